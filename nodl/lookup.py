@@ -97,18 +97,6 @@ class ManifestLookup:
         return self._packages[package]
 
 
-def find_node_interfaces(
-    package: str,
-    executable: str | None = None,
-    plugin: str | None = None,
-    *,
-    prefixes: Sequence[str],
-    manifests: Iterable[str | Path] = (),
-) -> Lookup:
-    """One question; for many, keep a ``ManifestLookup``. Raises as ``ManifestLookup.find``."""
-    return ManifestLookup(prefixes, manifests).find(package, executable=executable, plugin=plugin)
-
-
 class _Package(NamedTuple):
     nodes: tuple[ManifestNode, ...]
     searched: tuple[str, ...]

@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from contextlib import suppress
+from enum import Enum
 
 from enclave_launch.boundary.light import NamedTuple, TextEnum, late_pattern
 from nodl.names import InvalidNameError, expand_name, join, shown, validate_full_name
@@ -214,9 +216,13 @@ def parse_rule(text: str, origin: str = "") -> ParsedRule:
         raise InvalidRemapRuleError(text, str(error), origin) from None
 
 
-def parse_rules(rules: Iterable[tuple[str, str]]) -> tuple[ParsedRule, ...]:
-    """Pairs of rule text and origin. Raises ``InvalidRemapRuleError`` for the first bad one."""
-    return tuple(parse_rule(text, origin) for text, origin in rules)
+def valid_rules(texts: Iterable[str]) -> tuple[ParsedRule, ...]:
+    """Those of ``texts`` that rcl would take: another one cannot have acted."""
+    rules = []
+    for text in texts:
+        with suppress(InvalidRemapRuleError):
+            rules.append(parse_rule(text))
+    return tuple(rules)
 
 
 def _rule_of_kind(match: str, replacement: str, node: str | None, text: str, origin: str) -> ParsedRule:

@@ -12,8 +12,7 @@ from typing import IO
 
 from enclave_launch.boundary.files import read_bytes
 from nodl.ament_index import package_share_directory, search_prefixes
-from nodl.document import V1_SUFFIX
-from nodl.document.manifest_node import ManifestNode
+from nodl.document import V1_SUFFIX, ManifestNode
 from nodl.document.v1 import parse_v1
 from nodl.errors import DuplicateNodeError, ExecutableNotFoundError, InvalidNoDLError, NoNoDLFilesError
 from nodl.node_interface import Endpoint

@@ -53,7 +53,7 @@ FLOORS: dict[str, tuple[set[str], ...]] = {
     "nodl": (
         {"source_ref", "types", "names", "ament_index"},
         {"errors", "remap", "name_template"},
-        {"node_interface", "yaml_text", "xml_text"},
+        {"node_interface", "ros_arguments", "yaml_text", "xml_text"},
         {"builtin_interfaces", "policy_text"},
         {"dependence"},
         {"document"},

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 from enclave_launch.boundary.files import read_bytes
-from enclave_launch.boundary.light import TYPE_CHECKING
-from nodl.document.manifest_node import ManifestNode
+from enclave_launch.boundary.light import TYPE_CHECKING, NamedTuple
 from nodl.errors import InvalidNoDLError
+from nodl.node_interface import NodeInterface
 from nodl.source_ref import SourceRef
 
 if TYPE_CHECKING:
@@ -30,6 +31,22 @@ V1_SUFFIX = ".nodl.xml"
 V2_SUFFIXES = (".nodl.yaml", ".nodl.yml", ".nodl.json", ".yaml", ".yml", ".json")
 RESOURCE_TYPE = "nodl"  # of v2 documents in the ament index
 _MAX_BYTES = 4_000_000
+
+
+class ManifestNode(NamedTuple):
+    """One node as one document describes it, in ``version`` 1 or 2 of NoDL. ``parameter_types``: declared parameters
+    with the type as written.
+
+    ``explicit_executable``: the document itself says which executable or plugin runs the node (always in
+    v1; in v2 only through our extension), rather than the name under which it was registered.
+    ``included``: files that were merged in, to know what the description depends on.
+    """
+
+    interface: NodeInterface
+    version: int
+    parameter_types: Mapping[str, str] = MappingProxyType({})
+    explicit_executable: bool = True
+    included: tuple[str, ...] = ()
 
 
 def read_document(

@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from enclave_launch.boundary.xml_tree import XmlElement
-from nodl.document.manifest_node import ManifestNode
+from nodl.document import ManifestNode
 from nodl.errors import (
     InvalidElementError,
     InvalidNodeChildError,

@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from enclave_launch.boundary.light import NamedTuple
-from nodl.document.manifest_node import ManifestNode
+from nodl.document import ManifestNode
 from nodl.document.v2_include import Included, follow_includes
 from nodl.document.v2_learnt import LearntName, learnt_from, learnt_names, logger_services
 from nodl.document.v2_schema import check_document

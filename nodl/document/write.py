@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
 
-from nodl.document.manifest_node import ManifestNode
+from nodl.document import ManifestNode
 from nodl.document.v2_schema import NAME_PATTERN, PARAMETER_TYPES, TYPE_PATTERN
 from nodl.document.v2_section import CATEGORIES, IDENTITY_KEY
 from nodl.errors import InvalidNoDLDocumentError

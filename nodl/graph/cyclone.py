@@ -15,10 +15,8 @@ from xml.sax.saxutils import quoteattr
 
 from nodl.errors import NoDLError
 from nodl.graph.discovery_info import TYPE_NAME, decode
-from nodl.graph.model import Graph
+from nodl.graph.model import Graph, GraphState, SeenEndpoint, SeenParticipant, claimed_enclave
 from nodl.graph.quality import INFINITE, Quality
-from nodl.graph.seen import SeenEndpoint, SeenParticipant, claimed_enclave
-from nodl.graph.state import GraphState
 from nodl.graph.udp_ports import UdpPorts
 from nodl.graph.wire_names import DISCOVERY_TOPIC
 
@@ -110,12 +108,8 @@ class CycloneObserver:
 
     def close(self) -> None:
         """Deletes the entities while the interpreter still works: DDS threads may be calling it until then."""
-        for entity in (
-            *(reader for reader, _ in self._readers),
-            self._lists,
-            self._participant,
-            self._domain,
-        ):
+        readers = (reader for reader, _ in self._readers)
+        for entity in (*readers, self._lists, self._participant, self._domain):
             entity._delete(entity._ref)
 
     def _take_in(self, sample: Any, read: Any) -> None:
@@ -247,38 +241,26 @@ def quality_from(qos: Any, *, has_history: bool) -> Quality:
     for policy in qos:
         reader = _POLICIES.get(policy.__scope__)
         if reader is not None:
-            fields.update(reader(type(policy).__qualname__.rpartition(".")[2], policy))
+            fields.update(reader(_word(type(policy)), policy))
     if not has_history:
         fields.update(history="", depth=0)
     return Quality(**fields)
 
 
-_WORDS = {
-    "BestEffort": "BEST_EFFORT",
-    "Reliable": "RELIABLE",
-    "Volatile": "VOLATILE",
-    "TransientLocal": "TRANSIENT_LOCAL",
-    "Transient": "TRANSIENT",
-    "Persistent": "PERSISTENT",
-    "KeepLast": "KEEP_LAST",
-    "KeepAll": "KEEP_ALL",
-    "Automatic": "AUTOMATIC",
-    "ManualByParticipant": "MANUAL_BY_PARTICIPANT",
-    "ManualByTopic": "MANUAL_BY_TOPIC",
-    "Shared": "SHARED",
-    "Exclusive": "EXCLUSIVE",
-}
 _POLICIES: Mapping[str, Callable[[str, Any], dict[str, Any]]] = {
-    "Reliability": lambda word, _: {"reliability": _WORDS[word]},
-    "Durability": lambda word, _: {"durability": _WORDS[word]},
-    "History": lambda word, policy: {"history": _WORDS[word], "depth": getattr(policy, "depth", 0)},
+    "Reliability": lambda word, _: {"reliability": word},
+    "Durability": lambda word, _: {"durability": word},
+    "History": lambda word, policy: {"history": word, "depth": getattr(policy, "depth", 0)},
     "Deadline": lambda _, policy: {"deadline": _duration(policy.deadline)},
-    "Liveliness": lambda word, policy: {
-        "liveliness": _WORDS[word],
-        "lease": _duration(policy.lease_duration),
-    },
-    "Ownership": lambda word, _: {"ownership": _WORDS[word]},
+    "Liveliness": lambda word, policy: {"liveliness": word, "lease": _duration(policy.lease_duration)},
+    "Ownership": lambda word, _: {"ownership": word},
 }
+
+
+def _word(policy: type) -> str:
+    """The class ``Policy.Durability.TransientLocal`` as NoDL v2 writes it: ``TRANSIENT_LOCAL``."""
+    name = policy.__qualname__.rpartition(".")[2]
+    return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).upper()
 
 
 def _duration(nanoseconds: int) -> int:

@@ -8,9 +8,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from nodl.graph.model import Attribution, Graph, GraphNode, GraphProcess, SeenInterface
+from nodl.graph.model import (
+    Attribution,
+    Graph,
+    GraphNode,
+    GraphProcess,
+    SeenEndpoint,
+    SeenInterface,
+    SeenParticipant,
+)
 from nodl.graph.quality import Quality
-from nodl.graph.seen import SeenEndpoint, SeenParticipant
 from nodl.node_interface import EndpointKind
 
 VERSION = 1

@@ -1,4 +1,4 @@
-"""Announcements → processes, nodes and their interfaces. Pure.
+"""What DDS discovery announced (claims of whoever sent them) → processes, nodes and their interfaces. Pure.
 
 Which node owns an endpoint is told by ``ros_discovery_info`` only. Where its list is missing, a participant with one
 node owns its endpoints, and parameter services tell the names of nodes (programs that publish no list, or one that this
@@ -7,22 +7,69 @@ observer may not read). What no rule gives to a node stays the process's: nothin
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from enum import Enum
 from typing import NamedTuple
 
 from nodl.graph.discovery_info import ParticipantList
-from nodl.graph.seen import SeenEndpoint, SeenParticipant
+from nodl.graph.quality import Quality
 from nodl.graph.wire_names import DISCOVERY_TOPIC, PARTS, Part, part_of
 from nodl.node_interface import EndpointKind
 from nodl.remap import ACTION_TOPICS
 
-_ACTIONS = (EndpointKind.ACTION_SERVER, EndpointKind.ACTION_CLIENT)
 _AS_TOPICS = {
     EndpointKind.ACTION_SERVER: EndpointKind.PUBLISHER,
     EndpointKind.ACTION_CLIENT: EndpointKind.SUBSCRIPTION,
 }
+_ENCLAVE = re.compile(r"(?:\A|;)enclave=([^;]*);")
+_PREFIX_DIGITS = 24  # 12 bytes of a GUID are the participant's, the last 4 the entity's
+_HASH_DIGITS = 12
 _NAMED_BY = "/get_parameters"  # every node has it, unless its program switches parameter services off
+
+
+class SeenParticipant(NamedTuple):
+    """``guid``: 32 hexadecimal digits. ``enclave`` is what it says in clear; ``pid`` is of its own pid namespace, and
+    ``None`` where it does not say; ``own_history``: it announces how much it keeps (Cyclone DDS)."""
+
+    guid: str
+    enclave: str = ""
+    pid: int | None = None
+    host: str = ""
+    program: str = ""
+    own_history: bool = False
+
+    @property
+    def prefix(self) -> str:
+        return self.guid[:_PREFIX_DIGITS]
+
+    @property
+    def claims_security(self) -> bool:
+        """Its GUID begins as DDS-Security 9.3.3 makes it of a certificate: the highest bit is set. Unsecured ones
+        begin with the vendor's number. Peers that authenticate it have verified that."""
+        return int(self.guid[:2], 16) & 0x80 != 0
+
+    @property
+    def subject_hash(self) -> int:
+        """The first 48 bits of its GUID: of a secured one a hash of the certificate's subject."""
+        return int(self.guid[:_HASH_DIGITS], 16)
+
+
+class SeenEndpoint(NamedTuple):
+    """One writer or reader; ``participant`` is a GUID."""
+
+    guid: str
+    participant: str
+    writes: bool
+    topic: str
+    type: str
+    quality: Quality = Quality()
+
+
+def claimed_enclave(user_data: bytes) -> str:
+    """The enclave that rmw writes into the participant's user data (``enclave=/x;``); empty for none."""
+    match = _ENCLAVE.search(user_data.decode("utf-8", "replace"))
+    return match[1] if match else ""
 
 
 class Attribution(str, Enum):
@@ -219,7 +266,7 @@ def _joined(
     kind: EndpointKind, name: str, members: Sequence[tuple[SeenEndpoint, Part]], by: Mapping[str, Attribution]
 ) -> Iterator[SeenInterface]:
     """The parts of one name; the topics of an action without any of its services are topics (``ros2 topic echo``)."""
-    if kind in _ACTIONS and all(part.part in ACTION_TOPICS for _, part in members):
+    if kind in _AS_TOPICS and all(part.part in ACTION_TOPICS for _, part in members):
         for endpoint, part in members:
             topic = part_of(
                 "rt/_" + endpoint.topic[3:].replace("/_action/", "/_"), endpoint.type, writes=True
@@ -238,3 +285,73 @@ def _by_type(members: Sequence[tuple[SeenEndpoint, Part]]) -> dict[str, list[tup
     """Parts that do not tell a type belong to each that the others tell."""
     types = sorted({part.type for _, part in members if part.type}) or [""]
     return {each: [(e, part) for e, part in members if part.type in ("", each)] for each in types}
+
+
+class GraphState:
+    """Announcements, as they come and go → what is there now, or was since the observer began. ``changes`` counts those
+    that said something new.
+
+    Each participant writes its whole list at every change, so the newest one counts; but an endpoint that has ended is
+    no longer in it, so whose it was is remembered. A list is believed only of the participant that it is about: in an
+    unsecured domain anybody may write lists for others.
+    """
+
+    def __init__(self, own_participant: str = "") -> None:
+        self._own = own_participant
+        self._participants: dict[str, SeenParticipant] = {}
+        self._endpoints: dict[str, SeenEndpoint] = {}
+        self._gone: set[str] = set()
+        self._lists: dict[str, ParticipantList] = {}
+        self._owners: dict[str, Owner] = {}
+        self.changes = 0
+        self.forged: list[str] = []
+
+    def participant(self, seen: SeenParticipant) -> None:
+        if seen.guid != self._own and (self._participants.get(seen.guid) != seen or seen.guid in self._gone):
+            self._participants[seen.guid] = seen
+            self._back(seen.guid)
+
+    def endpoint(self, seen: SeenEndpoint) -> None:
+        if seen.participant != self._own and (
+            self._endpoints.get(seen.guid) != seen or seen.guid in self._gone
+        ):
+            self._endpoints[seen.guid] = seen
+            self._back(seen.guid)
+
+    def gone(self, guid: str) -> None:
+        """A participant or an endpoint has ended. The endpoints of a participant end with it."""
+        known = guid in self._participants or guid in self._endpoints
+        if known and guid not in self._gone:
+            self._gone.add(guid)
+            self.changes += 1
+
+    def listed(self, message: ParticipantList, writer: str) -> None:
+        """``writer``: GUID of the participant that published ``message``; empty when that is not known."""
+        if writer and writer != message.participant:
+            text = f"participant {writer} publishes a list of the nodes of {message.participant}; it is not believed"
+            if text not in self.forged:
+                self.forged.append(text)
+            return
+        if message.participant != self._own and self._lists.get(message.participant) != message:
+            self._lists[message.participant] = message
+            own = message.participant[:24]
+            self._owners.update({g: owner for g, owner in owners_in(message).items() if g[:24] == own})
+            self.changes += 1
+
+    def graph(self, *, past: bool = False) -> Graph:
+        """What is there now; with ``past`` also all that has ended meanwhile."""
+        return Graph(
+            tuple(self._process(guid, past) for guid in sorted(self._participants) if self._there(guid, past))
+        )
+
+    def _process(self, guid: str, past: bool) -> GraphProcess:
+        endpoints = [each for each in self._endpoints.values() if each.participant == guid]
+        there = [each for each in endpoints if self._there(each.guid, past)]
+        return process_of(self._participants[guid], there, self._lists.get(guid), self._owners)
+
+    def _there(self, guid: str, past: bool) -> bool:
+        return past or guid not in self._gone
+
+    def _back(self, guid: str) -> None:
+        self._gone.discard(guid)
+        self.changes += 1

@@ -12,9 +12,16 @@ import os
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 
-from nodl.graph.model import Attribution, Graph, GraphNode, GraphProcess, SeenInterface
+from nodl.graph.model import (
+    Attribution,
+    Graph,
+    GraphNode,
+    GraphProcess,
+    SeenEndpoint,
+    SeenInterface,
+    SeenParticipant,
+)
 from nodl.graph.quality import INFINITE, Quality
-from nodl.graph.seen import SeenEndpoint, SeenParticipant
 from nodl.names import join
 from nodl.node_interface import EndpointKind
 
@@ -88,9 +95,9 @@ class RclpyObserver:
     def _interfaces(self, name: str, namespace: str, fqn: str) -> Iterator[SeenInterface]:
         for kind, ask in self._questions().items():
             for final, types in _asked(ask, name, namespace):
-                if "/_action/" in final and kind not in _ACTIONS:
+                if "/_action/" in final and kind.family != "action":
                     continue
-                endpoints = tuple(self._endpoints(kind, final, fqn)) if kind in _TOPICS else ()
+                endpoints = tuple(self._endpoints(kind, final, fqn)) if kind.family == "topic" else ()
                 for type_name in types:
                     yield SeenInterface(kind, final, type_name, endpoints, (), Attribution.LIST)
 
@@ -122,10 +129,6 @@ class RclpyObserver:
                 participant = f"{guid[:24]}000001c1"
                 quality = _quality(info.qos_profile)
                 yield SeenEndpoint(guid, participant, writes, f"rt{final}", info.topic_type, quality)
-
-
-_TOPICS = (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION)
-_ACTIONS = (EndpointKind.ACTION_SERVER, EndpointKind.ACTION_CLIENT)
 
 
 def _asked(ask: Any, name: str, namespace: str) -> Iterable[tuple[str, list[str]]]:

@@ -11,7 +11,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from nodl.builtin_interfaces import DISTROS, BuiltinCondition, built_in_interfaces
-from nodl.graph.inverse import written_names
 from nodl.graph.model import GraphNode, SeenInterface
 from nodl.graph.observation import Observed
 from nodl.graph.starts import StartedNode, start_for, start_of_command
@@ -21,7 +20,7 @@ from nodl.record.asked import Asked, AskedNode
 from nodl.record.learning import OBSERVED, Learnt, learn_from
 from nodl.record.lines import RecordedRun
 from nodl.record.origins import arguments_as_inputs
-from nodl.record.written import final_names
+from nodl.record.written import final_names, written_names
 
 _WITHOUT_PROGRAM = (
     "nothing tells which program it is: give the launch file, or observe on the machine that runs it"
@@ -109,13 +108,11 @@ def _asked(placed: _Placed, others: Sequence[_Placed], left_out: list[str]) -> A
     every = _BuiltIn(placed.node)
     endpoints = []
     for interface in placed.node.interfaces:
+        shown = f"{placed.node.fqn}: {interface.kind.value} {interface.name}"
         if not interface.complete:
-            missing = ", ".join(interface.missing)
-            left_out.append(
-                f"{placed.node.fqn}: {interface.kind.value} {interface.name} is half open, without {missing}"
-            )
+            left_out.append(f"{shown} is half open, without {', '.join(interface.missing)}")
         elif len(interface.type.split("/")) != _ROS_TYPE_PARTS:
-            left_out.append(f"{placed.node.fqn}: {interface.kind.value} {interface.name} has no ROS type")
+            left_out.append(f"{shown} has no ROS type")
         elif not every.has(interface):
             endpoints.append(_endpoint(interface, placed, others))
     return AskedNode(
@@ -126,22 +123,18 @@ def _asked(placed: _Placed, others: Sequence[_Placed], left_out: list[str]) -> A
         namespace="" if moved or namespace == "/" else namespace,
         fqn=placed.node.fqn,
         library=ClientLibrary.UNKNOWN,
-        lifecycle=every.lifecycle,
+        lifecycle=BuiltinCondition.LIFECYCLE in every.there,
         states=(),
         endpoints=tuple(endpoints),
         parameters=start.parameters,
         arguments=start.arguments,
         rules=rules,
         known_start=True,
-        logger_services=every.logger_services,
-        container=every.container,
+        logger_services=BuiltinCondition.LOGGER_SERVICES in every.there,
+        container=BuiltinCondition.CONTAINER in every.there,
         process=placed.run.id,
         started_as=OBSERVED,
     )
-
-
-def _shown(placed: _Placed, interface: SeenInterface) -> str:
-    return f"{placed.node.fqn}: {interface.kind.value} {interface.name}"
 
 
 def _endpoint(interface: SeenInterface, placed: _Placed, others: Sequence[_Placed]) -> Asked:
@@ -181,34 +174,15 @@ def _values(start: StartedNode) -> set[object]:
 class _BuiltIn:
     """What every node has, and every one of its sort, under the final names of this one."""
 
-    _SORTS = (
-        BuiltinCondition.ALWAYS,
-        BuiltinCondition.PARAMETERS,
-        BuiltinCondition.TYPE_DESCRIPTION,
-        BuiltinCondition.LIFECYCLE,
-        BuiltinCondition.CONTAINER,
-        BuiltinCondition.LOGGER_SERVICES,
-    )
+    _SORTS = frozenset(BuiltinCondition) - {BuiltinCondition.SIM_TIME, BuiltinCondition.TF_LISTENER}
 
     def __init__(self, node: GraphNode) -> None:
-        rows = built_in_interfaces(DISTROS[-1], ClientLibrary.UNKNOWN, frozenset(self._SORTS))
+        rows = built_in_interfaces(DISTROS[-1], ClientLibrary.UNKNOWN, self._SORTS)
         self._rows = {(row.kind, row.name.replace("~", node.fqn, 1), row.type): row.condition for row in rows}
-        self._there = {self._rows[key] for each in node.interfaces if (key := _key(each)) in self._rows}
+        self.there = {self._rows[key] for each in node.interfaces if (key := _key(each)) in self._rows}
 
     def has(self, interface: SeenInterface) -> bool:
         return _key(interface) in self._rows
-
-    @property
-    def lifecycle(self) -> bool:
-        return BuiltinCondition.LIFECYCLE in self._there
-
-    @property
-    def logger_services(self) -> bool:
-        return BuiltinCondition.LOGGER_SERVICES in self._there
-
-    @property
-    def container(self) -> bool:
-        return BuiltinCondition.CONTAINER in self._there
 
 
 def _key(interface: SeenInterface) -> tuple[EndpointKind, str, str]:

@@ -10,7 +10,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from nodl.remap import InvalidRemapRuleError, ParsedRule, RemapRules, parse_rule
+from nodl.remap import RemapRules, valid_rules
+from nodl.ros_arguments import PARAMETER, REMAP, flags
 
 _IN_PREFIX = re.compile(r"(?:.*/)?lib/([^/]+)/([^/]+)\Z")  # an executable of an ament package
 _UNSPECIFIED = "<node_name_unspecified>"
@@ -38,26 +39,19 @@ class StartedNode(NamedTuple):
     @property
     def rules(self) -> RemapRules:
         """Those that rcl would take."""
-        parsed = tuple(_parsed(self.rule_texts))
-        return RemapRules(local=parsed) if self.plugin else RemapRules(process=parsed)
+        rules = valid_rules(self.rule_texts)
+        return RemapRules(local=rules) if self.plugin else RemapRules(process=rules)
 
 
 def start_of_command(command: Sequence[str]) -> StartedNode | None:
     """Of a running process, by its command line; ``None`` for what is not a program of an ament package."""
-    place = next((i for i, word in enumerate(command[:3]) if _IN_PREFIX.match(word)), None)
-    if place is None:
-        return None
-    match = _IN_PREFIX.match(command[place])
-    assert match is not None
-    rules, parameters, arguments = _ros_words(command[place + 1 :])
-    return StartedNode(
-        match[1],
-        match[2],
-        command=tuple(command),
-        rule_texts=rules,
-        parameters=parameters,
-        arguments=arguments,
-    )
+    programs = ((place, _IN_PREFIX.match(word)) for place, word in enumerate(command[:3], 1))
+    for rest, match in programs:
+        if match:
+            rules, parameters, arguments = _ros_words(command[rest:])
+            of_command = StartedNode(match[1], match[2], command=tuple(command))
+            return of_command._replace(rule_texts=rules, parameters=parameters, arguments=arguments)
+    return None
 
 
 def starts_of_plan(document: Mapping[str, Any]) -> tuple[StartedNode, ...]:
@@ -71,11 +65,8 @@ def start_for(fqn: str, command: Sequence[str], starts: Iterable[StartedNode]) -
     known = [each for each in starts if not each.command or not command or _within(each.command, command)]
     named = [each for each in known if each.fqn == fqn]
     if named:
-        return (
-            tuple(named[:1])
-            if len({(each.program, each.rule_texts) for each in named}) == 1
-            else tuple(named)
-        )
+        alike = len({(each.program, each.rule_texts) for each in named}) == 1
+        return tuple(named[:1] if alike else named)
     by_command = [each for each in known if command and each.command]
     if by_command:  # a further node of a program, or one that the launch file does not name
         return tuple(by_command[:1])
@@ -125,38 +116,8 @@ def _of_component(fields: Mapping[str, Any]) -> StartedNode:
 
 def _ros_words(words: Sequence[str]) -> tuple[tuple[str, ...], dict[str, object], tuple[str, ...]]:
     """Rules, parameters and the words that are not ROS's, of what follows the program (rcl ``arguments.c``)."""
-    rules: list[str] = []
-    parameters: dict[str, object] = {}
-    others: list[str] = []
-    ours, waiting = False, ""
-    for word in words:
-        if waiting:
-            if waiting in ("-r", "--remap"):
-                rules.append(word)
-            elif waiting in ("-p", "--param"):
-                name, _, value = word.partition(":=")
-                parameters[name] = value
-            waiting = ""
-        elif word == "--ros-args":
-            ours = True
-        elif ours and word == "--":
-            ours = False
-        elif ours:
-            waiting = word if word in _WITH_VALUE else ""
-        else:
-            others.append(word)
-    return tuple(rules), parameters, tuple(others)
-
-
-_WITH_VALUE = frozenset(
-    {"-r", "--remap", "-p", "--param", "--params-file", "--log-level", "--log-config-file", "--log-file-name"}
-    | {"-e", "--enclave"}
-)
-
-
-def _parsed(texts: Iterable[str]) -> Iterable[ParsedRule]:
-    for text in texts:
-        try:
-            yield parse_rule(text)
-        except InvalidRemapRuleError:
-            continue
+    found = [(flag, word) for flag, word in flags(words) if word or not flag]
+    rules = tuple(word for flag, word in found if flag in REMAP)
+    given = (word.partition(":=") for flag, word in found if flag in PARAMETER)
+    others = tuple(word for flag, word in found if not flag)
+    return rules, {name: value for name, _, value in given}, others

@@ -76,10 +76,8 @@ def ros_type(type_name: str) -> str:
     if not match:
         return type_name
     package, kind, name = match.groups()
-    for ending in _TYPE_ENDINGS.get(kind, ()):
-        if name.endswith(ending):
-            return f"{package}/{kind}/{name[: -len(ending)]}"
-    return f"{package}/{kind}/{name}"
+    ending = next(filter(name.endswith, _TYPE_ENDINGS.get(kind, ())), "")
+    return f"{package}/{kind}/{name.removesuffix(ending)}"
 
 
 def _topic(name: str, type_name: str, writes: bool) -> Part:

@@ -6,7 +6,6 @@ Parameters stay symbolic, with what the code declares as their default; launch f
 from __future__ import annotations
 
 from nodl.infer.findings import Findings, FoundEndpoint, NodeRecord, OptionDefaults
-from nodl.infer.models.ros_arguments import ros_arguments
 from nodl.infer.start import LaunchKey
 from nodl.infer.text import Hole, Input, NodePart, Piece, Text
 from nodl.infer.values import Sequence, Unknown, Value
@@ -14,6 +13,7 @@ from nodl.name_template import NameTemplate, ParameterPart, Part, UnknownPart, m
 from nodl.names import InvalidNameError, expand_name
 from nodl.node_interface import Certainty, ClientLibrary, Endpoint, Gap, NodeInterface
 from nodl.remap import InvalidRemapRuleError, RemapKind, RemapRules, parse_rule
+from nodl.ros_arguments import ros_arguments
 
 MAX_ALTERNATIVES = 16
 

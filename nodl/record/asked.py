@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from enum import Enum
+from itertools import takewhile
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -16,12 +17,11 @@ from nodl.node_interface import ClientLibrary, EndpointKind
 from nodl.record.assembly import RecordedNode, RecordedProcess
 from nodl.record.lines import EndpointMade, LoadedComponent, StartedProcess
 from nodl.record.written import meant_name
-from nodl.remap import InvalidRemapRuleError, ParsedRule, RemapRules, parse_rule
+from nodl.remap import RemapRules, valid_rules
 
 REFUSED = 1
 """``RCL_RET_ERROR``: what an endpoint gives that DDS refuses. Other results say that an argument is bad."""
 
-_ACTIONS = (EndpointKind.ACTION_SERVER, EndpointKind.ACTION_CLIENT)
 LOGGER_SERVICES = frozenset({"get_logger_levels", "set_logger_levels"})
 _INTROSPECTION = "/_service_event"
 _FIRST_PART = "/_action/send_goal"
@@ -65,10 +65,6 @@ class Asked(NamedTuple):
     @property
     def granted(self) -> bool:
         return self.rc == 0
-
-    @property
-    def refused(self) -> bool:
-        return self.rc == REFUSED
 
 
 class AskedNode(NamedTuple):
@@ -114,8 +110,7 @@ def role_of(endpoint: EndpointMade) -> EndpointRole:
     if by == "librcl_lifecycle.so":
         return EndpointRole.LIFECYCLE
     if by == "librcl_action.so":
-        own = kind in _ACTIONS
-        return EndpointRole.REPEATED if own else EndpointRole.PART_OF_ACTION
+        return EndpointRole.REPEATED if kind.family == "action" else EndpointRole.PART_OF_ACTION
     if kind is EndpointKind.SERVICE_SERVER:
         return _role_of_server(endpoint)
     if endpoint.written == "/parameter_events" and endpoint.type in ("", "rcl_interfaces/msg/ParameterEvent"):
@@ -176,18 +171,12 @@ def asked_endpoint(process: RecordedProcess, node: RecordedNode, endpoint: Endpo
     if role_of(endpoint) in (EndpointRole.PART_OF_ACTION, EndpointRole.REPEATED):
         return None
     final = endpoint.final
-    if endpoint.kind in _ACTIONS:
-        before = node.endpoints[: _place(node, endpoint)]
-        final = _action_name(
-            [each for each in before if role_of(each) is EndpointRole.PART_OF_ACTION], endpoint
-        )
+    if endpoint.kind.family == "action":
+        before = list(takewhile(lambda each: each is not endpoint, node.endpoints))
+        parts = [each for each in before if role_of(each) is EndpointRole.PART_OF_ACTION]
+        final = _action_name(parts, endpoint)
     rules = _rules(process.started, node.component) if process.started else None
     return _own(endpoint, final, node.fqn or endpoint.fqn, rules, set())
-
-
-def _place(node: RecordedNode, endpoint: EndpointMade) -> int:
-    places = (i for i, each in enumerate(node.endpoints) if each is endpoint)
-    return next(places, len(node.endpoints))
 
 
 def all_asked(processes: Iterable[RecordedProcess]) -> list[AskedNode]:
@@ -208,18 +197,8 @@ def _program(
 def _rules(started: StartedProcess | None, component: LoadedComponent | None) -> RemapRules:
     """The launch's rules that act on the node; one that rcl would refuse cannot have acted."""
     if component is not None:
-        return RemapRules(local=_parsed(component.rules))
-    return RemapRules(process=_parsed(started.rules if started else ()))
-
-
-def _parsed(texts: Iterable[str]) -> tuple[ParsedRule, ...]:
-    rules = []
-    for text in texts:
-        try:
-            rules.append(parse_rule(text))
-        except InvalidRemapRuleError:
-            continue
-    return tuple(rules)
+        return RemapRules(local=valid_rules(component.rules))
+    return RemapRules(process=valid_rules(started.rules if started else ()))
 
 
 def _asked(node: RecordedNode, roles: list[EndpointRole], rules: RemapRules | None) -> Iterable[Asked]:
@@ -233,7 +212,7 @@ def _asked(node: RecordedNode, roles: list[EndpointRole], rules: RemapRules | No
         if role is EndpointRole.PART_OF_ACTION:
             parts.append(endpoint)
         elif role is EndpointRole.OWN:
-            is_action = endpoint.kind in _ACTIONS
+            is_action = endpoint.kind.family == "action"
             final = _action_name(parts, endpoint) if is_action else endpoint.final
             yield _own(endpoint, final, node.fqn, rules, introspected)
             parts = [] if is_action else parts
@@ -276,9 +255,8 @@ def _library(node: RecordedNode) -> ClientLibrary:
     callers += [endpoint.by for endpoint in node.endpoints]
     if any(_is_rclpy(by) for by in callers):
         return ClientLibrary.RCLPY
-    if any(by.startswith("librclcpp") for by in callers):
-        return ClientLibrary.RCLCPP
-    return ClientLibrary.UNKNOWN
+    of_rclcpp = any(by.startswith("librclcpp") for by in callers)
+    return ClientLibrary.RCLCPP if of_rclcpp else ClientLibrary.UNKNOWN
 
 
 def _is_rclpy(library: str) -> bool:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Sequence
 from enum import Enum
+from functools import partial
 from typing import NamedTuple
 
 from nodl.name_template import NameTemplate
@@ -17,9 +18,6 @@ from nodl.node_interface import RANDOM_ENDING, Endpoint, EndpointKind, NodeInter
 from nodl.record.asked import LOGGER_SERVICES, Asked, AskedNode
 from nodl.record.origins import arguments_as_inputs
 from nodl.remap import NodeNames
-
-_TOPICS = (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION)
-_ACTIONS = (EndpointKind.ACTION_SERVER, EndpointKind.ACTION_CLIENT)
 
 
 class Verdict(Enum):
@@ -121,21 +119,14 @@ def _granted(node: AskedNode) -> list[Asked]:
 
 
 def _about_the_node(node: AskedNode, interface: NodeInterface) -> Iterable[Difference]:
+    wrong = partial(Difference, Verdict.WRONG, node.fqn, None)
     if interface.name and node.name and not _is_named(node, interface.name):
-        yield Difference(
-            Verdict.WRONG, node.fqn, None, f"node name {interface.name}", f"recorded: {node.name}"
-        )
+        yield wrong(f"node name {interface.name}", f"recorded: {node.name}")
     if (interface.namespace or "/").strip("/") != node.namespace.strip("/"):
-        yield Difference(
-            Verdict.WRONG,
-            node.fqn,
-            None,
-            f"namespace {interface.namespace or '/'}",
-            f"recorded: {node.namespace or '/'}",
-        )
+        yield wrong(f"namespace {interface.namespace or '/'}", f"recorded: {node.namespace or '/'}")
     if interface.lifecycle != node.lifecycle:
         said = "a lifecycle node" if interface.lifecycle else "not a lifecycle node"
-        yield Difference(Verdict.WRONG, node.fqn, None, said, "the record says otherwise")
+        yield wrong(said, "the record says otherwise")
 
 
 def _difference(verdict: Verdict, node: AskedNode, asked: Asked) -> Difference:
@@ -183,12 +174,12 @@ def _finals(node: AskedNode, kind: EndpointKind, template: NameTemplate) -> set[
     names = NodeNames(name, namespace, node.rules)
     text = template.text.replace("*", _STAND_IN)
     try:
-        if kind in _ACTIONS:
+        if kind.family == "action":
             recorded = {each.final for each in node.endpoints if each.kind is kind}
             both = {names.action(text, as_a_whole=whole).name for whole in (True, False)}
             found = both & recorded or {names.action(text, as_a_whole=False).name}
         else:
-            found = {(names.topic(text) if kind in _TOPICS else names.service(text)).name}
+            found = {(names.topic(text) if kind.family == "topic" else names.service(text)).name}
     except InvalidNameError:
         return set()
     return {final.replace(_STAND_IN, "*") for final in found}

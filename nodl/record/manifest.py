@@ -13,11 +13,10 @@ from typing import Any
 
 from nodl.document.v2_schema import NAME_PATTERN
 from nodl.document.v2_section import CATEGORIES, IDENTITY_KEY
-from nodl.node_interface import ClientLibrary, EndpointKind
+from nodl.node_interface import ClientLibrary
 from nodl.record.learning import LearntEndpoint, LearntNode
 
 _HEAD = "# Learnt by secure-launch --learn from what the node asked of librcl; see docs/recording.md.\n"
-_TOPICS = (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION)
 _HISTORY = {0: "SYSTEM_DEFAULT", 1: "KEEP_LAST", 2: "KEEP_ALL"}
 _RELIABILITY = {0: "SYSTEM_DEFAULT", 1: "RELIABLE", 2: "BEST_EFFORT", 4: "BEST_AVAILABLE"}
 _DURABILITY = {0: "SYSTEM_DEFAULT", 1: "TRANSIENT_LOCAL", 2: "VOLATILE", 4: "BEST_AVAILABLE"}
@@ -93,7 +92,7 @@ def _run(fields: Mapping[str, Any]) -> dict[str, Any]:
 
 def _entry(entry: LearntEndpoint) -> dict[str, Any]:
     fields: dict[str, Any] = {"name": _plain_name(entry), "type": entry.type}
-    if entry.kind in _TOPICS:
+    if entry.kind.family == "topic":
         fields["qos"] = _quality(entry.qos)
     return fields
 

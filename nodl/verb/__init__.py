@@ -6,6 +6,7 @@ Exit status: 0 fine, 1 a document is wrong or nothing was found, 2 wrong usage.
 from __future__ import annotations
 
 import argparse
+import os
 from collections.abc import Sequence
 from importlib import import_module
 
@@ -51,3 +52,15 @@ def build_parser() -> argparse.ArgumentParser:
         import_module(f"nodl.verb.{name}").add_parser(verbs)
     add_verbosity(parser)
     return parser
+
+
+def add_prefix_argument(parser: argparse.ArgumentParser) -> None:
+    """Where packages are looked for."""
+    parser.add_argument(
+        "--prefix",
+        metavar="DIR",
+        action="append",
+        default=[],
+        type=os.path.abspath,
+        help="ament install prefix, searched before AMENT_PREFIX_PATH (repeatable)",
+    )

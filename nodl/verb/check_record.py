@@ -15,7 +15,7 @@ from nodl.dependence import Situation
 from nodl.library import Library, LibraryDocuments
 from nodl.lookup import ManifestLookup
 from nodl.names import split_fqn
-from nodl.verb.options import add_prefix_argument
+from nodl.verb import add_prefix_argument
 
 if TYPE_CHECKING:
     from nodl.infer.cpp.reach import SourcesInReach

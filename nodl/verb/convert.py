@@ -12,7 +12,7 @@ from nodl.ament_index import search_prefixes
 from nodl.document import ManifestNode, read_document
 from nodl.document.write import Written, v1_xml, v2_yaml
 from nodl.errors import NoDLError
-from nodl.verb.options import add_prefix_argument
+from nodl.verb import add_prefix_argument
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> argparse.ArgumentParser:

@@ -15,7 +15,7 @@ from nodl.ament_index import PackageNotFoundError, package_prefix, search_prefix
 from nodl.lookup import ManifestLookup
 from nodl.node_interface import Gap
 from nodl.source_ref import SourceRef
-from nodl.verb.options import add_prefix_argument
+from nodl.verb import add_prefix_argument
 
 if TYPE_CHECKING:
     from nodl.infer.report.expanded import ExpandedSystem

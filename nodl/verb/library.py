@@ -11,7 +11,7 @@ from nodl.ament_index import package_version, search_prefixes
 from nodl.library import SHIPPED, Hit, Library
 from nodl.library.document import LibraryDocument
 from nodl.library.index import write_index
-from nodl.verb.options import add_prefix_argument
+from nodl.verb import add_prefix_argument
 from nodl.verb.show import description_lines
 
 

@@ -12,7 +12,7 @@ from nodl.ament_index import search_prefixes
 from nodl.document import read_document
 from nodl.lookup import ManifestLookup
 from nodl.node_interface import EndpointKind, NodeInterface
-from nodl.verb.options import add_prefix_argument
+from nodl.verb import add_prefix_argument
 
 _LABELS = {
     EndpointKind.PUBLISHER: "publishes",

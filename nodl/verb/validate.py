@@ -10,7 +10,7 @@ from enclave_launch.boundary.terminal import printable
 from nodl.ament_index import search_prefixes
 from nodl.document import V1_SUFFIX, read_document
 from nodl.errors import NoDLError
-from nodl.verb.options import add_prefix_argument
+from nodl.verb import add_prefix_argument
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> argparse.ArgumentParser:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from nodl.graph.discovery_info import ListedNode, ParticipantList
-from nodl.graph.model import Graph
+from nodl.graph.model import Graph, GraphState, SeenEndpoint, SeenParticipant
 from nodl.graph.quality import Quality
-from nodl.graph.seen import SeenEndpoint, SeenParticipant
-from nodl.graph.state import GraphState
 
 RELIABLE = Quality()
 

@@ -6,10 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nodl.graph.inverse import written_names
 from nodl.names import InvalidNameError
 from nodl.node_interface import EndpointKind as Kind
-from nodl.record.written import final_names
+from nodl.record.written import final_names, written_names
 from nodl.remap import RemapRules, parse_rule
 
 TOKENS = st.sampled_from(["a", "b", "n", "ns"])  # few, so that rules and names meet

@@ -177,8 +177,7 @@ def test_without_a_list_parameter_services_tell_the_node_and_what_is_not_ros_is_
 def test_a_list_about_somebody_else_is_not_believed() -> None:
     """In an unsecured domain anybody may write one."""
     from nodl.graph.discovery_info import ListedNode, ParticipantList
-    from nodl.graph.seen import SeenEndpoint, SeenParticipant
-    from nodl.graph.state import GraphState
+    from nodl.graph.model import GraphState, SeenEndpoint, SeenParticipant
 
     honest, liar = "0110" + "a" * 20 + "000001c1", "0110" + "b" * 20 + "000001c1"
     state = GraphState()

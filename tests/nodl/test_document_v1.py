@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nodl import errors
-from nodl.document.manifest_node import ManifestNode
+from nodl.document import ManifestNode
 from nodl.document.v1 import parse_v1
 from nodl.node_interface import NodeInterface
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from nodl import errors
-from nodl.lookup import Lookup, ManifestLookup, find_node_interfaces
+from nodl.lookup import Lookup, ManifestLookup
 
 
 class Prefix:
@@ -61,9 +61,8 @@ def prefix(tmp_path: Path) -> Prefix:
 def find(
     prefix: Prefix, package: str, executable: str = "", plugin: str = "", manifests: Sequence[Path] = ()
 ) -> Lookup:
-    return find_node_interfaces(
-        package, executable or None, plugin or None, prefixes=[str(prefix.root)], manifests=manifests
-    )
+    lookup = ManifestLookup([str(prefix.root)], manifests)
+    return lookup.find(package, executable=executable or None, plugin=plugin or None)
 
 
 def topics(found: Lookup) -> list[str]:
@@ -122,7 +121,8 @@ def test_nothing_found_says_where_it_looked(prefix: Prefix) -> None:
         f"{prefix.root}/share/ament_index/resource_index/nodl/demo__*",
     )
     assert f"package 'none' in {prefix.root}" in find(prefix, "none", "x").searched
-    assert find_node_interfaces("none", "x", prefixes=[]).searched == ("package 'none' in no prefix at all",)
+    nowhere = ManifestLookup([]).find("none", executable="x")
+    assert nowhere.searched == ("package 'none' in no prefix at all",)
     assert not find(prefix, "../etc", "x")
 
 
@@ -230,4 +230,4 @@ def test_the_overlay_wins(prefix: Prefix, tmp_path: Path) -> None:
     overlay.v2("demo", "other", "over")
     prefixes = [str(overlay.root), str(prefix.root)]
     for executable in ("talker", "other"):
-        assert topics(find_node_interfaces("demo", executable, prefixes=prefixes)) == ["over"]
+        assert topics(ManifestLookup(prefixes).find("demo", executable=executable)) == ["over"]

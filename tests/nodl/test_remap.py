@@ -13,7 +13,6 @@ from nodl.remap import (
     RemapKind,
     RemapRules,
     parse_rule,
-    parse_rules,
 )
 
 SERVICES = ("send_goal", "cancel_goal", "get_result")  # rcl_action names.c
@@ -22,8 +21,8 @@ TOPICS = ("feedback", "status")
 
 def rules(*texts: str, local: tuple[str, ...] = ()) -> RemapRules:
     return RemapRules(
-        local=parse_rules((text, "local") for text in local),
-        process=parse_rules((text, "process") for text in texts),
+        local=tuple(parse_rule(text, "local") for text in local),
+        process=tuple(parse_rule(text, "process") for text in texts),
     )
 
 

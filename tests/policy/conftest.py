@@ -12,7 +12,7 @@ from enclave_launch.policy.running_node import Role
 from enclave_launch.source_location import SourceLocation
 from nodl.name_template import NameTemplate
 from nodl.node_interface import ClientLibrary, Endpoint, EndpointKind, NodeInterface
-from nodl.remap import RemapRules, parse_rules
+from nodl.remap import RemapRules, parse_rule
 from nodl.source_ref import SourceRef
 
 KINDS = {
@@ -46,8 +46,8 @@ def make_node(
         for line, endpoint in enumerate(endpoints, start=1)
     )
     rules = RemapRules(
-        local=parse_rules((text, "load.launch.xml:9") for text in local),
-        process=parse_rules((text, "demo.launch.xml:7") for text in remap),
+        local=tuple(parse_rule(text, "load.launch.xml:9") for text in local),
+        process=tuple(parse_rule(text, "demo.launch.xml:7") for text in remap),
     )
     source = SourceRef("demo.nodl.xml")
     node = NodeInterface("demo", original, None, original, None, found, source, library=library, **interface)

@@ -18,7 +18,7 @@ from enclave_launch.process import (
 )
 from enclave_launch.source_location import SourceLocation
 from keystore.formats.policy_xml import policy_xml
-from nodl.lookup import find_node_interfaces
+from nodl.lookup import ManifestLookup
 
 MANIFEST = """\
 <interface version="1">
@@ -80,7 +80,7 @@ def derive(
 ) -> DerivedPolicy:
     nodes = []
     for each in processes:
-        (interface,) = find_node_interfaces("demo_nodes_cpp", each.executable, prefixes=[prefix]).found
+        (interface,) = ManifestLookup([prefix]).find("demo_nodes_cpp", executable=each.executable).found
         assignment = assign_enclave(each, scope, interface.name)
         assert assignment
         nodes.append(node_of_process(each, interface, assignment.path, "node"))

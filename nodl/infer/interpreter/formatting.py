@@ -32,11 +32,15 @@ from nodl.infer.values import (
 )
 
 
+def _hole(why: str) -> Text:
+    return make_text((Hole(why),))
+
+
 def as_texts(value: Value) -> list[TextAtom]:
     """The texts that formatting ``value`` may give."""
     texts = list(dict.fromkeys(_text_of_atom(atom) for atom in value))
     if not texts:
-        return [make_text((Hole("a value that is never set"),))]
+        return [_hole("a value that is never set")]
     return texts if len(texts) <= 32 else [common_text(texts, "too many possible values")]
 
 
@@ -46,16 +50,16 @@ def _text_of_atom(atom: object) -> TextAtom:
     if isinstance(atom, int | float | type(None)):
         return str(atom)
     if isinstance(atom, Unknown):
-        return make_text((Hole(atom.why),))
+        return _hole(atom.why)
     if isinstance(atom, External):
-        return make_text((Hole(f"a result of {atom.path.removesuffix(RESULT)}"),))
+        return _hole(f"a result of {atom.path.removesuffix(RESULT)}")
     if isinstance(atom, NativeObject) and isinstance(atom.object, PurePath):
         return str(atom.object)
     if isinstance(atom, Instance) and "_value_" in atom.cells:
         value = sole(atom.cells["_value_"])
         if isinstance(value, str):
             return value
-    return make_text((Hole("the text of an object"),))
+    return _hole("the text of an object")
 
 
 def text_value(texts: Iterable[TextAtom]) -> Value:
@@ -83,7 +87,7 @@ def _formatted(run: Run, part: ast.FormattedValue, frame: Frame) -> list[TextAto
         return as_texts(said)
     value = said
     if part.conversion not in (-1, 115):  # !r and !a quote their argument
-        return [make_text((Hole("text made with !r"),))]
+        return [_hole("text made with !r")]
     if part.format_spec is None:
         return as_texts(value)
     known = sole(spec)
@@ -104,14 +108,11 @@ def _each_formatted(value: Value, spec: str | None, write: Callable[[Any], str])
     texts: list[TextAtom] = []
     for atom in value:
         if spec is None or not isinstance(atom, str | int | float) or _WIDE.search(spec):
-            texts.append(_FORMATTED)
+            texts.append(_hole("formatted text"))
             continue
         with suppress(ValueError, TypeError, OverflowError):  # an error at run time, no text
             texts.append(write(atom))
-    return texts or [_FORMATTED]
-
-
-_FORMATTED = make_text((Hole("formatted text"),))
+    return texts or [_hole("formatted text")]
 
 
 def percent(left: Value, right: Value) -> Value:
@@ -121,7 +122,7 @@ def percent(left: Value, right: Value) -> Value:
         if isinstance(atom, str):
             results.extend(_percent_one(atom, right))
         elif isinstance(atom, Text):
-            results.append(make_text((Hole("a format that is not known"),)))
+            results.append(_hole("a format that is not known"))
     return text_value(results) or ANY
 
 
@@ -166,13 +167,13 @@ def _mapping_item(atom: object, key: str) -> Value:
 def str_format(template: TextAtom, args: Arguments) -> list[TextAtom]:
     """``template.format(...)``."""
     if not isinstance(template, str):
-        return [make_text((Hole("a format that is not known"),))]
+        return [_hole("a format that is not known")]
     operands: list[Sequences[TextAtom]] = []
     automatic = 0
     try:
         fields = list(string.Formatter().parse(template))
     except ValueError:
-        return [make_text((Hole("an invalid format"),))]
+        return [_hole("an invalid format")]
     for literal, name, spec, conversion in fields:
         operands.append([literal])
         if name is None:
@@ -182,7 +183,7 @@ def str_format(template: TextAtom, args: Arguments) -> list[TextAtom]:
             automatic += 1
         value = (args.at(int(name)) if name.isdigit() else args.at(-1, name)) or ANY
         plain = not conversion and "{" not in (spec or "")
-        operands.append(formatted(value, spec or "") if plain else [_FORMATTED])
+        operands.append(formatted(value, spec or "") if plain else [_hole("formatted text")])
     return concatenations(operands)
 
 
@@ -190,7 +191,7 @@ def joined(separators: Value, items: Items) -> list[TextAtom]:
     """``separator.join(items)``."""
     separator_texts = [atom for atom in separators if isinstance(atom, str | Text)]
     if items.exact is None or len(items.exact) > 32 or not separator_texts:
-        return [make_text((Hole("joined texts"),))]
+        return [_hole("joined texts")]
     results: list[TextAtom] = []
     for separator in separator_texts:
         operands: list[Sequences[TextAtom]] = []

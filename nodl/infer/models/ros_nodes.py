@@ -8,7 +8,6 @@ from nodl.infer.interpreter.frames import Call
 from nodl.infer.interpreter.iterate import elements
 from nodl.infer.interpreter.run import Run
 from nodl.infer.models.library_nodes import library_node
-from nodl.infer.models.ros_arguments import ros_arguments
 from nodl.infer.models.ros_parameters import assign_parameters
 from nodl.infer.values import (
     ANY,
@@ -24,6 +23,7 @@ from nodl.infer.values import (
     unknown,
 )
 from nodl.node_interface import EndpointKind
+from nodl.ros_arguments import ros_arguments
 
 NODE_CLASS = "rclpy.node.Node"
 

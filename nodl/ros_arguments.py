@@ -11,11 +11,11 @@ from typing import NamedTuple
 
 from nodl.remap import InvalidRemapRuleError, parse_rule
 
-_REMAP = ("-r", "--remap")
-_PARAMETER = ("-p", "--param")
+REMAP = ("-r", "--remap")
+PARAMETER = ("-p", "--param")
 _FILE = "--params-file"
 _WITH_VALUE = frozenset(
-    {*_REMAP, *_PARAMETER, _FILE, "-e", "--enclave", "--log-level", "--log-config-file", "--log-file-name"}
+    {*REMAP, *PARAMETER, _FILE, "-e", "--enclave", "--log-level", "--log-config-file", "--log-file-name"}
 )
 
 
@@ -37,28 +37,28 @@ class WrittenRosArguments(NamedTuple):
 
 def ros_arguments(words: Iterable[str]) -> WrittenRosArguments:
     """What the flags among ``words`` say. What rcl would refuse is left out: the program ends there."""
-    pairs = list(_flags(words))
-    parameters = (_parameter(value) for flag, value in pairs if flag in _PARAMETER)
+    pairs = [(REMAP[0], word) if not flag and _is_rule(word) else (flag, word) for flag, word in flags(words)]
+    parameters = (_parameter(value) for flag, value in pairs if flag in PARAMETER)
     return WrittenRosArguments(
-        tuple(value for flag, value in pairs if flag in _REMAP),
+        tuple(value for flag, value in pairs if flag in REMAP),
         tuple(parameter for parameter in parameters if parameter is not None),
         tuple(value for flag, value in pairs if flag == _FILE),
     )
 
 
-def _flags(words: Iterable[str]) -> Iterator[tuple[str, str]]:
-    """Each flag that takes a value, with it."""
+def flags(words: Iterable[str]) -> Iterator[tuple[str, str]]:
+    """Each flag that takes a value, with it; a word that is not among ROS arguments with no flag."""
     reading = False
     left = iter(words)
     for word in left:
         if word == "--ros-args":
             reading = True
+        elif not reading:
+            yield "", word
         elif word == "--":
             reading = False
-        elif reading and word in _WITH_VALUE:
+        elif word in _WITH_VALUE:
             yield word, next(left, "")
-        elif not reading and _is_rule(word):
-            yield _REMAP[0], word
 
 
 def _is_rule(word: str) -> bool:
