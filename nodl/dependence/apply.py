@@ -94,7 +94,7 @@ class _Application:
             for item in _repeated(gap.each, scope):
                 if scope.holds(gap.when, item):
                     why = scope.fill(gap.why, item).text or gap.why
-                    self.gaps.append(Gap(interface.source, "; ".join((why, *notes))))
+                    self._gap(interface, "; ".join((why, *notes)))
         for plugins in depends.plugins:
             self._load(plugins, scope, interface, depth)
         for transport in depends.transports:
@@ -107,11 +107,14 @@ class _Application:
         if depends.tf_listener is not None and scope.holds(depends.tf_listener):
             self.further.append(_tf_listener(self._main))
 
+    def _gap(self, by: NodeInterface, why: str) -> None:
+        self.gaps.append(Gap(by.source, why))
+
     def _load(self, plugins: PluginList, scope: Scope, by: NodeInterface, depth: int) -> None:
         if not scope.holds(plugins.when):
             return
         if depth >= _DEPTH:
-            self.gaps.append(Gap(by.source, "plugins that load plugins are nested too deep"))
+            self._gap(by, "plugins that load plugins are nested too deep")
             return
         instances = [*plugins.always, *scope.items(plugins.parameter)]
         types = dict(plugins.types)
@@ -132,15 +135,11 @@ class _Application:
         value = inner.value(class_parameter or "", plugins.types.get(instance))
         plugin_class = inner.fill(plugins.plugin_class).text or (None if value is None else str(value.value))
         if plugin_class is None:
-            self.gaps.append(
-                Gap(by.source, f"the class of plugin '{instance}' is not known: {class_parameter} is not set")
-            )
+            self._gap(by, f"the class of plugin '{instance}' is not known: {class_parameter} is not set")
             return
         described = self._documents.of_class(plugin_class)
         if described is None:
-            self.gaps.append(
-                Gap(by.source, f"plugin '{instance}' is of class {plugin_class}, which no document describes")
-            )
+            self._gap(by, f"plugin '{instance}' is of class {plugin_class}, which no document describes")
             return
         if described.depends is not None and described.depends.own_node:
             self.further.append(self._own_node(described, instance))
@@ -201,7 +200,7 @@ class _Application:
         described = self._documents.named(node.document)
         name = scope.fill(node.node).text
         if described is None or name is None:
-            self.gaps.append(Gap(by.source, f"no document {node.document} describes its node '{node.node}'"))
+            self._gap(by, f"no document {node.document} describes its node '{node.node}'")
             return
         rules = [] if node.renamed else [f"__node:={name}"]
         if node.namespace:
@@ -230,9 +229,7 @@ class _Application:
         for name in found.nodes:
             described = self._documents.named(configuration.document)
             if described is None:
-                self.gaps.append(
-                    Gap(by.source, f"no document {configuration.document} describes node '{name}'")
-                )
+                self._gap(by, f"no document {configuration.document} describes node '{name}'")
             else:
                 self.further.append(described._replace(name=name, own_rules=(f"__node:={name}",)))
 

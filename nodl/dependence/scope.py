@@ -110,21 +110,17 @@ class Scope:
             return self.argument(name.removeprefix(_ARGUMENT), default)
         if name in self.situation.parameters:
             return Value(self.situation.parameters[name], f"parameter {name}, set by launch")
-        if default is None:
-            default = self._defaults.get(name)
-        return None if default is None else Value(default, f"parameter {name}, its default")
+        return _default(f"parameter {name}", self._defaults.get(name) if default is None else default)
 
     def option(self, name: str, default: object = None) -> Value | None:
         if name in self._options:
             return Value(self._options[name], f"option {name}, set by launch")
-        return None if default is None else Value(default, f"option {name}, its default")
+        return _default(f"option {name}", default)
 
     def argument(self, number: str, default: object = None) -> Value | None:
-        index = int(number) - 1
-        if index < len(self._arguments):
-            return Value(self._arguments[index], f"argument {number} of the command line")
+        index, what = int(number) - 1, f"argument {number} of the command line"
         return (
-            None if default is None else Value(default, f"argument {number} of the command line, its default")
+            Value(self._arguments[index], what) if index < len(self._arguments) else _default(what, default)
         )
 
     def _plain(self, text: str) -> str:
@@ -142,6 +138,10 @@ class Scope:
         if test.is_set:
             return value is not None and _text(value) not in ("", "()")
         return any(entry == allowed for entry in entries for allowed in test.values)
+
+
+def _default(what: str, default: object) -> Value | None:
+    return None if default is None else Value(default, f"{what}, its default")
 
 
 class _Filling:
@@ -168,9 +168,8 @@ class _Filling:
         given = self._released(default).strip("'") if blank else None
         if word in ("remapped", "camera_info"):
             return self._hold(self._remapped(word, name))
-        look = {"param": self._scope.value, "option": self._scope.option, "argument": self._scope.argument}[
-            word
-        ]
+        scope = self._scope
+        look = {"param": scope.value, "option": scope.option, "argument": scope.argument}[word]
         found = look(name, given)
         if found is None or isinstance(found.value, (tuple, list)):
             self._why.append(f"{'parameter' if word == 'param' else word} {name!r} has no value")

@@ -34,21 +34,12 @@ VERSION = 1
 
 # element -> role -> the endpoints it stands for
 _ROLES: dict[str, dict[str, tuple[EndpointKind, ...]]] = {
-    "topic": {
-        "publisher": (EndpointKind.PUBLISHER,),
-        "subscription": (EndpointKind.SUBSCRIPTION,),
-        "both": (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION),
-    },
-    "service": {
-        "server": (EndpointKind.SERVICE_SERVER,),
-        "client": (EndpointKind.SERVICE_CLIENT,),
-        "both": (EndpointKind.SERVICE_SERVER, EndpointKind.SERVICE_CLIENT),
-    },
-    "action": {
-        "server": (EndpointKind.ACTION_SERVER,),
-        "client": (EndpointKind.ACTION_CLIENT,),
-        "both": (EndpointKind.ACTION_SERVER, EndpointKind.ACTION_CLIENT),
-    },
+    one.family: {one.role: (one,), other.role: (other,), "both": (one, other)}
+    for one, other in (
+        (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION),
+        (EndpointKind.SERVICE_SERVER, EndpointKind.SERVICE_CLIENT),
+        (EndpointKind.ACTION_SERVER, EndpointKind.ACTION_CLIENT),
+    )
 }
 
 
@@ -136,10 +127,8 @@ def _endpoints(element: XmlElement, file: str, own_prefix: str) -> list[Endpoint
     private = name.startswith(own_prefix)
     template = NameTemplate.literal(f"~/{name[len(own_prefix) :]}" if private else name)
     written = name if private else ""
-    return [
-        Endpoint(kind, template, element.get("type", ""), source, written=written)
-        for kind in _ROLES[tag][role]
-    ]
+    type_name = element.get("type", "")
+    return [Endpoint(kind, template, type_name, source, written=written) for kind in _ROLES[tag][role]]
 
 
 def _once(endpoints: Iterable[Endpoint]) -> tuple[Endpoint, ...]:
@@ -159,16 +148,9 @@ def _expect(element: XmlElement, tag: str, attributes: tuple[str, ...], file: st
     for attribute in element.attrib:
         if attribute not in attributes:
             raise InvalidNoDLDocumentError.at(_at(element, file), f"<{tag}> has no attribute {attribute!s}")
-    _no_text(element, file)
-
-
-def _no_text(element: XmlElement, file: str) -> None:
-    """The schema knows no text; some there is mostly a tag that lost its bracket."""
-    if element.text:
-        raise InvalidNoDLDocumentError.at(
-            _at(element, file),
-            f"<{element.tag}> holds the text {shown(element.text[:40])}, which has no meaning",
-        )
+    if element.text:  # the schema knows none; some there is mostly a tag that lost its bracket
+        why = f"<{element.tag}> holds the text {shown(element.text[:40])}, which has no meaning"
+        raise InvalidNoDLDocumentError.at(_at(element, file), why)
 
 
 def _at(element: XmlElement, file: str) -> SourceRef:

@@ -17,7 +17,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from enclave_launch.boundary.light import NamedTuple
 from nodl.document import ManifestNode
 from nodl.document.v2_include import Included, follow_includes
 from nodl.document.v2_learnt import LearntName, learnt_from, learnt_names, logger_services
@@ -31,17 +30,6 @@ from nodl.source_ref import SourceRef
 from nodl.yaml_text import YamlList, YamlMap, YamlScalar, parse_yaml
 
 VERSION = 2
-
-
-class _Identity(NamedTuple):
-    package: str | None
-    node: str | None
-    namespace: str | None
-    executable: str | None
-    plugin: str | None
-    library: ClientLibrary
-    lifecycle: bool
-    explicit: bool
 
 
 def parse_v2(
@@ -61,32 +49,30 @@ def parse_root(
 ) -> ManifestNode:
     """``parse_v2`` for a document that was read and checked."""
     documents = (Included(file, root), *follow_includes(root, file, prefixes))
-    identity, learnt = _identity(root, name), learnt_from(root)
-    endpoints = (*_endpoints(documents, learnt_names(root)), *logger_services(root))
+    own, learnt = _identified(root, file, package, name), learnt_from(root)
     parameters = _parameters(documents)
-    interface = NodeInterface(
-        package=identity.package or package,
-        executable=identity.executable,
-        plugin=identity.plugin,
-        name=identity.node,
-        namespace=identity.namespace,
-        endpoints=endpoints,
-        source=SourceRef(file, 1),
-        library=identity.library,
-        lifecycle=identity.lifecycle,
+    interface = own._replace(
+        endpoints=(*_endpoints(documents, learnt_names(root)), *logger_services(root)),
         parameters=tuple(parameters),
         depends=dependence_of(root),
         runs=learnt.runs,
         incomplete=learnt.incomplete,
     )
     included = tuple(document.file for document in documents[1:])
-    return ManifestNode(interface, VERSION, parameters, identity.explicit, included)
+    explicit = not {"executable", "plugin"}.isdisjoint(_fields(root))
+    return ManifestNode(interface, VERSION, parameters, explicit, included)
 
 
-def _identity(root: YamlMap, name: str) -> _Identity:
+def _fields(root: YamlMap) -> dict[str, str | int | float | bool | None]:
+    """What our section of the document says in one word."""
     ours = section_of(root)
     given = ours.items if ours else {}
-    fields = {key: value.value for key, value in given.items() if isinstance(value, YamlScalar)}
+    return {key: value.value for key, value in given.items() if isinstance(value, YamlScalar)}
+
+
+def _identified(root: YamlMap, file: str, package: str | None, name: str) -> NodeInterface:
+    """The node without its interfaces."""
+    fields = _fields(root)
     executable, plugin = _text(fields, "executable"), _text(fields, "plugin")
     if executable is None and plugin is None:
         executable, plugin = (None, name) if "::" in name else (name, None)
@@ -97,17 +83,17 @@ def _identity(root: YamlMap, name: str) -> _Identity:
         if namespace is not None:
             validate_namespace(namespace)
     except InvalidNameError as error:
-        source = ours.source if ours else root.source
-        raise InvalidElementError.at(source, str(error)) from None
-    return _Identity(
-        package=_text(fields, "package"),
-        node=node or _node_name_from(name),
-        namespace=namespace,
+        raise InvalidElementError.at((section_of(root) or root).source, str(error)) from None
+    return NodeInterface(
+        package=_text(fields, "package") or package,
         executable=executable,
         plugin=plugin,
+        name=node or _node_name_from(name),
+        namespace=namespace,
+        endpoints=(),
+        source=SourceRef(file, 1),
         library=ClientLibrary(_text(fields, "library") or "unknown"),
         lifecycle=fields.get("lifecycle") is True,
-        explicit="executable" in fields or "plugin" in fields,
     )
 
 
@@ -180,8 +166,8 @@ def _full_type(type_name: str, kind: EndpointKind) -> str:
     package, _, rest = type_name.partition("/")
     if "/" in rest:
         return type_name
-    middle = {"publisher": "msg", "subscription": "msg"}.get(kind.value, kind.value.partition("_")[0])
-    return f"{package}/{middle.replace('service', 'srv')}/{rest}"
+    middle = {"topic": "msg", "service": "srv"}.get(kind.family, kind.family)
+    return f"{package}/{middle}/{rest}"
 
 
 def _parameters(documents: Sequence[Included]) -> dict[str, str]:

@@ -19,7 +19,7 @@ from collections.abc import Iterator
 
 from enclave_launch.boundary.light import NamedTuple
 from enclave_launch.boundary.words import counted
-from nodl.document.v2_section import IDENTITY_KEY
+from nodl.document.v2_section import section_of
 from nodl.errors import InvalidElementError
 from nodl.name_template import NameTemplate, ParameterPart
 from nodl.names import InvalidNameError, validate_name
@@ -95,9 +95,8 @@ def logger_services(root: YamlMap) -> Iterator[Endpoint]:
 
 
 def _section(root: YamlMap) -> dict[str, YamlValue]:
-    codegen = root.items.get("codegen")
-    section = codegen.items.get(IDENTITY_KEY) if isinstance(codegen, YamlMap) else None
-    return section.items if isinstance(section, YamlMap) else {}
+    section = section_of(root)
+    return section.items if section else {}
 
 
 def _template(fields: dict[str, str | int | float | bool | None], row: YamlMap) -> NameTemplate:

@@ -8,15 +8,15 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from html import escape
 
+from enclave_launch.boundary.light import NamedTuple
 from nodl.document import ManifestNode
 from nodl.document.v2_schema import NAME_PATTERN, PARAMETER_TYPES, TYPE_PATTERN
 from nodl.document.v2_section import CATEGORIES, IDENTITY_KEY
 from nodl.errors import InvalidNoDLDocumentError
 from nodl.names import shown
-from nodl.node_interface import ClientLibrary, Endpoint, EndpointKind, NodeInterface
+from nodl.node_interface import ClientLibrary, Endpoint, NodeInterface
 
 _UNKNOWN_QOS = "{history: SYSTEM_DEFAULT, reliability: SYSTEM_DEFAULT}"
 _PLAIN_SCALAR = re.compile(r"[A-Za-z/][A-Za-z0-9_/.:]*[A-Za-z0-9_]\Z|~/[A-Za-z0-9_/]+\Z")
@@ -37,8 +37,7 @@ _PARAMETER_TYPES = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Written:
+class Written(NamedTuple):
     """``notes``: what had to be invented or left out, for the person who converts."""
 
     text: str
@@ -57,9 +56,8 @@ def v2_yaml(node: ManifestNode) -> Written:
         entries = [endpoint for endpoint in interface.endpoints if endpoint.kind is kind]
         if not entries:
             continue
-        is_topic = kind in (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION)
-        topics |= is_topic
-        qos = f", qos: {_UNKNOWN_QOS}" if is_topic else ""
+        topics |= kind.family == "topic"
+        qos = f", qos: {_UNKNOWN_QOS}" if kind.family == "topic" else ""
         lines.append(f"{category}:")
         lines += [f"  - {{name: {_v2_name(e)}, type: {_v2_endpoint_type(e)}{qos}}}" for e in entries]
     note = (
@@ -74,13 +72,12 @@ def v1_xml(nodes: Sequence[ManifestNode]) -> Written:
     notes: list[str] = []
     for node in nodes:
         lines += _v1_node(node)
+        name = node.interface.name
         if node.version == 2:
-            notes.append(
-                f"{node.interface.name}: QoS, descriptions and details of parameters have no place in v1"
-            )
+            notes.append(f"{name}: QoS, descriptions and details of parameters have no place in v1")
         if node.interface.depends is not None:
             notes.append(
-                f"{node.interface.name}: what depends on how launch starts it has no place in v1; defaults were written"
+                f"{name}: what depends on how launch starts it has no place in v1; defaults were written"
             )
     return Written("\n".join([*lines, "</interface>", ""]), tuple(notes))
 

@@ -54,27 +54,18 @@ def read_package(folder: str) -> Package:
     base = Path(folder)
     match = _NAME.search(text_or_nothing(base / "package.xml"))
     name = match[1] if match else base.name
-    entries = (*_python_entries(base / "setup.py"), *_text_entries(base / "setup.cfg"))
+    texts = (*_literal_texts(base / "setup.py"), *text_or_nothing(base / "setup.cfg").splitlines())
+    entries = tuple(EntryPoint(*match.groups()) for match in map(_ENTRY.match, texts) if match)
     return Package(name, folder, entries, _cmake_programs(base / "CMakeLists.txt"))
 
 
-def _python_entries(path: Path) -> list[EntryPoint]:
+def _literal_texts(path: Path) -> list[str]:
     try:
         tree = ast.parse(text_or_nothing(path))
     except (SyntaxError, ValueError):
         return []
-    entries = []
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Constant) and isinstance(node.value, str):
-            match = _ENTRY.match(node.value)
-            if match:
-                entries.append(EntryPoint(match[1], match[2], match[3]))
-    return entries
-
-
-def _text_entries(path: Path) -> list[EntryPoint]:
-    matches = (_ENTRY.match(line) for line in text_or_nothing(path).splitlines())
-    return [EntryPoint(match[1], match[2], match[3]) for match in matches if match]
+    constants = (node.value for node in ast.walk(tree) if isinstance(node, ast.Constant))
+    return [value for value in constants if isinstance(value, str)]
 
 
 def _cmake_programs(path: Path) -> frozenset[str]:

@@ -57,7 +57,10 @@ def infer_paths(paths: Iterable[str | Path], prefixes: Sequence[str] = ()) -> In
     gaps = dict.fromkeys(Gap(source, why) for run, _ in runs for source, why in run.findings.gaps)
     gaps.update(dict.fromkeys(unsettled))
     cpp_nodes, cpp_gaps = _cpp([file for file in found if file not in files])
-    return InferredSystem(_distinct([*nodes, *cpp_nodes]), (*gaps, *cpp_gaps), tuple(found))
+    distinct = tuple(
+        dict.fromkeys([*nodes, *cpp_nodes])
+    )  # one may be found through several files of a program
+    return InferredSystem(distinct, (*gaps, *cpp_gaps), tuple(found))
 
 
 def _cpp(files: list[str]) -> tuple[list[NodeInterface], list[Gap]]:
@@ -72,11 +75,6 @@ def _cpp(files: list[str]) -> tuple[list[NodeInterface], list[Gap]]:
     except CppSupportMissing as error:
         return [], [Gap(SourceRef(files[0]), str(error))]
     return inferred.nodes, inferred.gaps
-
-
-def _distinct(nodes: list[NodeInterface]) -> tuple[NodeInterface, ...]:
-    """A node found twice through different files of one program counts once."""
-    return tuple(dict.fromkeys(nodes))
 
 
 def _runs(program: Program, file: str) -> Iterator[tuple[Run, LaunchKey]]:

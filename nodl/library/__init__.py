@@ -7,7 +7,7 @@ the one that ships with us. ``find`` opens the index and one document. docs/libr
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 
 from enclave_launch.boundary.light import TYPE_CHECKING, NamedTuple
 from nodl.errors import NoDLError
@@ -64,16 +64,15 @@ class Library:
 
     def of_class(self, plugin_class: str, *, distro: str = "") -> Hit | None:
         """The document of a plugin, by the name of its class as launch files give it."""
-        for folder in self._all():
-            entries = [e for e in self._entries(folder) if plugin_class in e.classes]
-            if entries:
-                return self._chosen(folder, entries, distro, None)
-        return None
+        return self._first(lambda entry: plugin_class in entry.classes, distro)
 
     def named(self, name: str, *, distro: str = "") -> Hit | None:
         """The document ``package/stem``, as documents refer to each other."""
+        return self._first(lambda entry: entry.stem == name, distro)
+
+    def _first(self, fitting: Callable[[IndexEntry], bool], distro: str) -> Hit | None:
         for folder in self._all():
-            entries = [e for e in self._entries(folder) if e.stem == name]
+            entries = list(filter(fitting, self._entries(folder)))
             if entries:
                 return self._chosen(folder, entries, distro, None)
         return None
@@ -114,15 +113,10 @@ class Library:
 
     def _document(self, folder: str, file: str) -> LibraryDocument:
         if (folder, file) not in self._documents:
+            from nodl.library.document import read_library_document  # with the reader of NoDL documents
+
             self._documents[folder, file] = read_library_document(folder, file)
         return self._documents[folder, file]
-
-
-def read_library_document(folder: str, file: str) -> LibraryDocument:
-    """As ``nodl.library.document``'s, whose reader of NoDL documents is imported when there is one to read."""
-    from nodl.library.document import read_library_document as read
-
-    return read(folder, file)
 
 
 class LibraryDocuments(NamedTuple):
@@ -156,11 +150,7 @@ def fits(versions: dict[str, str], distro: str, version: str | None) -> bool:
         return True
     if version is None:
         return not distro or distro in versions
-    return any(_in_series(version, series) for series in versions.values())
-
-
-def _in_series(version: str, series: str) -> bool:
-    return version.split(".")[: len(series.split("."))] == series.split(".")
+    return any(f"{version}.".startswith(f"{series}.") for series in versions.values())
 
 
 def _doubt(document: LibraryDocument, distro: str, version: str | None) -> str:

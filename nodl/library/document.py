@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 
-from enclave_launch.boundary.light import NamedTuple
+from enclave_launch.boundary.light import Any, NamedTuple
 from nodl.document import read_root
 from nodl.document.v2 import parse_root
 from nodl.document.v2_section import plain, section_of
@@ -54,6 +54,10 @@ def read_library_document(folder: str, file: str) -> LibraryDocument:
     given = plain(section) if section else {}
     assert isinstance(given, dict)
     classes = tuple(given.get("classes") or ())
+    told = (given.get("evidence") or {}).items()
+    evidence: dict[str, Any] = {
+        key: tuple(value) if isinstance(value, list) else value for key, value in told
+    }
     node = parse_root(root, path, package=package, name=name).interface
     programs = () if classes or given.get("transport") else (node.executable, node.plugin)
     return LibraryDocument(
@@ -63,18 +67,7 @@ def read_library_document(folder: str, file: str) -> LibraryDocument:
         programs=(*(each for each in programs if each), *(given.get("also") or ())),
         classes=classes,
         versions=given.get("versions") or {},
-        evidence=_evidence(given.get("evidence") or {}),
+        evidence=Evidence(**evidence),
         transport=given.get("transport") or "",
-        recorded=bool(given.get("runs")) or (given.get("evidence") or {}).get("how") == "recorded",
-    )
-
-
-def _evidence(given: dict[str, str]) -> Evidence:
-    return Evidence(
-        given.get("repository", ""),
-        given.get("version", ""),
-        given.get("commit", ""),
-        given.get("how", ""),
-        tuple(given.get("missing") or ()),
-        tuple(given.get("differs") or ()),
+        recorded=bool(given.get("runs")) or evidence.get("how") == "recorded",
     )

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 from enclave_launch.boundary.terminal import printable
 from enclave_launch.boundary.words import counted
-from nodl.ament_index import PackageNotFoundError, package_prefix, search_prefixes
+from nodl.ament_index import PackageNotFoundError, executables, package_prefix, search_prefixes
 from nodl.lookup import ManifestLookup
 from nodl.node_interface import Gap
 from nodl.source_ref import SourceRef
@@ -74,10 +74,8 @@ def run(args: argparse.Namespace) -> int:
     else:
         sys.stdout.write(_encodable("".join(documents.values())))
     if not system.nodes:
-        count = len(system.files)
-        print(
-            f"secure-nodl infer: error: no node was found in {counted(count, 'source file')}", file=sys.stderr
-        )
+        looked_at = counted(len(system.files), "source file")
+        print(f"secure-nodl infer: error: no node was found in {looked_at}", file=sys.stderr)
     if expanded.unresolved and (chosen not in ("text", "json") or args.output):
         print(f"{len(expanded.unresolved)} unresolved:", file=sys.stderr)
         for question in expanded.unresolved:
@@ -121,21 +119,16 @@ def _compare(system: InferredSystem, prefixes: Sequence[str]) -> int:
 def _documents(
     chosen: str, system: InferredSystem, expanded: ExpandedSystem, args: argparse.Namespace
 ) -> dict[str, str]:
+    from nodl.infer.report import written
+
     if chosen == "json":
-        from nodl.infer.report.json_report import to_json
-
-        return {"inferred.json": to_json(expanded, built_in=args.builtin)}
+        return {"inferred.json": written.to_json(expanded, built_in=args.builtin)}
     if chosen == "policy":
-        from nodl.infer.report.policy_report import to_policy
-
-        return {"policy.xml": to_policy(expanded, accept_patterns=args.accept_patterns)}
+        return {"policy.xml": written.to_policy(expanded, accept_patterns=args.accept_patterns)}
     if chosen == "text":
-        from nodl.infer.report.text_report import to_text
-
-        text = to_text(expanded, built_in=args.builtin)
-        return {
-            "inferred.txt": text.replace(os.path.join(os.getcwd(), ""), "")
-        }  # as a person would name the files
+        text = written.to_text(expanded, built_in=args.builtin)
+        here = os.path.join(os.getcwd(), "")
+        return {"inferred.txt": text.replace(here, "")}  # as a person would name the files
     from nodl.infer.report.nodl_report import to_v1
     from nodl.infer.report.v2_report import to_v2
 
@@ -151,10 +144,8 @@ def _writable(system: InferredSystem, with_gaps: bool) -> list[NodeInterface]:
         questions = open_questions(node)
         if questions and not with_gaps:
             who = f"{node.package or '-'}/{node.executable or node.plugin or node.name}"
-            print(
-                printable(f"not written: {who} has {len(questions)} open questions (--with-gaps)"),
-                file=sys.stderr,
-            )
+            text = f"not written: {who} has {len(questions)} open questions (--with-gaps)"
+            print(printable(text), file=sys.stderr)
         else:
             kept.append(node)
     return kept
@@ -195,15 +186,10 @@ def _infer_package(package: str, prefixes: Sequence[str]) -> InferredSystem:
     except ValueError:
         raise LookupError(f"no such file or folder: {package}") from None
     except PackageNotFoundError as error:
-        raise LookupError(
-            f"'{package}' is neither a file or folder nor an installed package: {error}"
-        ) from None
-    files = sorted(p for p in folder.glob("*") if p.is_file() and os.access(p, os.X_OK))
-    nodes: list[NodeInterface] = []
-    gaps: list[Gap] = []
-    for path in files:
-        inferred = infer_executable(package, path.name, prefixes=prefixes)
-        nodes.extend(inferred.interfaces)
-        if not inferred:
-            gaps.append(Gap(SourceRef(str(path)), inferred.why))
-    return InferredSystem(tuple(nodes), tuple(gaps), tuple(str(path) for path in files))
+        why = f"'{package}' is neither a file or folder nor an installed package: {error}"
+        raise LookupError(why) from None
+    programs = [os.path.join(folder, name) for name in executables(str(folder))]
+    inferred = {path: infer_executable(package, Path(path).name, prefixes=prefixes) for path in programs}
+    nodes = (node for each in inferred.values() for node in each.interfaces)
+    gaps = (Gap(SourceRef(path), each.why) for path, each in inferred.items() if not each)
+    return InferredSystem(tuple(nodes), tuple(gaps), tuple(programs))

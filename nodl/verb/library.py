@@ -85,10 +85,9 @@ def _show(arguments: argparse.Namespace) -> int:
 
 def _where(arguments: argparse.Namespace) -> int:
     hit = _found(arguments)
-    if hit is None:
-        return 1
-    print(hit.document.file)
-    return 0
+    if hit is not None:
+        print(hit.document.file)
+    return 1 if hit is None else 0
 
 
 def _found(arguments: argparse.Namespace) -> Hit | None:

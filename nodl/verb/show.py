@@ -60,23 +60,13 @@ def _of_package(
     wanted = list(names)
     if not wanted:
         everything = lookup.all_of(package)
-        where = (
-            "" if everything else f"no NoDL of package {package}; looked at {_listing(everything.searched)}"
-        )
-        return list(everything.found), [where] if where else []
-    nodes: list[NodeInterface] = []
-    missing: list[str] = []
-    for name in wanted:
-        key = "plugin" if "::" in name else "executable"
-        result = lookup.find(package, **{key: name})
-        nodes.extend(result.found)
-        if not result:
-            missing.append(f"no NoDL for {package}/{name}; looked at {_listing(result.searched)}")
-    return nodes, missing
-
-
-def _listing(places: Iterable[str]) -> str:
-    return ", ".join(places)
+        missing = f"no NoDL of package {package}; looked at {', '.join(everything.searched)}"
+        return list(everything.found), [] if everything else [missing]
+    kinds = (("plugin" if "::" in name else "executable", name) for name in wanted)
+    results = [(name, lookup.find(package, **{kind: name})) for kind, name in kinds]
+    none = ((name, ", ".join(result.searched)) for name, result in results if not result)
+    nodes = [node for _, result in results for node in result.found]
+    return nodes, [f"no NoDL for {package}/{name}; looked at {searched}" for name, searched in none]
 
 
 def description_lines(node: NodeInterface) -> Iterator[str]:

@@ -6,12 +6,15 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable
 
 from enclave_launch.boundary.files import read_bytes
 from enclave_launch.boundary.light import NamedTuple
 from nodl.dependence import Situation
 from nodl.errors import InvalidNoDLError
-from nodl.node_interface import Endpoint, Gap
+from nodl.name_template import NameTemplate
+from nodl.names import InvalidNameError, validate_written_name
+from nodl.node_interface import Endpoint, EndpointKind, Gap
 from nodl.source_ref import SourceRef
 from nodl.yaml_text import YamlValue, parse_yaml
 
@@ -22,6 +25,24 @@ class Configured(NamedTuple):
     endpoints: tuple[Endpoint, ...] = ()
     gaps: tuple[Gap, ...] = ()
     nodes: tuple[str, ...] = ()
+
+
+def collected(parts: Iterable[Endpoint | Gap]) -> Configured:
+    """Each once, in their order."""
+    found = list(dict.fromkeys(parts))
+    endpoints = tuple(part for part in found if isinstance(part, Endpoint))
+    return Configured(endpoints, tuple(part for part in found if isinstance(part, Gap)))
+
+
+def endpoint_named(
+    kind: EndpointKind, name: str, type_name: str, place: SourceRef, note: str
+) -> Endpoint | InvalidNameError:
+    """The endpoint that a tool makes under the ``name`` in its file, or why there can be none of that name."""
+    try:
+        validate_written_name(name)
+    except InvalidNameError as error:
+        return error
+    return Endpoint(kind, NameTemplate.literal(name), type_name, place, note=note)
 
 
 def read_configuration(kind: str, file: str, situation: Situation, place: SourceRef) -> Configured:

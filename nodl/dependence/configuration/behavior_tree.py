@@ -11,10 +11,9 @@ from collections.abc import Iterator
 
 from enclave_launch.boundary.files import read_bytes
 from enclave_launch.boundary.xml_tree import XmlElement
-from nodl.dependence.configuration import Configured
+from nodl.dependence.configuration import Configured, collected, endpoint_named
 from nodl.errors import InvalidXMLError
-from nodl.name_template import NameTemplate
-from nodl.names import InvalidNameError, shown, validate_written_name
+from nodl.names import shown
 from nodl.node_interface import Endpoint, EndpointKind, Gap
 from nodl.source_ref import SourceRef
 from nodl.xml_text import parse_xml
@@ -91,11 +90,7 @@ def of_tree(file: str) -> Configured:
         root = parse_xml(read_bytes(file, _MAX_BYTES), file)
     except (OSError, InvalidXMLError) as error:
         return Configured(gaps=(Gap(place, f"the behavior tree cannot be read: {error}"),))
-    found = list(dict.fromkeys(_used(root, place)))
-    return Configured(
-        tuple(part for part in found if isinstance(part, Endpoint)),
-        tuple(part for part in found if isinstance(part, Gap)),
-    )
+    return collected(_used(root, place))
 
 
 def _used(root: XmlElement, place: SourceRef) -> Iterator[Endpoint | Gap]:
@@ -125,8 +120,5 @@ def _of_node(element: XmlElement, place: SourceRef) -> Iterator[Endpoint | Gap]:
 
 
 def _named(kind: EndpointKind, name: str, type_name: str, tag: str, place: SourceRef) -> Endpoint | Gap:
-    try:
-        validate_written_name(name)
-    except InvalidNameError as error:
-        return Gap(place, f"{tag}: {error}")
-    return Endpoint(kind, NameTemplate.literal(name), type_name, place, note=f"{tag} of the behavior tree")
+    made = endpoint_named(kind, name, type_name, place, f"{tag} of the behavior tree")
+    return made if isinstance(made, Endpoint) else Gap(place, f"{tag}: {made}")

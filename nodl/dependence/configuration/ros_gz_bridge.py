@@ -6,11 +6,10 @@ directions each is one endpoint, an entry that the bridge itself would refuse is
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
-from nodl.dependence.configuration import Configured
-from nodl.name_template import NameTemplate
-from nodl.names import InvalidNameError, shown, validate_written_name
+from nodl.dependence.configuration import Configured, collected, endpoint_named
+from nodl.names import shown
 from nodl.node_interface import Endpoint, EndpointKind, Gap
 from nodl.source_ref import SourceRef
 from nodl.yaml_text import YamlList, YamlMap, YamlScalar, YamlValue
@@ -27,20 +26,12 @@ def of_configuration(root: YamlValue) -> Configured:
     """The entries of a ``config_file``."""
     if not isinstance(root, YamlList):
         return Configured(gaps=(Gap(root.source, "a bridge configuration must be a list of entries"),))
-    return _collected(part for entry in root.items for part in _entry(entry))
+    return collected(part for entry in root.items for part in _entry(entry))
 
 
 def of_arguments(words: Sequence[str], place: SourceRef) -> Configured:
     """``TOPIC@ROS_TYPE{@,[,]}GZ_TYPE`` and ``SERVICE@ROS_SRV_TYPE[@...]``, one a word."""
-    return _collected(part for word in words for part in _word(word, place))
-
-
-def _collected(parts: Iterator[Endpoint | Gap]) -> Configured:
-    found = list(dict.fromkeys(parts))
-    return Configured(
-        tuple(part for part in found if isinstance(part, Endpoint)),
-        tuple(part for part in found if isinstance(part, Gap)),
-    )
+    return collected(part for word in words for part in _word(word, place))
 
 
 def _entry(entry: YamlValue) -> Iterator[Endpoint | Gap]:
@@ -57,9 +48,8 @@ def _entry(entry: YamlValue) -> Iterator[Endpoint | Gap]:
     if direction not in _DIRECTIONS:
         yield Gap(entry.source, f"{shown(direction)} is not a direction of a bridge")
         return
-    yield from _endpoints(
-        name, fields.get("ros_type_name", ""), direction, entry.source, "bridge configuration"
-    )
+    type_name = fields.get("ros_type_name", "")
+    yield from _endpoints(_DIRECTIONS[direction], name, type_name, entry.source, "bridge configuration")
 
 
 def _word(word: str, place: SourceRef) -> Iterator[Endpoint | Gap]:
@@ -68,28 +58,18 @@ def _word(word: str, place: SourceRef) -> Iterator[Endpoint | Gap]:
     position = next((index for index, letter in enumerate(rest) if letter in _SEPARATORS), len(rest))
     type_name = rest[:position]
     if at and "/srv/" in type_name:
-        yield from _named(EndpointKind.SERVICE_SERVER, name, type_name, place, note)
+        yield from _endpoints((EndpointKind.SERVICE_SERVER,), name, type_name, place, note)
     elif not at or position == len(rest):
         yield Gap(
             place, f"{shown(word)} does not describe a bridge: it is not TOPIC@ROS_TYPE{{@,[,]}}GZ_TYPE"
         )
     else:
-        yield from _endpoints(name, type_name, _SEPARATORS[rest[position]], place, note)
+        yield from _endpoints(_DIRECTIONS[_SEPARATORS[rest[position]]], name, type_name, place, note)
 
 
 def _endpoints(
-    name: str, type_name: str, direction: str, place: SourceRef, note: str
+    kinds: Iterable[EndpointKind], name: str, type_name: str, place: SourceRef, note: str
 ) -> Iterator[Endpoint | Gap]:
-    for kind in _DIRECTIONS[direction]:
-        yield from _named(kind, name, type_name, place, note)
-
-
-def _named(
-    kind: EndpointKind, name: str, type_name: str, place: SourceRef, note: str
-) -> Iterator[Endpoint | Gap]:
-    try:
-        validate_written_name(name)
-    except InvalidNameError as error:
-        yield Gap(place, str(error))
-        return
-    yield Endpoint(kind, NameTemplate.literal(name), type_name, place, note=note)
+    for kind in kinds:
+        made = endpoint_named(kind, name, type_name, place, note)
+        yield made if isinstance(made, Endpoint) else Gap(place, str(made))

@@ -9,9 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from nodl.dependence.configuration import Configured
-from nodl.name_template import NameTemplate
-from nodl.names import InvalidNameError, shown, validate_written_name
+from nodl.dependence.configuration import Configured, endpoint_named
+from nodl.names import shown
 from nodl.node_interface import Endpoint, EndpointKind, Gap
 from nodl.source_ref import SourceRef
 from nodl.yaml_text import YamlList, YamlMap, YamlScalar, YamlValue
@@ -163,12 +162,11 @@ class _Reading:
     def _topic(self, kind: EndpointKind, name: str, place: SourceRef, type_name: str, why: str) -> None:
         if not name:
             return  # rviz asks for nothing until somebody chooses a topic
-        try:
-            validate_written_name(name)
-        except InvalidNameError as error:
-            self.gaps.append(Gap(place, str(error)))
-            return
-        self.endpoints.append(Endpoint(kind, NameTemplate.literal(name), type_name, place, note=why))
+        made = endpoint_named(kind, name, type_name, place, why)
+        if isinstance(made, Endpoint):
+            self.endpoints.append(made)
+        else:
+            self.gaps.append(Gap(place, str(made)))
 
     def _unknown(self, item: YamlMap, what: str) -> None:
         self.gaps.append(Gap(item.source, f"what the {what} needs is not known"))

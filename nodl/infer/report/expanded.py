@@ -6,14 +6,14 @@ All writers read this; names here are those that apply when launch changes nothi
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 
-from nodl.builtin_interfaces import PARAMETER_SERVICES
+from enclave_launch.boundary.light import NamedTuple
+from nodl.builtin_interfaces import DISTROS, BuiltinCondition, built_in_interfaces
 from nodl.infer.results import remapped
 from nodl.infer.system import InferredSystem
 from nodl.name_template import NameTemplate, UnknownPart
-from nodl.names import InvalidNameError, expand_name
-from nodl.node_interface import Certainty, ClientLibrary, Endpoint, EndpointKind, NodeInterface
+from nodl.names import InvalidNameError, expand_name, join
+from nodl.node_interface import Certainty, Endpoint, EndpointKind, Gap, NodeInterface
 from nodl.remap import RemapRules, parse_rule
 from nodl.source_ref import SourceRef
 
@@ -21,8 +21,7 @@ _STAR = "STAR_OF_A_PATTERN"
 _NODE = "NAME_OF_THE_NODE"
 
 
-@dataclass(frozen=True, slots=True)
-class ExpandedInterface:
+class ExpandedInterface(NamedTuple):
     """One interface under its fully qualified name (``*`` for what is not known of it)."""
 
     kind: EndpointKind
@@ -33,8 +32,7 @@ class ExpandedInterface:
     built_in: bool = False
 
 
-@dataclass(frozen=True, slots=True)
-class ExpandedNode:
+class ExpandedNode(NamedTuple):
     """A node with all its interfaces, built-in ones included; ``*`` stands for a name that is not known."""
 
     interface: NodeInterface
@@ -50,25 +48,16 @@ class ExpandedNode:
         return self.interface.namespace or "/"
 
 
-@dataclass(frozen=True, slots=True)
-class OpenQuestion:
-    """Something that the analysis could not find out, with the place in the source."""
-
-    source: SourceRef
-    why: str
-
-
-@dataclass(frozen=True, slots=True)
-class ExpandedSystem:
+class ExpandedSystem(NamedTuple):
     """All nodes by namespace and name, and by place what stayed open, each question once."""
 
     nodes: tuple[ExpandedNode, ...]
-    unresolved: tuple[OpenQuestion, ...]
+    unresolved: tuple[Gap, ...]
 
 
 def expand(system: InferredSystem) -> ExpandedSystem:
     """Sorted by node and place; equal questions are asked once."""
-    unresolved: dict[OpenQuestion, None] = {}
+    unresolved = dict.fromkeys(system.gaps)
     nodes = []
     for written, programs in _told_once(system.nodes):
         interface = _under_own_rules(written)
@@ -76,17 +65,14 @@ def expand(system: InferredSystem) -> ExpandedSystem:
         for endpoint in interface.endpoints:
             for expanded, why in _expanded(endpoint, interface):
                 if why:
-                    unresolved[OpenQuestion(endpoint.source, why)] = None
+                    unresolved[Gap(endpoint.source, why)] = None
                 if expanded is not None:
                     found.append(expanded)
-        for gap in interface.gaps:
-            unresolved[OpenQuestion(gap.source, gap.why)] = None
+        unresolved.update(dict.fromkeys(interface.gaps))
         found.extend(_built_in(interface))
         nodes.append(ExpandedNode(interface, tuple(dict.fromkeys(found)), programs))
-    for gap in system.gaps:
-        unresolved[OpenQuestion(gap.source, gap.why)] = None
     nodes.sort(key=lambda node: (node.namespace, node.name, node.interface.source))
-    return ExpandedSystem(tuple(nodes), tuple(sorted(unresolved, key=lambda q: (q.source, q.why))))
+    return ExpandedSystem(tuple(nodes), tuple(sorted(unresolved)))
 
 
 def _told_once(nodes: Iterable[NodeInterface]) -> list[tuple[NodeInterface, tuple[str, ...]]]:
@@ -138,33 +124,13 @@ def _full_name(template: NameTemplate, node: NodeInterface) -> str:
 
 # --- built-in interfaces ------------------------------------------------------------------------------------
 
-_LIFECYCLE_SERVICES = {
-    "change_state": "lifecycle_msgs/srv/ChangeState",
-    "get_state": "lifecycle_msgs/srv/GetState",
-    "get_available_states": "lifecycle_msgs/srv/GetAvailableStates",
-    "get_available_transitions": "lifecycle_msgs/srv/GetAvailableTransitions",
-    "get_transition_graph": "lifecycle_msgs/srv/GetAvailableTransitions",
-}
+_OF_EVERY_NODE = {BuiltinCondition.ALWAYS, BuiltinCondition.PARAMETERS, BuiltinCondition.TYPE_DESCRIPTION}
 
 
 def _built_in(node: NodeInterface) -> Iterator[ExpandedInterface]:
     """What every node of a current distribution (iron and later) has, by client library."""
-    base = f"{'' if node.namespace in (None, '/') else node.namespace}/{node.name or '*'}"
-
-    def made(kind: EndpointKind, name: str, type_name: str) -> ExpandedInterface:
-        return ExpandedInterface(kind, name, type_name, Certainty.EXACT, node.source, built_in=True)
-
-    events = "rcl_interfaces/msg/ParameterEvent"
-    yield made(EndpointKind.PUBLISHER, "/parameter_events", events)
-    yield made(EndpointKind.PUBLISHER, "/rosout", "rcl_interfaces/msg/Log")
-    if node.library is ClientLibrary.RCLCPP:
-        yield made(EndpointKind.SUBSCRIPTION, "/parameter_events", events)
-    for service, type_name in PARAMETER_SERVICES.items():
-        yield made(EndpointKind.SERVICE_SERVER, f"{base}/{service}", type_name)
-    description = "type_description_interfaces/srv/GetTypeDescription"
-    yield made(EndpointKind.SERVICE_SERVER, f"{base}/get_type_description", description)
-    if node.lifecycle:
-        for service, type_name in _LIFECYCLE_SERVICES.items():
-            yield made(EndpointKind.SERVICE_SERVER, f"{base}/{service}", type_name)
-        transition = "lifecycle_msgs/msg/TransitionEvent"
-        yield made(EndpointKind.PUBLISHER, f"{base}/transition_event", transition)
+    base = join(node.namespace or "/", node.name or "*")
+    conditions = _OF_EVERY_NODE | ({BuiltinCondition.LIFECYCLE} if node.lifecycle else set())
+    for row in built_in_interfaces(DISTROS[-1], node.library, frozenset(conditions)):
+        name = row.name.replace("~", base, 1)
+        yield ExpandedInterface(row.kind, name, row.type, Certainty.EXACT, node.source, built_in=True)

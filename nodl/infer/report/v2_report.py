@@ -82,15 +82,12 @@ def open_questions(node: NodeInterface) -> list[str]:
 
 
 def _document(node: NodeInterface, *, listener: bool) -> str:
-    entries = list(
-        dict.fromkeys(entry for e in node.endpoints if (entry := _entry(e, node.depends)) is not None)
-    )
-    lines = [f"# Node {node.name or '(name not known)'}, inferred from {node.source}."]
-    lines += [
+    found = (_entry(endpoint, node.depends) for endpoint in node.endpoints)
+    entries = list(dict.fromkeys(entry for entry in found if entry is not None))
+    lines = [
+        f"# Node {node.name or '(name not known)'}, inferred from {node.source}.",
         "# SYSTEM_DEFAULT: quality of service that is not inferred; put in what the code asks for.",
         "nodl_version: 2",
-    ]
-    lines += [
         "codegen:",
         f"  {IDENTITY_KEY}:",
         *(f"    {line}" for line in _section(node, entries, listener)),
@@ -108,9 +105,8 @@ def _document(node: NodeInterface, *, listener: bool) -> str:
                 listed.setdefault((entry.name, entry.type), set()).add(entry.qos)
         if listed:
             lines.append(f"{category}:")
-        topics = kind in (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION)
         lines += [
-            f"  - {{name: {_quoted(name)}, type: {_quoted(type_)}{_qos(found) if topics else ''}}}"
+            f"  - {{name: {_quoted(name)}, type: {_quoted(type_)}{_qos(found) if kind.family == 'topic' else ''}}}"
             for (name, type_), found in sorted(listed.items())
         ]
     return "\n".join([*lines, ""])
@@ -156,11 +152,8 @@ def _entry(endpoint: Endpoint, depends: Dependence | None = None) -> _Entry | No
     template = endpoint.name.unconditional
     filled = template.fill({})
     name = filled.text
-    if (
-        not filled.is_literal
-        or not re.search(NAME_PATTERN, name)
-        or not re.search(TYPE_PATTERN, endpoint.type)
-    ):
+    is_name = filled.is_literal and re.search(NAME_PATTERN, name)
+    if not is_name or not re.search(TYPE_PATTERN, endpoint.type):
         return None
     variation = depends.variations.get((endpoint.kind, endpoint.name.text)) if depends is not None else None
     if variation is not None:

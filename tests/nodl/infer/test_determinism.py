@@ -13,7 +13,7 @@ import pytest
 
 from nodl.infer import InferredSystem, infer_paths
 from nodl.infer.report.expanded import expand
-from nodl.infer.report.json_report import to_json
+from nodl.infer.report.written import to_json
 
 # Each level of calls doubles the work: without a budget this would take minutes.
 _ENDLESS = "\n".join(

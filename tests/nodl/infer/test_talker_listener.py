@@ -15,10 +15,9 @@ import pytest
 
 from nodl.infer import InferredSystem, infer_executable
 from nodl.infer.report.expanded import expand
-from nodl.infer.report.json_report import to_json
 from nodl.infer.report.nodl_report import to_v1
-from nodl.infer.report.policy_report import to_policy
 from nodl.infer.report.v2_report import to_v2
+from nodl.infer.report.written import to_json, to_policy
 
 Infer = Callable[..., InferredSystem]
 

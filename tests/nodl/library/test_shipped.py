@@ -40,7 +40,7 @@ def test_a_look_up_opens_one_document(monkeypatch: pytest.MonkeyPatch) -> None:
         opened.append(file)
         return read_library_document(folder, file)
 
-    monkeypatch.setattr("nodl.library.read_library_document", read)
+    monkeypatch.setattr("nodl.library.document.read_library_document", read)
     assert Library().find("nav2_lifecycle_manager", "lifecycle_manager", distro="jazzy")
     assert len(opened) <= 1
 
