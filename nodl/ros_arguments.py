@@ -1,4 +1,4 @@
-"""ROS arguments that a program gives itself: ``rclpy.init(args=...)``, ``Node(cli_args=...)``.
+"""ROS arguments: of a command line, or given in code (``rclpy.init(args=...)``, ``Node(cli_args=...)``).
 
 Words in, rules and parameters out; pure. As rcl reads them (ros2/rcl, ``arguments.c``): flags between ``--ros-args``
 and ``--`` or the end, and outside of it each word that is a rule (``a:=b``), which is deprecated and still obeyed.

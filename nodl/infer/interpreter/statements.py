@@ -15,16 +15,7 @@ from nodl.infer.interpreter.managers import run_with
 from nodl.infer.interpreter.operators import binary_operation
 from nodl.infer.interpreter.raising import throw, throw_value
 from nodl.infer.interpreter.run import Executor, Run
-from nodl.infer.values import (
-    ANY,
-    NONE,
-    ClassValue,
-    External,
-    Sequence,
-    Value,
-    join,
-    sole,
-)
+from nodl.infer.values import ANY, NONE, ClassValue, External, Sequence, Value, join, sole
 
 
 def _expression(run: Run, node: ast.Expr, frame: Frame) -> bool:
