@@ -11,7 +11,7 @@ Pure; read by policy derivation and by the reports of inference.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
 from enum import Enum
 
 from enclave_launch.boundary.light import NamedTuple
@@ -53,7 +53,7 @@ class BuiltIn(NamedTuple):
 _P, _S, _R = EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION, EndpointKind.SERVICE_SERVER
 _PARAMETERS = "rclcpp parameter_service.cpp, rclpy parameter_service.py"
 _LIFECYCLE = "rcl_lifecycle com_interface.c"
-_CONTAINER = "rclcpp_components component_manager.cpp"
+_LOGGERS = "rclcpp node_logger_services.cpp, rclpy logging_service.py"
 _EVENT = "rcl_interfaces/msg/ParameterEvent"
 
 PARAMETER_SERVICES = {
@@ -66,6 +66,20 @@ PARAMETER_SERVICES = {
 }
 """Below a node's name: what it serves, and what a client of its parameters calls; with their types."""
 
+LOGGER_SERVICES = {
+    "get_logger_levels": "rcl_interfaces/srv/GetLoggerLevels",
+    "set_logger_levels": "rcl_interfaces/srv/SetLoggerLevels",
+}
+"""The same for a node with logger services."""
+
+
+def _services(
+    above: str, types: Mapping[str, str], source: str, condition: BuiltinCondition, since: str = DISTROS[0]
+) -> Iterator[BuiltIn]:
+    for name, type_name in types.items():
+        yield BuiltIn(_R, f"{above}{name}", type_name, source, condition, since=since)
+
+
 TABLE: tuple[BuiltIn, ...] = (
     BuiltIn(_P, "/rosout", "rcl_interfaces/msg/Log", "rcl logging_rosout.c"),
     BuiltIn(
@@ -76,10 +90,7 @@ TABLE: tuple[BuiltIn, ...] = (
         BuiltinCondition.PARAMETERS,
     ),
     BuiltIn(_S, "/parameter_events", _EVENT, "rclcpp time_source.cpp", library=ClientLibrary.RCLCPP),
-    *(
-        BuiltIn(_R, f"~/{name}", type_name, _PARAMETERS, BuiltinCondition.PARAMETERS)
-        for name, type_name in PARAMETER_SERVICES.items()
-    ),
+    *_services("~/", PARAMETER_SERVICES, _PARAMETERS, BuiltinCondition.PARAMETERS),
     BuiltIn(
         _R,
         "~/get_type_description",
@@ -95,47 +106,32 @@ TABLE: tuple[BuiltIn, ...] = (
         "rclcpp time_source.cpp, rclpy time_source.py",
         BuiltinCondition.SIM_TIME,
     ),
-    *(
-        BuiltIn(_R, f"~/{name}", f"lifecycle_msgs/srv/{type_name}", _LIFECYCLE, BuiltinCondition.LIFECYCLE)
-        for name, type_name in (
-            ("change_state", "ChangeState"),
-            ("get_state", "GetState"),
-            ("get_available_states", "GetAvailableStates"),
-            ("get_available_transitions", "GetAvailableTransitions"),
-            ("get_transition_graph", "GetAvailableTransitions"),
-        )
+    *_services(
+        "~/",
+        {
+            "change_state": "lifecycle_msgs/srv/ChangeState",
+            "get_state": "lifecycle_msgs/srv/GetState",
+            "get_available_states": "lifecycle_msgs/srv/GetAvailableStates",
+            "get_available_transitions": "lifecycle_msgs/srv/GetAvailableTransitions",
+            "get_transition_graph": "lifecycle_msgs/srv/GetAvailableTransitions",
+        },
+        _LIFECYCLE,
+        BuiltinCondition.LIFECYCLE,
     ),
     BuiltIn(
         _P, "~/transition_event", "lifecycle_msgs/msg/TransitionEvent", _LIFECYCLE, BuiltinCondition.LIFECYCLE
     ),
-    *(
-        BuiltIn(
-            _R,
-            f"~/_container/{name}",
-            f"composition_interfaces/srv/{type_name}",
-            _CONTAINER,
-            BuiltinCondition.CONTAINER,
-        )
-        for name, type_name in (
-            ("load_node", "LoadNode"),
-            ("unload_node", "UnloadNode"),
-            ("list_nodes", "ListNodes"),
-        )
+    *_services(
+        "~/_container/",
+        {
+            "load_node": "composition_interfaces/srv/LoadNode",
+            "unload_node": "composition_interfaces/srv/UnloadNode",
+            "list_nodes": "composition_interfaces/srv/ListNodes",
+        },
+        "rclcpp_components component_manager.cpp",
+        BuiltinCondition.CONTAINER,
     ),
-    *(
-        BuiltIn(
-            _R,
-            f"~/{name}",
-            f"rcl_interfaces/srv/{type_name}",
-            "rclcpp node_logger_services.cpp, rclpy logging_service.py",
-            BuiltinCondition.LOGGER_SERVICES,
-            since="iron",
-        )
-        for name, type_name in (
-            ("get_logger_levels", "GetLoggerLevels"),
-            ("set_logger_levels", "SetLoggerLevels"),
-        )
-    ),
+    *_services("~/", LOGGER_SERVICES, _LOGGERS, BuiltinCondition.LOGGER_SERVICES, since="iron"),
     BuiltIn(
         _S, "/tf_static", "tf2_msgs/msg/TFMessage", "tf2_ros transform_listener", BuiltinCondition.TF_LISTENER
     ),

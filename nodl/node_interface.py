@@ -37,6 +37,11 @@ class EndpointKind(TextEnum):
         return self.value.rpartition("_")[2]
 
     @property
+    def type_folder(self) -> str:
+        """``msg``, ``srv`` or ``action``: the middle part of its interface types."""
+        return {"topic": "msg", "service": "srv", "action": "action"}[self.family]
+
+    @property
     def category(self) -> str:
         """``publishers``, ``service_servers`` ...: the lists of NoDL v2."""
         return f"{self.value}s"

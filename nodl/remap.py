@@ -12,7 +12,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from contextlib import suppress
-from enum import Enum
 
 from enclave_launch.boundary.light import NamedTuple, TextEnum, late_pattern
 from nodl.names import InvalidNameError, expand_name, join, shown, validate_full_name

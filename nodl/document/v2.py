@@ -164,10 +164,7 @@ def _field(entry: YamlMap, key: str) -> tuple[str, SourceRef]:
 def _full_type(type_name: str, kind: EndpointKind) -> str:
     """``std_msgs/String`` -> ``std_msgs/msg/String``: the middle part may be omitted in v2."""
     package, _, rest = type_name.partition("/")
-    if "/" in rest:
-        return type_name
-    middle = {"topic": "msg", "service": "srv"}.get(kind.family, kind.family)
-    return f"{package}/{middle}/{rest}"
+    return type_name if "/" in rest else f"{package}/{kind.type_folder}/{rest}"
 
 
 def _parameters(documents: Sequence[Included]) -> dict[str, str]:

@@ -19,6 +19,7 @@ from collections.abc import Iterator
 
 from enclave_launch.boundary.light import NamedTuple
 from enclave_launch.boundary.words import counted
+from nodl.builtin_interfaces import LOGGER_SERVICES
 from nodl.document.v2_section import section_of
 from nodl.errors import InvalidElementError
 from nodl.name_template import NameTemplate, ParameterPart
@@ -87,11 +88,9 @@ def logger_services(root: YamlMap) -> Iterator[Endpoint]:
     """The services of a node that was made with ``enable_logger_service`` (rclcpp node_logging.cpp)."""
     given = _section(root).get("logger_services")
     if isinstance(given, YamlScalar) and given.value is True:
-        for name, type_name in (("get", "GetLoggerLevels"), ("set", "SetLoggerLevels")):
-            template = NameTemplate.literal(f"~/{name}_logger_levels")
-            yield Endpoint(
-                EndpointKind.SERVICE_SERVER, template, f"rcl_interfaces/srv/{type_name}", given.source
-            )
+        for name, type_name in LOGGER_SERVICES.items():
+            template = NameTemplate.literal(f"~/{name}")
+            yield Endpoint(EndpointKind.SERVICE_SERVER, template, type_name, given.source)
 
 
 def _section(root: YamlMap) -> dict[str, YamlValue]:

@@ -15,7 +15,7 @@ from nodl.graph.model import Graph
 from nodl.graph.rclpy_graph import RclpyObserver
 
 INTERVAL = 0.1  # seconds between two looks: clients that call once and leave are there for about that long
-SOURCES = ("auto", "cyclonedds", "rclpy")
+SOURCES = ("auto", "cyclonedds", "rclpy")  # all but the first are packages
 
 
 _OF_RCLPY = (
@@ -48,10 +48,9 @@ class Where(NamedTuple):
 def chosen_source(wanted: str) -> str:
     """``auto``: Cyclone DDS's binding, which sees more (processes, what is not ROS), else rclpy. Raises
     ``ObserverError`` where that is not installed."""
-    packages = {"cyclonedds": "cyclonedds", "rclpy": "rclpy"}
-    for name in (wanted,) if wanted != "auto" else tuple(packages):
-        if importlib.util.find_spec(packages[name]) is not None:
-            return name
+    for package in (wanted,) if wanted != "auto" else SOURCES[1:]:
+        if importlib.util.find_spec(package) is not None:
+            return package
     raise ObserverError(
         f"nothing to observe with ({wanted}): install the Python binding of Cyclone DDS (pip install "
         "'enclave-launch[observe]'; it is built against an installed Cyclone DDS 0.10), or source a ROS 2 workspace, "

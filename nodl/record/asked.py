@@ -12,7 +12,7 @@ from itertools import takewhile
 from types import MappingProxyType
 from typing import NamedTuple
 
-from nodl.builtin_interfaces import PARAMETER_SERVICES
+from nodl.builtin_interfaces import LOGGER_SERVICES, PARAMETER_SERVICES
 from nodl.node_interface import ClientLibrary, EndpointKind
 from nodl.record.assembly import RecordedNode, RecordedProcess
 from nodl.record.lines import EndpointMade, LoadedComponent, StartedProcess
@@ -22,7 +22,6 @@ from nodl.remap import RemapRules, valid_rules
 REFUSED = 1
 """``RCL_RET_ERROR``: what an endpoint gives that DDS refuses. Other results say that an argument is bad."""
 
-LOGGER_SERVICES = frozenset({"get_logger_levels", "set_logger_levels"})
 _INTROSPECTION = "/_service_event"
 _FIRST_PART = "/_action/send_goal"
 

@@ -12,10 +12,11 @@ from enum import Enum
 from functools import partial
 from typing import NamedTuple
 
+from nodl.builtin_interfaces import LOGGER_SERVICES
 from nodl.name_template import NameTemplate
 from nodl.names import InvalidNameError, split_fqn
 from nodl.node_interface import RANDOM_ENDING, Endpoint, EndpointKind, NodeInterface
-from nodl.record.asked import LOGGER_SERVICES, Asked, AskedNode
+from nodl.record.asked import Asked, AskedNode
 from nodl.record.origins import arguments_as_inputs
 from nodl.remap import NodeNames
 

@@ -24,15 +24,6 @@ _RANDOM = re.compile(r"(static_transform_publisher)_([A-Za-z0-9]+)\Z")  # tf2_ro
 OBSERVED = "observed"
 """What ``AskedNode.started_as`` is for a node of the graph, which says nothing of states."""
 
-_UNKNOWN_TYPES = {
-    EndpointKind.PUBLISHER: "unknown/msg/Unknown",
-    EndpointKind.SUBSCRIPTION: "unknown/msg/Unknown",
-    EndpointKind.SERVICE_SERVER: "unknown/srv/Unknown",
-    EndpointKind.SERVICE_CLIENT: "unknown/srv/Unknown",
-    EndpointKind.ACTION_SERVER: "unknown/action/Unknown",
-    EndpointKind.ACTION_CLIENT: "unknown/action/Unknown",
-}
-
 
 class LearntEndpoint(NamedTuple):
     """One name of a node. ``written`` where the manifest cannot hold it as a plain name; ``moved``: rules of the
@@ -212,7 +203,7 @@ def _entry(name: Name, origin: NameOrigin, names: set[Name], seen: Sequence[_See
     return LearntEndpoint(
         name.kind,
         name.name,
-        name.type or _UNKNOWN_TYPES[name.kind],
+        name.type or f"unknown/{name.kind.type_folder}/Unknown",
         _common([asked.qos for asked, _ in askers]),
         runs,
         origin,

@@ -30,9 +30,7 @@ _CHANGES = frozenset({"append", "extend", "insert", "remove", "pop", "clear"})
 
 def _call_partial(run: Run, partial: Partial, call: Call) -> Value:
     args = call.args.preceded(*partial.positional)
-    args = Arguments(
-        args.positional, {**dict(partial.keywords), **args.keywords}, args.more, args.more_keywords
-    )
+    args.keywords = {**dict(partial.keywords), **args.keywords}
     return run.call(partial.function, args, call.node, call.frame)
 
 
@@ -63,13 +61,8 @@ def _call_instance(run: Run, instance: Instance, call: Call) -> Value:
     if isinstance(instance.cls, External):
         run.escape(call.args)
         return ANY
-    return run.call(
-        run.attribute((instance,), "__call__", call.node, call.frame), call.args, call.node, call.frame
-    )
-
-
-def _call_class_method(run: Run, method: ClassMethod, call: Call) -> Value:
-    return run.call(method.function, call.args, call.node, call.frame)
+    method = run.attribute((instance,), "__call__", call.node, call.frame)
+    return run.call(method, call.args, call.node, call.frame)
 
 
 def _run_generator(run: Run, atom: NativeObject, call: Call) -> Value:
@@ -99,7 +92,7 @@ CALLABLES: dict[type, Caller] = {
     Partial: _call_partial,
     Getter: _call_getter,
     Instance: _call_instance,
-    ClassMethod: _call_class_method,
+    ClassMethod: lambda run, method, call: run.call(method.function, call.args, call.node, call.frame),
     ClassValue: instantiate,
     Unknown: _call_unknown,
     External: foreign.call_external,

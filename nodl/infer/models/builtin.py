@@ -9,7 +9,7 @@ from nodl.infer.interpreter.frames import Call
 from nodl.infer.interpreter.iterate import keys_of
 from nodl.infer.interpreter.run import Model, Run
 from nodl.infer.models import iterables, reflection
-from nodl.infer.values import ANY, Dictionary, Sequence, Unknown, Value, boolean, sole, unknown
+from nodl.infer.values import ANY, BOOLEAN, NONE, Dictionary, Sequence, Unknown, Value, boolean, sole, unknown
 
 
 def _str(run: Run, call: Call) -> Value:
@@ -81,7 +81,7 @@ FUNCTIONS: dict[str, Model] = {
         "tuple": iterables.made_sequence("tuple"),
         "set": iterables.call_set,
         "frozenset": iterables.call_set,
-        "iter": iterables.same_items,
+        "iter": lambda run, call: call.args.at(0) or ANY,  # walking along it gives the same
         "sorted": iterables.call_sorted,
         "reversed": iterables.call_reversed,
         "enumerate": iterables.call_enumerate,
@@ -96,23 +96,17 @@ FUNCTIONS: dict[str, Model] = {
         "type": reflection.call_type,
         "format": _format,
         "repr": _repr,
-        "min": iterables.chosen,
-        "max": iterables.chosen,
-        "next": iterables.chosen,
-        "any": iterables.any_all,
-        "all": iterables.any_all,
-        "callable": iterables.any_all,
-        "eval": reflection.dynamic_code,
-        "exec": reflection.dynamic_code,
-        "compile": reflection.dynamic_code,
+        **dict.fromkeys(("min", "max", "next"), iterables.chosen),
+        **dict.fromkeys(("any", "all", "callable"), lambda run, call: BOOLEAN),
+        **dict.fromkeys(("eval", "exec", "compile"), reflection.dynamic_code),
         "__import__": reflection.import_dynamic,
         "vars": reflection.call_vars,
         "globals": reflection.call_globals,
         "locals": reflection.call_locals,
         "input": lambda run, call: unknown("text that the user types"),
-        "object": reflection.call_object,
+        "object": lambda run, call: ANY,
         "object.__new__": reflection.object_new,
-        "object.__init_subclass__": reflection.nothing,
+        "object.__init_subclass__": lambda run, call: NONE,
         "property": reflection.call_property,
     }.items()
 }

@@ -13,7 +13,6 @@ from nodl.infer.interpreter.run import Run
 from nodl.infer.text import input_of, with_edit
 from nodl.infer.values import (
     ANY,
-    BOOLEAN,
     BOTTOM,
     NONE,
     OTHER,
@@ -177,13 +176,3 @@ def chosen(run: Run, call: Call) -> Value:
     if len(call.args.positional) > 1 and not call.args.more:
         return join_all((*call.args.positional, argument_items(run, call).any_element())) or ANY
     return argument_items(run, call).any_element() or ANY
-
-
-def same_items(run: Run, call: Call) -> Value:
-    """``iter``: the argument itself, since walking along it gives the same."""
-    return call.args.at(0) or ANY
-
-
-def any_all(run: Run, call: Call) -> Value:
-    """``any``, ``all`` and ``callable``: true or false, left open."""
-    return BOOLEAN

@@ -216,18 +216,8 @@ def object_new(run: Run, call: Call) -> Value:
     return tuple(made)
 
 
-def nothing(run: Run, call: Call) -> Value:
-    """The model of functions that have no effect and return ``None``."""
-    return NONE
-
-
 def call_property(run: Run, call: Call) -> Value:
     """``property(fget, fset, fdel)``: what is left out, or ``None``, stays empty."""
     given = [call.args.at(index, name) for index, name in enumerate(("fget", "fset", "fdel"))]
     getter, setter, deleter = (tuple(a for a in value or () if a is not None) for value in given)
     return (PropertyValue(getter, setter, deleter),)
-
-
-def call_object(run: Run, call: Call) -> Value:
-    """``object()``: an unknown value."""
-    return ANY

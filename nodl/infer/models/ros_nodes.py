@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from nodl.builtin_interfaces import LOGGER_SERVICES
 from nodl.infer.findings import NodeRecord
 from nodl.infer.interpreter.conditions import truth
 from nodl.infer.interpreter.frames import Call
@@ -26,12 +27,6 @@ from nodl.node_interface import EndpointKind
 from nodl.ros_arguments import ros_arguments
 
 NODE_CLASS = "rclpy.node.Node"
-
-
-LOGGER_SERVICES = {  # rclpy/logging_service.py
-    "~/get_logger_levels": "rcl_interfaces/srv/GetLoggerLevels",
-    "~/set_logger_levels": "rcl_interfaces/srv/SetLoggerLevels",
-}
 
 
 LIFECYCLE_CLASS = "rclpy.lifecycle.Node"
@@ -70,7 +65,7 @@ def initialise_node(run: Run, instance: Instance, path: str, call: Call) -> None
         assign_parameters(run, record, overrides, call)
     if truth(call.args.at(-1, "enable_logger_service") or (False,)) is not False:
         for service, service_type in LOGGER_SERVICES.items():
-            record.add_endpoint(EndpointKind.SERVICE_SERVER, service, service_type, call.source)
+            record.add_endpoint(EndpointKind.SERVICE_SERVER, f"~/{service}", service_type, call.source)
 
 
 def _override_parameters(run: Run, record: NodeRecord, arguments: Value) -> None:

@@ -62,18 +62,13 @@ class Helper(NamedTuple):
 
 
 _CALLBACK = Argument(2, "callback")
+_MESSAGES = Argument(0, "msg_type"), Argument(1, "topic")
 
 NODE_ENDPOINTS: dict[str, EndpointCall] = {
-    "create_publisher": EndpointCall(PUBLISHER, Argument(0, "msg_type"), Argument(1, "topic"), qos=2),
-    "create_lifecycle_publisher": EndpointCall(
-        PUBLISHER, Argument(0, "msg_type"), Argument(1, "topic"), qos=2
-    ),
+    "create_publisher": EndpointCall(PUBLISHER, *_MESSAGES, qos=2),
+    "create_lifecycle_publisher": EndpointCall(PUBLISHER, *_MESSAGES, qos=2),
     "create_subscription": EndpointCall(
-        SUBSCRIPTION,
-        Argument(0, "msg_type"),
-        Argument(1, "topic"),
-        callbacks=(CallbackArgument(_CALLBACK, 1),),
-        qos=3,
+        SUBSCRIPTION, *_MESSAGES, callbacks=(CallbackArgument(_CALLBACK, 1),), qos=3
     ),
     "create_service": EndpointCall(
         SERVER, Argument(0, "srv_type"), Argument(1, "srv_name"), callbacks=(CallbackArgument(_CALLBACK, 2),)
@@ -92,11 +87,9 @@ ENDPOINT_CALLS: dict[tuple[str, str], EndpointCall] = {
         _ACTION_TYPE,
         _ACTION_NAME,
         _NODE,
-        callbacks=(
-            CallbackArgument(Argument(3, "execute_callback"), 1),
-            CallbackArgument(Argument(-1, "goal_callback"), 1),
-            CallbackArgument(Argument(-1, "handle_accepted_callback"), 1),
-            CallbackArgument(Argument(-1, "cancel_callback"), 1),
+        callbacks=tuple(
+            CallbackArgument(Argument(position, f"{name}_callback"), 1)
+            for position, name in ((3, "execute"), (-1, "goal"), (-1, "handle_accepted"), (-1, "cancel"))
         ),
     ),
     ("message_filters", "Subscriber"): EndpointCall(
@@ -107,7 +100,6 @@ ENDPOINT_CALLS: dict[tuple[str, str], EndpointCall] = {
     ),
 }
 
-_NAMESPACE = Argument(1, "namespace")
 _TF = FixedEndpoint(SUBSCRIPTION, "/tf", "tf2_msgs/msg/TFMessage", unless=Argument(-1, "static_only"))
 _TF_STATIC = FixedEndpoint(SUBSCRIPTION, "/tf_static", "tf2_msgs/msg/TFMessage")
 
@@ -127,22 +119,13 @@ HELPERS: dict[tuple[str, str], Helper] = {
     ),
     ("interactive_markers", "InteractiveMarkerServer"): Helper(
         _NODE,
-        (
-            FixedEndpoint(
-                SERVER,
-                "/get_interactive_markers",
-                "visualization_msgs/srv/GetInteractiveMarkers",
-                below=_NAMESPACE,
-            ),
-            FixedEndpoint(
-                PUBLISHER, "/update", "visualization_msgs/msg/InteractiveMarkerUpdate", below=_NAMESPACE
-            ),
-            FixedEndpoint(
-                SUBSCRIPTION,
-                "/feedback",
-                "visualization_msgs/msg/InteractiveMarkerFeedback",
-                below=_NAMESPACE,
-            ),
+        tuple(
+            FixedEndpoint(kind, name, f"visualization_msgs/{type_name}", below=Argument(1, "namespace"))
+            for kind, name, type_name in (
+                (SERVER, "/get_interactive_markers", "srv/GetInteractiveMarkers"),
+                (PUBLISHER, "/update", "msg/InteractiveMarkerUpdate"),
+                (SUBSCRIPTION, "/feedback", "msg/InteractiveMarkerFeedback"),
+            )
         ),
     ),
     ("rclpy", "ParameterEventHandler"): Helper(
@@ -154,10 +137,10 @@ HELPERS: dict[tuple[str, str], Helper] = {
 NODE_CALLBACKS: dict[str, CallbackArgument] = {
     "create_timer": CallbackArgument(Argument(1, "callback"), 0),
     "create_guard_condition": CallbackArgument(Argument(0, "callback"), 0),
-    "add_on_set_parameters_callback": CallbackArgument(Argument(0, "callback"), 1),
-    "add_pre_set_parameters_callback": CallbackArgument(Argument(0, "callback"), 1),
-    "add_post_set_parameters_callback": CallbackArgument(Argument(0, "callback"), 1),
-    "set_parameters_callback": CallbackArgument(Argument(0, "callback"), 1),
+    **{
+        f"{before}set_parameters_callback": CallbackArgument(Argument(0, "callback"), 1)
+        for before in ("add_on_", "add_pre_", "add_post_", "")
+    },
     "add_waitable": CallbackArgument(Argument(0, "waitable"), None),
 }
 
