@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib import import_module
+from pathlib import Path
 
 from enclave_launch.boundary.command_line import CommandParser, add_verbosity, add_version, complete, guarded
-from enclave_launch.boundary.terminal import safe_output
+from enclave_launch.boundary.terminal import printable, safe_output
 from nodl.errors import NoDLError
 
 VERBS = ("check_record", "convert", "infer", "library", "observe", "show", "validate")
@@ -52,6 +53,19 @@ def build_parser() -> argparse.ArgumentParser:
         import_module(f"nodl.verb.{name}").add_parser(verbs)
     add_verbosity(parser)
     return parser
+
+
+def encodable(text: str) -> str:
+    """Names of files need not be UTF-8; their odd bytes are shown as escapes."""
+    return text.encode("utf-8", "backslashreplace").decode()
+
+
+def write_documents(folder: Path, documents: Mapping[str, str]) -> None:
+    """Write each text into a file of that name, and say which."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, text in documents.items():
+        (folder / name).write_text(encodable(text), encoding="utf-8")
+        print(printable(str(folder / name)))
 
 
 def add_prefix_argument(parser: argparse.ArgumentParser) -> None:

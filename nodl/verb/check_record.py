@@ -79,10 +79,9 @@ def run(arguments: argparse.Namespace) -> int:
     for text in complaints:
         print(f"the record is not complete: {text}", file=sys.stderr)
     prefixes = search_prefixes(arguments.prefix)
-    lookup = ManifestLookup(prefixes, arguments.nodl)
-    folders = tuple(map(str, arguments.source))
+    known = _Known(ManifestLookup(prefixes, arguments.nodl), prefixes, tuple(map(str, arguments.source)))
     judges = JUDGED if arguments.judge == "all" else (arguments.judge,)
-    judgements = [each for node in nodes for each in _judge(node, lookup, prefixes, folders, judges)]
+    judgements = [each for node in nodes for each in _judge(node, known, judges)]
     sys.stdout.write(_json(judgements) if arguments.format == "json" else _text(judgements))
     fits = all(each.comparison is not None and each.comparison.fits for each in _counted(judgements))
     return 0 if fits else 1
@@ -109,39 +108,37 @@ def _recorded(files: Iterable[Path]) -> tuple[list[AskedNode], list[str]]:
     return nodes, complaints
 
 
-def _judge(
-    node: AskedNode,
-    lookup: ManifestLookup,
-    prefixes: Sequence[str],
-    folders: tuple[str, ...],
-    judges: Iterable[str],
-) -> Iterable[Judgement]:
+class _Known(NamedTuple):
+    """Where descriptions come from; ``folders`` with sources."""
+
+    lookup: ManifestLookup
+    prefixes: tuple[str, ...]
+    folders: tuple[str, ...]
+
+
+def _judge(node: AskedNode, known: _Known, judges: Iterable[str]) -> Iterable[Judgement]:
     from nodl.record.checking import compare
 
     for judge in judges:
-        interfaces, why = _SAYS[judge](node, lookup, prefixes, folders)
+        interfaces, why = _SAYS[judge](node, known)
         described = _at_this_start(node, interfaces)
         yield Judgement(node, judge, compare(node, described) if described else None, why)
 
 
-def _described(
-    node: AskedNode, lookup: ManifestLookup, prefixes: Sequence[str], folders: tuple[str, ...]
-) -> tuple[Sequence[NodeInterface], str]:
-    found = lookup.find(node.package, executable=node.executable or None, plugin=node.plugin or None)
+def _described(node: AskedNode, known: _Known) -> tuple[Sequence[NodeInterface], str]:
+    found = known.lookup.find(node.package, executable=node.executable or None, plugin=node.plugin or None)
     return found.found, f"no manifest; looked at {', '.join(found.searched)}"
 
 
-def _inferred(
-    node: AskedNode, lookup: ManifestLookup, prefixes: Sequence[str], folders: tuple[str, ...]
-) -> tuple[Sequence[NodeInterface], str]:
+def _inferred(node: AskedNode, known: _Known) -> tuple[Sequence[NodeInterface], str]:
     from nodl.infer.executable import infer_executable
 
     inferred = infer_executable(
         node.package,
         node.executable or None,
         node.plugin or None,
-        prefixes=prefixes,
-        sources=_sources(tuple(prefixes), folders),
+        prefixes=known.prefixes,
+        sources=_sources(known.prefixes, known.folders),
         start_of=_RecordedStart(node),
     )
     return inferred.interfaces, inferred.why
@@ -170,9 +167,7 @@ def _sources(prefixes: tuple[str, ...], folders: tuple[str, ...]) -> SourcesInRe
     return SourcesInReach(prefixes, folders)
 
 
-def _of_library(
-    node: AskedNode, lookup: ManifestLookup, prefixes: Sequence[str], folders: tuple[str, ...]
-) -> tuple[Sequence[NodeInterface], str]:
+def _of_library(node: AskedNode, known: _Known) -> tuple[Sequence[NodeInterface], str]:
     hit = Library().find(node.package, node.plugin or node.executable, distro=node.distro)
     return ((), "the library has no document of it") if hit is None else ((hit.document.interface,), "")
 

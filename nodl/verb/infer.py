@@ -15,7 +15,7 @@ from nodl.ament_index import PackageNotFoundError, executables, package_prefix, 
 from nodl.lookup import ManifestLookup
 from nodl.node_interface import Gap
 from nodl.source_ref import SourceRef
-from nodl.verb import add_prefix_argument
+from nodl.verb import add_prefix_argument, encodable, write_documents
 
 if TYPE_CHECKING:
     from nodl.infer.report.expanded import ExpandedSystem
@@ -70,9 +70,9 @@ def run(args: argparse.Namespace) -> int:
     if chosen in ("v1", "v2") and not args.quiet:
         _tell_guesses(system)
     if args.output:
-        _write(args.output, documents)
+        write_documents(args.output, documents)
     else:
-        sys.stdout.write(_encodable("".join(documents.values())))
+        sys.stdout.write(encodable("".join(documents.values())))
     if not system.nodes:
         looked_at = counted(len(system.files), "source file")
         print(f"secure-nodl infer: error: no node was found in {looked_at}", file=sys.stderr)
@@ -111,7 +111,7 @@ def _compare(system: InferredSystem, prefixes: Sequence[str]) -> int:
             print(printable(f"{name}: no manifest; looked at {', '.join(manifest.searched)}"))
             continue
         found = lacking(manifest.found, nodes)
-        sys.stdout.write(_encodable(to_text(name, found)))
+        sys.stdout.write(encodable(to_text(name, found)))
         described, complete = described + 1, complete and not found.endpoints
     return 0 if described and complete else 1
 
@@ -149,18 +149,6 @@ def _writable(system: InferredSystem, with_gaps: bool) -> list[NodeInterface]:
         else:
             kept.append(node)
     return kept
-
-
-def _write(folder: Path, documents: dict[str, str]) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, text in documents.items():
-        (folder / name).write_text(_encodable(text), encoding="utf-8")
-        print(printable(str(folder / name)))
-
-
-def _encodable(text: str) -> str:
-    """Names of files need not be UTF-8; their odd bytes are shown as escapes."""
-    return text.encode("utf-8", "backslashreplace").decode()
 
 
 def _infer(subjects: list[str], prefixes: Sequence[str]) -> InferredSystem:

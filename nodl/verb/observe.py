@@ -20,12 +20,12 @@ from typing import TYPE_CHECKING, Any
 
 from enclave_launch.boundary.terminal import json_text, printable
 from nodl.errors import NoDLError
+from nodl.verb import write_documents
 
 if TYPE_CHECKING:
     from nodl.graph.model import Graph
     from nodl.graph.observation import Observed
     from nodl.graph.starts import StartedNode
-    from nodl.record.learning import LearntNode
 
 FORMATS = ("text", "json", "policy", "v2")
 _SECONDS = re.compile(r"([0-9]+(?:\.[0-9]+)?)(s|m|h)?\Z")
@@ -99,7 +99,7 @@ def run(arguments: argparse.Namespace) -> int:
     chosen = arguments.format or ("v2" if arguments.output else "text")
     documents = _documents(chosen, runs, arguments.output)
     if arguments.output:
-        _write(arguments.output, documents)
+        write_documents(arguments.output, documents)
     else:
         sys.stdout.write("".join(documents.values()))
     seen = any(True for each in runs for _ in each.graph.nodes)
@@ -160,7 +160,8 @@ def _manifests(runs: Sequence[Observed], folder: Path | None) -> dict[str, str]:
     found = learn_observed(runs)
     documents: dict[str, str] = {}
     for node in found.learnt.nodes:
-        name = manifest_file_name(node, _alone(node, found.learnt.nodes))
+        alone = sum(each.program == node.program for each in found.learnt.nodes) == 1
+        name = manifest_file_name(node, alone)
         path = folder / name if folder else None
         before = path.read_text(encoding="utf-8") if path is not None and path.exists() else ""
         documents[name] = manifest_text(node, before, OBSERVED_HEAD)
@@ -171,17 +172,6 @@ def _manifests(runs: Sequence[Observed], folder: Path | None) -> dict[str, str]:
             which = f"{node.program}, {node.key.node or 'a node that the launch renames'}"
             print(printable(f"secure-nodl observe: {which}: {note}"), file=sys.stderr)
     return documents
-
-
-def _alone(node: LearntNode, nodes: Sequence[LearntNode]) -> bool:
-    return sum(each.program == node.program for each in nodes) == 1
-
-
-def _write(folder: Path, documents: dict[str, str]) -> None:
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, text in documents.items():
-        (folder / name).write_text(text, encoding="utf-8")
-        print(folder / name)
 
 
 def _starts(words: Sequence[str]) -> tuple[StartedNode, ...]:
