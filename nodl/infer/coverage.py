@@ -109,7 +109,6 @@ class _Audit:
         self._called = called
         self._instantiated = instantiated
         self._file = ""
-        self._mentions: _Mentions | None = None
 
     def module(self, module: ModuleValue) -> None:
         self._file = module.source.path
@@ -162,33 +161,31 @@ class _Audit:
         if cls not in self._instantiated and not self._referred(cls.name):
             return False
         special = name.startswith("__") and name.endswith("__")
-        return special or node in self._run.bound or name in self._run.asked or name in self._found().texts
+        return special or node in self._run.bound or name in self._run.asked or name in self._mentions.texts
 
     def _referred(self, name: str) -> bool:
-        mentions = self._found()
+        mentions = self._mentions
         return mentions.name(name, self._file) or name in mentions.texts or name in self._run.asked
 
-    def _found(self) -> _Mentions:
-        if self._mentions is None:
-            self._mentions = _Mentions()
-            for module in self._run.modules.values():
-                path = module.source.path
-                names = self._mentions.names.setdefault(path, set())
-                imported = self._mentions.imported.setdefault(path, set())
-                self._collect(module.source.tree.body, names, imported)
-        return self._mentions
+    @functools.cached_property
+    def _mentions(self) -> _Mentions:
+        mentions = _Mentions()
+        for module in self._run.modules.values():
+            names = mentions.names.setdefault(module.source.path, set())
+            imported = mentions.imported.setdefault(module.source.path, set())
+            for node in self._executed(module.source.tree.body):
+                if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load):
+                    names.add(node.id)
+                elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+                    mentions.texts.add(node.value)
+                elif isinstance(node, ast.ImportFrom):
+                    imported.update(alias.name for alias in node.names)
+        return mentions
 
-    def _collect(self, body: list[ast.stmt], names: set[str], imported: set[str]) -> None:
-        assert self._mentions is not None
+    def _executed(self, body: list[ast.stmt]) -> Iterator[ast.AST]:
         for statement in body:
             if statement in self._run.executed and not _is_list_of_exports(statement):
-                for node in _referring(statement, self._called):
-                    if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load):
-                        names.add(node.id)
-                    elif isinstance(node, ast.Constant) and isinstance(node.value, str):
-                        self._mentions.texts.add(node.value)
-                    elif isinstance(node, ast.ImportFrom):
-                        imported.update(alias.name for alias in node.names)
+                yield from _referring(statement, self._called)
 
     def _gap(self, node: ast.AST, why: str) -> None:
         self.gaps.append(Gap(SourceRef(self._file, getattr(node, "lineno", 0)), why))

@@ -109,7 +109,8 @@ def _merged(paths: list[Path]) -> Findings:
     merged.by_path = True
     found: dict[object, set[Guards]] = {}
     for path in paths:
-        for record, endpoint in _endpoints(path):
+        made_there = ((record, each) for record in path.run.findings.nodes for each in record.endpoints)
+        for record, endpoint in made_there:
             found.setdefault(_identity(record, endpoint), set()).add(_guards(path.decisions))
     conditions = {identity: _simplified(guards) for identity, guards in found.items()}
     for path in paths:
@@ -126,26 +127,12 @@ def _merged(paths: list[Path]) -> Findings:
     return merged
 
 
-def _endpoints(path: Path) -> Iterator[tuple[NodeRecord, FoundEndpoint]]:
-    for record in path.run.findings.nodes:
-        for endpoint in record.endpoints:
-            yield record, endpoint
-
-
 def _identity(record: NodeRecord, endpoint: FoundEndpoint) -> object:
     """The same on all paths, though each has node records of its own."""
     name = endpoint.name
     if isinstance(name, Text):
         name = tuple((p.name, p.item, p.edits) if isinstance(p, Input) else p for p in name.pieces)
-    return (
-        record.source,
-        tuple(map(str, record.names)),
-        endpoint.kind,
-        str(name),
-        endpoint.type,
-        endpoint.source,
-        endpoint.qos,
-    )
+    return record.source, tuple(map(str, record.names)), endpoint._replace(name=str(name))
 
 
 def _guards(decisions: Decisions) -> Guards:

@@ -78,9 +78,8 @@ class Program:
     def __init__(self, roots: Iterable[str] = (), prefixes: Sequence[str] = ()):
         self.prefixes = tuple(prefixes)  # where packages are installed, with the data that programs ask for
         self.roots = list(dict.fromkeys(os.path.abspath(root) for root in roots))
-        self.asked: dict[
-            tuple[str, str], str
-        ] = {}  # what was asked of the disk, with a digest of what it said
+        # What was asked of the disk, with a digest of what it said.
+        self.asked: dict[tuple[str, str], str] = {}
         self._by_path: dict[str, SourceModule] = {}
         self._found: dict[tuple[str, str], str | None] = {}
         self._listings: dict[str, frozenset[str]] = {}
@@ -107,12 +106,10 @@ class Program:
         """
         said = self.asked.get((kind, what))
         if said is None:
-            if kind == "file":
-                said = digest_of(what)
-            elif kind == "folder":
+            if kind == "folder":
                 said = digest(sorted(self._listing(what)))
             else:
-                said = installed_in(what, self.prefixes)
+                said = digest_of(what) if kind == "file" else installed_in(what, self.prefixes)
             self.asked[kind, what] = said
         return said
 

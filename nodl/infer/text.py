@@ -120,9 +120,13 @@ def concatenate(left: TextAtom, right: TextAtom) -> TextAtom:
         return left or right
     head, tail = pieces_of(left), pieces_of(right)
     melts = len(head) + len(tail) > MAX_PARTS or type(head[-1]) is type(tail[0])
-    if melts or any(type(text) is str and len(text) > MAX_LENGTH for text in (left, right)):
+    if melts or _is_long(left) or _is_long(right):
         return text_of((*head, *tail))
     return make_text((*head, *tail))
+
+
+def _is_long(text: TextAtom) -> bool:
+    return type(text) is str and len(text) > MAX_LENGTH
 
 
 def concatenations(operands: Sequence[Sequence[TextAtom]]) -> list[TextAtom]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterable
 
-from enclave_launch.boundary.light import NamedTuple
 from nodl.infer.values import BOTTOM, FunctionValue, LocalCells, ModuleValue, Value, join
 from nodl.source_ref import SourceRef
 
@@ -87,12 +86,15 @@ class Arguments:
         return (*self.positional, *self.keywords.values(), self.more, self.more_keywords)
 
 
-class Call(NamedTuple):
+class Call:  # its fields are read so often that those of a named tuple would cost a launch of 50 nodes half a percent
     """A call as the models of libraries see it."""
 
-    args: Arguments
-    node: ast.AST
-    frame: Frame
+    __slots__ = ("args", "frame", "node")
+
+    def __init__(self, args: Arguments, node: ast.AST, frame: Frame) -> None:
+        self.args = args
+        self.node = node
+        self.frame = frame
 
     @property
     def source(self) -> SourceRef:

@@ -16,6 +16,7 @@ from nodl.infer.models import concrete
 from nodl.infer.text import Hole, Text, TextAtom, concatenate, concatenations, make_text
 from nodl.infer.values import (
     ANY,
+    BOTTOM,
     Dictionary,
     Instance,
     Items,
@@ -89,7 +90,11 @@ def _holds(value: Value, kind: type) -> bool:
 
 
 def _arithmetic(run: Run, node: ast.AST, left: Value, op: ast.operator, right: Value) -> Value:
-    return join_all(_arithmetic_atoms(run, node, a, op, b) for a in left for b in right) or ANY
+    result: Value = BOTTOM
+    for a in left:
+        for b in right:
+            result = join(result, _arithmetic_atoms(run, node, a, op, b))
+    return result or ANY
 
 
 def _arithmetic_atoms(run: Run, node: ast.AST, a: object, op: ast.operator, b: object) -> Value:

@@ -133,9 +133,8 @@ class Run(Allocations):
         self.limit = min(MAX_STEPS, MAX_STEPS_IN_VAIN)
         self.gave_up = False
         self.generators: dict[object, NativeObject] = {}  # in the hands of others, by the call that made them
-        self.called_back: dict[
-            tuple[object, int | None], WhatWasRead
-        ] = {}  # what callbacks read when they last ran
+        # What callbacks read when they last ran.
+        self.called_back: dict[tuple[object, int | None], WhatWasRead] = {}
         self.turns = MAX_TURNS
         self.undecided = 0  # tests outside of any undecided branch or repetition
         self.conditional = False  # one of them asks for the value of a parameter
@@ -164,12 +163,8 @@ class Run(Allocations):
         """Count what could have failed: an unknown or symbolic value, or the call of a library."""
         atom = value[0] if len(value) == 1 else None
         kind = type(atom)
-        if (
-            kind is Unknown
-            or kind is Text
-            or (len(value) != 1)
-            or (type(node) is ast.Call and (kind is External or self.tables.may_fail(atom)))
-        ):
+        unknown = len(value) != 1 or kind is Unknown or kind is Text
+        if unknown or (type(node) is ast.Call and (kind is External or self.tables.may_fail(atom))):
             self.risks += 1
         return value
 

@@ -43,7 +43,11 @@ def subscript(run: Run, node: ast.Subscript, frame: Frame) -> Value:
         for bound in (node.slice.lower, node.slice.upper, node.slice.step):
             if bound is not None:
                 run.evaluate(bound, frame)
-    return join_all(_element(run, atom, key, node, frame) for atom in owner if atom is not None) or ANY
+    result: Value = BOTTOM
+    for atom in owner:
+        if atom is not None:
+            result = join(result, _element(run, atom, key, node, frame))
+    return result or ANY
 
 
 def _element(run: Run, atom: object, key: Value, node: ast.Subscript, frame: Frame) -> Value:
@@ -139,9 +143,11 @@ def _sequence_item(run: Run, sequence: Sequence, key: Value) -> Value:
     if items.exact is None or sequence.escaped:
         return join(items.any_element(), ANY) if sequence.escaped else items.any_element() or ANY
     if all(type(index) is int for index in key):
-        exact, length = items.exact, len(items.exact)
-        inside = (index for index in key if isinstance(index, int) and -length <= index < length)
-        result = join_all(exact[index] for index in inside)
+        length = len(items.exact)
+        result: Value = BOTTOM
+        for index in key:
+            if isinstance(index, int) and -length <= index < length:
+                result = join(result, items.exact[index])
         if not result and is_settled(run):
             throw(run, IndexError)
         return result or ANY

@@ -39,18 +39,18 @@ def argument_items(run: Run, call: Call, index: int = 0) -> Items:
 def call_range(run: Run, call: Call) -> Value:
     """``range``: the numbers if they are known and few; else any number, tied to an input that bounds it."""
     bounds = [sole(value) for value in call.args.positional]
+    items = Items(None, unknown("a number of a loop"))
     if not bounds or call.args.more:  # range(*bounds)
-        return run.sequence(call.node, "tuple", Items(None, unknown("a number of a loop")))
+        return run.sequence(call.node, "tuple", items)
+    counted = input_of(bounds[-1]) if len(bounds) < 3 else None
+    if counted is not None and counted.item is None and (len(bounds) == 1 or isinstance(bounds[0], int)):
+        items = Items(None, (with_edit(counted, "range", tuple(map(str, bounds[:-1]))),))
     integers = [bound for bound in bounds if isinstance(bound, int)]
     if len(integers) == len(bounds) and (len(bounds) in (1, 2) or (len(bounds) == 3 and integers[2])):
         numbers = range(*integers)
         if len(numbers) <= MAX_RANGE:
-            return run.sequence(call.node, "tuple", Items(tuple((number,) for number in numbers)))
-    counted = input_of(bounds[-1]) if len(bounds) < 3 else None
-    if counted is not None and counted.item is None and (len(bounds) == 1 or isinstance(bounds[0], int)):
-        first = (str(bounds[0]),) if len(bounds) == 2 else ()
-        return run.sequence(call.node, "tuple", Items(None, (with_edit(counted, "range", first),)))
-    return run.sequence(call.node, "tuple", Items(None, unknown("a number of a loop")))
+            items = Items(tuple((number,) for number in numbers))
+    return run.sequence(call.node, "tuple", items)
 
 
 def made_sequence(kind: str) -> Callable[[Run, Call], Value]:
