@@ -18,9 +18,8 @@ from enclave_launch.policy.derivation import LIST_NAMES
 from enclave_launch.policy.node_permissions import OPERATIONS
 from enclave_launch.review.document import GrantedName
 from keystore.formats.permissions_patterns import covers
-from nodl.graph.model import Attribution, Graph, GraphNode, GraphProcess, SeenInterface
+from nodl.graph.model import Attribution, Graph, GraphNode, GraphProcess, SeenEndpoint, SeenInterface
 from nodl.graph.quality import differences, unmet
-from nodl.graph.model import SeenEndpoint
 from nodl.graph.text import participant_text
 from nodl.graph.wire_names import ros_type
 from nodl.node_interface import EndpointKind
