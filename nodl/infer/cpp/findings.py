@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from nodl.infer.cpp.reading.declarations import Class
 from nodl.infer.cpp.running.notes import Notes
 from nodl.infer.cpp.running.values import BOTTOM, Text, Value, join
 from nodl.node_interface import EndpointKind
@@ -40,20 +39,18 @@ class PossibleEndpoint:
 
 @dataclass(eq=False)
 class AllocatedNode:
-    """A node under construction."""
+    """A node under construction. ``description``: the class of a library that makes it for itself."""
 
     source: SourceRef
+    parameters: Notes
+    overrides: Notes
+    lifecycle: bool
     names: Value = BOTTOM
     namespaces: Value = BOTTOM
-    lifecycle: bool = False
-    cls: Class | None = None
-    created: bool = False
     endpoints: dict[PossibleEndpoint, list[tuple[Condition, ...]]] = field(default_factory=dict)
-    parameters: Notes = field(default_factory=Notes)
     gaps: dict[tuple[SourceRef, str], None] = field(default_factory=dict)
     arguments: list[tuple[str | None, ...]] = field(default_factory=list)
     use_global_arguments: bool = True
-    overrides: Notes = field(default_factory=Notes)
     description: str = ""
 
     def declare(self, name: str, default: Value) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from enclave_launch.boundary.files import read_bytes
 from nodl.infer.cpp.cache.folder import digest_of, digest_of_content
@@ -15,7 +15,7 @@ from nodl.infer.cpp.ledger import CREATES, SiteAnswer, account
 from nodl.infer.cpp.models.nodes import ARGUMENT
 from nodl.infer.cpp.reading.cmake import Target
 from nodl.infer.cpp.reading.collect import index_file
-from nodl.infer.cpp.reading.declarations import FileIndex, Function, Global
+from nodl.infer.cpp.reading.declarations import Class, FileIndex, Function, FunctionParameter, Global
 from nodl.infer.cpp.reading.known_headers import KNOWN_HEADERS
 from nodl.infer.cpp.reading.names import Names
 from nodl.infer.cpp.reading.preprocess import Preprocessed, preprocess
@@ -36,17 +36,17 @@ _REGISTERED = re.compile(
 )
 
 
-@dataclass
+@dataclass(frozen=True)
 class ProgramFindings:
     """What one program makes. ``classes``: the node classes that it makes objects of."""
 
-    nodes: list[AllocatedNode] = field(default_factory=list)
-    gaps: dict[tuple[SourceRef, str], None] = field(default_factory=dict)
-    answers: list[SiteAnswer] = field(default_factory=list)
-    classes: set[str] = field(default_factory=set)
-    files: tuple[str, ...] = ()
-    consulted: dict[str, object] = field(default_factory=dict)
-    from_default: tuple[str, ...] = ()
+    nodes: list[AllocatedNode]
+    gaps: tuple[tuple[SourceRef, str], ...]
+    answers: list[SiteAnswer]
+    classes: set[str]
+    files: tuple[str, ...]
+    consulted: bool
+    from_default: tuple[str, ...]
 
 
 class Sources:
@@ -163,12 +163,8 @@ def run_program(sources: Sources, entry: Entry, start: Start | None) -> ProgramF
         _start(run, entry)
         run_callbacks(run)
     except (StepLimitExceeded, RecursionError):
-        run.gaps.setdefault(
-            (
-                SourceRef(entry.files[0] if entry.files else ""),
-                "this program is too large to be followed to its end",
-            )
-        )
+        place = SourceRef(entry.files[0] if entry.files else "")
+        run.gap_at(place, "this program is too large to be followed to its end")
     return _findings(run, sources)
 
 
@@ -218,7 +214,7 @@ def _check_order(run: Machine, initialised: Global, mark: int) -> None:
         if isinstance(owner, Global) and owner.file.file not in run.names.visible(initialised.file.file):
             place = SourceRef(initialised.file.file, line_of(initialised.node))
             why = f"{owner.name} is changed before main by another file than its own: in which order is not known"
-            run.gaps.setdefault((place, why))
+            run.gap_at(place, why)
 
 
 def _variables(run: Machine, index: FileIndex) -> list[Global]:
@@ -235,92 +231,81 @@ def _variables(run: Machine, index: FileIndex) -> list[Global]:
 def _run_main(run: Machine, function: Function) -> None:
     from nodl.infer.cpp.running.invocation import invoke
 
-    arguments: list[Value] = [
-        unknown("the number of arguments"),
-        (Seq((unknown(ARGUMENT),), open=True),),
-    ]
-    frame = Frame(function.file, function.scope)
-    invoke(run, function, None, arguments[: len(function.parameters)], function.node, frame, ())
+    words: Value = (Seq((unknown(ARGUMENT),), open=True),)
+    arguments = [unknown("the number of arguments"), words][: len(function.parameters)]
+    invoke(run, function, None, arguments, function.node, Frame(function.file, function.scope), ())
 
 
 def _construct_entry(run: Machine, entry: Entry) -> None:
     index = next((run.names.files[f] for f in entry.files if f in run.names.files), None)
     if index is None:
-        run.gaps.setdefault(
-            (SourceRef(entry.place), f"the source of component {entry.cls} was not found in its package")
-        )
+        why = f"the source of component {entry.cls} was not found in its package"
+        run.gap_at(SourceRef(entry.place), why)
         return
     cls = run.names.find_class(entry.cls, (), index)
     if cls is None:
-        run.gaps.setdefault(
-            (SourceRef(index.file), f"the class {entry.cls} was not found in the sources of its library")
-        )
+        why = f"the class {entry.cls} was not found in the sources of its library"
+        run.gap_at(SourceRef(index.file), why)
         return
-    frame = Frame(cls.file, ())
+    arguments = _entry_arguments(run, cls)
+    construct(run, Type(cls.qualified), arguments, cls.node, Frame(cls.file, ()), heap=True)
+
+
+def _entry_arguments(run: Machine, cls: Class) -> list[Value]:
+    """What a container gives: node options, to the constructor that takes only these; else it is not known."""
     constructors = run.names.find_methods(cls, cls.name)
-    options = run.obj(("options", cls), Type("rclcpp::NodeOptions"))
-    one = [
-        c
-        for c in constructors
-        if [p for p in c.parameters if "NodeOptions" in p.type]
-        and len([p for p in c.parameters if p.default is None]) <= 1
-    ]
-    arguments: list[Value] = [(options,)] if one or cls.inherits_constructors else []
-    if not one and constructors and all(any(p.default is None for p in c.parameters) for c in constructors):
+    options: Value = (run.obj(("options", cls), Type("rclcpp::NodeOptions")),)
+    required = {c: [p for p in c.parameters if p.default is None] for c in constructors}
+    one = [c for c in constructors if len(required[c]) <= 1 and any(map(_is_options, c.parameters))]
+    if one:
+        return [options] if _is_options(one[0].parameters[0]) else []
+    if constructors and all(required.values()):
         best = min(constructors, key=lambda c: len(c.parameters))
-        arguments = [
-            (options,) if "NodeOptions" in p.type else unknown(f"the argument {p.name}")
-            for p in best.parameters
-        ]
-    elif one and "NodeOptions" not in one[0].parameters[0].type:
-        arguments = []
-    construct(run, Type(cls.qualified), arguments, cls.node, frame, heap=True)
+        return [options if _is_options(p) else unknown(f"the argument {p.name}") for p in best.parameters]
+    return [options] if cls.inherits_constructors else []
+
+
+def _is_options(parameter: FunctionParameter) -> bool:
+    return "NodeOptions" in parameter.type
 
 
 def _findings(run: Machine, sources: Sources) -> ProgramFindings:
-    findings = ProgramFindings()
-    findings.nodes = [record for record in run.nodes if record.created]
-    for record in findings.nodes if run.global_arguments else ():
+    nodes = list(run.nodes.values())
+    for record in nodes if run.global_arguments else ():
         if record.use_global_arguments:
             record.arguments += run.global_arguments
             record.use_global_arguments = False
-    findings.gaps = dict(run.gaps)
     for (file, start), (source, what, name) in run.unset.items():
         if start not in run.handled.get(file, ()):
-            findings.gaps.setdefault(
-                (source, f"{what} was never seen to be set: what {name}() makes is not known")
-            )
+            run.gap_at(source, f"{what} was never seen to be set: what {name}() makes is not known")
     for cls in run.names.specialisations.doubts.values():
         why = f"which specialisation of {cls.qualified} is meant is not known"
-        findings.gaps.setdefault((SourceRef(cls.file.file, cls.line), why))
-    own = list(run.names.files.values())
-    findings.answers = account(run, own)
-    for index in own:
-        _text_gaps(run, index, findings)
+        run.gap_at(SourceRef(cls.file.file, cls.line), why)
+    for index in run.names.files.values():
+        _text_gaps(run, index)
     for file, why in sources.unreadable.items():
-        findings.gaps.setdefault((SourceRef(file), why))
-    findings.classes = {cls.qualified for cls in run.made_classes()}
-    findings.files = tuple(run.names.files)
-    findings.consulted = dict(run.consulted)
-    findings.from_default = tuple(run.from_default)
-    return findings
+        run.gap_at(SourceRef(file), why)
+    return ProgramFindings(
+        nodes=nodes,
+        gaps=tuple(run.gaps),
+        answers=account(run, run.names.files.values()),
+        classes={cls.qualified for cls in run.made_classes()},
+        files=tuple(run.names.files),
+        consulted=bool(run.consulted),
+        from_default=tuple(run.from_default),
+    )
 
 
-def _text_gaps(run: Machine, index: FileIndex, findings: ProgramFindings) -> None:
+def _text_gaps(run: Machine, index: FileIndex) -> None:
     """What the parser did not understand, and macros that nobody in reach defines."""
-    ran = {f for f in run.called if f.file is index}
-    if not ran:
+    if not any(function.file is index for function in run.called):
         return
     for _, line, written in index.errors:
         if CREATES.search(written):
-            findings.gaps.setdefault((SourceRef(index.file, line), "this C++ could not be parsed"))
+            run.gap_at(SourceRef(index.file, line), "this C++ could not be parsed")
     for line, name in index.source.unknown_macros:
-        findings.gaps.setdefault(
-            (
-                SourceRef(index.file, line),
-                f"the macro {name} is not in reach: what it stands for is not known",
-            )
-        )
+        why = f"the macro {name} is not in reach: what it stands for is not known"
+        run.gap_at(SourceRef(index.file, line), why)
 
 
 def registered_components(index: FileIndex) -> list[str]:

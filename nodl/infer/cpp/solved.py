@@ -29,7 +29,7 @@ def solve(sources: Sources, key: LaunchKey, entry: Entry, start: Start | None = 
         gaps=tuple(program_gaps(findings)),
         dead=tuple(Gap(answer.source, answer.reason) for answer in findings.answers if answer.dead),
         classes=tuple(sorted(findings.classes)),
-        consulted=bool(findings.consulted),
+        consulted=findings.consulted,
     )
     read = (*findings.files, *sources.unreadable)
     return Made(solved, {name: sources.digests[name] for name in read})

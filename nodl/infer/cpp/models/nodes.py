@@ -19,6 +19,7 @@ from nodl.infer.cpp.libraries import (
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.launch_values import text_of
 from nodl.infer.cpp.running.machine import Machine
+from nodl.infer.cpp.running.notes import Notes
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     Map,
@@ -44,13 +45,12 @@ OPTIONS = "rclcpp::NodeOptions"
 def become_node(run: Machine, call: Call, *, lifecycle: bool = False) -> AllocatedNode:
     """The object is a node from now on: ``Node(name, options)`` or ``Node(name, namespace, options)``."""
     this = call.this
-    record = run.new_node(call.node, call.frame, this)
-    if not record.created:
-        record.created = True
-        record.cls = this.cls
-        record.source = run.place(call.node, call.frame)
-        record.lifecycle = lifecycle
-        record.description = this.type.name
+    record = run.nodes.get(this)
+    if record is None:
+        source, log = run.place(call.node, call.frame), run.store.log
+        record = AllocatedNode(source, Notes(log), Notes(log), lifecycle)
+        run.nodes[this] = record
+        run.size["nodes"] = len(run.nodes)
     this.node, this.is_node = record, True
     record.names = join(record.names, call.value(0) or unknown("a name that is not given"))
     rest = call.values[1:]

@@ -74,7 +74,7 @@ def run_callbacks(run: Machine) -> None:
         if number:
             _widen(run, mark, number >= PATIENCE)
     place = next(iter(run.callbacks.values()))[1].file.file
-    run.gaps.setdefault((SourceRef(place), "callbacks change variables for more rounds than are followed"))
+    run.gap_at(SourceRef(place), "callbacks change variables for more rounds than are followed")
 
 
 def _round(rounds: _Rounds) -> bool:

@@ -69,7 +69,7 @@ def _part_text(run: Machine, part: object) -> str | None:
 
 def _parameter_part(run: Machine, part: ParameterPart) -> str | None:
     run.size.get("nodes")
-    for record in run.nodes:
+    for record in run.nodes.values():
         if part.name in record.parameters:
             value = given_by_launch(run, record, part.name)
             texts = part.texts({} if value is None else {part.name: value})

@@ -88,11 +88,10 @@ class Machine:
         self.store = AbstractStore(self.count)
         self.memory = Memory(self.store)
         self.size = Notes(self.store.log)  # how many nodes and classes the program has, so far
-        self.nodes: dict[AllocatedNode, None] = {}
+        self.nodes: dict[Obj, AllocatedNode] = {}
         self.gaps: dict[tuple[SourceRef, str], None] = {}
         self.objects: dict[object, Obj] = {}
         self.frames: dict[object, Frame] = {}
-        self.records: dict[object, AllocatedNode] = {}
         self.callbacks: dict[tuple[object, object], tuple[Atom, Frame]] = {}
         self.ran: dict[str, set[int]] = {}  # file -> first bytes of what was run
         self.handled: dict[str, set[int]] = {}  # file -> first bytes of calls with a result
@@ -263,7 +262,10 @@ class Machine:
         if record is not None:
             record.gap(source, why)
         else:
-            self.gaps.setdefault((source, why))
+            self.gap_at(source, why)
+
+    def gap_at(self, source: SourceRef, why: str) -> None:
+        self.gaps.setdefault((source, why))
 
     def handle(self, node: Node, frame: Frame) -> None:
         """This place has its result: an interface, a gap, or somebody who was followed."""
@@ -333,16 +335,6 @@ class Machine:
         if known not in self._leading:
             self._leading[known] = leads_to_interfaces(self, words)
         return self._leading[known]
-
-    def new_node(self, node: Node, frame: Frame, key: object) -> AllocatedNode:
-        record = self.records.get(key)
-        if record is None:
-            log = self.store.log
-            record = AllocatedNode(self.place(node, frame), parameters=Notes(log), overrides=Notes(log))
-            self.records[key] = record
-            self.nodes[record] = None
-            self.size["nodes"] = len(self.nodes)
-        return record
 
 
 _CALLS_ALL = frozenset({"fold_expression", "co_await_expression", "generic_expression"})
