@@ -74,7 +74,6 @@ class LaunchContext:
         self.noninteractive = noninteractive
         self.__host = host
         self.__loop: Any = None
-        self.is_shutdown = False
         self.__globals: dict[str, Any] = {}
         self.__locals: dict[str, Any] = {}
         self.__locals_stack: list[dict[str, Any]] = []

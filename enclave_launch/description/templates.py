@@ -28,7 +28,8 @@ _REQUIRED: Any = object()
 
 
 class Template(NamedTuple):
-    """One declaration. ``read`` makes what is kept of what the constructor is given; ``None`` as default is kept."""
+    """One declaration. ``read`` makes what is kept of what the constructor is given; ``None`` as default is kept.
+    ``attribute``: its name in XML and YAML, ``None`` for the same, empty where they have none."""
 
     attribute: str | None
     default: Any
@@ -38,6 +39,8 @@ class Template(NamedTuple):
 
     def parse(self, name: str, entity: Entity, parser: Parser) -> Any:
         """The constructor argument that ``entity`` gives, ``None`` without one."""
+        if self.attribute == "":
+            return None
         attribute = self.attribute or name
         if self.default is not _REQUIRED and attribute not in entity.given:
             return None
@@ -62,6 +65,11 @@ def template(
 ) -> Any:
     """Declare a template. ``attribute``: its name in XML and YAML where that differs."""
     return Template(attribute, default, keyword_only, read, data_type)
+
+
+def kept(default: Any = _REQUIRED, *, keyword_only: bool = True) -> Any:
+    """Declare an argument of the constructor alone, which keeps it as it is."""
+    return Template("", default, keyword_only, lambda value: value, None)
 
 
 class _Signature:

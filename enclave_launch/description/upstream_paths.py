@@ -228,7 +228,7 @@ PATHS: dict[str, dict[str, str]] = {
     "launch_ros.substitutions": {
         "executable_in_package": "substitutions.paths: ExecutableInPackage",
         "find_package": "substitutions.paths: FindPackage FindPackagePrefix FindPackageShare",
-        "parameter": "substitutions.parameter: Parameter",
+        "parameter": "substitutions.variables: Parameter",
     },
     "launch_ros.utilities": {
         "evaluate_parameters": "parameters.evaluate: evaluate_parameters | evaluate_parameter_dict",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.actions.nodes import Node, parse_remaps
-from enclave_launch.description.conditions import Condition, IfCondition, UnlessCondition
+from enclave_launch.description.entity import Action
 from enclave_launch.description.markup.entity import Entity
 from enclave_launch.description.markup.parser import Parser
 from enclave_launch.description.node_names import RemapRules, SomeRemapRules, normalize_remap_rules
@@ -18,6 +18,7 @@ from enclave_launch.host.current import current_release
 from enclave_launch.ros_rules.distro import Feature
 
 if TYPE_CHECKING:
+    from enclave_launch.description.conditions import Condition
     from enclave_launch.description.parameters.types import Parameters, SomeParameters
     from enclave_launch.source_location import SourceLocation
 
@@ -64,9 +65,7 @@ class ComposableNode:
             "plugin": parser.parse_substitution(entity.get_attr("plugin")),
             "name": parser.parse_substitution(entity.get_attr("name")),
         }
-        condition = _parse_condition(entity, parser)
-        if condition is not None:
-            kwargs["condition"] = condition
+        kwargs |= Action.parse(entity, parser)[1]
         namespace = entity.get_attr("namespace", optional=True)
         if namespace is not None:
             kwargs["namespace"] = parser.parse_substitution(namespace)
@@ -100,18 +99,6 @@ class ComposableNode:
 
     def condition(self) -> Condition | None:
         return self.__condition
-
-
-def _parse_condition(entity: Entity, parser: Parser) -> Condition | None:
-    if_text = entity.get_attr("if", optional=True)
-    unless_text = entity.get_attr("unless", optional=True)
-    if if_text is not None and unless_text is not None:
-        raise RuntimeError("if and unless conditions can't be used simultaneously")
-    if if_text is not None:
-        return IfCondition(predicate_expression=parser.parse_substitution(if_text))
-    if unless_text is not None:
-        return UnlessCondition(predicate_expression=parser.parse_substitution(unless_text))
-    return None
 
 
 def _parse_extra_argument(entity: Entity, parser: Parser) -> dict[tuple[Substitution, ...], Any]:

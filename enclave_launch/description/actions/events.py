@@ -9,6 +9,7 @@ from enclave_launch.description.entity import Action, normalize_to_list_of_entit
 from enclave_launch.description.events.event import ProcessExited
 from enclave_launch.description.events.event import Shutdown as ShutdownEvent
 from enclave_launch.description.markup.expose import expose_action
+from enclave_launch.description.templates import TemplateAction, kept
 
 if TYPE_CHECKING:
     from enclave_launch.description.entity import LaunchDescriptionEntity
@@ -19,31 +20,19 @@ if TYPE_CHECKING:
     from enclave_launch.description.markup.parser import Parser
 
 
-class EmitEvent(Action):
+class EmitEvent(TemplateAction):
     """Queue an event; it is handled after all that is being visited now."""
 
-    def __init__(self, *, event: Event, **kwargs: Any) -> None:
-        super().__init__(**kwargs)
-        self.__event = event
-
-    @property
-    def event(self) -> Event:
-        return self.__event
+    event: Event = kept()
 
     def execute(self, context: LaunchContext) -> None:
-        context.emit_event_sync(self.__event)
+        context.emit_event_sync(self.event)
 
 
-class _OfHandler(Action):
+class _OfHandler(TemplateAction):
     """An action about one event handler."""
 
-    def __init__(self, event_handler: BaseEventHandler, **kwargs: Any) -> None:
-        super().__init__(**kwargs)
-        self.__event_handler = event_handler
-
-    @property
-    def event_handler(self) -> BaseEventHandler:
-        return self.__event_handler
+    event_handler: BaseEventHandler = kept(keyword_only=False)
 
 
 class RegisterEventHandler(_OfHandler):

@@ -20,8 +20,9 @@ from enclave_launch.description.entity import Action
 from enclave_launch.description.events.handlers import OnShutdown
 from enclave_launch.description.markup.entity import Entity
 from enclave_launch.description.markup.expose import expose_action
-from enclave_launch.description.substitution import normalize_to_list_of_substitutions, perform_substitutions
+from enclave_launch.description.substitution import perform_substitutions
 from enclave_launch.description.substitutions.variables import local_name
+from enclave_launch.description.templates import TemplateAction, kept, template
 from enclave_launch.frontend import yaml_scalar
 from enclave_launch.host.user_code import called_for_entities
 from enclave_launch.ros_rules.distro import Feature
@@ -31,7 +32,7 @@ if TYPE_CHECKING:
     from enclave_launch.description.events.event import Event
     from enclave_launch.description.launch_context import LaunchContext
     from enclave_launch.description.markup.parser import Parser
-    from enclave_launch.description.substitution import SomeSubstitutionsType, Substitution
+    from enclave_launch.description.substitution import SomeSubstitutionsType
 
 
 class OpaqueFunction(Action):
@@ -169,7 +170,7 @@ Body = Callable[..., "list[LaunchDescriptionEntity] | None"]
 
 
 @expose_action("for_each", feature=Feature.FOR_EACH)
-class ForEach(Action):
+class ForEach(TemplateAction):
     """Call ``function(**values)`` for each set of values; it gives the entities of that round.
 
     ``input_values`` performs to YAML mappings separated by semicolons. In XML and YAML the body is the
@@ -178,85 +179,58 @@ class ForEach(Action):
 
     SEPARATOR = ";"
 
-    def __init__(self, input_values: SomeSubstitutionsType, *, function: Body, **kwargs: Any) -> None:
-        super().__init__(**kwargs)
-        self._input_values = normalize_to_list_of_substitutions(input_values)
-        self._function = function
+    input_values = template(attribute="values")
+    function: Body = kept()
 
     @classmethod
     def parse(cls, entity: Entity, parser: Parser) -> tuple[type[Action], dict[str, Any]]:
         _, kwargs = super().parse(entity, parser)
         kwargs["function"] = _ParsedBody(entity, parser)
-        kwargs["input_values"] = parser.parse_substitution(entity.get_attr("values"))
         return cls, kwargs
 
-    @property
-    def input_values(self) -> list[Substitution]:
-        return self._input_values
-
-    @property
-    def function(self) -> Body:
-        return self._function
-
     def execute(self, context: LaunchContext) -> list[LaunchDescriptionEntity]:
-        text = perform_substitutions(context, self._input_values)
+        text = perform_substitutions(context, self.input_values)
         entities: list[LaunchDescriptionEntity] = []
         for item in filter(None, text.strip().split(self.SEPARATOR)):
             values = yaml_scalar.load(item.strip())
             if values is not None:
-                context.count_unfolded(_size_of(self._function))
+                context.count_unfolded(_size_of(self.function))
                 entities.extend(self._round(context, values) or ())
         return entities
 
     def _round(
         self, context: LaunchContext, values: Mapping[str, Any]
     ) -> list[LaunchDescriptionEntity] | None:
-        return called_for_entities(self, self._function, lambda: self._function(**values), context)
+        return called_for_entities(self, self.function, lambda: self.function(**values), context)
 
 
 @expose_action("for", feature=Feature.FOR_LOOP)
-class ForLoop(Action):
+class ForLoop(TemplateAction):
     """Call ``function(i)`` for i from 0 to ``length`` (exclusive); in XML and YAML ``$(index name)`` is i.
 
     Raises ``ValueError`` when ``length`` does not perform to an integer.
     """
 
-    name: str | None = None
-
-    def __init__(
-        self, length: SomeSubstitutionsType, *, function: Body, name: str | None = None, **kwargs: Any
-    ) -> None:
-        super().__init__(**kwargs)
-        self._length = normalize_to_list_of_substitutions(length)
-        self._function = function
-        self.name = name
+    length = template(attribute="len")
+    function: Body = kept()
+    name: str | None = kept(default=None)
 
     @classmethod
     def parse(cls, entity: Entity, parser: Parser) -> tuple[type[Action], dict[str, Any]]:
         _, kwargs = super().parse(entity, parser)
-        name = entity.get_attr("name")
-        kwargs["name"] = name
-        kwargs["function"] = _ParsedBody(entity, parser, index=name)
-        kwargs["length"] = parser.parse_substitution(entity.get_attr("len"))
+        kwargs["name"] = entity.get_attr("name")
+        kwargs["function"] = _ParsedBody(entity, parser, index=kwargs["name"])
         return cls, kwargs
-
-    @property
-    def length(self) -> list[Substitution]:
-        return self._length
-
-    @property
-    def function(self) -> Body:
-        return self._function
 
     def execute(self, context: LaunchContext) -> list[LaunchDescriptionEntity]:
         entities: list[LaunchDescriptionEntity] = []
-        for index in range(int(perform_substitutions(context, self._length))):
-            context.count_unfolded(_size_of(self._function))
+        for index in range(int(perform_substitutions(context, self.length))):
+            context.count_unfolded(_size_of(self.function))
             entities.extend(self._round(context, index) or ())
         return entities
 
     def _round(self, context: LaunchContext, index: int) -> list[LaunchDescriptionEntity] | None:
-        return called_for_entities(self, self._function, lambda: self._function(i=index), context)
+        return called_for_entities(self, self.function, lambda: self.function(i=index), context)
 
 
 class _ParsedBody:

@@ -139,20 +139,10 @@ class SetParametersFromFile(TemplateAction):
 
 
 @expose_action("set_use_sim_time")
-class SetUseSimTime(Action):
+class SetUseSimTime(TemplateAction):
     """The clock of launch's own node (for ``ros_timer``). Launched nodes get ``use_sim_time`` by ``SetParameter``."""
 
-    value: bool | SomeSubstitutionsType | None = None
-
-    def __init__(self, value: bool | SomeSubstitutionsType, **kwargs: Any):
-        super().__init__(**kwargs)
-        self.value = value
-
-    @classmethod
-    def parse(cls, entity: Entity, parser: Parser) -> tuple[type[SetUseSimTime], dict[str, Any]]:
-        _, kwargs = super().parse(entity, parser)
-        kwargs["value"] = parser.parse_substitution(entity.get_attr("value"))
-        return cls, kwargs
+    value: bool | SomeSubstitutionsType = template(read=lambda value: value)
 
     def execute(self, context: LaunchContext) -> None:
         """Older releases pass the text of the front ends on unevaluated, and refuse to switch it off.

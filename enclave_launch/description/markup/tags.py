@@ -74,7 +74,7 @@ SUBSTITUTIONS = {
     "not": "substitutions.logic",
     "not-equals": "substitutions.logic",
     "or": "substitutions.logic",
-    "param": "substitutions.parameter",
+    "param": "substitutions.variables",
     "path-join": "substitutions.paths",
     "string-join": "substitutions.computed",
     "var": "substitutions.variables",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 from enclave_launch.boundary import shell_words
 from enclave_launch.boundary.files import read_text
@@ -116,8 +116,8 @@ class PythonExpression(Substitution):
         return self.__python_modules
 
     def describe(self) -> str:
-        expression = " + ".join(sub.describe() for sub in self.__expression)
-        return f"PythonExpr({expression}, [{', '.join(sub.describe() for sub in self.__python_modules)}])"
+        modules = ", ".join(sub.describe() for sub in self.__python_modules)
+        return f"PythonExpr({described(self.__expression)}, [{modules}])"
 
     def perform(self, context: LaunchContext) -> str:
         if context.host.release.has(Feature.EVAL_MODULES):
@@ -190,14 +190,11 @@ class FindExecutable(TemplateSubstitution):
 
 
 @expose_substitution("string-join", feature=Feature.JOIN_IN_FRONTENDS)
-class StringJoinSubstitution(Substitution):
+class StringJoinSubstitution(TemplateSubstitution):
     """Concatenates each component, then joins them with the delimiter."""
 
-    def __init__(
-        self, substitutions: Iterable[SomeSubstitutionsType], delimiter: SomeSubstitutionsType = ""
-    ) -> None:
-        self.__substitutions = [normalize_to_list_of_substitutions(component) for component in substitutions]
-        self.__delimiter = normalize_to_list_of_substitutions(delimiter)
+    substitutions = template(read=lambda items: list(map(normalize_to_list_of_substitutions, items)))
+    delimiter = template(default="")
 
     @classmethod
     def parse(cls, data: Sequence[SomeSubstitutionsType]) -> tuple[type[Substitution], dict[str, Any]]:
@@ -207,19 +204,10 @@ class StringJoinSubstitution(Substitution):
             )
         return cls, {"delimiter": data[0], "substitutions": data[1:]}
 
-    @property
-    def substitutions(self) -> list[list[Substitution]]:
-        return self.__substitutions
-
-    @property
-    def delimiter(self) -> list[Substitution]:
-        return self.__delimiter
-
     def describe(self) -> str:
-        components = [" + ".join(sub.describe() for sub in component) for component in self.__substitutions]
-        delimiter = " + ".join(sub.describe() for sub in self.__delimiter)
-        return f"StringJoinSubstitution([{', '.join(components)}], delimiter={delimiter})"
+        components = ", ".join(map(described, self.substitutions))
+        return f"StringJoinSubstitution([{components}], delimiter={described(self.delimiter)})"
 
     def perform(self, context: LaunchContext) -> str:
-        components = [perform_substitutions(context, component) for component in self.__substitutions]
-        return perform_substitutions(context, self.__delimiter).join(components)
+        components = [perform_substitutions(context, component) for component in self.substitutions]
+        return perform_substitutions(context, self.delimiter).join(components)

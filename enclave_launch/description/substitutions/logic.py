@@ -113,9 +113,6 @@ class _Variadic(Substitution):
 class AnySubstitution(_Variadic):
     """``true`` when at least one is."""
 
-    def __init__(self, *args: SomeSubstitutionsType) -> None:
-        super().__init__(*args)
-
     def perform(self, context: LaunchContext) -> str:
         return _text(any(self._operands(context)))
 
@@ -123,9 +120,6 @@ class AnySubstitution(_Variadic):
 @expose_substitution("all", feature=Feature.EQUALS_IF)
 class AllSubstitution(_Variadic):
     """``true`` when each is."""
-
-    def __init__(self, *args: SomeSubstitutionsType) -> None:
-        super().__init__(*args)
 
     def perform(self, context: LaunchContext) -> str:
         return _text(all(self._operands(context)))
@@ -157,7 +151,7 @@ class EqualsSubstitution(TemplateSubstitution):
     def perform(self, context: LaunchContext) -> str:
         left = perform_substitutions(context, self.left)
         right = perform_substitutions(context, self.right)
-        return "true" if _equal(left, right) else "false"
+        return _text(_equal(left, right))
 
 
 def _equal(left: str, right: str) -> bool:
@@ -175,7 +169,7 @@ class NotEqualsSubstitution(EqualsSubstitution):
     """``true`` when ``equals`` is not."""
 
     def perform(self, context: LaunchContext) -> str:
-        return "false" if super().perform(context) == "true" else "true"
+        return _text(super().perform(context) == "false")
 
 
 @expose_substitution("if", feature=Feature.EQUALS_IF)

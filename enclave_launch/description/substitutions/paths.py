@@ -15,7 +15,7 @@ from enclave_launch.description.substitution import (
     normalize_to_list_of_substitutions,
     perform_substitutions,
 )
-from enclave_launch.description.templates import TemplateSubstitution, template
+from enclave_launch.description.templates import TemplateSubstitution, described, template
 from enclave_launch.host.current import current_release
 from enclave_launch.ros_rules.distro import Feature
 from nodl.ament_index import ExecutableNotInstalledError
@@ -56,8 +56,7 @@ class PathJoinSubstitution(Substitution):
         return [part[0] if len(part) == 1 else part for part in self.__parts]
 
     def describe(self) -> str:
-        parts = (" + ".join(sub.describe() for sub in part) for part in self.__parts)
-        return f"PathJoin('{' + '.join(parts)}')"
+        return f"PathJoin('{' + '.join(map(described, self.__parts))}')"
 
     def perform(self, context: LaunchContext) -> str:
         return os.path.join(*("".join([sub.perform(context) for sub in part]) for part in self.__parts))
@@ -156,8 +155,7 @@ class FindPackage(PathOperator, TemplateSubstitution):
         raise NotImplementedError
 
     def describe(self) -> str:
-        package = " + ".join(part.describe() for part in self.package)
-        return f"{type(self).__name__}(pkg={package})"
+        return f"{type(self).__name__}(pkg={described(self.package)})"
 
     def perform(self, context: LaunchContext) -> str:
         return self.find(perform_substitutions(context, self.package))
@@ -191,9 +189,7 @@ class ExecutableInPackage(FindPackagePrefix):
     refusal = (AttributeError, "exec-in-package substitution expects 2 arguments")
 
     def describe(self) -> str:
-        executable = " + ".join(part.describe() for part in self.executable)
-        package = " + ".join(part.describe() for part in self.package)
-        return f"ExecInPkg(pkg={package}, exec={executable})"
+        return f"ExecInPkg(pkg={described(self.package)}, exec={described(self.executable)})"
 
     def perform(self, context: LaunchContext) -> str:
         """Raises as ``find``, and ``SubstitutionFailure`` when the package lacks the executable."""

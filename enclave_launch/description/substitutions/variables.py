@@ -1,4 +1,4 @@
-"""Substitutions that look a value up: ``var``, ``env``, ``for-var``, ``index``, ``anon`` and locals."""
+"""Substitutions that look a value up: ``var``, ``env``, ``param``, ``for-var``, ``index``, ``anon`` and locals."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from enclave_launch.description.substitution import (
     perform_substitutions,
 )
 from enclave_launch.description.templates import TemplateSubstitution, described, template
+from enclave_launch.host.current import current_release
 from enclave_launch.ros_rules.distro import Feature
 
 if TYPE_CHECKING:
@@ -69,6 +70,45 @@ class EnvironmentVariable(TemplateSubstitution):
         if value is None:
             raise SubstitutionFailure(f"environment variable '{name}' does not exist")
         return value
+
+
+@expose_substitution("param")
+class Parameter(TemplateSubstitution):
+    """The first parameter of that name that ``set_parameter`` set, as ``str``. Parameter files are not searched."""
+
+    name = template()
+    default = template(default=None, keyword_only=True, read=_as_text)
+
+    def __init__(self, name: SomeSubstitutionsType, *, default: Any = None):
+        if default is not None and not _takes_default():
+            raise TypeError("Parameter.__init__() got an unexpected keyword argument 'default'")
+        super().__init__(name, default=default)
+
+    @classmethod
+    def parse(cls, data: Sequence[SomeSubstitutionsType]) -> tuple[type[Substitution], dict[str, Any]]:
+        if len(data) != 1 and not _takes_default():
+            raise AttributeError("param substitutions expect 1 argument")
+        if not 1 <= len(data) <= 2:
+            raise TypeError("param substitution expects 1 or 2 arguments")
+        return super().parse(data)
+
+    def describe(self) -> str:
+        return f"{type(self).__name__}(name={described(self.name)})"
+
+    def perform(self, context: LaunchContext) -> str:
+        """Raises ``SubstitutionFailure`` when there is no such parameter and no default."""
+        name = perform_substitutions(context, self.name)
+        no_parameters: Any = [] if _takes_default() else None  # without defaults, iterating None fails
+        for item in context.launch_configurations.get("global_params", no_parameters):
+            if isinstance(item, tuple) and item[0] == name:
+                return str(item[1])
+        if self.default is None:
+            raise SubstitutionFailure(f"parameter '{name}' not found")
+        return perform_substitutions(context, self.default)
+
+
+def _takes_default() -> bool:
+    return current_release().has(Feature.PARAMETER_DEFAULT)
 
 
 class LocalSubstitution(Substitution):
