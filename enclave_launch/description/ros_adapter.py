@@ -22,9 +22,6 @@ class ROSAdapter:
 
     def __init__(self, *, argv: list[str] | None = None, autostart: bool = True):
         self.__argv = argv or []  # never None: rclpy would take sys.argv
-        self.ros_context: Any = None
-        self.ros_node: Any = None
-        self.ros_executor: Any = None
         self.__thread: Any = None
         if autostart:
             self.start()

@@ -26,6 +26,17 @@ Variables = list[tuple["list[Substitution]", "list[Substitution]"]]
 class Executable:
     """Describes a process; ``prepare`` performs it. The ``final_...`` members are ``None`` before that."""
 
+    name: list[Substitution] | None = None
+    cwd: list[Substitution] | None = None
+    env: Variables | None = None
+    additional_env: Variables | None = None
+    arguments: Iterable[SomeSubstitutionsType] | None = None
+    final_name: str | None = None
+    final_cmd: list[str] | None = None
+    final_prefix: tuple[str, ...] = ()  # the words of ``final_cmd`` that the prefix gave (ours)
+    final_cwd: str | None = None
+    final_env: dict[str, str] | None = None  # shared between processes with the same one: do not modify
+
     def __init__(
         self,
         *,
@@ -43,20 +54,11 @@ class Executable:
         self.__cmd += [normalize_to_list_of_substitutions(word) for word in arguments or ()]
         self.__prefix = _DEFAULT_PREFIX if prefix is None else normalize_to_list_of_substitutions(prefix)
         self.__prefix_filter = _PREFIX_FILTER if prefix is None else None
-        self.__name = None if name is None else normalize_to_list_of_substitutions(name)
-        self.__cwd = None if cwd is None else normalize_to_list_of_substitutions(cwd)
-        self.__env = None if env is None else _normalize(env)
-        self.__additional_env = None if additional_env is None else _normalize(additional_env)
-        self.__arguments = arguments
-        self.__final_prefix: tuple[str, ...] = ()
-        self.__final_cmd: list[str] | None = None
-        self.__final_cwd: str | None = None
-        self.__final_env: dict[str, str] | None = None
-        self.__final_name: str | None = None
-
-    @property
-    def name(self) -> list[Substitution] | None:
-        return self.__name
+        self.name = None if name is None else normalize_to_list_of_substitutions(name)
+        self.cwd = None if cwd is None else normalize_to_list_of_substitutions(cwd)
+        self.env = None if env is None else _normalize(env)
+        self.additional_env = None if additional_env is None else _normalize(additional_env)
+        self.arguments = arguments
 
     @property
     def prefix(self) -> list[Substitution]:
@@ -67,58 +69,18 @@ class Executable:
         """The command, shared: derived descriptions append to it."""
         return self.__cmd
 
-    @property
-    def cwd(self) -> list[Substitution] | None:
-        return self.__cwd
-
-    @property
-    def env(self) -> Variables | None:
-        return self.__env
-
-    @property
-    def additional_env(self) -> Variables | None:
-        return self.__additional_env
-
-    @property
-    def arguments(self) -> Iterable[SomeSubstitutionsType] | None:
-        return self.__arguments
-
-    @property
-    def final_name(self) -> str | None:
-        return self.__final_name
-
-    @property
-    def final_cmd(self) -> list[str] | None:
-        return self.__final_cmd
-
-    @property
-    def final_prefix(self) -> tuple[str, ...]:
-        """The words of ``final_cmd`` that the prefix gave (ours)."""
-        return self.__final_prefix
-
-    @property
-    def final_cwd(self) -> str | None:
-        return self.__final_cwd
-
-    @property
-    def final_env(self) -> dict[str, str] | None:
-        """Shared between processes with the same environment: do not modify."""
-        return self.__final_env
-
     def prepare(self, context: LaunchContext, action: Action) -> None:
         """Perform command, prefix, name, directory and environment, in this order."""
         cmd = [perform_substitutions(context, word) for word in self.__cmd]
         if self.__prefix_applies(context, cmd):
             prefix = perform_substitutions(context, self.__prefix)
-            self.__final_prefix = tuple(shell_words.split_words(prefix)) if prefix else ()
-            cmd = [*self.__final_prefix, *cmd]
-        self.__final_cmd = cmd
-        name = (
-            os.path.basename(cmd[0]) if self.__name is None else perform_substitutions(context, self.__name)
-        )
-        self.__final_name = f"{name}-{context.host.next_process_index()}"
-        self.__final_cwd = None if self.__cwd is None else perform_substitutions(context, self.__cwd)
-        self.__final_env = self.__environment(context)
+            self.final_prefix = tuple(shell_words.split_words(prefix)) if prefix else ()
+            cmd = [*self.final_prefix, *cmd]
+        self.final_cmd = cmd
+        name = os.path.basename(cmd[0]) if self.name is None else perform_substitutions(context, self.name)
+        self.final_name = f"{name}-{context.host.next_process_index()}"
+        self.final_cwd = None if self.cwd is None else perform_substitutions(context, self.cwd)
+        self.final_env = self.__environment(context)
 
     def __prefix_applies(self, context: LaunchContext, cmd: list[str]) -> bool:
         if self.__prefix_filter is None:
@@ -128,13 +90,13 @@ class Executable:
 
     def __environment(self, context: LaunchContext) -> dict[str, str]:
         """Each variable sees the environment of the context, not the ones added before it."""
-        if self.__env is None:
+        if self.env is None:
             base = context.process_environment.snapshot()
         else:
-            base = _perform(context, self.__env)
-        if not self.__additional_env:
+            base = _perform(context, self.env)
+        if not self.additional_env:
             return base
-        return {**base, **_perform(context, self.__additional_env)}
+        return {**base, **_perform(context, self.additional_env)}
 
 
 def _normalize(variables: Mapping[SomeSubstitutionsType, SomeSubstitutionsType]) -> Variables:

@@ -68,6 +68,8 @@ class Node(ExecuteProcess):
     UNSPECIFIED_NODE_NAME = UNSPECIFIED_NODE_NAME
     UNSPECIFIED_NODE_NAMESPACE = UNSPECIFIED_NODE_NAMESPACE
     process_kind: ProcessKind = "node"
+    node_package: SomeSubstitutionsType | None = None
+    expanded_remapping_rules: list[PlacedRule] | None = None
 
     def __init__(
         self,
@@ -93,7 +95,7 @@ class Node(ExecuteProcess):
         super().__init__(
             cmd=[program, *user_words, "--ros-args", *name_words], **{**kwargs, "name": exec_name}
         )
-        self.__package = package
+        self.node_package = package
         self.__executable = executable
         self.__name = None if name is None else normalize_to_list_of_substitutions(name)
         self.__namespace = None if namespace is None else normalize_to_list_of_substitutions(namespace)
@@ -102,7 +104,6 @@ class Node(ExecuteProcess):
         self.__expanded_name = UNSPECIFIED_NODE_NAME
         self.__expanded_namespace = UNSPECIFIED_NODE_NAMESPACE
         self.__final_name: str | None = None
-        self.__expanded_remappings: list[PlacedRule] | None = None
         self.__first_remap = 0  # the index of its "-r" in self.cmd
 
     @staticmethod
@@ -134,10 +135,6 @@ class Node(ExecuteProcess):
         return cls, kwargs
 
     @property
-    def node_package(self) -> SomeSubstitutionsType | None:
-        return self.__package
-
-    @property
     def node_executable(self) -> SomeSubstitutionsType:
         return self.__executable
 
@@ -152,10 +149,6 @@ class Node(ExecuteProcess):
     @property
     def expanded_node_namespace(self) -> str:
         return self.__expanded_namespace
-
-    @property
-    def expanded_remapping_rules(self) -> list[PlacedRule] | None:
-        return self.__expanded_remappings
 
     def is_node_name_fully_specified(self) -> bool:
         return not any(
@@ -190,7 +183,7 @@ class Node(ExecuteProcess):
         everywhere = context.launch_configurations.get("ros_remaps") or []
         rules = [*everywhere, *performed_remaps(self.__remappings, context)]
         if rules:
-            self.__expanded_remappings = rules
+            self.expanded_remapping_rules = rules
             self.__first_remap = len(self.cmd)
             self.__extend_command(word for rule in rules for word in ("-r", f"{rule[0]}:={rule[1]}"))
 
@@ -217,7 +210,7 @@ class Node(ExecuteProcess):
         parameters = self.__parameters.resolve(self.__name_tokens(), sources, process.cwd)
         return process._replace(
             kind=self.process_kind,
-            package=None if self.__package is None else _performed(context, self.__package),
+            package=None if self.node_package is None else _performed(context, self.node_package),
             executable=_performed(context, self.__executable),
             name=self.__expanded_name,
             namespace=self.__expanded_namespace,
@@ -231,7 +224,7 @@ class Node(ExecuteProcess):
     def __placed_remaps(self, process: ResolvedProcess) -> Iterator[RemapRule]:
         """The rules of the launch file, each with its place in the file and on the command line."""
         first = len(process.prefix) + self.__first_remap + 1  # "-r" stands before each
-        for number, rule in enumerate(self.__expanded_remappings or ()):
+        for number, rule in enumerate(self.expanded_remapping_rules or ()):
             yield placed(rule, process.location, first + 2 * number)
 
     def __name_tokens(self) -> list[str | None]:

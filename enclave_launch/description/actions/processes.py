@@ -54,6 +54,13 @@ class ExecuteLocal(Action):
     ``machine`` (ours) names the host that the process is meant for; launch starts it on this one all the same.
     """
 
+    shell: bool = False
+    emulate_tty: bool = False
+    cached_output: bool = False
+    log_cmd: bool = False
+    respawn_delay: float | None = None
+    respawn_max_retries: int = -1
+
     def __init__(
         self,
         *,
@@ -76,18 +83,18 @@ class ExecuteLocal(Action):
     ) -> None:
         super().__init__(**kwargs)
         self.__process_description = process_description
-        self.__shell = shell
+        self.shell = shell
         self.__sigterm_timeout = normalize_to_list_of_substitutions(sigterm_timeout)
         self.__sigkill_timeout = normalize_to_list_of_substitutions(sigkill_timeout)
-        self.__emulate_tty = emulate_tty
+        self.emulate_tty = emulate_tty
         self.__output = _output(os.environ.get("OVERRIDE_LAUNCH_PROCESS_OUTPUT", output))
         self.__output_format = output_format
-        self.__cached_output = cached_output
-        self.__log_cmd = log_cmd
+        self.cached_output = cached_output
+        self.log_cmd = log_cmd
         self.__on_exit = on_exit
         self.__respawn = _respawn(respawn)
-        self.__respawn_delay = respawn_delay
-        self.__respawn_max_retries = respawn_max_retries
+        self.respawn_delay = respawn_delay
+        self.respawn_max_retries = respawn_max_retries
         self.__enclave = None if enclave is None else normalize_to_list_of_substitutions(enclave)
         self.__machine = None if machine is None else normalize_to_list_of_substitutions(machine)
         self.__executed = False
@@ -100,14 +107,6 @@ class ExecuteLocal(Action):
     @property
     def process_description(self) -> Executable:
         return self.__process_description
-
-    @property
-    def shell(self) -> bool:
-        return self.__shell
-
-    @property
-    def emulate_tty(self) -> bool:
-        return self.__emulate_tty
 
     @property
     def sigterm_timeout(self) -> list[Substitution]:
@@ -126,25 +125,9 @@ class ExecuteLocal(Action):
         return self.__output_format
 
     @property
-    def cached_output(self) -> bool:
-        return self.__cached_output
-
-    @property
-    def log_cmd(self) -> bool:
-        return self.__log_cmd
-
-    @property
     def respawn(self) -> Any:
         """A bool once prepared, before that what was given."""
         return self.__respawn
-
-    @property
-    def respawn_delay(self) -> float | None:
-        return self.__respawn_delay
-
-    @property
-    def respawn_max_retries(self) -> int:
-        return self.__respawn_max_retries
 
     @property
     def process_details(self) -> dict[str, Any] | None:
@@ -164,7 +147,7 @@ class ExecuteLocal(Action):
         return self.__captured(1, "stderr")
 
     def __captured(self, stream: int, name: str) -> str:
-        if not self.__cached_output:
+        if not self.cached_output:
             raise RuntimeError(
                 f"cached output must be true to be able to get {name}, proc '{self.__process_description.name}'"
             )
@@ -238,20 +221,18 @@ class ExecuteLocal(Action):
             location=location_of(self, context),
             on_event=context.on_event,
             cwd=description.final_cwd,
-            shell=self.__shell is True,  # other true values do not make one, as upstream
+            shell=self.shell is True,  # other true values do not make one, as upstream
             prefix=description.final_prefix,
             final_environment=description.final_env or {},
             machine=None if self.__machine is None else perform_substitutions(context, self.__machine),
-            respawn=Respawn(self.__respawn_delay or 0.0, self.__respawn_max_retries)
-            if self.__respawn
-            else None,
+            respawn=Respawn(self.respawn_delay or 0.0, self.respawn_max_retries) if self.__respawn else None,
         )
 
     def ros_arguments(self) -> RosArguments:
         """What rcl would find on the prepared command line."""
         description = self.__process_description
         words = words_after_program(
-            description.final_cmd or (), len(description.final_prefix), shell=self.__shell is True
+            description.final_cmd or (), len(description.final_prefix), shell=self.shell is True
         )
         return parse_ros_arguments(words)
 
