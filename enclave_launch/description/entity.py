@@ -18,11 +18,6 @@ if TYPE_CHECKING:
     from enclave_launch.description.markup.entity import Entity
     from enclave_launch.description.markup.parser import Parser
 
-if TYPE_CHECKING:
-    pass
-
-    from enclave_launch.description.launch_context import LaunchContext
-
 
 _OURS = "enclave_launch."
 _BUILDERS = (

@@ -9,12 +9,11 @@ from enclave_launch.description.actions.events import EmitEvent, RegisterEventHa
 from enclave_launch.description.actions.log import LogInfo
 from enclave_launch.description.actions.processes import ExecuteProcess
 from enclave_launch.description.entity import Action, LaunchDescriptionEntity
-from enclave_launch.description.substitution import normalize_to_list_of_substitutions
+from enclave_launch.description.substitution import SomeSubstitutionsType, normalize_to_list_of_substitutions
 
 if TYPE_CHECKING:
     from enclave_launch.description.events.handlers import BaseEventHandler
     from enclave_launch.description.launch_description import LaunchDescription
-    from enclave_launch.description.substitution import SomeSubstitutionsType
 
 
 _INDENT = "    "

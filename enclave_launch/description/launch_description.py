@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from enclave_launch.boundary.light import TYPE_CHECKING
-from enclave_launch.description.argument_scan import collect_arguments
-from enclave_launch.description.entity import LaunchDescriptionEntity
+from enclave_launch.description.argument_scan import DeclaredArguments, collect_arguments
+from enclave_launch.description.entity import Action, LaunchDescriptionEntity
 from enclave_launch.diagnostics.evaluation import launch_file_deprecated
 
 if TYPE_CHECKING:
     from enclave_launch.description.actions.arguments import DeclareLaunchArgument
     from enclave_launch.description.actions.includes import IncludeLaunchDescription
-    from enclave_launch.description.argument_scan import DeclaredArguments
-    from enclave_launch.description.entity import Action
     from enclave_launch.description.launch_context import LaunchContext
 
 

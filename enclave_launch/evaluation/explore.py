@@ -12,20 +12,19 @@ from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.actions.events import EmitEvent
 from enclave_launch.description.events.dispatch import AND_THEN, chain, run_handler
 from enclave_launch.description.events.event import (
+    Event,
     ProcessStarted,
     Shutdown,
     TimerEvent,
     process_event_arguments,
 )
-from enclave_launch.description.events.handlers import EventHandler
+from enclave_launch.description.events.handlers import BaseEventHandler, EventHandler
 from enclave_launch.description.location import location_of, place_of
 from enclave_launch.host.user_code import only_acts
 from enclave_launch.process import Reaction, Unforeseeable
 from nodl.ament_index import ExecutableNotInstalledError, PackageNotFoundError
 
 if TYPE_CHECKING:
-    from enclave_launch.description.events.event import Event
-    from enclave_launch.description.events.handlers import BaseEventHandler
     from enclave_launch.description.launch_context import LaunchContext
     from enclave_launch.host.plan_host import PlanHost
 

@@ -43,15 +43,9 @@ class BaseHost:
         self._process_count = 0
         self._anonymous_seed = options.anonymous_seed
         self._anonymous_random: Any = None
-        self._loads: LoadCache | None = None
+        self.loads = LoadCache()
         self._prefix_cache: dict[tuple[str, str], str] = {}
         self._executable_cache: dict[tuple[str, str, str], str] = {}
-
-    @property
-    def loads(self) -> LoadCache:
-        if self._loads is None:
-            self._loads = LoadCache()
-        return self._loads
 
     def prefixes(self) -> tuple[str, ...]:
         return ament_index.search_prefixes()

@@ -7,14 +7,13 @@ from collections.abc import Callable, Coroutine, Sequence
 
 from enclave_launch.boundary.light import TYPE_CHECKING, Any, NoReturn
 from enclave_launch.host.base_host import BaseHost
-from enclave_launch.host.protocol import HostOptions
+from enclave_launch.host.protocol import Completion, HostOptions
 
 if TYPE_CHECKING:
     from enclave_launch.description.actions.lifecycle import LifecycleNode
     from enclave_launch.description.actions.processes import ExecuteLocal
     from enclave_launch.description.launch_context import LaunchContext
     from enclave_launch.host.outcomes import Outcomes
-    from enclave_launch.host.protocol import Completion
     from enclave_launch.process import (
         LauncherCall,
         Reaction,
@@ -39,14 +38,10 @@ class PlanHost(BaseHost):
         self.unforeseen: list[Unforeseeable] = []
         self.reactions: list[Reaction] = []
         self.parameter_files: dict[str, str] = {}
-        self._loop = VirtualLoop()
-
-    @property
-    def loop(self) -> VirtualLoop:
-        return self._loop
+        self.loop = VirtualLoop()
 
     def started_so_far(self) -> int:
-        return len(self.processes) + len(self.components) + len(self.calls) + self._loop.used
+        return len(self.processes) + len(self.components) + len(self.calls) + self.loop.used
 
     def write_parameter_file(self, text: str) -> str:
         path = f"<params:{len(self.parameter_files) + 1}>"
@@ -61,7 +56,7 @@ class PlanHost(BaseHost):
     ) -> Completion | None:
         self.processes.append(process)
         self.started.append(action)
-        return self._loop.create_future()
+        return self.loop.create_future()
 
     def load_components(self, components: Sequence[ResolvedComponent], context: LaunchContext) -> None:
         self.components.extend(components)

@@ -7,6 +7,7 @@ from enclave_launch.description.entity import Action
 from enclave_launch.description.markup.entity import Entity
 from enclave_launch.description.markup.expose import expose_action
 from enclave_launch.description.substitution import (
+    SomeSubstitutionsType,
     Substitution,
     normalize_to_list_of_substitutions,
     perform_substitutions,
@@ -16,7 +17,6 @@ from enclave_launch.ros_rules.distro import Feature
 if TYPE_CHECKING:
     from enclave_launch.description.launch_context import LaunchContext
     from enclave_launch.description.markup.parser import Parser
-    from enclave_launch.description.substitution import SomeSubstitutionsType
 
 
 @expose_action("arg")

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from enclave_launch.boundary.light import TYPE_CHECKING, Any
-from enclave_launch.description.entity import Action, normalize_to_list_of_entities
-from enclave_launch.description.events.event import ProcessExited
+from enclave_launch.description.entity import Action, LaunchDescriptionEntity, normalize_to_list_of_entities
+from enclave_launch.description.events.event import Event, ProcessExited
 from enclave_launch.description.events.event import Shutdown as ShutdownEvent
 from enclave_launch.description.markup.expose import expose_action
 from enclave_launch.description.templates import TemplateAction, kept
 
 if TYPE_CHECKING:
-    from enclave_launch.description.entity import LaunchDescriptionEntity
-    from enclave_launch.description.events.event import Event
     from enclave_launch.description.events.handlers import BaseEventHandler
     from enclave_launch.description.launch_context import LaunchContext
     from enclave_launch.description.markup.entity import Entity

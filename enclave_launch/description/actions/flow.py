@@ -16,11 +16,11 @@ from enclave_launch.description.actions.configurations import (
 )
 from enclave_launch.description.actions.environment import PopEnvironment, PushEnvironment, ResetEnvironment
 from enclave_launch.description.argument_types import ensure_argument_type
-from enclave_launch.description.entity import Action
+from enclave_launch.description.entity import Action, LaunchDescriptionEntity
 from enclave_launch.description.events.handlers import OnShutdown
 from enclave_launch.description.markup.entity import Entity
 from enclave_launch.description.markup.expose import expose_action
-from enclave_launch.description.substitution import perform_substitutions
+from enclave_launch.description.substitution import SomeSubstitutionsType, perform_substitutions
 from enclave_launch.description.substitutions.variables import local_name
 from enclave_launch.description.templates import TemplateAction, kept, template
 from enclave_launch.frontend import yaml_scalar
@@ -28,11 +28,9 @@ from enclave_launch.host.user_code import called_for_entities
 from enclave_launch.ros_rules.distro import Feature
 
 if TYPE_CHECKING:
-    from enclave_launch.description.entity import LaunchDescriptionEntity
     from enclave_launch.description.events.event import Event
     from enclave_launch.description.launch_context import LaunchContext
     from enclave_launch.description.markup.parser import Parser
-    from enclave_launch.description.substitution import SomeSubstitutionsType
 
 
 class OpaqueFunction(Action):

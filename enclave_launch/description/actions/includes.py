@@ -9,7 +9,7 @@ from collections.abc import Iterable
 
 from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.actions.configurations import SetLaunchConfiguration
-from enclave_launch.description.entity import Action
+from enclave_launch.description.entity import Action, LaunchDescriptionEntity
 from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.description.markup.entity import Entity
 from enclave_launch.description.markup.expose import expose_action
@@ -21,7 +21,6 @@ from enclave_launch.host.current import current_release
 from enclave_launch.ros_rules.distro import Feature
 
 if TYPE_CHECKING:
-    from enclave_launch.description.entity import LaunchDescriptionEntity
     from enclave_launch.description.launch_description import LaunchDescription
     from enclave_launch.description.markup.parser import Parser
     from enclave_launch.description.substitution import SomeSubstitutionsType

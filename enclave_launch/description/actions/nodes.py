@@ -13,6 +13,7 @@ from enclave_launch.description.markup.expose import expose_action
 from enclave_launch.description.markup.parser import Parser
 from enclave_launch.description.node_names import (
     PlacedRule,
+    SomeRemapRules,
     normalize_remap_rules,
     performed_remaps,
     placed,
@@ -24,6 +25,7 @@ from enclave_launch.description.parameters.descriptions import ParameterFile, Pa
 from enclave_launch.description.parameters.normalize import normalize_parameters
 from enclave_launch.description.parameters.of_node import NodeParameters
 from enclave_launch.description.substitution import (
+    SomeSubstitutionsType,
     Substitution,
     TextSubstitution,
     normalize_to_list_of_substitutions,
@@ -36,9 +38,7 @@ from enclave_launch.ros_rules.namespaces import NAMESPACE, make_namespace_absolu
 if TYPE_CHECKING:
     from enclave_launch.description.entity import LaunchDescriptionEntity
     from enclave_launch.description.launch_context import LaunchContext
-    from enclave_launch.description.node_names import SomeRemapRules
     from enclave_launch.description.parameters.types import SomeParameters
-    from enclave_launch.description.substitution import SomeSubstitutionsType
     from enclave_launch.process import RemapRule, ResolvedProcess
 
 

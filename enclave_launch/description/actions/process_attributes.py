@@ -8,11 +8,10 @@ from functools import lru_cache
 from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.actions.events import Shutdown
 from enclave_launch.description.markup.entity import Entity
-from enclave_launch.ros_rules.distro import Feature
+from enclave_launch.ros_rules.distro import Feature, Release
 
 if TYPE_CHECKING:
     from enclave_launch.description.markup.parser import Parser
-    from enclave_launch.ros_rules.distro import Release
 
 
 def _text(entity: Entity, parser: Parser, name: str) -> Any:

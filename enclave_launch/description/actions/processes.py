@@ -13,11 +13,13 @@ from enclave_launch.boundary import shell_words
 from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.actions.executable import Executable
 from enclave_launch.description.actions.process_attributes import attributes_of
-from enclave_launch.description.entity import Action
+from enclave_launch.description.entity import Action, LaunchDescriptionEntity, SomeEntitiesType
 from enclave_launch.description.location import location_of
 from enclave_launch.description.markup.entity import Entity
 from enclave_launch.description.markup.expose import expose_action
 from enclave_launch.description.substitution import (
+    SomeSubstitutionsType,
+    Substitution,
     TextSubstitution,
     normalize_to_list_of_substitutions,
     perform_substitutions,
@@ -32,14 +34,10 @@ from enclave_launch.ros_rules.output import Routes, output_routes
 from enclave_launch.ros_rules.ros_arguments import RosArguments, parse_ros_arguments, words_after_program
 
 if TYPE_CHECKING:
-    from enclave_launch.description.entity import LaunchDescriptionEntity, SomeEntitiesType
     from enclave_launch.description.events.event import ProcessExited
     from enclave_launch.description.launch_context import LaunchContext
     from enclave_launch.description.markup.parser import Parser
-    from enclave_launch.description.substitution import SomeSubstitutionsType, Substitution
 
-
-if TYPE_CHECKING:
     OnExit = SomeEntitiesType | Callable[[ProcessExited, LaunchContext], SomeEntitiesType | None]
 
 
@@ -266,6 +264,17 @@ def _respawn(respawn: bool | SomeSubstitutionsType) -> Any:
     return normalize_typed_substitution(respawn, bool)
 
 
+def _final_or_given(name: str) -> Any:
+    """A property of the process: what is final once it is prepared, before that what was given."""
+
+    def get(process: ExecuteLocal) -> Any:
+        description = process.process_description
+        final = getattr(description, f"final_{name}")
+        return getattr(description, name) if final is None else final
+
+    return property(get)
+
+
 @expose_action("executable")
 class ExecuteProcess(ExecuteLocal):
     """Starts a command; each item of ``cmd`` is one argument (plain text would be one argument per character)."""
@@ -308,26 +317,10 @@ class ExecuteProcess(ExecuteLocal):
                     kwargs[keyword] = value
         return cls, kwargs
 
-    @property
-    def name(self) -> Any:
-        """The process name NAME-N once prepared, before that what was given."""
-        description = self.process_description
-        return description.name if description.final_name is None else description.final_name
-
-    @property
-    def cmd(self) -> Any:
-        description = self.process_description
-        return description.cmd if description.final_cmd is None else description.final_cmd
-
-    @property
-    def cwd(self) -> Any:
-        description = self.process_description
-        return description.cwd if description.final_cwd is None else description.final_cwd
-
-    @property
-    def env(self) -> Any:
-        description = self.process_description
-        return description.env if description.final_env is None else description.final_env
+    name = _final_or_given("name")  # NAME-N once prepared
+    cmd = _final_or_given("cmd")
+    cwd = _final_or_given("cwd")
+    env = _final_or_given("env")
 
     @property
     def additional_env(self) -> Any:

@@ -8,8 +8,8 @@ from collections.abc import Iterable
 from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.actions.flow import OpaqueFunction
 from enclave_launch.description.argument_types import ensure_argument_type
-from enclave_launch.description.entity import Action, LaunchDescriptionEntity
-from enclave_launch.description.events.event import Shutdown, TimerEvent
+from enclave_launch.description.entity import Action, LaunchDescriptionEntity, SomeEntitiesType
+from enclave_launch.description.events.event import Event, Shutdown, TimerEvent
 from enclave_launch.description.events.handlers import BaseEventHandler
 from enclave_launch.description.markup.expose import expose_action
 from enclave_launch.description.substitution import SomeSubstitutionsType, SomeSubstitutionsType_types_tuple
@@ -17,8 +17,6 @@ from enclave_launch.description.typed_values import normalize_typed_substitution
 from enclave_launch.ros_rules.distro import Feature
 
 if TYPE_CHECKING:
-    from enclave_launch.description.entity import SomeEntitiesType
-    from enclave_launch.description.events.event import Event
     from enclave_launch.description.launch_context import LaunchContext
     from enclave_launch.description.markup.entity import Entity
     from enclave_launch.description.markup.parser import Parser

@@ -6,7 +6,7 @@ import collections.abc
 from collections.abc import Callable, Sequence
 
 from enclave_launch.boundary.light import TYPE_CHECKING, Any, TypeAlias
-from enclave_launch.description.entity import Action, LaunchDescriptionEntity
+from enclave_launch.description.entity import Action, LaunchDescriptionEntity, SomeEntitiesType
 from enclave_launch.description.events.event import (
     Event,
     ExecutionComplete,
@@ -17,7 +17,6 @@ from enclave_launch.description.events.event import (
 from enclave_launch.host.user_code import called_for_entities
 
 if TYPE_CHECKING:
-    from enclave_launch.description.entity import SomeEntitiesType
     from enclave_launch.description.launch_context import LaunchContext
     from enclave_launch.source_location import SourceLocation
 

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.actions.processes import ExecuteLocal, ExecuteProcess
 from enclave_launch.description.events.event import (
+    Event,
     ProcessExited,
     ProcessIO,
     ProcessStarted,
@@ -16,7 +17,6 @@ from enclave_launch.description.events.handlers import OnActionEventBase
 
 if TYPE_CHECKING:
     from enclave_launch.description.entity import SomeEntitiesType
-    from enclave_launch.description.events.event import Event
     from enclave_launch.description.events.handlers import ActionMatcher, OnEvent
     from enclave_launch.description.launch_context import LaunchContext
 

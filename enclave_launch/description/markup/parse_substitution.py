@@ -10,7 +10,7 @@ from functools import lru_cache
 
 from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.markup import expose
-from enclave_launch.description.substitution import TextSubstitution
+from enclave_launch.description.substitution import Substitution, TextSubstitution
 from enclave_launch.frontend.substitution_grammar import (
     SubstitutionCall,
     Template,
@@ -22,7 +22,6 @@ from enclave_launch.frontend.substitution_grammar import (
 from enclave_launch.host.current import current_release
 
 if TYPE_CHECKING:
-    from enclave_launch.description.substitution import Substitution
     from enclave_launch.ros_rules.distro import Release
 
 

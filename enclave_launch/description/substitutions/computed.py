@@ -12,6 +12,7 @@ from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.markup.expose import expose_substitution
 from enclave_launch.description.substitution import (
     MAX_TEXT,
+    SomeSubstitutionsType,
     Substitution,
     SubstitutionFailure,
     normalize_to_list_of_substitutions,
@@ -24,7 +25,6 @@ from enclave_launch.ros_rules.distro import Feature
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch_context import LaunchContext
-    from enclave_launch.description.substitution import SomeSubstitutionsType
     from enclave_launch.host.protocol import CommandResult
 
 

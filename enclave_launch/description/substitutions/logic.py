@@ -9,6 +9,7 @@ from functools import partial
 from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.markup.expose import expose_substitution
 from enclave_launch.description.substitution import (
+    SomeSubstitutionsType,
     Substitution,
     SubstitutionFailure,
     normalize_to_list_of_substitutions,
@@ -21,7 +22,6 @@ from enclave_launch.ros_rules.distro import Feature
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch_context import LaunchContext
-    from enclave_launch.description.substitution import SomeSubstitutionsType
 
 
 Parsed = tuple[type[Substitution], dict[str, Any]]

@@ -10,6 +10,7 @@ from enclave_launch.description import ament_index as packages
 from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.description.markup.expose import expose_substitution
 from enclave_launch.description.substitution import (
+    SomeSubstitutionsType,
     Substitution,
     SubstitutionFailure,
     normalize_to_list_of_substitutions,
@@ -22,9 +23,6 @@ from nodl.ament_index import ExecutableNotInstalledError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
-
-    from enclave_launch.description.launch_context import LaunchContext
-    from enclave_launch.description.substitution import SomeSubstitutionsType
 
 
 class PathOperator:

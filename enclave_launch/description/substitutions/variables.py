@@ -9,6 +9,7 @@ from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.argument_types import ensure_argument_type
 from enclave_launch.description.markup.expose import expose_substitution
 from enclave_launch.description.substitution import (
+    SomeSubstitutionsType,
     Substitution,
     SubstitutionFailure,
     normalize_to_list_of_substitutions,
@@ -20,7 +21,6 @@ from enclave_launch.ros_rules.distro import Feature
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch_context import LaunchContext
-    from enclave_launch.description.substitution import SomeSubstitutionsType
 
 
 def _as_text(default: Any) -> list[Substitution]:
