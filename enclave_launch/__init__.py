@@ -7,8 +7,8 @@ costs nothing.
 
 from __future__ import annotations
 
+from enclave_launch.boundary import VERSION
 from enclave_launch.boundary.public_names import public_names
-from enclave_launch.boundary.version import VERSION
 
 __version__ = VERSION
 __getattr__, __dir__ = public_names(__name__, __file__)

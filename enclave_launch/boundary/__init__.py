@@ -12,5 +12,7 @@ environment.py   variables of our own environment, set for a while
 dependencies.py  a Python package that is not installed -> one line
 public_names.py  the names that a package offers, imported when first used
 light.py         typing's names, value types and patterns at little cost for start-up
-version.py       the version of all three packages
 """
+
+VERSION = "0.1.0"
+"""Of all three packages."""

@@ -60,7 +60,7 @@ def parsers(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser
 
 def add_version(parser: argparse.ArgumentParser) -> None:
     """``--version``, the same for all commands."""
-    from enclave_launch.boundary.version import VERSION
+    from enclave_launch.boundary import VERSION
 
     parser.add_argument("--version", action="version", version=f"{parser.prog} {VERSION}")
 

@@ -25,8 +25,6 @@ _VALUE_TYPES = frozenset({str, int, float, bool, None})  # certainly no lists of
 class Entity(BaseEntity):
     """One XML element; attributes are coerced to the type that is asked for."""
 
-    __slots__ = ("_element", "_file", "_parent", "_read_attributes", "_read_children")
-
     def __init__(self, xml_element: XmlElement, *, parent: Entity | None = None, file: str = "") -> None:
         self._element = xml_element
         self._parent = parent

@@ -24,17 +24,6 @@ _NO_LINES: Mapping[int, int] = {}
 class Entity(BaseEntity):
     """One YAML value under the key that names it; attributes must already have their type."""
 
-    __slots__ = (
-        "_children_called",
-        "_element",
-        "_file",
-        "_line",
-        "_lines",
-        "_parent",
-        "_read_keys",
-        "_type_name",
-    )
-
     def __init__(
         self,
         element: Any,
