@@ -10,44 +10,33 @@ import gzip
 import io
 import os
 import tarfile
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from enclave_launch.boundary.files import read_bytes
+from keystore.disk.store import Content, Link
 from keystore.errors import DamagedKeystoreError, StorageError, printable
 
 MAX_ARCHIVE = 256_000_000
 """Bytes; some 20 000 enclaves."""
 
 
-@dataclass(frozen=True, slots=True)
-class ExportedFile:
-    """``path`` is relative to the bundle; either ``data`` or ``link`` (a relative target)."""
-
-    path: str
-    mode: int
-    data: bytes = field(default=b"", repr=False)
-    link: str | None = None
-
-
-def archive_bytes(files: Iterable[ExportedFile], *, compressed: bool = False) -> bytes:
-    """Sorted, without times and owners."""
-    listed = list(files)
+def archive_bytes(files: Mapping[str, Content | Link], *, compressed: bool = False) -> bytes:
+    """``files`` by their path in the archive: sorted, without times and owners."""
     buffer = io.BytesIO()
     with tarfile.open(fileobj=buffer, mode="w", format=tarfile.GNU_FORMAT) as archive:
-        for directory in sorted({parent for file in listed for parent in parents(file.path)}):
+        for directory in sorted({parent for path in files for parent in parents(path)}):
             archive.addfile(_entry(directory, 0o755, tarfile.DIRTYPE))
-        for file in sorted(listed, key=lambda file: file.path):
-            kind = tarfile.SYMTYPE if file.link is not None else tarfile.REGTYPE
-            entry = _entry(file.path, file.mode, kind)
-            entry.linkname = file.link or ""
-            entry.size = len(file.data)
-            archive.addfile(entry, io.BytesIO(file.data))
-    if not compressed:
-        return buffer.getvalue()
-
-    return gzip.compress(buffer.getvalue(), mtime=0)
+        for path, file in sorted(files.items()):
+            if isinstance(file, Link):
+                entry = _entry(path, 0o777, tarfile.SYMTYPE)
+                entry.linkname = file.target
+                archive.addfile(entry)
+            else:
+                entry = _entry(path, file.mode, tarfile.REGTYPE)
+                entry.size = len(file.data)
+                archive.addfile(entry, io.BytesIO(file.data))
+    return gzip.compress(buffer.getvalue(), mtime=0) if compressed else buffer.getvalue()
 
 
 def read_bundle(bundle: Path) -> dict[str, bytes]:

@@ -60,14 +60,7 @@ class Versions:
         """Write a version aside; its place, for ``switch``. Raises StorageError."""
         staging = self.folder / _STAGING
         try:
-            os.mkdir(staging, 0o700)
-            os.chmod(staging, 0o755)
-            for relative, entry in entries.items():
-                make_directories(staging, relative)
-                if isinstance(entry, Link):
-                    os.symlink(entry.target, staging / relative)
-                else:
-                    write_new(staging / relative, entry.data, entry.mode)
+            write_tree(staging, entries)
         except OSError as error:
             raise StorageError.of(error, "writing the bundle's files") from None
         return staging
@@ -103,6 +96,18 @@ class Versions:
                 shutil.rmtree(path)
             else:
                 os.unlink(path)
+
+
+def write_tree(root: Path, entries: Mapping[str, Content | Link], *, durable: bool = False) -> None:
+    """A new directory with these files, by their paths below it."""
+    os.mkdir(root, 0o700)
+    os.chmod(root, 0o755)
+    for relative, entry in entries.items():
+        make_directories(root, relative)
+        if isinstance(entry, Link):
+            os.symlink(entry.target, root / relative)
+        else:
+            write_new(root / relative, entry.data, entry.mode, durable=durable)
 
 
 def write_new(path: Path, data: bytes, mode: int, *, durable: bool = False) -> None:

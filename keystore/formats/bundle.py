@@ -11,13 +11,14 @@ CAs; and of each enclave what the register of the CA holds: serial, hash of the 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Mapping
 from datetime import datetime
 from typing import Any, NamedTuple
 
 from keystore.errors import DamagedKeystoreError, KeystoreError
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.hosts import refuse_host_name
+from keystore.formats.register import lines_json
 from keystore.formats.role import Role
 from keystore.formats.validity import iso, parse_moment
 
@@ -69,16 +70,8 @@ def manifest_json(manifest: Manifest) -> bytes:
         "crl_number": manifest.crl_number,
         "ends": iso(manifest.ends),
     }
-    lines = [f"{json.dumps(name)}: {json.dumps(value)}," for name, value in head.items()]
-    lines += _block("enclaves", (_row(one) for one in manifest.enclaves), "],")
-    lines += _block("files", ([name, digest] for name, digest in sorted(manifest.files.items())), "]")
-    return "\n".join(("{", *lines, "}", "")).encode()
-
-
-def _block(name: str, rows: Iterable[list[Any]], end: str) -> Iterator[str]:
-    yield f'"{name}": ['
-    yield ",\n".join(json.dumps(row) for row in rows)
-    yield end
+    files = ([name, digest] for name, digest in sorted(manifest.files.items()))
+    return lines_json(head, {"enclaves": map(_row, manifest.enclaves), "files": files})
 
 
 def _row(one: BundledEnclave) -> list[Any]:

@@ -181,26 +181,32 @@ class Register:
 
 def register_json(register: Register) -> bytes:
     """One line for each entry: differences between two versions can be read."""
-    authorities = [
-        [role.value, state.value, base64.b64encode(ca).decode()]
-        for (role, ca), state in register.authorities.items()
-    ]
-    parts = {
-        "authorities": authorities,
-        "certificates": [_certificate_row(one) for one in register.certificates.values()],
-        "documents": [
+    head = {
+        "version": _VERSION,
+        "crl_number": register.crl_number,
+        "crl_published": register.crl_published,
+        "governance": register.governance.decode(),
+    }
+    rows: dict[str, Iterable[list[Any]]] = {
+        "authorities": (
+            [role.value, state.value, base64.b64encode(ca).decode()]
+            for (role, ca), state in register.authorities.items()
+        ),
+        "certificates": map(_certificate_row, register.certificates.values()),
+        "documents": (
             [one.enclave, one.subject, one.document, one.rules, iso(one.not_after)]
             for one in register.documents
-        ],
+        ),
     }
-    lines = ["{", f'"version": {_VERSION},', f'"crl_number": {register.crl_number},']
-    lines.append(f'"crl_published": {json.dumps(register.crl_published)},')
-    lines.append(f'"governance": {json.dumps(register.governance.decode())},')
-    for name, rows in parts.items():
-        body = ",\n".join(json.dumps(row) for row in rows)
-        lines.append(f'"{name}": [\n{body}\n],')
-    lines[-1] = lines[-1].rstrip(",")
-    return "\n".join((*lines, "}", "")).encode()
+    return lines_json(head, rows)
+
+
+def lines_json(head: Mapping[str, Any], rows: Mapping[str, Iterable[list[Any]]]) -> bytes:
+    """An object with ``head``, then lists of ``rows``; each entry and each row on a line of its own."""
+    entries = [f"{json.dumps(name)}: {json.dumps(value)}" for name, value in head.items()]
+    for name, listed in rows.items():
+        entries.append(f"{json.dumps(name)}: [\n" + ",\n".join(map(json.dumps, listed)) + "\n]")
+    return ("{\n" + ",\n".join(entries) + "\n}\n").encode()
 
 
 def _certificate_row(one: IssuedCertificate) -> list[Any]:

@@ -15,8 +15,9 @@ from enum import Enum
 from pathlib import Path
 
 from keystore.disk import layout, safe_files, store
-from keystore.disk.archive import ExportedFile, archive_bytes
-from keystore.disk.versions import make_directories, write_new
+from keystore.disk.archive import archive_bytes
+from keystore.disk.store import Content, Link
+from keystore.disk.versions import write_new, write_tree
 from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import DamagedKeystoreError, InvalidInputError, StorageError, printable
 from keystore.formats.validity import utc_now
@@ -50,8 +51,9 @@ def export(
     names = view.matching(patterns)
     refuse_unfit(view, names, now or utc_now(), accept_exposures)
     _refuse_without_key(view, names)
-    files = files_of(view, names)
-    files += [file for name in names for file in _public_files(view, name, public)]
+    files: dict[str, Content | Link] = {**files_of(view, names)}
+    for name in names:
+        files |= _public_files(view, name, public)
     target = Path(output)
     if target.exists() or target.is_symlink():
         raise InvalidInputError(f"{printable(target)} exists already; choose a new name or remove it")
@@ -111,28 +113,27 @@ def _refuse(what: str, finding: Finding, accept_exposures: bool) -> None:
         raise DamagedKeystoreError(f"{what} is exposed: {found}; or export with --accept-exposures")
 
 
-def files_of(view: KeystoreView, names: Iterable[str]) -> list[ExportedFile]:
+def files_of(view: KeystoreView, names: Iterable[str]) -> dict[str, Content]:
     """What every bundle of these enclaves holds, by path; a key only where it was not made on its host."""
     enclaves = [(name, not view.has_request(name)) for name in names]
-    found = []
+    found = {}
     for path in sorted(layout.bundle_files(enclaves, crl=view.has_crl)):
-        is_key = path.endswith(f"/{layout.KEY}")
-        data = (safe_files.read_private if is_key else safe_files.read)(view.root, path)
-        found.append(ExportedFile(path, store.PRIVATE_MODE if is_key else store.PUBLIC_MODE, data))
+        if path.endswith(f"/{layout.KEY}"):
+            found[path] = Content(safe_files.read_private(view.root, path), store.PRIVATE_MODE)
+        else:
+            found[path] = Content(safe_files.read(view.root, path))
     return found
 
 
-def _public_files(view: KeystoreView, enclave: str, public: PublicFiles) -> Iterator[ExportedFile]:
-    directory = layout.enclave_directory(enclave)
-    for name, target in layout.enclave_links(enclave, crl=view.has_crl).items():
-        if public is PublicFiles.LINK:
-            yield ExportedFile(f"{directory}/{name}", 0o777, link=target)
-        else:
-            content = safe_files.read(view.root, layout.link_source(name))
-            yield ExportedFile(f"{directory}/{name}", store.PUBLIC_MODE, content)
+def _public_files(
+    view: KeystoreView, enclave: str, public: PublicFiles
+) -> Iterator[tuple[str, Content | Link]]:
+    for name, link in store.enclave_links(enclave, crl=view.has_crl).items():
+        file = link if public is PublicFiles.LINK else Content(safe_files.read(view.root, link.source))
+        yield f"{layout.enclave_directory(enclave)}/{name}", file
 
 
-def _write(target: Path, files: list[ExportedFile]) -> None:
+def _write(target: Path, files: Mapping[str, Content | Link]) -> None:
     """Written beside the target and renamed: a bundle is complete or absent."""
     target.parent.mkdir(parents=True, exist_ok=True)
     aside = target.with_name(f".{target.name}.{os.getpid()}.partial")
@@ -141,22 +142,10 @@ def _write(target: Path, files: list[ExportedFile]) -> None:
             content = archive_bytes(files, compressed=target.name.endswith(".gz"))
             write_new(aside, content, store.PRIVATE_MODE, durable=True)  # it holds keys
         else:
-            _write_directory(aside, files)
+            write_tree(aside, files, durable=True)
         os.rename(aside, target)
     finally:
         if aside.is_dir():
             shutil.rmtree(aside)
         elif aside.exists():
             aside.unlink()
-
-
-def _write_directory(aside: Path, files: list[ExportedFile]) -> None:
-    os.mkdir(aside, 0o700)
-    os.chmod(aside, 0o755)
-    for file in files:
-        path = aside / file.path
-        make_directories(aside, file.path)
-        if file.link is not None:
-            os.symlink(file.link, path)
-        else:
-            write_new(path, file.data, file.mode, durable=True)

@@ -14,9 +14,9 @@ from datetime import datetime
 from pathlib import Path
 
 from keystore.disk import layout, safe_files, store
-from keystore.disk.archive import ExportedFile, archive_bytes
+from keystore.disk.archive import archive_bytes
 from keystore.disk.crl_file import crl_number, crl_validity
-from keystore.disk.store import Store
+from keystore.disk.store import Content, Store
 from keystore.disk.versions import write_new
 from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import InvalidInputError, StorageError, printable
@@ -113,7 +113,7 @@ def _export(
     opened: Store, output: Path, host: str, names: list[str], options: BundleOptions, now: datetime
 ) -> HostBundle:
     view = KeystoreView(opened.root)
-    files = {file.path: file for file in files_of(view, names)}
+    files = files_of(view, names)
     manifest = _manifest(view, host, names, files)
     present = last_signed(view, host)
     is_new = present is None or not manifest.same_content(present[0])
@@ -125,7 +125,7 @@ def _export(
             batch.file(layout.signed_bundle(host), signed, store.PRIVATE_MODE)
     else:
         manifest, signed = present
-    content = archive_bytes([ExportedFile(layout.BUNDLE, store.PUBLIC_MODE, signed), *files.values()])
+    content = archive_bytes({layout.BUNDLE: Content(signed), **files})
     return HostBundle(_write(output, host, content, opened.root), manifest, is_new)
 
 
@@ -145,7 +145,7 @@ def last_signed(view: KeystoreView, host: str) -> tuple[Manifest, bytes] | None:
     return manifest, signed
 
 
-def _manifest(view: KeystoreView, host: str, names: list[str], files: Mapping[str, ExportedFile]) -> Manifest:
+def _manifest(view: KeystoreView, host: str, names: list[str], files: Mapping[str, Content]) -> Manifest:
     enclaves = tuple(_bundled(enclave, files) for enclave in names)
     ends = [ca.validity.not_after for role in Role for ca in view.ca_bundle(role)]
     ends += [one.not_after for one in enclaves]
@@ -161,7 +161,7 @@ def _manifest(view: KeystoreView, host: str, names: list[str], files: Mapping[st
     )
 
 
-def _bundled(enclave: str, files: Mapping[str, ExportedFile]) -> BundledEnclave:
+def _bundled(enclave: str, files: Mapping[str, Content]) -> BundledEnclave:
     """From the very bytes that are exported; they were checked to be what the register holds."""
     directory = layout.enclave_directory(enclave)
     cert = read_certificate(files[f"{directory}/{layout.CERT}"].data, f"{directory}/{layout.CERT}")

@@ -18,7 +18,8 @@ from enclave_launch.frontend.yaml_scalar import load as load_scalar
 from enclave_launch.frontend.yaml_tree import parse_yaml as parse_launch_yaml
 from enclave_launch.ros_rules.parameter_file import RefusedParameters, sections_of_text
 from enclave_launch.ros_rules.ros_arguments import parse_ros_arguments
-from keystore.disk.archive import ExportedFile, archive_bytes, read_archive
+from keystore.disk.archive import archive_bytes, read_archive
+from keystore.disk.store import Content
 from keystore.errors import KeystoreError
 from keystore.formats import der
 from keystore.formats.bundle import parse_manifest
@@ -244,7 +245,7 @@ def targets() -> dict[str, Target]:
         "bundle": Target(
             lambda data: read_archive(data, "a.bundle"),
             refused,
-            (archive_bytes([ExportedFile("enclaves/a/key.pem", 0o600, b"key")]),),
+            (archive_bytes({"enclaves/a/key.pem": Content(b"key", 0o600)}),),
             words("\0", "ustar", "../", "0000600", "1", "2", "x", "L"),
         ),
         "bundle-manifest": Target(

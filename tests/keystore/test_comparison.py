@@ -129,6 +129,9 @@ class TestDifferences:
         assert told(root) == ()
         shutil.copy(tmp_path / "old.p7s", root / layout.GOVERNANCE)
         assert "the governance is not what it was" in told(root)
+        report = again(root, domains=Domains(((0, 3),)))
+        assert report.created == ("governance signed for domains 0-3",) and kit.actions(report) == {}
+        assert told(root) == ()
 
     def test_are_told_of_a_policy_that_grants_something_else(self, root: Path) -> None:
         assert told(root, kit.policy("/a", "/chatter")) == ()
@@ -264,11 +267,13 @@ class TestDomains:
 
 
 class TestALifeThatWasAskedFor:
-    @pytest.mark.parametrize("form", ["lifetime", "valid_until"])
+    @pytest.mark.parametrize("form", ["lifetime", "valid_until", "both, of which the date counts"])
     def test_is_given_to_existing_enclaves_too(self, root: Path, form: str) -> None:
         def asked(days: int) -> ProvisionOptions:
-            end = {"lifetime": days * DAY, "valid_until": utc_now() + days * DAY}[form]
-            return kit.options(**{form: end})
+            lifetime, end = days * DAY, utc_now() + days * DAY
+            if form == "both, of which the date counts":
+                return kit.options(lifetime=2 * lifetime, valid_until=end)
+            return kit.options(**{form: lifetime if form == "lifetime" else end})
 
         report = create_enclaves(root, ["/a"], options=asked(10))
         assert kit.actions(report) == {"/a": ("certificate", "permissions", "old certificate revoked")}
@@ -293,6 +298,7 @@ def test_a_bundle_that_grants_more_than_ours_is_taken_as_a_union_and_one_that_la
     report = again(tmp_path / "bundle", kit.policy("/a"), launch=hold)
     assert not report.changed
     assert any("may do more in this bundle than this launch asks for" in text for text in report.warnings)
+    assert told(tmp_path / "bundle", launch=hold) == (), "its next process starts"
     same = again(tmp_path / "bundle", kit.policy("/a", "/chatter", "/other"), launch=hold)
     assert same.warnings == report.warnings[1:]
     with pytest.raises(SigningUnavailableError, match="lacks publish rt/third"):

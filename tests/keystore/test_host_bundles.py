@@ -12,7 +12,8 @@ from pathlib import Path
 import pytest
 
 from keystore.disk import layout
-from keystore.disk.archive import ExportedFile, archive_bytes, read_archive
+from keystore.disk.archive import archive_bytes, read_archive
+from keystore.disk.store import Content
 from keystore.errors import (
     DamagedKeystoreError,
     InvalidInputError,
@@ -181,7 +182,7 @@ def test_the_first_import_needs_pins_and_holds_to_them(ca: Path, tmp_path: Path)
 def tampered(source: Path, target: Path, change: Callable[[dict[str, bytes]], None]) -> Path:
     files = read_archive(source.read_bytes(), "bundle")
     change(files)
-    target.write_bytes(archive_bytes([ExportedFile(name, 0o644, data) for name, data in files.items()]))
+    target.write_bytes(archive_bytes({name: Content(data) for name, data in files.items()}))
     return target
 
 
