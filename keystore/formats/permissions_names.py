@@ -57,7 +57,8 @@ def full_name(expression: str, profile: Profile) -> str:
     if _FULL_NAME.match(expression) and len(expression) <= MAX_NAME_LENGTH:
         return expression
     _check_profile(profile)
-    _check_expression(expression)
+    if problem := _problem(expression):
+        raise PolicyError(f"{printable(expression)} {problem}")
     ns = "" if profile.ns == "/" else profile.ns
     if expression[0] == "~":
         name = f"{ns}/{profile.node}{expression[1:]}"
@@ -127,12 +128,6 @@ def _check_profile(profile: Profile) -> None:
         )
     if not re.match(_NODE, profile.node) or len(profile.node) > 255:
         raise PolicyError(f"node={printable(profile.node)} is not a node name")
-
-
-def _check_expression(expression: str) -> None:
-    problem = _problem(expression)
-    if problem:
-        raise PolicyError(f"{printable(expression)} {problem}")
 
 
 def _problem(expression: str) -> str | None:

@@ -51,18 +51,12 @@ class FileSigner:
         return self._key.public_key()
 
     def sign(self, data: bytes) -> bytes:
-        from cryptography.hazmat.primitives.asymmetric import ec
+        from cryptography.hazmat.primitives import hashes
+        from cryptography.hazmat.primitives.asymmetric import ec, padding
 
         if isinstance(self._key, ec.EllipticCurvePrivateKey):
             return self._key.sign(data, self._ec_algorithm)
-        return _sign_rsa(self._key, data)
-
-
-def _sign_rsa(key: rsa.RSAPrivateKey, data: bytes) -> bytes:
-    from cryptography.hazmat.primitives import hashes
-    from cryptography.hazmat.primitives.asymmetric import padding
-
-    return key.sign(data, padding.PKCS1v15(), hashes.SHA256())
+        return self._key.sign(data, padding.PKCS1v15(), hashes.SHA256())
 
 
 def load_private_key(pem: bytes, passphrase: Secret | None, place: str) -> PrivateKey:

@@ -25,13 +25,10 @@ def refuse_without_keys(
 ) -> None:
     """Raises SigningUnavailableError with every enclave that differs, and how, when the key that would be needed is not
     here."""
-    if view.key_file(Role.PERMISSIONS) is not None and view.key_file(Role.IDENTITY) is not None:
-        return
     lines = []
     for state in states:
-        needs = [Role.IDENTITY] if state.reissue is not Reissue.NOTHING else []
-        needs += [Role.PERMISSIONS] if state.permissions else []
-        if any(view.key_file(role) is None for role in needs):
+        needs = {Role.IDENTITY: state.reissue is not Reissue.NOTHING, Role.PERMISSIONS: state.permissions}
+        if any(needed and view.key_file(role) is None for role, needed in needs.items()):
             lines.append(f"{state.enclave}: {'; '.join(_reasons(view, state, wanted[state.enclave]))}")
     if not lines:
         return

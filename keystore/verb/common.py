@@ -183,6 +183,14 @@ def print_json(content: Any) -> None:
     print(json_text(content, indent=2, sort_keys=True, default=str))
 
 
+def print_answer(arguments: argparse.Namespace, content: dict[str, Any], lines: Iterable[str]) -> None:
+    """What was asked for, as ``--format`` says."""
+    if arguments.format == "json":
+        print_json({"version": 1, **content})
+    else:
+        print_lines(lines)
+
+
 def print_lines(lines: Iterable[str]) -> None:
     """Each on a line of its own."""
     for line in lines:

@@ -9,6 +9,7 @@ exit status: 0 all well, 1 something to look at (or unreadable), 3 something end
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,10 +38,7 @@ def run(arguments: argparse.Namespace) -> int:
     report = fleet_status(
         arguments.places, keystore=arguments.keystore, within=parse_duration(arguments.within)
     )
-    if arguments.format == "json":
-        common.print_json(_json(report))
-    else:
-        _print(report)
+    common.print_answer(arguments, _json(report), _lines(report))
     if any(one.ended for one in report.hosts):
         return ENDED
     if any(one.due for one in report.hosts):
@@ -48,22 +46,19 @@ def run(arguments: argparse.Namespace) -> int:
     return 0 if report.is_good else 1
 
 
-def _print(report: FleetReport) -> None:
+def _lines(report: FleetReport) -> Iterator[str]:
     for one in report.hosts:
-        manifest = one.manifest
-        print(
-            f"{manifest.host}: number {manifest.number}, {len(manifest.enclaves)} enclaves, until {iso(manifest.ends)}"
-        )
-        common.print_lines(f"  {text}" for text in one.found)
+        held = f"{len(one.manifest.enclaves)} enclaves, until {iso(one.manifest.ends)}"
+        yield f"{one.manifest.host}: number {one.manifest.number}, {held}"
+        yield from (f"  {text}" for text in one.found)
     for place, why in report.unreadable:
-        print(f"{printable(str(place))}: cannot be used: {why}")
+        yield f"{printable(str(place))}: cannot be used: {why}"
     good = sum(not one.found for one in report.hosts)
-    print(f"{len(report.hosts)} hosts, {good} of them as they should be, {len(report.unreadable)} unreadable")
+    yield f"{len(report.hosts)} hosts, {good} of them as they should be, {len(report.unreadable)} unreadable"
 
 
 def _json(report: FleetReport) -> dict[str, Any]:
     return {
-        "version": 1,
         "now": iso(report.now),
         "hosts": [_host(one) for one in report.hosts],
         "unreadable": [{"place": str(place), "why": why} for place, why in report.unreadable],

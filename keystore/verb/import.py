@@ -40,19 +40,19 @@ def run(arguments: argparse.Namespace) -> int:
         host = socket.gethostname()
     options = ImportOptions(host, tuple(arguments.require_ca), arguments.lock_timeout)
     report = import_bundle(arguments.keystore, arguments.bundle, options=options)
-    if arguments.format == "json":
-        common.print_json({
-            "version": 1,
-            "host": report.manifest.host,
-            "number": report.manifest.number,
-            "changed": list(report.changed),
-            "removed": list(report.removed),
-            "restart": report.restart.name.lower(),
-        })  # fmt: skip
-    else:
-        print(f"{report.keystore}: {report.manifest.host}, number {report.manifest.number} is in force")
-        common.print_lines(f"{one}: changed" for one in report.changed)
-        common.print_lines(f"{one}: removed" for one in report.removed)
-        print(f"to restart: {report.restart.value}")
+    content = {
+        "host": report.manifest.host,
+        "number": report.manifest.number,
+        "changed": list(report.changed),
+        "removed": list(report.removed),
+        "restart": report.restart.name.lower(),
+    }
+    lines = (
+        f"{report.keystore}: {report.manifest.host}, number {report.manifest.number} is in force",
+        *(f"{one}: changed" for one in report.changed),
+        *(f"{one}: removed" for one in report.removed),
+        f"to restart: {report.restart.value}",
+    )
+    common.print_answer(arguments, content, lines)
     common.warn(report.notes, arguments)
     return 0

@@ -18,8 +18,5 @@ def run(arguments: argparse.Namespace) -> int:
     from keystore.steps.provisioning import list_enclaves
 
     names = list_enclaves(arguments.keystore)
-    if arguments.format == "json":
-        common.print_json({"version": 1, "enclaves": names})
-    else:
-        common.print_lines(names)
+    common.print_answer(arguments, {"enclaves": names}, names)
     return 0

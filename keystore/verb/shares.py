@@ -32,11 +32,9 @@ def run(arguments: argparse.Namespace) -> int:
         common.print_report(drop_shares(arguments.keystore, arguments.drop, options=options), arguments)
         return 0
     found = list_shares(arguments.keystore)
-    if arguments.format == "json":
-        common.print_json({"version": 1, "launches": [one._asdict() for one in found]})
-    else:
-        common.print_lines(
-            f"{printable(one.owner)}{' (running)' if one.running else ''}: {' '.join(one.enclaves)}"
-            for one in found
-        )
+    lines = (
+        f"{printable(one.owner)}{' (running)' if one.running else ''}: {' '.join(one.enclaves)}"
+        for one in found
+    )
+    common.print_answer(arguments, {"launches": [one._asdict() for one in found]}, lines)
     return 0

@@ -6,6 +6,7 @@ Exit status for monitoring: 0 all well, 3 something ends within the margin, 4 so
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from enclave_launch.boundary.terminal import printable
@@ -36,10 +37,8 @@ def run(arguments: argparse.Namespace) -> int:
 
     report = status(arguments.keystore)
     due = report.due(parse_duration(arguments.within))
-    if arguments.format == "json":
-        common.print_json(_json(report, due))
-    else:
-        _print(report, report.expiries if arguments.all else due)
+    lines = _lines(report, report.expiries if arguments.all else due)
+    common.print_answer(arguments, _json(report, due), lines)
     if any(not one.is_valid(report.now) for one in due):
         return ENDED
     return SOON if due else 0
@@ -47,7 +46,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _json(report: StatusReport, due: tuple[Expiry, ...]) -> dict[str, Any]:
     return {
-        "version": 1,
         "keystore": str(report.keystore),
         "now": iso(report.now),
         "enclaves": list(report.enclaves),
@@ -66,13 +64,13 @@ def _json(report: StatusReport, due: tuple[Expiry, ...]) -> dict[str, Any]:
     }
 
 
-def _print(report: StatusReport, shown: tuple[Expiry, ...]) -> None:
-    print(f"{len(report.enclaves)} enclaves in {printable(str(report.keystore))}")
+def _lines(report: StatusReport, shown: tuple[Expiry, ...]) -> Iterator[str]:
+    yield f"{len(report.enclaves)} enclaves in {printable(str(report.keystore))}"
     for one in shown:
-        print(f"{iso(one.not_after)}  {_left(one, report.now):>14}  {printable(one.subject)}")
+        yield f"{iso(one.not_after)}  {_left(one, report.now):>14}  {printable(one.subject)}"
     if not shown and report.expiries:
         first = report.expiries[0]
-        print(f"nothing is due; the first to end is the {first.subject}, {iso(first.not_after)}")
+        yield f"nothing is due; the first to end is the {first.subject}, {iso(first.not_after)}"
 
 
 def _left(one: Expiry, now: datetime) -> str:

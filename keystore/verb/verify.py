@@ -6,6 +6,7 @@ Each finding comes with its repair. Exit status 1 for errors and exposures, 0 fo
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -43,23 +44,20 @@ def run(arguments: argparse.Namespace) -> int:
         tuple(arguments.require_ca),
     )
     report = verify(arguments.keystore, access=common.access(arguments), required=required)
-    if arguments.format == "json":
-        common.print_json({
-            "version": 1,
-            "keystore": str(report.keystore),
-            "enclaves": report.enclaves,
-            "good": report.is_good,
-            "findings": [asdict(finding) for finding in report.findings],
-        })  # fmt: skip
-    else:
-        _print(report)
+    content = {
+        "keystore": str(report.keystore),
+        "enclaves": report.enclaves,
+        "good": report.is_good,
+        "findings": [asdict(finding) for finding in report.findings],
+    }
+    common.print_answer(arguments, content, _lines(report))
     return 0 if report.is_good else 1
 
 
-def _print(report: VerifyReport) -> None:
+def _lines(report: VerifyReport) -> Iterator[str]:
     for finding in report.findings:
-        print(f"{finding.severity.value}: {printable(finding.place)}: {finding.message} [{finding.code}]")
+        yield f"{finding.severity.value}: {printable(finding.place)}: {finding.message} [{finding.code}]"
         if finding.repair:
-            print(f"    {finding.repair}")
+            yield f"    {finding.repair}"
     verdict = "good" if report.is_good else "not good"
-    print(f"{counted(report.enclaves, 'enclave')}, {counted(len(report.findings), 'finding')}: {verdict}")
+    yield f"{counted(report.enclaves, 'enclave')}, {counted(len(report.findings), 'finding')}: {verdict}"

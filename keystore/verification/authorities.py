@@ -24,7 +24,6 @@ from keystore.verification import repair
 from keystore.verification.contents import mime_problem
 from keystore.verification.finding import Finding, Severity
 from keystore.verification.governance import check_strength
-from keystore.verification.issued import check_governance_issued
 
 
 def check_authorities(
@@ -120,7 +119,11 @@ def _check_governance(
             "carries another certificate than that of the permissions CA: older DDS versions refuse it", again,
         )  # fmt: skip
     yield from check_strength(view.root, governance, required)
-    yield from check_governance_issued(view, register, signed.document)
+    if register is not None and register.governance and signed.document != register.governance:
+        yield Finding(
+            Severity.ERROR, "governance-not-last", place, "signed here, but not the governance that was signed last",
+            repair.run(view.root, "renew", note="signs the last one again"),
+        )  # fmt: skip
     twin = safe_files.read_if_there(view.root, layout.GOVERNANCE_XML)
     if twin is not None and twin.replace(b"\r\n", b"\n") != signed.document:
         yield Finding(

@@ -85,18 +85,6 @@ def check_published(view: KeystoreView, register: Register | None, now: datetime
             )  # fmt: skip
 
 
-def check_governance_issued(
-    view: KeystoreView, register: Register | None, document: bytes
-) -> Iterator[Finding]:
-    """Finds a governance that was signed here once and is not the last one."""
-    if register is not None and register.governance and document != register.governance:
-        yield Finding(
-            Severity.ERROR, "governance-not-last", layout.GOVERNANCE,
-            "signed here, but not the governance that was signed last",
-            repair.run(view.root, "renew", note="signs the last one again"),
-        )  # fmt: skip
-
-
 def check_certificate_issued(
     view: KeystoreView, register: Register | None, enclave: str, facts: CertificateFacts
 ) -> Iterator[Finding]:
