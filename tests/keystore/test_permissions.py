@@ -274,7 +274,9 @@ patterns = st.text("ab*?/", min_size=1, max_size=6).map(
     lambda t: "/" + t.replace("//", "/a/").strip("/") + "a"
 )
 expressions = st.one_of(literals, patterns.filter(lambda text: "//" not in text))
-rules_strategy = st.builds(Rule, st.sampled_from(Operation), st.sampled_from(Qualifier), expressions)
+rules_strategy = st.builds(
+    Rule, st.sampled_from(tuple(Operation)), st.sampled_from(tuple(Qualifier)), expressions
+)
 
 
 def decide(policy: EnclavePolicy, direction: int, topic: str, cyclone_creation: bool = False) -> bool:
@@ -328,7 +330,11 @@ def test_every_document_is_valid_and_the_same_for_any_order(rules: list[Rule]) -
 
 
 @settings(max_examples=60, deadline=None)
-@given(st.lists(st.builds(Rule, st.sampled_from(Operation), st.just(Qualifier.ALLOW), literals), max_size=6))
+@given(
+    st.lists(
+        st.builds(Rule, st.sampled_from(tuple(Operation)), st.just(Qualifier.ALLOW), literals), max_size=6
+    )
+)
 def test_reading_a_document_gives_back_what_the_policy_grants(rules: list[Rule]) -> None:
     (grant,) = parse_permissions(document(enclave(*rules)))
     found, unknown = grant.ros_rules

@@ -179,7 +179,7 @@ def test_a_policy_without_enclaves_cannot_be_written() -> None:
 
 tokens = st.from_regex(r"[a-z_][a-z0-9_]{0,3}", fullmatch=True)
 names = st.builds(lambda head, tail: head + tail, st.sampled_from(["", "/", "~/", "/*", "/[a-c]"]), tokens)
-rules_strategy = st.builds(Rule, st.sampled_from(Operation), st.sampled_from(Qualifier), names)
+rules_strategy = st.builds(Rule, st.sampled_from(tuple(Operation)), st.sampled_from(tuple(Qualifier)), names)
 profiles = st.builds(
     lambda node, rules: Profile("/ns", node, tuple(sorted(set(rules)))),
     tokens,
