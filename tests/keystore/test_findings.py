@@ -1,0 +1,228 @@
+"""Findings of ``verify`` that no other test names: each where it belongs, and not where all is well.
+
+Found by asking for each code of ``keystore/verification`` which test would miss it.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from datetime import timedelta
+from pathlib import Path
+
+import pytest
+
+from keystore.disk import layout
+from keystore.disk.view import KeystoreView
+from keystore.formats.certificate import read_pem
+from keystore.formats.domains import Domains
+from keystore.formats.governance import DomainRule, Governance, Protection
+from keystore.formats.role import Role
+from keystore.formats.subject import SubjectScheme
+from keystore.formats.validity import Validity, utc_now
+from keystore.signing.authority import Authority, Curve, IdentityIssuer, pem_certificate
+from keystore.signing.ca_access import CaAccess
+from keystore.signing.identity import public_half
+from keystore.signing.public_key import fingerprint
+from keystore.signing.smime import sign_document
+from keystore.steps.creation import CreateOptions
+from keystore.steps.provisioning import provision
+from keystore.steps.removal import RemoveOptions, remove
+from keystore.steps.renewal import RenewOptions, renew
+from keystore.steps.zenoh_configuration import write_zenoh
+from keystore.verification import Finding, Requirements, Severity, verify
+from tests.keystore import kit
+
+YEAR = timedelta(days=365)
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return kit.filled(tmp_path_factory.mktemp("made") / "ks")
+
+
+@pytest.fixture
+def root(made: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(made, tmp_path / "ks", symlinks=True))
+
+
+def found(root: Path, code: str, **options: object) -> list[Finding]:
+    return [one for one in verify(root, **options).findings if one.code == code]  # type: ignore[arg-type]
+
+
+def of_enclave(root: Path, code: str, **options: object) -> Severity:
+    """Of the one finding with this code, which is about /a; /b is as it was."""
+    (one,) = found(root, code, **options)
+    assert one.place.startswith("enclaves/a") and one.repair, one
+    return one.severity
+
+
+def test_a_keystore_that_is_well_has_nothing_to_be_told(root: Path) -> None:
+    assert verify(root).findings == ()
+
+
+def test_an_earlier_certificate_that_was_put_back(root: Path, tmp_path: Path) -> None:
+    shutil.copy(root / "enclaves/a/cert.pem", tmp_path / "old.pem")
+    renew(root, ["/a"], options=RenewOptions(provisioning=kit.options()))
+    assert found(root, "certificate-not-last") == []
+    shutil.copy(tmp_path / "old.pem", root / "enclaves/a/cert.pem")
+    assert of_enclave(root, "certificate-not-last") is Severity.ERROR
+
+
+def test_an_enclave_that_is_gone_but_not_revoked(root: Path) -> None:
+    shutil.rmtree(root / "enclaves/a")
+    assert of_enclave(root, "enclave-gone") is Severity.WARNING
+    assert found(root, "enclave-gone", now=utc_now() + 11 * YEAR) == [], "its certificate has ended"
+    remove(root, ["/b"], options=RemoveOptions(durable=False))
+    assert of_enclave(root, "enclave-gone") is Severity.WARNING
+
+
+def test_subjects_as_sros2_writes_them(root: Path, tmp_path: Path) -> None:
+    assert found(root, "compatible-subjects") == []
+    kit.filled(tmp_path / "other", ["/a"], subjects=SubjectScheme.COMPATIBLE)
+    (one,) = found(tmp_path / "other", "compatible-subjects")
+    assert one.severity is Severity.NOTE and "1 enclaves" in one.message and one.repair.count(" /a ") == 1
+
+
+def test_a_domain_that_no_permissions_name(root: Path) -> None:
+    both = Domains(((0, 1),))
+    kit.filled(root, domains=both)
+    assert found(root, "domain-unused") == []
+    kit.filled(root, domains=both, enclave_domains={name: Domains.single(0) for name in ("/a", "/b")})
+    (one,) = found(root, "domain-unused")
+    assert one.severity is Severity.NOTE and "domains 1," in one.message
+
+
+def test_what_somebody_decided_it_must_be(root: Path) -> None:
+    default = Governance.for_domains(Domains.single(0))
+    weaker = Governance((DomainRule(rtps_protection_kind=Protection.NONE),))
+    pins = tuple(fingerprint(KeystoreView(root).ca(role).der) for role in Role)
+    colons = tuple(":".join(pin[at : at + 2] for at in range(0, 64, 2)).upper() for pin in pins)
+    for good in (Requirements(default), Requirements(authorities=pins), Requirements(authorities=colons)):
+        assert verify(root, required=good).findings == ()
+    (one,) = found(root, "governance-not-required", required=Requirements(weaker))
+    assert one.severity is Severity.ERROR
+    for role, pin in zip(Role, reversed(pins), strict=True):
+        (one,) = found(root, "ca-not-required", required=Requirements(authorities=(pin,)))
+        assert one.severity is Severity.ERROR and one.place == layout.ca_cert(role)
+
+
+def test_keys_that_cyclone_dds_refuses(root: Path, tmp_path: Path) -> None:
+    other = kit.filled(tmp_path / "other", ["/a"], creation=CreateOptions(curve=Curve.P384))
+    assert of_enclave_without_repair(other, "key-kind") is Severity.WARNING
+    kinds = found(other, "ca-key-kind")
+    assert [one.place for one in kinds] == sorted(layout.ca_cert(role) for role in Role)
+    assert all(one.severity is Severity.WARNING and "P-384" in one.message for one in kinds)
+    assert found(root, "key-kind") == found(root, "ca-key-kind") == []
+
+
+def of_enclave_without_repair(root: Path, code: str) -> Severity:
+    (one,) = found(root, code)
+    assert one.place.startswith("enclaves/a")
+    return one.severity
+
+
+def test_a_ca_that_is_not_valid_now(root: Path) -> None:
+    assert found(root, "ca-unfit", now=utc_now() + 9 * YEAR) == []
+    for years in (-1, 11):
+        unfit = found(root, "ca-unfit", now=utc_now() + years * YEAR)
+        assert [one.place for one in unfit] == sorted(layout.ca_cert(role) for role in Role)
+        assert all(one.severity is Severity.ERROR and "--ca start" in one.repair for one in unfit)
+
+
+def test_a_ca_whose_own_signature_is_wrong(root: Path) -> None:
+    place = root / layout.ca_cert(Role.IDENTITY)
+    facts = read_pem(place.read_bytes())
+    place.write_bytes(pem_certificate(facts.der[:-1] + bytes((facts.der[-1] ^ 1,))))
+    (one,) = found(root, "ca-signature")
+    assert one.severity is Severity.ERROR and one.place == layout.ca_cert(Role.IDENTITY)
+
+
+def authority(root: Path, role: Role) -> Authority:
+    return KeystoreView(root).authority(role, CaAccess())
+
+
+def issued(root: Path, **changes: object) -> None:
+    """Another certificate for the key of /a, by our own CA, which promises longer than it lives itself."""
+    ca = authority(root, Role.IDENTITY)
+    if "validity" in changes:
+        ca = Authority(ca.facts._replace(validity=changes["validity"]), ca.signer)  # type: ignore[arg-type]
+    public = public_half((root / "enclaves/a/key.pem").read_bytes(), "key")
+    validity = Validity.starting(utc_now(), 100 * YEAR if "validity" in changes else YEAR)
+    made = IdentityIssuer(ca).issue("ros.a", public, validity, changes.get("hosts", ()))  # type: ignore[arg-type]
+    (root / "enclaves/a/cert.pem").write_bytes(pem_certificate(made.der))
+
+
+def test_a_certificate_that_outlives_its_ca(root: Path) -> None:
+    issued(root)
+    assert found(root, "outlives-ca") == []
+    issued(root, validity=Validity.starting(utc_now(), 200 * YEAR))
+    assert of_enclave_without_repair(root, "outlives-ca") is Severity.WARNING
+
+
+def test_an_enclave_that_could_play_the_router(root: Path) -> None:
+    write_zenoh(root, ["/a", "/b"], options=kit.options())
+    issued(root)
+    assert found(root, "zenoh-impostor") == []
+    issued(root, hosts=("localhost",))
+    assert of_enclave(root, "zenoh-impostor") is Severity.EXPOSURE
+
+
+def test_what_zenoh_cannot_grant(root: Path) -> None:
+    write_zenoh(root, ["/a", "/b"], options=kit.options())
+    assert found(root, "zenoh-gap") == []
+    provision(root, [kit.policy("/a", "/camera/*"), kit.policy("/b", "/camera?")], options=kit.options())
+    (one,) = found(root, "zenoh-gap")
+    assert one.severity is Severity.WARNING and "enclave /b" in one.message and "/camera?" in one.message
+
+
+def test_a_certificate_signed_with_a_broken_hash(root: Path, tmp_path: Path) -> None:
+    request, extensions = tmp_path / "a.csr", tmp_path / "extensions"
+    extensions.write_text("basicConstraints=CA:FALSE\n")
+    kit.openssl("req", "-new", "-key", root / "enclaves/a/key.pem", "-subj", "/CN=ros.a", "-out", request)
+    for digest in ("sha256", "sha1"):
+        kit.openssl(
+            "x509", "-req", "-in", request, f"-{digest}", "-days", "90", "-out", root / "enclaves/a/cert.pem",
+            "-extfile", extensions, "-CA", root / layout.ca_cert(Role.IDENTITY),
+            "-CAkey", root / layout.ca_key(Role.IDENTITY),
+        )  # fmt: skip
+        if digest == "sha256":
+            assert found(root, "weak-signature") == []
+    assert of_enclave(root, "weak-signature") is Severity.EXPOSURE
+
+
+def with_another_certificate(document: bytes, root: Path) -> bytes:
+    ca, other = authority(root, Role.PERMISSIONS), authority(root, Role.IDENTITY)
+    return sign_document(document, Authority(ca.facts._replace(der=other.facts.der), ca.signer), utc_now())
+
+
+def with_a_grant_for_others(document: bytes, root: Path) -> bytes:
+    _, grant, tail = document.partition(b"<grant")
+    grant += tail.partition(b"</grant>\n")[0] + b"</grant>\n"
+    both = document.replace(b"</permissions>", grant.replace(b"CN=ros.a<", b"CN=ros.z<") + b"</permissions>")
+    return sign_document(both, authority(root, Role.PERMISSIONS), utc_now())
+
+
+@pytest.mark.parametrize(
+    ("code", "severity", "forged"),
+    [
+        ("embedded-differs", Severity.ERROR, with_another_certificate),
+        ("foreign-grant", Severity.EXPOSURE, with_a_grant_for_others),
+    ],
+)
+def test_signed_permissions_with_more_in_them_than_belongs_there(
+    root: Path, code: str, severity: Severity, forged: Callable[[bytes, Path], bytes]
+) -> None:
+    document = (root / "enclaves/a/permissions.xml").read_bytes()
+    plain = sign_document(document, authority(root, Role.PERMISSIONS), utc_now())
+    (root / "enclaves/a/permissions.p7s").write_bytes(plain)
+    assert verify(root).findings == ()
+    (root / "enclaves/a/permissions.p7s").write_bytes(forged(document, root))
+    assert of_enclave(root, code) is severity
+
+
+def test_a_governance_with_another_certificate_in_it(root: Path) -> None:
+    document = (root / layout.GOVERNANCE_XML).read_bytes()
+    (root / layout.GOVERNANCE).write_bytes(with_another_certificate(document, root))
+    (one,) = found(root, "embedded-differs")
+    assert one.severity is Severity.ERROR and one.place == layout.GOVERNANCE
