@@ -205,16 +205,14 @@ def _present_key_ca(view: KeystoreView, role: Role, options: CreateOptions) -> t
     if present is None:
         return None
     reference = safe_files.read_private(view.root, present)
-    return _self_signed(
-        role, options, open_signer(reference, printable(view.root / present), options.access)
-    ), reference
+    signer = open_signer(reference, printable(view.root / present), options.access)
+    return _self_signed(role, options, signer), reference
 
 
 def _self_signed(role: Role, options: CreateOptions, signer: Signer) -> Authority:
     validity = Validity.starting(options.now or utc_now(), options.ca_lifetime, backdate=options.backdate)
-    return authority.self_signed_ca(
-        role, options.names.get(role) or authority.default_ca_name(role), signer, validity
-    )
+    name = options.names.get(role) or authority.default_ca_name(role)
+    return authority.self_signed_ca(role, name, signer, validity)
 
 
 def _passphrase(options: CreateOptions) -> Secret | None:
