@@ -182,6 +182,27 @@ class TestModes:
         assert [kit.mode(tmp_path / name) for name in ("a", "a/b")] == [0o755, 0o755]
         assert [kit.mode(tmp_path / "a/b" / name) for name in ("key.pem", "cert.pem")] == [0o600, 0o644]
         assert modes[str(tmp_path / "a/b/key.pem")] & 0o077 == 0
+        made = [str(tmp_path / name) for name in ("new", "a", "a/b")]
+        assert not any(modes[path] & 0o022 for path in made), "nor for a moment open to others"
+
+    @pytest.mark.parametrize("mask", UMASKS)
+    def test_of_a_version_that_is_imported(
+        self, tmp_path: Path, mask: int, umask: Callable[[int], int], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        umask(mask)
+        modes = born(monkeypatch)
+        versions = Versions(tmp_path / "ks")
+        with versions.opened(5):
+            staged = versions.stage({"enclaves/a/key.pem": Content(b"k", 0o600), "a.pem": Content(b"c")})
+            assert modes[str(staged)] == 0o700 & ~mask and kit.mode(staged) == 0o755
+            assert modes[str(staged / "enclaves/a/key.pem")] & 0o077 == 0
+            versions.switch(1)
+        found = [kit.mode(tmp_path / "ks" / name) for name in ("enclaves", "enclaves/a/key.pem", "a.pem")]
+        assert found == [0o755, 0o600, 0o644]
+
+    def test_a_root_is_made_with_those_above_it(self, tmp_path: Path) -> None:
+        store.create_root(tmp_path / "robots/one/ks")
+        assert kit.mode(tmp_path / "robots/one/ks") == 0o755
 
     def test_an_existing_root_keeps_its_mode(self, tmp_path: Path) -> None:
         (tmp_path / "ks").mkdir(mode=0o700)
@@ -506,6 +527,36 @@ class TestOpening:
         (tmp_path / "file").write_text("")
         with pytest.raises(StorageError, match="creating the keystore"):
             store.create_root(tmp_path / "file/below/ks")
+
+
+def test_a_version_is_on_the_disk_before_it_is_in_force(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    versions = Versions(tmp_path / "ks")
+    with versions.opened(5):
+        versions.stage({"enclaves/a.pem": Content(b"c"), "link": Link("enclaves/a.pem", "enclaves/a.pem")})
+        disk = Disk(tmp_path, monkeypatch)
+        versions.switch(1)
+    staging = "ks.d/.staging"
+    assert sorted(disk.steps[:3]) == [
+        f"fsync {staging}", f"fsync {staging}/enclaves", f"fsync {staging}/enclaves/a.pem",
+    ]  # fmt: skip
+    assert disk.steps[3:] == ["rename ks.d/1", "fsync ks.d", "rename ks", "fsync ."]
+
+
+def test_a_bundle_is_on_the_disk_when_it_is_asked_to_be(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    disk = Disk(tmp_path, monkeypatch)
+    write_new(tmp_path / "quick", b"c", 0o644)
+    assert disk.steps == []
+    write_new(tmp_path / "safe", b"c", 0o644, durable=True)
+    assert disk.steps == ["fsync safe"]
+    (tmp_path / "link").symlink_to(tmp_path / "none")
+    for taken in ("safe", "link"):
+        with pytest.raises(FileExistsError):
+            write_new(tmp_path / taken, b"d", 0o644)
+    assert not (tmp_path / "none").exists()
 
 
 def test_a_host_sees_the_version_of_before_or_the_new_one(tmp_path: Path) -> None:
