@@ -19,8 +19,8 @@ _DECIMAL = late_pattern(r"[-+]?(?:[0-9]{1,17}\.[0-9]{0,17}(?:[eE][-+][0-9]{1,2})
 _PLAIN_TEXT = late_pattern(r"[A-Za-z_/][ !\"$-~]*(?<![: ])")
 _WORDS = frozenset(("y", "n", "yes", "no", "on", "off", "true", "false", "null"))
 _LONE_SPACE = late_pattern(r"(?<! )(?<!\A') (?! )(?!'\Z)")  # at neither end of what is quoted
-_WIDTH = 80  # a line goes on below at the first lone space beyond
-_LONGEST_KEY = 100  # one of 128 characters has a form of its own
+WIDTH = 80  # a line goes on below at the first lone space beyond
+LONGEST_KEY = 100  # one of 128 characters has a form of its own
 _MOST_KEPT = 64
 TUPLE_TAG = " !!python/tuple"
 QUOTES = ("'", '"')
@@ -43,12 +43,20 @@ def block_text(values: Any, *, sort_keys: bool = True, tuple_tag: str = TUPLE_TA
     try:
         return _written(marshal.dumps(values, 2), sort_keys, tuple_tag)
     except (
-        _NeedsPyYAML,
+        NeedsPyYAML,
         TypeError,
         ValueError,
         RecursionError,
     ):  # keys of two types, an object, an endless number
         return None
+
+
+def scalar_text(value: Any) -> str:
+    """``value`` in a line of such a text. Raises ``NeedsPyYAML``, for collections too."""
+    write = _SCALARS.get(type(value))
+    if write is None:
+        raise NeedsPyYAML
+    return write(value)
 
 
 def known_parts(text: str) -> Sequence[Part] | None:
@@ -59,7 +67,7 @@ def known_parts(text: str) -> Sequence[Part] | None:
 _known: dict[str, Sequence[Part]] = {}
 
 
-class _NeedsPyYAML(Exception):
+class NeedsPyYAML(Exception):
     """Only PyYAML itself writes these values."""
 
 
@@ -107,7 +115,7 @@ class _Writer:
                 text = value if type(value) is str else written
                 self._note("scalar", text, "" if written == text else written[0])
                 line = f"{lead}{head} {written}\n"
-                if len(line) > _WIDTH and " " in written:
+                if len(line) > WIDTH and " " in written:
                     self.lines += _folded(line, len(line) - len(written) - 1, indent)
                 else:
                     self.lines.append(line)
@@ -121,8 +129,8 @@ class _Writer:
                 yield "-", item
             return
         for key in sorted(values) if self._sort_keys else values:
-            if type(key) is not str or not 0 < len(key) <= _LONGEST_KEY:
-                raise _NeedsPyYAML
+            if type(key) is not str or not 0 < len(key) <= LONGEST_KEY:
+                raise NeedsPyYAML
             written = _text_written(key)
             self._note("scalar", key, "" if written == key else written[0])
             yield f"{written}:", values[key]
@@ -130,7 +138,7 @@ class _Writer:
     def _collection(self, head: str, value: Any, indent: str, in_list: bool) -> None:
         tag = self._tags.get(type(value))
         if tag is None:
-            raise _NeedsPyYAML
+            raise NeedsPyYAML
         deeper = f"{indent}  " if in_list or type(value) is dict else indent
         if not value:
             self.lines.append(f"{head}{tag} {'{}' if type(value) is dict else '[]'}\n")
@@ -148,7 +156,7 @@ def _folded(line: str, start: int, indent: str) -> list[str]:
     first, *words = _LONE_SPACE.split(line[start:-1])
     line = line[:start] + first
     for word in words:
-        if len(line) > _WIDTH:
+        if len(line) > WIDTH:
             lines.append(f"{line}\n")
             line = f"{indent}  {word}"
         else:
@@ -161,7 +169,7 @@ def _text_written(text: str) -> str:
     if _PLAIN_TEXT.fullmatch(text) and ": " not in text and text.lower() not in _WORDS:
         return text
     if not (text.isascii() and text.isprintable()):
-        raise _NeedsPyYAML
+        raise NeedsPyYAML
     from io import StringIO
 
     from yaml import ScalarNode
@@ -177,7 +185,7 @@ def _text_written(text: str) -> str:
 
 def _float_written(value: float) -> str:
     if not abs(value) < math.inf:
-        raise _NeedsPyYAML
+        raise NeedsPyYAML
     text = repr(value)
     return text if "." in text else text.replace("e", ".0e")
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from functools import lru_cache
 
 from enclave_launch.boundary.light import Any
-from enclave_launch.boundary.plain_yaml import block_text
+from enclave_launch.boundary.plain_yaml import LONGEST_KEY, WIDTH, NeedsPyYAML, block_text, scalar_text
 from enclave_launch.description.substitution import TextSubstitution
 from enclave_launch.frontend import yaml_scalar
 
@@ -72,5 +73,9 @@ def quoted_parameter_file(section: str, parameters: Mapping[str, Any]) -> str:
 
 def parameter_file(section: str, parameters: Mapping[str, Any]) -> str:
     """The parameter file launch writes for one dict: ``section`` is a node's full name or ``/**``."""
+    with suppress(NeedsPyYAML):  # for lists, and what does not fit into a line
+        lines = [f"    {scalar_text(name)}: {scalar_text(parameters[name])}\n" for name in sorted(parameters)]
+        if lines and all(parameters) and len(max(lines, key=len)) <= WIDTH and len(section) <= LONGEST_KEY:
+            return f"{scalar_text(section)}:\n  ros__parameters:\n{''.join(lines)}"
     values = {section: {"ros__parameters": dict(parameters)}}
     return block_text(values) or dump(values)
