@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
 
 import pytest
 from hypothesis import given
@@ -11,6 +12,7 @@ from hypothesis import strategies as st
 from nodl.names import (
     InvalidNameError,
     expand_name,
+    is_full_name,
     join,
     split_fqn,
     validate_full_name,
@@ -157,3 +159,62 @@ def test_whatever_is_accepted_is_a_valid_full_name(name: str, namespace: str, no
 @given(namespaces, tokens)
 def test_splitting_undoes_joining(namespace: str, node: str) -> None:
     assert split_fqn(join(namespace, node)) == (namespace, node)
+
+
+REASONS = [
+    (validate_node_name, "", "must not be empty", None),
+    (validate_node_name, "a/b", "must not contain '/'", 1),
+    (validate_node_name, "1a", "must not start with a digit", 0),
+    (validate_node_name, "n" * 256, "is longer than 255 characters", None),
+    (validate_namespace, "", "must not be empty", None),
+    (validate_namespace, "a", "must be absolute", 0),
+    (validate_namespace, "/a/", "must not end with '/'", 2),
+    (validate_namespace, "/a b", "must not contain ' '", 2),
+    (validate_namespace, "/a/1b", "no part may start with a digit", 3),
+    (validate_namespace, "/a//b", "must not contain '//'", 2),
+    (validate_namespace, "/" + "n" * 245, "is longer than 245 characters", None),
+    (validate_full_name, "/" + "n" * 247, "is longer than 247 characters", None),
+    (validate_name, "1a", "must not start with a digit", 0),
+    (validate_name, "a/1b", "no part may start with a digit", 2),
+    (validate_name, "~ab", "'~' must be followed by '/'", 1),
+    (validate_name, "{1}", "a substitution must not start with a digit", 1),
+    (validate_written_name, "a*", "wildcards are not allowed here", 1),
+    (validate_written_name, "~a", "'~' must be followed by '/'", 1),
+    (validate_written_name, "a//b", "must not contain '//'", 1),
+    (validate_written_name, "a/{me}", "unknown substitution {me}", 2),
+]
+
+
+@pytest.mark.parametrize(("check", "name", "reason", "position"), REASONS)
+def test_what_is_wrong_with_a_name_is_said_with_its_place(
+    check: Callable[[str], None], name: str, reason: str, position: int | None
+) -> None:
+    with pytest.raises(InvalidNameError) as refused:
+        check(name)
+    assert refused.value.reason.startswith(reason) and refused.value.position == position
+    assert str(refused.value).startswith("invalid ") and reason in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ("check", "name"),
+    [
+        (validate_node_name, "n" * 255),
+        (validate_namespace, "/"),
+        (validate_namespace, "/" + "n" * 244),
+        (validate_full_name, "/" + "n" * 246),
+        (validate_name, "~"),
+        (validate_name, "~a"),
+        (validate_name, "a1"),
+        (validate_name, "{a1}"),
+        (validate_written_name, "~/{node}/{ns}/{namespace}"),
+    ],
+)
+def test_their_neighbours_are_names(check: Callable[[str], None], name: str) -> None:
+    check(name)
+
+
+def test_the_longest_name_is_one_and_the_next_is_none() -> None:
+    longest = expand_name("n" * 242, namespace="/abc", node="x")
+    assert len(longest) == 247 and is_full_name(longest)
+    with pytest.raises(InvalidNameError, match="which is longer than 247 characters"):
+        expand_name("n" * 243, namespace="/abc", node="x")
