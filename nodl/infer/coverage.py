@@ -95,6 +95,16 @@ class _Mentions:
         self.imported: dict[str, set[str]] = {}  # names that a file imports
         self.texts: set[str] = set()
 
+    def add(self, file: str, nodes: Iterable[ast.AST]) -> None:
+        names, imported = self.names.setdefault(file, set()), self.imported.setdefault(file, set())
+        for node in nodes:
+            if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load):
+                names.add(node.id)
+            elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+                self.texts.add(node.value)
+            elif isinstance(node, ast.ImportFrom):
+                imported.update(alias.name for alias in node.names)
+
     def name(self, name: str, file: str) -> bool:
         elsewhere = any(
             name in names and name in self.imported.get(other, ()) for other, names in self.names.items()
@@ -171,21 +181,10 @@ class _Audit:
     def _mentions(self) -> _Mentions:
         mentions = _Mentions()
         for module in self._run.modules.values():
-            names = mentions.names.setdefault(module.source.path, set())
-            imported = mentions.imported.setdefault(module.source.path, set())
-            for node in self._executed(module.source.tree.body):
-                if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Load):
-                    names.add(node.id)
-                elif isinstance(node, ast.Constant) and isinstance(node.value, str):
-                    mentions.texts.add(node.value)
-                elif isinstance(node, ast.ImportFrom):
-                    imported.update(alias.name for alias in node.names)
+            for statement in module.source.tree.body:
+                if statement in self._run.executed and not _is_list_of_exports(statement):
+                    mentions.add(module.source.path, _referring(statement, self._called))
         return mentions
-
-    def _executed(self, body: list[ast.stmt]) -> Iterator[ast.AST]:
-        for statement in body:
-            if statement in self._run.executed and not _is_list_of_exports(statement):
-                yield from _referring(statement, self._called)
 
     def _gap(self, node: ast.AST, why: str) -> None:
         self.gaps.append(Gap(SourceRef(self._file, getattr(node, "lineno", 0)), why))

@@ -17,6 +17,7 @@ from nodl.infer.interpreter.run import Run
 from nodl.infer.text import Hole, Text, TextAtom, common_text, concatenations, make_text
 from nodl.infer.values import (
     ANY,
+    BOTTOM,
     RESULT,
     Dictionary,
     External,
@@ -26,7 +27,7 @@ from nodl.infer.values import (
     Sequence,
     Unknown,
     Value,
-    join_all,
+    join,
     sole,
     unknown,
 )
@@ -64,8 +65,11 @@ def _text_of_atom(atom: object) -> TextAtom:
 
 def text_value(texts: Iterable[TextAtom]) -> Value:
     """A value of ``texts``; a text that is one hole is simply unknown."""
-    holes = ((text, text.pieces[0] if isinstance(text, Text) and text.is_hole else None) for text in texts)
-    return join_all(unknown(hole.why) if isinstance(hole, Hole) else (text,) for text, hole in holes)
+    result: Value = BOTTOM
+    for text in texts:
+        hole = text.pieces[0] if isinstance(text, Text) and text.is_hole else None
+        result = join(result, unknown(hole.why) if isinstance(hole, Hole) else (text,))
+    return result
 
 
 def f_string(run: Run, node: ast.JoinedStr, frame: Frame) -> Value:
