@@ -114,8 +114,10 @@ def _plain_texts(value: Value) -> list[str]:
 
 
 def _endpoints(found: FoundEndpoint, note: str) -> list[Endpoint]:
-    shape = Endpoint(found.kind, NameTemplate(()), found.type, found.source, note=note, qos=found.qos)
-    return [shape._replace(name=each, certainty=certainty_of(each)) for each in templates(found.name)]
+    return [
+        Endpoint(found.kind, each, found.type, found.source, certainty_of(each), note=note, qos=found.qos)
+        for each in templates(found.name)
+    ]
 
 
 def certainty_of(template: NameTemplate) -> Certainty:

@@ -151,7 +151,14 @@ class ProgramState:
 
     def perhaps(self, make: Callable[[], Value]) -> Value:
         """What ``make`` gives, run as something that may happen or not."""
-        return self.each((make, lambda: BOTTOM))[0]
+        given: list[Value] = []
+
+        def run() -> bool:
+            given.append(make())
+            return True
+
+        self.maybe(run)
+        return given[0]
 
     def repeatedly(self, action: Alternative, widen_texts: bool) -> None:
         """``maybe`` as one step towards a fixpoint: what keeps growing is widened."""
