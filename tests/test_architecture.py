@@ -172,6 +172,19 @@ def test_only_the_disk_room_of_the_keystore_makes_files_that_may_hold_a_key() ->
     assert makers == {"disk"}
 
 
+def test_every_module_can_be_imported() -> None:
+    """Names that only a type checker has in ``boundary/light.py`` are not to be needed at run time."""
+    files = [path.relative_to(ROOT).with_suffix("") for package in PACKAGES for path in sources(package)]
+    needs_upstream = ROOT / "enclave_launch" / "ros2"
+    modules = [
+        ".".join(file.parts)
+        for file in files
+        if file.name != "__main__" and needs_upstream not in (ROOT / file).parents
+    ]
+    code = "import importlib, sys\nfor name in sys.argv[1:]: importlib.import_module(name)"
+    subprocess.run([sys.executable, "-c", code, *modules], check=True, cwd=ROOT)
+
+
 def modules_loaded_by(arguments: list[str], **environment: str) -> set[str]:
     """What a whole run of ``secure-launch`` imports; without ``site``, where an editable installation imports more."""
     code = (

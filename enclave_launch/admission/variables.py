@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Mapping
 
+from enclave_launch.boundary.environment import domain_id
 from enclave_launch.boundary.files import text_or_nothing
 from enclave_launch.boundary.light import NamedTuple, late_pattern
 from enclave_launch.errors import UsageError
@@ -74,13 +75,9 @@ def own_security(environment: Mapping[str, str]) -> Iterator[Setting]:
 
 
 def domain_of(environment: Mapping[str, str]) -> int:
-    """The DDS domain of a process; no value is 0. Read by ``strtoul`` with base 0 (rcl ``domain_id.c``): ``010`` is 8.
-
-    Raises ``UsageError`` for what rcl, or Cyclone DDS in a governance, would refuse."""
-    text = environment.get(DOMAIN) or "0"
-    number = re.fullmatch("0(?P<octal>[0-7]*)|0[xX](?P<hex>[0-9a-fA-F]+)|[1-9][0-9]*", text)
-    if number is not None:
-        domain = int(text, 8 if number["octal"] else 16 if number["hex"] else 10)
-        if domain <= HIGHEST_ID:
-            return domain
-    raise UsageError(f"{DOMAIN} is {printable(text)}, not a domain id from 0 to {HIGHEST_ID}")
+    """The DDS domain of a process. Raises ``UsageError`` for what rcl, or Cyclone DDS in a governance, would refuse."""
+    text = environment.get(DOMAIN, "")
+    domain = domain_id(text)
+    if domain is None or domain > HIGHEST_ID:
+        raise UsageError(f"{DOMAIN} is {printable(text)}, not a domain id from 0 to {HIGHEST_ID}")
+    return domain

@@ -1,8 +1,9 @@
-"""Variables of our own environment, for what only reads them there."""
+"""Environment variables: set for what reads them only there, and what one of rcl's says."""
 
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 
@@ -20,3 +21,12 @@ def environment_with(variables: Mapping[str, str]) -> Iterator[None]:
                 os.environ.pop(name, None)
             else:
                 os.environ[name] = value
+
+
+def domain_id(text: str) -> int | None:
+    """The number that ``ROS_DOMAIN_ID`` gives; ``None`` where rcl refuses it. No text is 0.
+
+    Read by ``strtoul`` with base 0 (rcl ``domain_id.c``): ``010`` is 8, ``0x1F`` is 31.
+    """
+    number = re.fullmatch("0(?P<octal>[0-7]*)|0[xX](?P<hex>[0-9a-fA-F]+)|[1-9][0-9]*", text or "0")
+    return number and int(number[0], 8 if number["octal"] else 16 if number["hex"] else 10)

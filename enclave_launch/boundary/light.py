@@ -80,8 +80,18 @@ else:
                 raise ValueError(f"{text!r} is not a valid {cls.__qualname__}")
             return cls._member_of[text]
 
+        def __getitem__(cls, name):
+            return cls.__members__[name]
+
+        def __contains__(cls, text):
+            return isinstance(text, cls) or (isinstance(text, str) and text in cls._member_of)
+
         def __iter__(cls):
             return iter(cls._member_of.values())
+
+        @property
+        def __members__(cls):
+            return {member.name: member for member in cls}
 
         def __len__(cls):
             return len(cls._member_of)

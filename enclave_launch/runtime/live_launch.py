@@ -63,6 +63,8 @@ from enclave_launch.runtime.signals import require_signals, signals_to
 from enclave_launch.runtime.sinks import ScreenSink, SinkWriter
 from enclave_launch.runtime.warden_process import WardenProcess
 
+_MOST_LAST_EVENTS = 100  # that lead to each other once everything is shut down and over
+
 
 def run_launch(launch: LiveLaunch) -> int:
     """Run it to the end; call it in the main thread. Gives the exit status: 0, or 1 when something failed.
@@ -106,6 +108,7 @@ class LiveLaunch:
         self._wake = asyncio.Event()
         self._futures: list[asyncio.Future[Any]] = []
         self._shutting_down = False
+        self._last_events = 0  # when all else was over
         self._interrupted = False
         self._failed = False
         self._services: RosServices | None = None
@@ -244,6 +247,7 @@ class LiveLaunch:
         """Handle one event, or wait for something to happen. Raises ``_Over`` when there is nothing more."""
         queue = self._context._event_queue
         if not queue.empty():
+            self._end_of_endless_events()
             if self._settings.debug:
                 name = getattr(queue.next, "process_name", None)
                 self.say("DEBUG", f"processing event: {queue.next.name}{f' of {name}' if name else ''}")
@@ -258,6 +262,18 @@ class LiveLaunch:
             self.shut_down("idle")
             return
         await self._wait_for(pending)
+
+    def _end_of_endless_events(self) -> None:
+        """An event that emits itself would hold up the end for ever: when nothing else is left, few more are handled.
+        Raises ``_Over``."""
+        if not self._shutting_down or self._pending():
+            return
+        self._last_events += 1
+        if self._last_events > _MOST_LAST_EVENTS:
+            self.say(
+                "WARNING", f"{_MOST_LAST_EVENTS} events after the end of all processes led to more: left out"
+            )
+            raise _Over
 
     def _pending(self) -> list[asyncio.Future[Any]]:
         self._futures += self._context._completion_futures

@@ -18,6 +18,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from enclave_launch.boundary.environment import domain_id
 from enclave_launch.boundary.terminal import json_text, printable
 from nodl.errors import NoDLError
 from nodl.verb import write_documents
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from nodl.graph.starts import StartedNode
 
 FORMATS = ("text", "json", "policy", "v2")
+_HIGHEST_DOMAIN = 232  # beyond, there are no ports (DDS-RTPS 9.6.1)
 _SECONDS = re.compile(r"([0-9]+(?:\.[0-9]+)?)(s|m|h)?\Z")
 _UNITS = {None: 1.0, "s": 1.0, "m": 60.0, "h": 3600.0}
 
@@ -213,17 +215,17 @@ def _enclave_directory(arguments: argparse.Namespace) -> Path | None:
 def _domain_id(arguments: argparse.Namespace) -> int:
     if arguments.domain_id is not None:
         return int(arguments.domain_id)
-    text = os.environ.get("ROS_DOMAIN_ID", "") or "0"
-    try:
-        return domain(text)
-    except ValueError as error:
-        raise NoDLError(f"ROS_DOMAIN_ID is {text!r}, not a number from 0 to 232") from error
+    text = os.environ.get("ROS_DOMAIN_ID", "")
+    found = domain_id(text)
+    if found is None or found > _HIGHEST_DOMAIN:
+        raise NoDLError(f"ROS_DOMAIN_ID is {text!r}, not a number from 0 to {_HIGHEST_DOMAIN}")
+    return found
 
 
 def domain(text: str) -> int:
-    """A DDS domain, 0 to 232. Raises ``ValueError``."""
+    """A DDS domain of the command line, 0 to 232. Raises ``ValueError``."""
     number = int(text)
-    if not 0 <= number <= 232:
+    if not 0 <= number <= _HIGHEST_DOMAIN:
         raise ValueError
     return number
 

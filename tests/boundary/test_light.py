@@ -157,6 +157,10 @@ WORDS: dict[str, Callable[[type[OurWord] | type[TheirWord]], object]] = {
     "by its text": lambda kind: kind("not sure") is kind.NOT_SURE,
     "by itself": lambda kind: kind(kind.NOT_SURE) is kind.NOT_SURE,
     "by a text that none has": lambda kind: kind("unsure"),
+    "by its name": lambda kind: kind["NOT_SURE"] is kind.NOT_SURE,
+    "by a name that none has": lambda kind: kind["UNSURE"],
+    "a member is in it": lambda kind: kind.SURE in kind,
+    "by all their names": lambda kind: [(name, each.value) for name, each in kind.__members__.items()],
     "equal to its text": lambda kind: kind.SURE == "sure" and kind.SURE != kind.NOT_SURE,
     "found among texts": lambda kind: kind.SURE in {"sure": 1},
     "an empty one is false": lambda kind: (bool(kind.NONE), bool(kind.SURE)),
@@ -175,7 +179,7 @@ WORDS: dict[str, Callable[[type[OurWord] | type[TheirWord]], object]] = {
 def test_a_member_is_used_as_one_of_enum(use: str) -> None:
     try:
         theirs = WORDS[use](TheirWord)
-    except (ValueError, AttributeError) as error:
+    except (ValueError, AttributeError, KeyError) as error:
         with pytest.raises(type(error)):
             WORDS[use](OurWord)
     else:

@@ -29,7 +29,7 @@ sys.exit(run(launch_source(sys.argv[1]), options=RunSettings(noninteractive={non
 
 PRELUDE = """
 import sys
-from launch import LaunchDescription, EventHandler
+from launch import Event, EventHandler, LaunchDescription
 from launch.actions import *
 from launch.event_handlers import *
 from launch.events import Shutdown as ShutdownEvent
@@ -214,6 +214,38 @@ def test_ctrl_c_ends_every_child_and_is_no_failure(tmp_path: Path) -> None:
     assert launch.wait() == 0
     assert "[WARNING] [launch]: user interrupted with ctrl-c (SIGINT)" in launch.lines()
     assert launch.screen.count("exit code -2") == 2
+
+
+TICKS = """
+class Tick(Event):
+    def __init__(self, left=None):
+        self.left = left
+
+class OnTick(EventHandler):
+    def __init__(self):
+        super().__init__(matcher=lambda event: isinstance(event, Tick))
+
+    def handle(self, tick, context):
+        super().handle(tick, context)
+        if tick.left != 0:
+            return EmitEvent(event=Tick(tick.left and tick.left - 1))
+
+ticks = RegisterEventHandler(OnTick())
+"""
+
+
+def test_ctrl_c_ends_a_launch_whose_events_never_end(tmp_path: Path) -> None:
+    launch = Launch(tmp_path, 'ticks, EmitEvent(event=Tick()), sh("echo up; exec sleep 60")', prelude=TICKS)
+    launch.until("up\n")
+    launch.process.send_signal(signal.SIGINT)
+    assert launch.wait() == 0
+    assert "100 events after the end of all processes led to more: left out" in launch.screen
+
+
+def test_events_of_a_shutdown_that_come_to_an_end_are_all_handled(tmp_path: Path) -> None:
+    after = "OnShutdown(on_shutdown=lambda *_: EmitEvent(event=Tick(60)))"
+    status, lines = finished(tmp_path, f'ticks, RegisterEventHandler({after}), sh("true")', prelude=TICKS)
+    assert status == 0 and not any("left out" in line for line in lines)
 
 
 def test_ctrl_c_twice_reaches_the_children_twice(tmp_path: Path) -> None:
