@@ -6,13 +6,40 @@ import argparse
 import os
 import re
 import sys
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 
 from enclave_launch.boundary.dependencies import missing_dependency
+from enclave_launch.boundary.files import as_path
 from enclave_launch.boundary.light import Any, NoReturn, late_pattern
 from enclave_launch.boundary.words import did_you_mean
 
 _INVALID_CHOICE = late_pattern(r"^(.*invalid choice: '([^']*)') \(choose from .*\)$", re.DOTALL)
+
+
+Kind = Mapping[str, Any]
+Option = tuple[str, Kind, str]
+"""As the help shows it, with its metavar (a positional by its name); what it takes, in argparse's words; what it is
+for."""
+
+FLAG: Kind = {"action": "store_true"}
+TEXT: Kind = {}
+PATH: Kind = {"type": as_path}
+TEXTS: Kind = {"action": "append", "default": []}
+PATHS: Kind = {**TEXTS, **PATH}
+
+
+def one_of(*choices: str) -> Kind:
+    """The first is the default."""
+    return {"choices": choices, "default": choices[0]}
+
+
+def add_options(group: argparse._ActionsContainer, options: Iterable[Option]) -> None:
+    """Add each to a parser, or to a group of its options."""
+    for written, kind, text in options:
+        words = written.split()
+        flags = [word for word in words if word.startswith("-")] or words[:1]
+        metavar = {"metavar": words[-1]} if len(words) > len(flags) else {}
+        group.add_argument(*flags, **{**metavar, **kind, "help": text})
 
 
 class CommandParser(argparse.ArgumentParser):

@@ -20,17 +20,11 @@ from typing import Any
 
 from ros2launch.option import OptionExtension
 
+from enclave_launch.boundary.command_line import add_options
 from enclave_launch.boundary.terminal import safe_output, stdout_is_for_the_plan
 from enclave_launch.errors import EnclaveLaunchError, UsageError
 from enclave_launch.ros2 import attributes  # noqa: F401  # ``enclave=`` in Python launch files, secured or not
-from enclave_launch.verb.options import (
-    DENIALS,
-    LOOKING,
-    POLICY,
-    add_options,
-    add_security_options,
-    build_parser,
-)
+from enclave_launch.verb.options import DENIALS, LOOKING, POLICY, add_security_options, build_parser
 from enclave_launch.verb.secure_launch import resolve_options, show_plan, start
 from enclave_launch.verb.target import LaunchTarget
 from enclave_launch.verb.usage import FOR_PLAN, FOR_SECURE, CommandLine, check_needs_secure, check_views

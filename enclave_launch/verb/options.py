@@ -5,11 +5,22 @@ from __future__ import annotations
 import argparse
 import os
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 
-from enclave_launch.boundary.command_line import CommandParser, add_verbosity, add_version
+from enclave_launch.boundary.command_line import (
+    FLAG,
+    PATH,
+    PATHS,
+    TEXT,
+    TEXTS,
+    CommandParser,
+    Option,
+    add_options,
+    add_verbosity,
+    add_version,
+    one_of,
+)
 from enclave_launch.boundary.files import as_path
-from enclave_launch.boundary.light import Any
 from enclave_launch.ros_rules.distro import Distro
 
 DESCRIPTION = """\
@@ -27,31 +38,6 @@ examples:
 
 exit status: 0 all ended well, 1 something failed (or a process could not be secured), 2 wrong usage
 """
-
-Kind = Mapping[str, Any]
-Option = tuple[str, Kind, str]
-"""As the help shows it, with its metavar (a positional by its name); what it takes, in argparse's words; what it is
-for."""
-
-FLAG: Kind = {"action": "store_true"}
-TEXT: Kind = {}
-PATH: Kind = {"type": as_path}
-TEXTS: Kind = {"action": "append", "default": []}
-PATHS: Kind = {**TEXTS, **PATH}
-
-
-def one_of(*choices: str) -> Kind:
-    """The first is the default."""
-    return {"choices": choices, "default": choices[0]}
-
-
-def add_options(group: argparse._ActionsContainer, options: Iterable[Option]) -> None:
-    """Add each to a parser, or to a group of its options."""
-    for written, kind, text in options:
-        words = written.split()
-        flags = [word for word in words if word.startswith("-")] or words[:1]
-        metavar = {"metavar": words[-1]} if len(words) > len(flags) else {}
-        group.add_argument(*flags, **{**metavar, **kind, "help": text})
 
 
 def names_of(options: Iterable[Option]) -> frozenset[str]:

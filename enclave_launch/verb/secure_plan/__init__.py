@@ -6,11 +6,19 @@ import argparse
 from collections.abc import Sequence
 from importlib import import_module
 
-from enclave_launch.boundary.command_line import CommandParser, add_verbosity, add_version, complete, guarded
+from enclave_launch.boundary.command_line import (
+    CommandParser,
+    Option,
+    add_options,
+    add_verbosity,
+    add_version,
+    complete,
+    guarded,
+)
 from enclave_launch.boundary.terminal import safe_output
 from enclave_launch.errors import EnclaveLaunchError
 from enclave_launch.verb.completion import offer_launches
-from enclave_launch.verb.options import EVALUATION, POLICY, Option, add_options
+from enclave_launch.verb.options import EVALUATION, POLICY
 from enclave_launch.verb.secure_plan.plans import WORDS
 
 PLAN: tuple[Option, ...] = (("words", {"nargs": "+", "metavar": WORDS}, ""),)

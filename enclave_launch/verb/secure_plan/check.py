@@ -14,8 +14,8 @@ import sys
 from typing import TYPE_CHECKING
 
 from enclave_launch import __version__
+from enclave_launch.boundary.command_line import FLAG, PATH, one_of
 from enclave_launch.boundary.terminal import json_text
-from enclave_launch.verb.options import FLAG, PATH, one_of
 from enclave_launch.verb.secure_plan.judging import EXPECT, WITHIN, judged
 from enclave_launch.verb.secure_plan.plans import read_plan
 

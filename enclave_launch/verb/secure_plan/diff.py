@@ -19,9 +19,9 @@ import os
 import sys
 from typing import TYPE_CHECKING
 
+from enclave_launch.boundary.command_line import TEXT, Option, one_of
 from enclave_launch.boundary.terminal import json_text
 from enclave_launch.errors import keystore_errors
-from enclave_launch.verb.options import TEXT, Option, one_of
 from enclave_launch.verb.secure_plan import plans
 from enclave_launch.verb.secure_plan.plans import read_plan
 

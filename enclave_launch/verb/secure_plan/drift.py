@@ -17,9 +17,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from enclave_launch.admission.variables import domain_of
+from enclave_launch.boundary.command_line import PATH, PATHS, TEXT, TEXTS, one_of
 from enclave_launch.boundary.terminal import json_text, message
 from enclave_launch.errors import EnclaveLaunchError, UsageError, translated
-from enclave_launch.verb.options import PATH, PATHS, TEXT, TEXTS, one_of
 from enclave_launch.verb.secure_plan.plans import FORM, read_plan, read_saved
 from keystore.errors import KeystoreError
 

@@ -17,9 +17,9 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from enclave_launch.boundary.command_line import PATH, TEXT
 from enclave_launch.boundary.files import read_bytes
 from enclave_launch.errors import UsageError, keystore_errors, translated
-from enclave_launch.verb.options import PATH, TEXT
 from enclave_launch.verb.secure_plan.judging import EXPECT, WITHIN, judged
 from enclave_launch.verb.secure_plan.keystores import endings
 from enclave_launch.verb.secure_plan.plans import read_plan

@@ -18,9 +18,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from enclave_launch.admission.middleware import ZENOH
+from enclave_launch.boundary.command_line import FLAG, PATH, TEXT, TEXTS
 from enclave_launch.boundary.terminal import message, printable
 from enclave_launch.errors import ManifestError, UsageError
-from enclave_launch.verb.options import FLAG, PATH, TEXT, TEXTS
 from enclave_launch.verb.secure_plan.hosts import HOSTS, hosts_of
 from enclave_launch.verb.secure_plan.plans import read_plan
 

@@ -12,8 +12,8 @@ from __future__ import annotations
 import argparse
 import sys
 
+from enclave_launch.boundary.command_line import FLAG
 from enclave_launch.errors import UsageError
-from enclave_launch.verb.options import FLAG
 from enclave_launch.verb.secure_plan.plans import read_plan
 
 OPTIONS = {

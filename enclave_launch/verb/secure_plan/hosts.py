@@ -13,9 +13,9 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from enclave_launch.boundary.command_line import PATH, Option
 from enclave_launch.boundary.terminal import json_text
 from enclave_launch.errors import UsageError, translated
-from enclave_launch.verb.options import PATH, Option
 from enclave_launch.verb.secure_plan.plans import FORM, read_plan
 from keystore.errors import InvalidInputError
 

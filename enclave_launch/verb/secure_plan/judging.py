@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from enclave_launch.boundary.command_line import PATH, Option
 from enclave_launch.boundary.files import read_text
 from enclave_launch.errors import UsageError, translated
-from enclave_launch.verb.options import PATH, Option
 from enclave_launch.verb.secure_plan.keystores import (
     DEFAULT_MARGIN,
     endings,

@@ -8,10 +8,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from enclave_launch.boundary.command_line import Option, one_of
 from enclave_launch.boundary.files import read_text
 from enclave_launch.boundary.terminal import stdout_is_for_the_plan
 from enclave_launch.errors import UsageError
-from enclave_launch.verb.options import Option, one_of
 from nodl.ament_index import search_prefixes
 
 LARGEST_PLAN = 256 << 20  # bytes

@@ -16,8 +16,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from enclave_launch.boundary.command_line import PATH, one_of
 from enclave_launch.errors import UsageError, translated
-from enclave_launch.verb.options import PATH, one_of
 from enclave_launch.verb.secure_plan.judging import EXPECT, judged
 from enclave_launch.verb.secure_plan.keystores import endings
 from enclave_launch.verb.secure_plan.plans import read_plan
