@@ -7,15 +7,29 @@ from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
-from enclave_launch.boundary.command_line import CommandParser, add_verbosity, add_version, complete, guarded
+from enclave_launch.boundary.command_line import (
+    TEXTS,
+    CommandParser,
+    Option,
+    add_options,
+    add_verbosity,
+    add_version,
+    complete,
+    guarded,
+)
 from enclave_launch.boundary.terminal import printable, safe_output
 from nodl.errors import NoDLError
 
 VERBS = ("check_record", "convert", "infer", "library", "observe", "show", "validate")
+PREFIX: Option = (
+    "--prefix DIR", {**TEXTS, "type": os.path.abspath},
+    "ament install prefix, searched before AMENT_PREFIX_PATH (repeatable)",
+)  # fmt: skip
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -55,6 +69,20 @@ def build_parser() -> argparse.ArgumentParser:
     return parser
 
 
+def add_verb(
+    verbs: argparse._SubParsersAction[argparse.ArgumentParser],
+    name: str,
+    run: Callable[[argparse.Namespace], int],
+    options: Iterable[Option],
+    **settings: Any,
+) -> argparse.ArgumentParser:
+    """The parser of a verb, or of what a verb does; ``settings`` as of ``add_subparsers().add_parser``."""
+    parser = verbs.add_parser(name, **settings)
+    add_options(parser, options)
+    parser.set_defaults(run=run)
+    return parser
+
+
 def encodable(text: str) -> str:
     """Names of files need not be UTF-8; their odd bytes are shown as escapes."""
     return text.encode("utf-8", "backslashreplace").decode()
@@ -66,15 +94,3 @@ def write_documents(folder: Path, documents: Mapping[str, str]) -> None:
     for name, text in documents.items():
         (folder / name).write_text(encodable(text), encoding="utf-8")
         print(printable(str(folder / name)))
-
-
-def add_prefix_argument(parser: argparse.ArgumentParser) -> None:
-    """Where packages are looked for."""
-    parser.add_argument(
-        "--prefix",
-        metavar="DIR",
-        action="append",
-        default=[],
-        type=os.path.abspath,
-        help="ament install prefix, searched before AMENT_PREFIX_PATH (repeatable)",
-    )

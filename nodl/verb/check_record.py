@@ -10,12 +10,13 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
+from enclave_launch.boundary.command_line import PATH, PATHS, Option, one_of
 from nodl.ament_index import search_prefixes
 from nodl.dependence import Situation
 from nodl.library import Library, LibraryDocuments
 from nodl.lookup import ManifestLookup
 from nodl.names import split_fqn
-from nodl.verb import add_prefix_argument
+from nodl.verb import PREFIX, add_verb
 
 if TYPE_CHECKING:
     from nodl.infer.cpp.reach import SourcesInReach
@@ -27,36 +28,23 @@ _MOST_NODES = 32  # of one program: descriptions may refer to each other
 JUDGED = ("manifest", "inference", "library")
 
 
-def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> argparse.ArgumentParser:
+OPTIONS: tuple[Option, ...] = (
+    ("records RECORD", {**PATH, "nargs": "+"}, "files *.record, or folders"),
+    ("--nodl FILE|DIR", PATHS, "manifests to judge"),
+    ("--judge", {"choices": (*JUDGED, "all"), "default": "all"},
+     "what to hold against the records: manifests, inference from source, the library, or each that speaks"),
+    ("--source DIR", PATHS,
+     "sources of compiled nodes, for inference (repeatable; default: the workspaces of the prefixes)"),
+    ("--format", one_of("text", "json"), ""),
+    PREFIX,
+)  # fmt: skip
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add ``secure-nodl check-record``."""
-    parser = subparsers.add_parser(
-        "check-record",
-        help="hold manifests, inference and the library against recorded nodes",
-        description=__doc__,
-        epilog="exit status: 0 nothing is missing or wrong, 1 something is, 2 a record cannot be used",
-    )
-    parser.add_argument("records", nargs="+", metavar="RECORD", type=Path, help="files *.record, or folders")
-    parser.add_argument(
-        "--nodl", metavar="FILE|DIR", action="append", type=Path, default=[], help="manifests to judge"
-    )
-    parser.add_argument(
-        "--judge",
-        choices=(*JUDGED, "all"),
-        default="all",
-        help="what to hold against the records: manifests, inference from source, the library, or each that speaks",
-    )
-    parser.add_argument(
-        "--source",
-        metavar="DIR",
-        action="append",
-        type=Path,
-        default=[],
-        help="sources of compiled nodes, for inference (repeatable; default: the workspaces of the prefixes)",
-    )
-    parser.add_argument("--format", choices=("text", "json"), default="text")
-    add_prefix_argument(parser)
-    parser.set_defaults(run=run)
-    return parser
+    text = "hold manifests, inference and the library against recorded nodes"
+    status = "exit status: 0 nothing is missing or wrong, 1 something is, 2 a record cannot be used"
+    add_verb(subparsers, "check-record", run, OPTIONS, help=text, description=__doc__, epilog=status)
 
 
 class Judgement(NamedTuple):

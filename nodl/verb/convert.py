@@ -8,29 +8,25 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+from enclave_launch.boundary.command_line import PATH, Option
 from nodl.ament_index import search_prefixes
 from nodl.document import ManifestNode, read_document
 from nodl.document.write import Written, v1_xml, v2_yaml
 from nodl.errors import NoDLError
-from nodl.verb import add_prefix_argument
+from nodl.verb import PREFIX, add_verb
+
+OPTIONS: tuple[Option, ...] = (
+    ("files FILE", {"nargs": "+"}, "documents of one version"),
+    ("-o --output PATH", PATH,
+     "file to write (default: standard output); a folder when v1 becomes several v2 files"),
+    PREFIX,
+)  # fmt: skip
 
 
-def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> argparse.ArgumentParser:
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add ``secure-nodl convert``."""
-    parser = subparsers.add_parser(
-        "convert", help="v1 to v2 or v2 to v1; what gets lost is told", description=__doc__
-    )
-    parser.add_argument("files", nargs="+", metavar="FILE", help="documents of one version")
-    parser.add_argument(
-        "-o",
-        "--output",
-        metavar="PATH",
-        type=Path,
-        help="file to write (default: standard output); a folder when v1 becomes several v2 files",
-    )
-    add_prefix_argument(parser)
-    parser.set_defaults(run=run)
-    return parser
+    text = "v1 to v2 or v2 to v1; what gets lost is told"
+    add_verb(subparsers, "convert", run, OPTIONS, help=text, description=__doc__)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -9,48 +9,37 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from enclave_launch.boundary.command_line import FLAG, PATH, Option
 from enclave_launch.boundary.terminal import printable
 from enclave_launch.boundary.words import counted
 from nodl.ament_index import PackageNotFoundError, executables, package_prefix, search_prefixes
 from nodl.lookup import ManifestLookup
 from nodl.node_interface import Gap
 from nodl.source_ref import SourceRef
-from nodl.verb import add_prefix_argument, encodable, write_documents
+from nodl.verb import PREFIX, add_verb, encodable, write_documents
 
 if TYPE_CHECKING:
     from nodl.infer.report.expanded import ExpandedSystem
     from nodl.infer.system import InferredSystem
     from nodl.node_interface import NodeInterface
 
-FORMATS = ("text", "json", "policy", "v1", "v2")
+OPTIONS: tuple[Option, ...] = (
+    ("subjects PACKAGE|PATH", {"nargs": "+"}, "an installed package, or files and folders"),
+    ("-o --output DIR", PATH, "write files into DIR"),
+    ("--format", {"choices": ("text", "json", "policy", "v1", "v2")}, "text (default); with -o: v2"),
+    ("--with-gaps", FLAG, "also write v2 documents of nodes that are not known in full; the gaps stand in them"),
+    ("--builtin", FLAG, "also show what every node has"),
+    ("--accept-patterns", FLAG, "allow names known in part as patterns in a policy"),
+    ("--compare", FLAG,
+     "say what installed manifests lack of that which the sources make; 1: something is missing"),
+    PREFIX,
+)  # fmt: skip
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add ``secure-nodl infer``."""
-    parser = subparsers.add_parser(
-        "infer", help="infer nodes and their interfaces from source, without running it", description=__doc__
-    )
-    parser.add_argument(
-        "subjects", nargs="+", metavar="PACKAGE|PATH", help="an installed package, or files and folders"
-    )
-    parser.add_argument("-o", "--output", type=Path, metavar="DIR", help="write files into DIR")
-    parser.add_argument("--format", choices=FORMATS, default=None, help="text (default); with -o: v2")
-    parser.add_argument(
-        "--with-gaps",
-        action="store_true",
-        help="also write v2 documents of nodes that are not known in full; the gaps stand in them",
-    )
-    parser.add_argument("--builtin", action="store_true", help="also show what every node has")
-    parser.add_argument(
-        "--accept-patterns", action="store_true", help="allow names known in part as patterns in a policy"
-    )
-    parser.add_argument(
-        "--compare",
-        action="store_true",
-        help="say what installed manifests lack of that which the sources make; 1: something is missing",
-    )
-    add_prefix_argument(parser)
-    parser.set_defaults(run=run)
+    text = "infer nodes and their interfaces from source, without running it"
+    add_verb(subparsers, "infer", run, OPTIONS, help=text, description=__doc__)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -6,53 +6,47 @@ import argparse
 import sys
 from collections.abc import Iterable, Iterator
 
+from enclave_launch.boundary.command_line import FLAG, TEXT, TEXTS, Option
 from enclave_launch.boundary.terminal import printable
 from nodl.ament_index import package_version, search_prefixes
 from nodl.library import SHIPPED, Hit, Library
 from nodl.library.document import LibraryDocument
 from nodl.library.index import write_index
-from nodl.verb import add_prefix_argument
+from nodl.verb import PREFIX, add_verb
 from nodl.verb.show import description_lines
 
+LIBRARY: Option = ("--library DIR", TEXTS, "documents of your own, which come first")
+LIST: tuple[Option, ...] = (("packages PACKAGE", {"nargs": "*"}, "only these"), LIBRARY)
+PROGRAM: tuple[Option, ...] = (
+    ("package PACKAGE", TEXT, ""),
+    ("name EXECUTABLE|PLUGIN", TEXT, ""),
+    ("--distro", {"default": ""}, "ROS distribution (default: any)"),
+    PREFIX,
+    LIBRARY,
+)
+CHECK: tuple[Option, ...] = (
+    ("sources DIR", TEXT, "a folder with packages, such as a workspace's src"),
+    ("--keep", FLAG, "note the verdicts beside the shipped documents (for its keepers)"),
+    LIBRARY,
+)
+INDEX: tuple[Option, ...] = (("folder DIR", {"nargs": "?", "default": SHIPPED}, ""),)
 
-def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> argparse.ArgumentParser:
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add ``secure-nodl library``."""
     parser = subparsers.add_parser(
         "library", help="the manifests of widely used packages: list, show, where, check", description=__doc__
     )
     actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
-    listing = actions.add_parser("list", help="every document: what it describes, for which versions")
-    listing.add_argument("packages", nargs="*", metavar="PACKAGE", help="only these")
-    listing.set_defaults(run=_list)
-    showing = actions.add_parser("show", help="what a document says, and how that is known")
-    showing.set_defaults(run=_show)
-    where = actions.add_parser("where", help="the file that would be used")
-    where.set_defaults(run=_where)
-    for action in (showing, where):
-        action.add_argument("package", metavar="PACKAGE")
-        action.add_argument("name", metavar="EXECUTABLE|PLUGIN")
-        action.add_argument("--distro", default="", help="ROS distribution (default: any)")
-        add_prefix_argument(action)
-    checking = actions.add_parser("check", help="hold the documents against sources in a folder")
-    checking.add_argument("sources", metavar="DIR", help="a folder with packages, such as a workspace's src")
-    checking.add_argument(
-        "--keep", action="store_true", help="note the verdicts beside the shipped documents (for its keepers)"
-    )
-    checking.set_defaults(run=_check)
-    table = actions.add_parser("table", help="all documents as a table in Markdown: docs/library-contents.md")
-    table.set_defaults(run=_table)
-    index = actions.add_parser("index", help="write the index of a folder of documents anew")
-    index.add_argument("folder", nargs="?", default=SHIPPED, metavar="DIR")
-    index.set_defaults(run=_index)
-    for action in (listing, showing, where, checking):
-        action.add_argument(
-            "--library",
-            metavar="DIR",
-            action="append",
-            default=[],
-            help="documents of your own, which come first",
-        )
-    return parser
+    for name, action, options, text in (
+        ("list", _list, LIST, "every document: what it describes, for which versions"),
+        ("show", _show, PROGRAM, "what a document says, and how that is known"),
+        ("where", _where, PROGRAM, "the file that would be used"),
+        ("check", _check, CHECK, "hold the documents against sources in a folder"),
+        ("table", _table, (), "all documents as a table in Markdown: docs/library-contents.md"),
+        ("index", _index, INDEX, "write the index of a folder of documents anew"),
+    ):
+        add_verb(actions, name, action, options, help=text)
 
 
 def _list(arguments: argparse.Namespace) -> int:

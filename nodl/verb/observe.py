@@ -18,71 +18,79 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from enclave_launch.boundary.command_line import FLAG, PATH, TEXT, Option, add_options, one_of
 from enclave_launch.boundary.environment import domain_id
 from enclave_launch.boundary.terminal import json_text, printable
 from nodl.errors import NoDLError
-from nodl.verb import write_documents
+from nodl.verb import add_verb, write_documents
 
 if TYPE_CHECKING:
     from nodl.graph.model import Graph
     from nodl.graph.observation import Observed
     from nodl.graph.starts import StartedNode
 
-FORMATS = ("text", "json", "policy", "v2")
 _HIGHEST_DOMAIN = 232  # beyond, there are no ports (DDS-RTPS 9.6.1)
 _SECONDS = re.compile(r"([0-9]+(?:\.[0-9]+)?)(s|m|h)?\Z")
 _UNITS = {None: 1.0, "s": 1.0, "m": 60.0, "h": 3600.0}
 
 
+def domain(text: str) -> int:
+    """A DDS domain of the command line, 0 to 232. Raises ``ValueError``."""
+    number = int(text)
+    if not 0 <= number <= _HIGHEST_DOMAIN:
+        raise ValueError
+    return number
+
+
+def seconds(text: str) -> float:
+    """``90``, ``90s``, ``5m`` or ``1h`` in seconds. Raises ``ValueError``."""
+    match = _SECONDS.match(text)
+    if not match:
+        raise ValueError
+    return float(match[1]) * _UNITS[match[2]]
+
+
+RUNS: tuple[Option, ...] = (
+    ("runs RUN.json", {**PATH, "nargs": "*"}, "earlier observations, merged with this one"),
+)
+LOOKING: tuple[Option, ...] = (
+    ("--domain-id N", {"type": domain}, "default: ROS_DOMAIN_ID, else 0"),
+    ("--for TIME", {"dest": "longest", "type": seconds, "default": 60.0}, "at the longest (60s)"),
+    ("--settle TIME", {"type": seconds, "default": 5.0}, "end when nothing changed for this long (5s)"),
+    ("--with", {**one_of("auto", "cyclonedds", "rclpy"), "dest": "source"},
+     "what to look with: Cyclone DDS's Python binding (sees processes and more) or rclpy"),
+    ("--merge-only", FLAG, "look at nothing; merge the observations that are named"),
+)  # fmt: skip
+SECURITY: tuple[Option, ...] = (
+    ("--keystore DIR", PATH, "default: ROS_SECURITY_KEYSTORE"),
+    ("--enclave NAME", TEXT,
+     "the observer's own (secure-keystore tool-enclave KEYSTORE --for observe makes one); "
+     "default: ROS_SECURITY_ENCLAVE_OVERRIDE"),
+)  # fmt: skip
+WRITING: tuple[Option, ...] = (
+    ("--launch WORD", {"nargs": "+", "default": []},
+     "how the nodes were started: PLAN.json, or PACKAGE LAUNCH_FILE | PATH [name:=value ...]"),
+    ("--save RUN.json", PATH, "keep this observation, to merge it later"),
+    ("--format", {"choices": ("text", "json", "policy", "v2")}, "text (default); with -o: v2, NoDL manifests"),
+    ("-o --output DIR", PATH, "write files into DIR"),
+)  # fmt: skip
+
+
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add ``secure-nodl observe``."""
-    parser = subparsers.add_parser(
+    parser = add_verb(
+        subparsers,
         "observe",
+        run,
+        RUNS,
         help="observe a running system: its graph, manifests or a policy of what runs",
         description=__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="exit status: 0 something was seen, 1 nothing was, or the domain cannot be observed, 2 wrong usage",
     )
-    parser.add_argument(
-        "runs", nargs="*", metavar="RUN.json", type=Path, help="earlier observations, merged with this one"
-    )
-    looking = parser.add_argument_group("what to look at")
-    looking.add_argument("--domain-id", type=domain, metavar="N", help="default: ROS_DOMAIN_ID, else 0")
-    looking.add_argument(
-        "--for", dest="longest", type=seconds, default=60.0, metavar="TIME", help="at the longest (60s)"
-    )
-    looking.add_argument(
-        "--settle",
-        type=seconds,
-        default=5.0,
-        metavar="TIME",
-        help="end when nothing changed for this long (5s)",
-    )
-    looking.add_argument(
-        "--with", dest="source", choices=("auto", "cyclonedds", "rclpy"), default="auto",
-        help="what to look with: Cyclone DDS's Python binding (sees processes and more) or rclpy",
-    )  # fmt: skip
-    looking.add_argument(
-        "--merge-only", action="store_true", help="look at nothing; merge the observations that are named"
-    )
-    security = parser.add_argument_group("a secured system")
-    security.add_argument("--keystore", type=Path, metavar="DIR", help="default: ROS_SECURITY_KEYSTORE")
-    security.add_argument(
-        "--enclave", metavar="NAME",
-        help="the observer's own (secure-keystore tool-enclave KEYSTORE --for observe makes one); "
-        "default: ROS_SECURITY_ENCLAVE_OVERRIDE",
-    )  # fmt: skip
-    writing = parser.add_argument_group("what to write")
-    writing.add_argument(
-        "--launch", nargs="+", metavar="WORD", default=[],
-        help="how the nodes were started: PLAN.json, or PACKAGE LAUNCH_FILE | PATH [name:=value ...]",
-    )  # fmt: skip
-    writing.add_argument(
-        "--save", type=Path, metavar="RUN.json", help="keep this observation, to merge it later"
-    )
-    writing.add_argument("--format", choices=FORMATS, help="text (default); with -o: v2, NoDL manifests")
-    writing.add_argument("-o", "--output", type=Path, metavar="DIR", help="write files into DIR")
-    parser.set_defaults(run=run)
+    add_options(parser.add_argument_group("what to look at"), LOOKING)
+    add_options(parser.add_argument_group("a secured system"), SECURITY)
+    add_options(parser.add_argument_group("what to write"), WRITING)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -220,22 +228,6 @@ def _domain_id(arguments: argparse.Namespace) -> int:
     if found is None or found > _HIGHEST_DOMAIN:
         raise NoDLError(f"ROS_DOMAIN_ID is {text!r}, not a number from 0 to {_HIGHEST_DOMAIN}")
     return found
-
-
-def domain(text: str) -> int:
-    """A DDS domain of the command line, 0 to 232. Raises ``ValueError``."""
-    number = int(text)
-    if not 0 <= number <= _HIGHEST_DOMAIN:
-        raise ValueError
-    return number
-
-
-def seconds(text: str) -> float:
-    """``90``, ``90s``, ``5m`` or ``1h`` in seconds. Raises ``ValueError``."""
-    match = _SECONDS.match(text)
-    if not match:
-        raise ValueError
-    return float(match[1]) * _UNITS[match[2]]
 
 
 def _nothing_seen(runs: Sequence[Observed]) -> str:

@@ -7,12 +7,13 @@ import os
 import sys
 from collections.abc import Iterable, Iterator
 
+from enclave_launch.boundary.command_line import TEXT, Option, one_of
 from enclave_launch.boundary.terminal import json_text, printable
 from nodl.ament_index import search_prefixes
 from nodl.document import read_document
 from nodl.lookup import ManifestLookup
 from nodl.node_interface import EndpointKind, NodeInterface
-from nodl.verb import add_prefix_argument
+from nodl.verb import PREFIX, add_verb
 
 _LABELS = {
     EndpointKind.PUBLISHER: "publishes",
@@ -24,17 +25,18 @@ _LABELS = {
 }
 
 
-def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> argparse.ArgumentParser:
+OPTIONS: tuple[Option, ...] = (
+    ("subject PACKAGE|FILE", TEXT, ""),
+    ("names EXECUTABLE|PLUGIN", {"nargs": "*"}, "only these of the package"),
+    ("--format", one_of("text", "json"), ""),
+    PREFIX,
+)
+
+
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add ``secure-nodl show``."""
-    parser = subparsers.add_parser(
-        "show", help="print the interfaces of a document, package or executable", description=__doc__
-    )
-    parser.add_argument("subject", metavar="PACKAGE|FILE")
-    parser.add_argument("names", nargs="*", metavar="EXECUTABLE|PLUGIN", help="only these of the package")
-    parser.add_argument("--format", choices=("text", "json"), default="text")
-    add_prefix_argument(parser)
-    parser.set_defaults(run=run)
-    return parser
+    text = "print the interfaces of a document, package or executable"
+    add_verb(subparsers, "show", run, OPTIONS, help=text, description=__doc__)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -6,24 +6,23 @@ import argparse
 import sys
 from pathlib import Path
 
+from enclave_launch.boundary.command_line import Option
 from enclave_launch.boundary.terminal import printable
 from nodl.ament_index import search_prefixes
 from nodl.document import V1_SUFFIX, read_document
 from nodl.errors import NoDLError
-from nodl.verb import add_prefix_argument
+from nodl.verb import PREFIX, add_verb
+
+OPTIONS: tuple[Option, ...] = (
+    ("files FILE", {"nargs": "*"}, "documents (default: all *.nodl.* files of this folder)"),
+    PREFIX,
+)
 
 
-def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> argparse.ArgumentParser:
+def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add ``secure-nodl validate``."""
-    parser = subparsers.add_parser(
-        "validate", help="check documents; errors come with file and line", description=__doc__
-    )
-    parser.add_argument(
-        "files", nargs="*", metavar="FILE", help="documents (default: all *.nodl.* files of this folder)"
-    )
-    add_prefix_argument(parser)
-    parser.set_defaults(run=run)
-    return parser
+    text = "check documents; errors come with file and line"
+    add_verb(subparsers, "validate", run, OPTIONS, help=text, description=__doc__)
 
 
 def run(arguments: argparse.Namespace) -> int:
