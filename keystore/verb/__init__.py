@@ -1,4 +1,5 @@
-"""``secure-keystore``: one file per verb, with ``describe`` (arguments) and ``run`` (one call, one report).
+"""``secure-keystore``: one file per verb, with ``OPTIONS``, ``run`` (one call, one report), and ``SETTINGS`` of its
+parser where it has any.
 
 Exit status: 0 done or all well; 1 an error, or findings of ``verify``; 2 wrong usage or input; 3
 something ends soon and 4 something has ended (``status``); 75 the keystore is in use; 130 interrupted.
@@ -21,6 +22,7 @@ from enclave_launch.boundary.command_line import (
 )
 from enclave_launch.boundary.terminal import safe_output
 from keystore.errors import KeystoreError
+from keystore.verb.common import add_table
 
 VERBS = (
     "create", "create-enclave", "apply-policy", "list", "status", "verify", "renew", "remove", "export",
@@ -68,8 +70,9 @@ def build_parser() -> argparse.ArgumentParser:
     for name in VERBS:
         module = import_module(f"keystore.verb.{name.replace('-', '_')}")
         summary = (module.__doc__ or "").strip()
-        verb = verbs.add_parser(name, help=summary.splitlines()[0], description=summary)
-        module.describe(verb)
+        settings = getattr(module, "SETTINGS", {})
+        verb = verbs.add_parser(name, help=summary.splitlines()[0], description=summary, **settings)
+        add_table(verb, module.OPTIONS)
         verb.set_defaults(run=module.run)
     add_verbosity(parser)
     return parser

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
+from enclave_launch.boundary.command_line import PATH
 from keystore.verb import common
 
-
-def describe(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``secure-keystore apply-policy``."""
-    common.add_keystore(parser)
-    parser.add_argument("policy", metavar="POLICY.xml", type=Path, help="SROS2 policy, version 0.2.0")
-    common.add_domains(parser)
-    common.add_provisioning(parser)
+OPTIONS: common.Table = (
+    common.KEYSTORE,
+    ("policy POLICY.xml", PATH, "SROS2 policy, version 0.2.0"),
+    common.DOMAINS,
+    *common.PROVISIONING,
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

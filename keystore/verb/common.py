@@ -8,9 +8,9 @@ import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import datetime, timedelta
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
+from enclave_launch.boundary.command_line import FLAG, PATH, TEXT, Option, add_options, one_of
 from enclave_launch.boundary.terminal import ProgressBar, json_text, wanted
 from enclave_launch.boundary.words import counted
 from keystore.disk.lock import DEFAULT_TIMEOUT
@@ -23,36 +23,14 @@ if TYPE_CHECKING:
     from keystore.steps.options import ProvisionOptions, ProvisionReport
 
 
-def add_keystore(parser: argparse.ArgumentParser) -> None:
-    """The keystore that the verb works on."""
-    parser.add_argument("keystore", metavar="KEYSTORE", type=Path, help="root directory of the keystore")
+class SecretOptions(NamedTuple):
+    """What opens CA keys, by file, descriptor or environment variable: arguments can be read by others. Only one of
+    its options may be given."""
+
+    options: tuple[Option, ...]
 
 
-def add_format(parser: argparse.ArgumentParser) -> None:
-    """Text for a person or JSON for a program."""
-    parser.add_argument("--format", choices=("text", "json"), default="text", help="how to print (text)")
-
-
-def add_signing(parser: argparse.ArgumentParser) -> None:
-    """Passphrase and PIN by file, descriptor or environment variable: arguments can be read by others."""
-    group = parser.add_argument_group("CA keys")
-    passphrase = group.add_mutually_exclusive_group()
-    passphrase.add_argument(
-        "--passphrase-file", metavar="FILE", type=Path, help="file with the CA keys' passphrase"
-    )
-    passphrase.add_argument("--passphrase-fd", metavar="N", type=int, help="open descriptor to read it from")
-    passphrase.add_argument("--passphrase-env", metavar="NAME", help="environment variable that holds it")
-    pin = group.add_mutually_exclusive_group()
-    pin.add_argument("--pin-file", metavar="FILE", type=Path, help="file with the PIN of the PKCS#11 token")
-    pin.add_argument("--pin-env", metavar="NAME", help="environment variable that holds the PIN")
-
-
-def add_lock(parser: argparse.ArgumentParser) -> None:
-    """How long to wait for others that change the keystore."""
-    parser.add_argument(
-        "--lock-timeout", metavar="SECONDS", type=_seconds, default=DEFAULT_TIMEOUT,
-        help="how long to wait for another run (30)",
-    )  # fmt: skip
+Table = tuple[Option | SecretOptions, ...]
 
 
 def _seconds(text: str) -> float:
@@ -62,69 +40,73 @@ def _seconds(text: str) -> float:
     return seconds
 
 
-def add_domains(parser: argparse.ArgumentParser) -> None:
-    """The DDS domains of the permissions; read by ``domains``."""
-    parser.add_argument(
-        "--domain-id", metavar="IDS", help="domains of the permissions (default: the governance's)"
-    )
+KEYSTORE: Option = ("keystore KEYSTORE", PATH, "root directory of the keystore")
+FORMAT: Option = ("--format", one_of("text", "json"), "how to print (text)")
+LOCK: Option = (
+    "--lock-timeout SECONDS", {"type": _seconds, "default": DEFAULT_TIMEOUT},
+    "how long to wait for another run (30)",
+)  # fmt: skip
+WITHIN: Option = ("--within TIME", {"default": "30d"}, "what counts as soon (30d)")
+DOMAINS: Option = ("--domain-id IDS", TEXT, "domains of the permissions (default: the governance's)")
+"""Read by ``domains``."""
+REVOKE_OLD: Option = ("--revoke-old", FLAG, "also revoke the certificates these enclaves had before")
+ENCRYPTION: Option = ("--encrypt-ca-keys", FLAG, "encrypt new CA keys with the passphrase")
+VALIDITY: Table = (
+    ("--valid-for TIME", TEXT, "90d, 12h, 10y from now, or until an ISO date (default: the keystore's)"),
+    ("--backdate TIME", TEXT, "begin this much earlier, for clocks that lag (1d)"),
+)
+"""How long certificates and permissions hold; read by ``span``."""
+SUBJECTS: Table = (
+    ("--compatible-subjects", FLAG,
+     "CN=/path as SROS2 writes it, for use with 'ros2 security create_permission'; on Cyclone DDS "
+     "some enclaves could then use the permissions of others: such names are refused"),
+    ("--allow-subject-overlap", FLAG, "with compatible subjects: accept such names"),
+)  # fmt: skip
+"""How certificate subjects are written."""
+SIGNING: Table = (
+    SecretOptions((
+        ("--passphrase-file FILE", PATH, "file with the CA keys' passphrase"),
+        ("--passphrase-fd N", {"type": int}, "open descriptor to read it from"),
+        ("--passphrase-env NAME", TEXT, "environment variable that holds it"),
+    )),
+    SecretOptions((
+        ("--pin-file FILE", PATH, "file with the PIN of the PKCS#11 token"),
+        ("--pin-env NAME", TEXT, "environment variable that holds the PIN"),
+    )),
+)  # fmt: skip
+"""Read by ``access``."""
+CHANGE: Table = (*SIGNING, LOCK)
+"""Of each verb that signs and writes; read by ``change``."""
+PROVISIONING: Table = (
+    *VALIDITY,
+    ("--no-revoke", FLAG,
+     "where rights are taken away or a life is shortened: do not revoke the certificate of before; copies "
+     "of it can then be used until it ends"),
+    *SUBJECTS,
+    *CHANGE,
+)  # fmt: skip
+"""Of each verb that issues certificates for enclaves; read by ``provision_options``."""
+
+
+def add_table(parser: argparse.ArgumentParser, table: Table) -> None:
+    """Add the options of a verb; argparse's help leaves out a group without any."""
+    ca_keys = parser.add_argument_group("CA keys")
+    for row in table:
+        if isinstance(row, SecretOptions):
+            add_options(ca_keys.add_mutually_exclusive_group(), row.options)
+        else:
+            add_options(parser, (row,))
 
 
 def domains(arguments: argparse.Namespace) -> Domains | None:
-    """What ``add_domains`` was given. Raises InvalidInputError."""
+    """What ``DOMAINS`` was given. Raises InvalidInputError."""
     from keystore.formats.domains import Domains
 
     return Domains.parse(arguments.domain_id) if arguments.domain_id else None
 
 
-def add_revocation(parser: argparse.ArgumentParser) -> None:
-    """Whether what was issued before is revoked when rights are taken away."""
-    parser.add_argument(
-        "--no-revoke", action="store_true",
-        help="where rights are taken away or a life is shortened: do not revoke the certificate of before; copies "
-        "of it can then be used until it ends",
-    )  # fmt: skip
-
-
-def add_validity(parser: argparse.ArgumentParser) -> None:
-    """How long certificates and permissions hold; read by ``span``."""
-    parser.add_argument(
-        "--valid-for",
-        metavar="TIME",
-        help="90d, 12h, 10y from now, or until an ISO date (default: the keystore's)",
-    )
-    parser.add_argument(
-        "--backdate", metavar="TIME", help="begin this much earlier, for clocks that lag (1d)"
-    )
-
-
-def add_subjects(parser: argparse.ArgumentParser) -> None:
-    """How certificate subjects are written."""
-    parser.add_argument(
-        "--compatible-subjects", action="store_true",
-        help="CN=/path as SROS2 writes it, for use with 'ros2 security create_permission'; on Cyclone DDS "
-        "some enclaves could then use the permissions of others: such names are refused",
-    )  # fmt: skip
-    parser.add_argument(
-        "--allow-subject-overlap", action="store_true", help="with compatible subjects: accept such names"
-    )
-
-
-def add_change(parser: argparse.ArgumentParser) -> None:
-    """Of each verb that signs and writes."""
-    add_signing(parser)
-    add_lock(parser)
-
-
-def add_provisioning(parser: argparse.ArgumentParser) -> None:
-    """Of each verb that issues certificates for enclaves; ``provision_options`` reads them."""
-    add_validity(parser)
-    add_revocation(parser)
-    add_subjects(parser)
-    add_change(parser)
-
-
 def access(arguments: argparse.Namespace) -> CaAccess:
-    """How CA keys are opened, from the arguments of ``add_signing``."""
+    """How CA keys are opened, from the options of ``SIGNING``."""
     from keystore.signing.ca_access import CaAccess, Secret
 
     given = vars(arguments)
@@ -134,7 +116,7 @@ def access(arguments: argparse.Namespace) -> CaAccess:
 
 
 def change(arguments: argparse.Namespace) -> dict[str, Any]:
-    """How the keystore is opened, from the arguments of ``add_change``: for the options of any change."""
+    """How the keystore is opened, from the options of ``CHANGE``: for any change."""
     return {"access": access(arguments), "lock_timeout": arguments.lock_timeout}
 
 
@@ -148,7 +130,7 @@ class Span:
 
 
 def span(arguments: argparse.Namespace) -> Span:
-    """From the arguments of ``add_validity``. Raises ``InvalidInputError``."""
+    """From the options of ``VALIDITY``. Raises ``InvalidInputError``."""
     text: str | None = arguments.valid_for
     backdate = parse_duration(arguments.backdate) if arguments.backdate else DEFAULT_BACKDATE
     if text is None:
@@ -160,7 +142,7 @@ def span(arguments: argparse.Namespace) -> Span:
 
 
 def provision_options(arguments: argparse.Namespace, **more: Any) -> ProvisionOptions:
-    """What ``add_provisioning`` was given."""
+    """What ``PROVISIONING`` was given."""
     from keystore.formats.subject import SubjectScheme
     from keystore.steps.options import ProvisionOptions
 

@@ -6,41 +6,35 @@ Identity and permissions get separate CAs. A complete keystore is left as it is.
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
+from enclave_launch.boundary.command_line import PATH, TEXT, one_of
 from keystore.formats.validity import DEFAULT_LIFETIME, parse_end, utc_now
 from keystore.verb import common
 
 
-def describe(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``secure-keystore create``."""
-    common.add_keystore(parser)
-    parser.add_argument(
-        "--domain-id", metavar="IDS", default="0", help="domains of the governance: 0, 0-10, 3,7 or all"
-    )
-    parser.add_argument(
-        "--governance", metavar="FILE.yaml", type=Path, help="governance instead of SROS2's default"
-    )
-    parser.add_argument(
-        "--curve", choices=("P-256", "P-384"), default="P-256", help="P-384 works on Fast DDS only"
-    )
-    parser.add_argument("--ca-valid-for", metavar="TIME", default="10y", help="validity of the CAs (10y)")
-    common.add_validity(parser)
-    for which in ("identity", "permissions"):
-        parser.add_argument(f"--{which}-ca-name", metavar="CN", help=f"common name of the {which} CA")
-        parser.add_argument(
-            f"--{which}-ca", metavar=("CERT", "KEY"), nargs=2, type=Path,
-            help="import an existing CA; KEY is a PEM file, or a file with a pkcs11: URI",
-        )  # fmt: skip
-    parser.add_argument(
-        "--external-identity-ca", metavar="CERT", type=Path,
-        help="certificates come from this CA (Vault, step-ca ...), by secure-keystore request and sign --issued",
+def _imported(which: str) -> common.Table:
+    return (
+        (f"--{which}-ca-name CN", TEXT, f"common name of the {which} CA"),
+        (f"--{which}-ca", {"metavar": ("CERT", "KEY"), "nargs": 2, **PATH},
+         "import an existing CA; KEY is a PEM file, or a file with a pkcs11: URI"),
     )  # fmt: skip
-    parser.add_argument(
-        "--encrypt-ca-keys", action="store_true", help="encrypt new CA keys with the passphrase"
-    )
-    common.add_subjects(parser)
-    common.add_change(parser)
+
+
+OPTIONS: common.Table = (
+    common.KEYSTORE,
+    ("--domain-id IDS", {"default": "0"}, "domains of the governance: 0, 0-10, 3,7 or all"),
+    ("--governance FILE.yaml", PATH, "governance instead of SROS2's default"),
+    ("--curve", one_of("P-256", "P-384"), "P-384 works on Fast DDS only"),
+    ("--ca-valid-for TIME", {"default": "10y"}, "validity of the CAs (10y)"),
+    *common.VALIDITY,
+    *_imported("identity"),
+    *_imported("permissions"),
+    ("--external-identity-ca CERT", PATH,
+     "certificates come from this CA (Vault, step-ca ...), by secure-keystore request and sign --issued"),
+    common.ENCRYPTION,
+    *common.SUBJECTS,
+    *common.CHANGE,
+)  # fmt: skip
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -7,16 +7,16 @@ from __future__ import annotations
 
 import argparse
 
+from enclave_launch.boundary.command_line import FLAG
 from keystore.verb import common
 
-
-def describe(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``secure-keystore create-enclave``."""
-    common.add_keystore(parser)
-    parser.add_argument("enclaves", metavar="ENCLAVE", nargs="+", help="absolute name, such as /front/camera")
-    parser.add_argument("--allow-all", action="store_true", help="grant every topic, service and action")
-    common.add_domains(parser)
-    common.add_provisioning(parser)
+OPTIONS: common.Table = (
+    common.KEYSTORE,
+    ("enclaves ENCLAVE", {"nargs": "+"}, "absolute name, such as /front/camera"),
+    ("--allow-all", FLAG, "grant every topic, service and action"),
+    common.DOMAINS,
+    *common.PROVISIONING,
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -15,17 +15,15 @@ import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
+from enclave_launch.boundary.command_line import PATH
 from keystore.errors import InvalidInputError, printable
 from keystore.verb import common
 
-
-def describe(parser: argparse.ArgumentParser) -> None:
-    """Declares the keystore, the logs and how to print."""
-    common.add_keystore(parser)
-    parser.add_argument(
-        "log", metavar="LOG", nargs="*", type=Path, help="its output, in order (default: stdin)"
-    )
-    common.add_format(parser)
+OPTIONS: common.Table = (
+    common.KEYSTORE,
+    ("log LOG", {"nargs": "*", **PATH}, "its output, in order (default: stdin)"),
+    common.FORMAT,
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

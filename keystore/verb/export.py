@@ -11,38 +11,22 @@ import argparse
 import sys
 from pathlib import Path
 
+from enclave_launch.boundary.command_line import FLAG, PATH, TEXTS, one_of
 from keystore.errors import InvalidInputError
 from keystore.verb import common
 
-
-def describe(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``secure-keystore export``."""
-    common.add_keystore(parser)
-    parser.add_argument("-o", "--output", metavar="OUT", type=Path, required=True)
-    parser.add_argument(
-        "--enclave", metavar="PATTERN", action="append", default=[],
-        help="name or fnmatch pattern such as '/robot1/*'; repeatable",
-    )  # fmt: skip
-    parser.add_argument(
-        "--hosts", metavar="FILE", type=Path, help="YAML: which enclaves belong to which host"
-    )
-    parser.add_argument(
-        "--host", metavar="NAME", action="append", default=[],
-        help="with --hosts only these; without, the one host that gets the enclaves of --enclave",
-    )  # fmt: skip
-    parser.add_argument(
-        "--public", choices=("link", "copy"), default="link",
-        help="link: public/ once and links to it (default); copy: each enclave directory stands alone",
-    )  # fmt: skip
-    parser.add_argument(
-        "--accept-exposures", action="store_true",
-        help="export although verify finds exposures (errors are never exported)",
-    )  # fmt: skip
-    parser.add_argument(
-        "--accept-shared-enclaves", action="store_true",
-        help="export although an enclave, and so its key, would be on several hosts",
-    )  # fmt: skip
-    common.add_change(parser)
+OPTIONS: common.Table = (
+    common.KEYSTORE,
+    ("-o --output OUT", {**PATH, "required": True}, ""),
+    ("--enclave PATTERN", TEXTS, "name or fnmatch pattern such as '/robot1/*'; repeatable"),
+    ("--hosts FILE", PATH, "YAML: which enclaves belong to which host"),
+    ("--host NAME", TEXTS, "with --hosts only these; without, the one host that gets the enclaves of --enclave"),
+    ("--public", one_of("link", "copy"),
+     "link: public/ once and links to it (default); copy: each enclave directory stands alone"),
+    ("--accept-exposures", FLAG, "export although verify finds exposures (errors are never exported)"),
+    ("--accept-shared-enclaves", FLAG, "export although an enclave, and so its key, would be on several hosts"),
+    *common.CHANGE,
+)  # fmt: skip
 
 
 def run(arguments: argparse.Namespace) -> int:

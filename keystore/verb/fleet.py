@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from enclave_launch.boundary.command_line import PATH
 from enclave_launch.boundary.terminal import printable
 from keystore.formats.validity import iso, parse_duration
 from keystore.verb import common
@@ -22,13 +22,13 @@ if TYPE_CHECKING:
     from keystore.steps.fleet import FleetReport, HostStatus
 
 
-def describe(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``secure-keystore fleet``."""
-    parser.add_argument("what", metavar="status", choices=("status",))
-    parser.add_argument("places", metavar="DIR", type=Path, nargs="+", help="bundles, or directories of them")
-    parser.add_argument("--keystore", metavar="KEYSTORE", type=Path, help="the CA's own, to compare with")
-    parser.add_argument("--within", metavar="TIME", default="30d", help="what counts as soon (30d)")
-    common.add_format(parser)
+OPTIONS: common.Table = (
+    ("what status", {"choices": ("status",)}, ""),
+    ("places DIR", {"nargs": "+", **PATH}, "bundles, or directories of them"),
+    ("--keystore KEYSTORE", PATH, "the CA's own, to compare with"),
+    common.WITHIN,
+    common.FORMAT,
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

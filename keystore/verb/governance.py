@@ -6,18 +6,15 @@ All participants need it at the same time: with different protection kinds they 
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
+from enclave_launch.boundary.command_line import PATH
 from keystore.verb import common
 
-
-def describe(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``secure-keystore governance``."""
-    common.add_keystore(parser)
-    parser.add_argument(
-        "file", metavar="FILE.yaml", type=Path, help="see docs: version, domain_rules, topic_rules"
-    )
-    common.add_change(parser)
+OPTIONS: common.Table = (
+    common.KEYSTORE,
+    ("file FILE.yaml", PATH, "see docs: version, domain_rules, topic_rules"),
+    *common.CHANGE,
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

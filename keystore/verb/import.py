@@ -8,24 +8,18 @@ force; ROS_SECURITY_KEYSTORE names it. What is printed last is who has to be res
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
+from enclave_launch.boundary.command_line import PATH, TEXT, TEXTS
 from keystore.verb import common
 
-
-def describe(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``secure-keystore import``."""
-    common.add_keystore(parser)
-    parser.add_argument("bundle", metavar="BUNDLE", type=Path, help="HOST.bundle of secure-keystore export")
-    parser.add_argument(
-        "--host", metavar="NAME", help="which host this is; for the first import (default: hostname)"
-    )
-    parser.add_argument(
-        "--require-ca", metavar="SHA256", action="append", default=[],
-        help="fingerprint of a CA to trust; both CAs at the first import; repeatable",
-    )  # fmt: skip
-    common.add_format(parser)
-    common.add_lock(parser)
+OPTIONS: common.Table = (
+    common.KEYSTORE,
+    ("bundle BUNDLE", PATH, "HOST.bundle of secure-keystore export"),
+    ("--host NAME", TEXT, "which host this is; for the first import (default: hostname)"),
+    ("--require-ca SHA256", TEXTS, "fingerprint of a CA to trust; both CAs at the first import; repeatable"),
+    common.FORMAT,
+    common.LOCK,
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

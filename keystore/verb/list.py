@@ -6,11 +6,7 @@ import argparse
 
 from keystore.verb import common
 
-
-def describe(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``secure-keystore list``."""
-    common.add_keystore(parser)
-    common.add_format(parser)
+OPTIONS: common.Table = (common.KEYSTORE, common.FORMAT)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -8,15 +8,15 @@ from __future__ import annotations
 
 import argparse
 
+from enclave_launch.boundary.command_line import FLAG
 from keystore.verb import common
 
-
-def describe(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``secure-keystore remove``."""
-    common.add_keystore(parser)
-    parser.add_argument("enclaves", metavar="ENCLAVE", nargs="+")
-    parser.add_argument("--no-revoke", action="store_true", help="only delete: copies elsewhere stay valid")
-    common.add_change(parser)
+OPTIONS: common.Table = (
+    common.KEYSTORE,
+    ("enclaves ENCLAVE", {"nargs": "+"}, ""),
+    ("--no-revoke", FLAG, "only delete: copies elsewhere stay valid"),
+    *common.CHANGE,
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
+from enclave_launch.boundary.command_line import FLAG
 from keystore.errors import InvalidInputError
 from keystore.formats.validity import parse_duration, parse_end, utc_now
 from keystore.verb import common
@@ -18,26 +19,21 @@ from keystore.verb import common
 if TYPE_CHECKING:
     from keystore.steps.options import ProvisionOptions, ProvisionReport
 
-_ROLES = ("identity", "permissions", "both")
 
-
-def describe(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``secure-keystore renew``."""
-    common.add_keystore(parser)
-    parser.add_argument("enclaves", metavar="ENCLAVE", nargs="*", help="enclaves to renew in any case")
-    parser.add_argument("--within", metavar="TIME", default="30d", help="what ends sooner is renewed (30d)")
-    parser.add_argument("--all", action="store_true", help="renew every enclave")
-    parser.add_argument("--new-keys", action="store_true", help="new private keys too, not only certificates")
-    parser.add_argument(
-        "--revoke-old", action="store_true", help="also revoke the certificates these enclaves had before"
-    )
-    parser.add_argument("--ca", choices=("start", "switch", "finish"), help="a step of replacing CAs")
-    parser.add_argument("--ca-role", choices=_ROLES, default="both", help="which CA to replace (both)")
-    parser.add_argument("--ca-valid-for", metavar="TIME", default="10y", help="validity of new CAs (10y)")
-    parser.add_argument(
-        "--encrypt-ca-keys", action="store_true", help="encrypt new CA keys with the passphrase"
-    )
-    common.add_provisioning(parser)
+OPTIONS: common.Table = (
+    common.KEYSTORE,
+    ("enclaves ENCLAVE", {"nargs": "*"}, "enclaves to renew in any case"),
+    ("--within TIME", {"default": "30d"}, "what ends sooner is renewed (30d)"),
+    ("--all", FLAG, "renew every enclave"),
+    ("--new-keys", FLAG, "new private keys too, not only certificates"),
+    common.REVOKE_OLD,
+    ("--ca", {"choices": ("start", "switch", "finish")}, "a step of replacing CAs"),
+    ("--ca-role", {"choices": ("identity", "permissions", "both"), "default": "both"},
+     "which CA to replace (both)"),
+    ("--ca-valid-for TIME", {"default": "10y"}, "validity of new CAs (10y)"),
+    common.ENCRYPTION,
+    *common.PROVISIONING,
+)  # fmt: skip
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -10,22 +10,18 @@ import argparse
 import sys
 from pathlib import Path
 
+from enclave_launch.boundary.command_line import PATH, TEXT
 from enclave_launch.boundary.new_file import write_bytes
 from keystore.errors import StorageError
 from keystore.verb import common
 
-
-def describe(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``secure-keystore request``."""
-    common.add_keystore(parser)
-    parser.add_argument("enclaves", metavar="ENCLAVE", nargs="+")
-    parser.add_argument(
-        "-o", "--output", metavar="FILE", type=Path, help="where the requests go (standard output)"
-    )
-    parser.add_argument(
-        "--token", metavar="URI", help="pkcs11: URI of the enclave's key in a token (RFC 7512)"
-    )
-    common.add_change(parser)
+OPTIONS: common.Table = (
+    common.KEYSTORE,
+    ("enclaves ENCLAVE", {"nargs": "+"}, ""),
+    ("-o --output FILE", PATH, "where the requests go (standard output)"),
+    ("--token URI", TEXT, "pkcs11: URI of the enclave's key in a token (RFC 7512)"),
+    *common.CHANGE,
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

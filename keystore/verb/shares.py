@@ -9,16 +9,16 @@ from __future__ import annotations
 
 import argparse
 
+from enclave_launch.boundary.command_line import TEXT
 from keystore.errors import printable
 from keystore.verb import common
 
-
-def describe(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``secure-keystore shares``."""
-    common.add_keystore(parser)
-    parser.add_argument("--drop", metavar="OWNER", help="drop the shares of this launch")
-    common.add_format(parser)
-    common.add_change(parser)
+OPTIONS: common.Table = (
+    common.KEYSTORE,
+    ("--drop OWNER", TEXT, "drop the shares of this launch"),
+    common.FORMAT,
+    *common.CHANGE,
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

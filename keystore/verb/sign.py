@@ -7,23 +7,18 @@ request proves who holds the key, not who asks.
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
+from enclave_launch.boundary.command_line import PATH
 from keystore.verb import common
 
-
-def describe(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``secure-keystore sign``."""
-    common.add_keystore(parser)
-    parser.add_argument("requests", metavar="FILE", type=Path, help="what secure-keystore request wrote")
-    parser.add_argument(
-        "--revoke-old", action="store_true", help="also revoke the certificates these enclaves had before"
-    )
-    parser.add_argument(
-        "--issued", metavar="FILE", type=Path,
-        help="PEM certificates that somebody else's identity CA issued for the requests: take these, issue none",
-    )  # fmt: skip
-    common.add_provisioning(parser)
+OPTIONS: common.Table = (
+    common.KEYSTORE,
+    ("requests FILE", PATH, "what secure-keystore request wrote"),
+    common.REVOKE_OLD,
+    ("--issued FILE", PATH,
+     "PEM certificates that somebody else's identity CA issued for the requests: take these, issue none"),
+    *common.PROVISIONING,
+)  # fmt: skip
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -9,6 +9,7 @@ import argparse
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
+from enclave_launch.boundary.command_line import FLAG
 from enclave_launch.boundary.terminal import printable
 from keystore.formats.validity import iso, parse_duration
 from keystore.verb import common
@@ -21,14 +22,12 @@ if TYPE_CHECKING:
 SOON, ENDED = 3, 4
 
 
-def describe(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``secure-keystore status``."""
-    common.add_keystore(parser)
-    parser.add_argument("--within", metavar="TIME", default="30d", help="what counts as soon (30d)")
-    parser.add_argument(
-        "--all", action="store_true", help="list everything in text too, not only what is due"
-    )
-    common.add_format(parser)
+OPTIONS: common.Table = (
+    common.KEYSTORE,
+    common.WITHIN,
+    ("--all", FLAG, "list everything in text too, not only what is due"),
+    common.FORMAT,
+)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -7,28 +7,27 @@ from __future__ import annotations
 
 import argparse
 
+from enclave_launch.boundary.command_line import TEXT
 from keystore.formats.tool_needs import TABLE
 from keystore.formats.validity import iso
 from keystore.verb import common
 
-
-def describe(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``secure-keystore tool-enclave``."""
-    parser.usage = "secure-keystore tool-enclave KEYSTORE --for TOOL [TARGET ...] [options]"
-    parser.formatter_class = argparse.RawDescriptionHelpFormatter
-    parser.epilog = "tools:\n" + "".join(
-        f"  {f'{tool.name} {tool.target.value}':20}  {tool.what}\n" for tool in TABLE
-    )
-    common.add_keystore(parser)
-    parser.add_argument("targets", metavar="TARGET", nargs="*", help=argparse.SUPPRESS)
-    parser.add_argument(
-        "--for", dest="tool", required=True, nargs="+", metavar=("TOOL", "TARGET"),
-        help="the tool, and the topics, nodes or services that it works on",
-    )  # fmt: skip
-    parser.add_argument("--name", metavar="ENCLAVE", help="default: /tools/TOOL/TARGET")
-    common.add_domains(parser)
-    common.add_provisioning(parser)
-    common.add_format(parser)
+SETTINGS = {
+    "usage": "secure-keystore tool-enclave KEYSTORE --for TOOL [TARGET ...] [options]",
+    "formatter_class": argparse.RawDescriptionHelpFormatter,
+    "epilog": "tools:\n"
+    + "".join(f"  {f'{tool.name} {tool.target.value}':20}  {tool.what}\n" for tool in TABLE),
+}
+OPTIONS: common.Table = (
+    common.KEYSTORE,
+    ("targets TARGET", {"nargs": "*"}, argparse.SUPPRESS),
+    ("--for", {"dest": "tool", "required": True, "nargs": "+", "metavar": ("TOOL", "TARGET")},
+     "the tool, and the topics, nodes or services that it works on"),
+    ("--name ENCLAVE", TEXT, "default: /tools/TOOL/TARGET"),
+    common.DOMAINS,
+    *common.PROVISIONING,
+    common.FORMAT,
+)  # fmt: skip
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -8,9 +8,9 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator
 from dataclasses import asdict
-from pathlib import Path
 from typing import TYPE_CHECKING
 
+from enclave_launch.boundary.command_line import PATH, TEXTS
 from enclave_launch.boundary.words import counted
 from keystore.errors import printable
 from keystore.verb import common
@@ -19,19 +19,15 @@ if TYPE_CHECKING:
     from keystore.verification import VerifyReport
 
 
-def describe(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``secure-keystore verify``."""
-    common.add_keystore(parser)
-    common.add_format(parser)
-    common.add_signing(parser)
-    parser.add_argument(
-        "--require-governance", metavar="FILE", type=Path,
-        help="the governance that must be in force, as YAML or XML; it may be weaker than the default",
-    )  # fmt: skip
-    parser.add_argument(
-        "--require-ca", metavar="SHA256", action="append", default=[],
-        help="fingerprint of a CA certificate that may be trusted, no other may; repeatable",
-    )  # fmt: skip
+OPTIONS: common.Table = (
+    common.KEYSTORE,
+    common.FORMAT,
+    *common.SIGNING,
+    ("--require-governance FILE", PATH,
+     "the governance that must be in force, as YAML or XML; it may be weaker than the default"),
+    ("--require-ca SHA256", TEXTS,
+     "fingerprint of a CA certificate that may be trusted, no other may; repeatable"),
+)  # fmt: skip
 
 
 def run(arguments: argparse.Namespace) -> int:

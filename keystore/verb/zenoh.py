@@ -10,23 +10,19 @@ from __future__ import annotations
 import argparse
 import shlex
 
+from enclave_launch.boundary.command_line import TEXT
 from keystore.verb import common
 
-
-def describe(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of ``secure-keystore zenoh``."""
-    common.add_keystore(parser)
-    parser.add_argument(
-        "--enclave", metavar="PATTERN", action="append",
-        help="which enclaves are on Zenoh: name or fnmatch pattern such as '/robot1/*'; repeatable (default: those "
-        "that are already, all of them for the first time)",
-    )  # fmt: skip
-    parser.add_argument(
-        "--router", metavar="HOST[:PORT]",
-        help="where processes find the router (as before; localhost:7447 for the first time). For another host than "
-        "localhost it listens on all addresses",
-    )  # fmt: skip
-    common.add_change(parser)
+OPTIONS: common.Table = (
+    common.KEYSTORE,
+    ("--enclave PATTERN", {"action": "append"},
+     "which enclaves are on Zenoh: name or fnmatch pattern such as '/robot1/*'; repeatable (default: those "
+     "that are already, all of them for the first time)"),
+    ("--router HOST[:PORT]", TEXT,
+     "where processes find the router (as before; localhost:7447 for the first time). For another host than "
+     "localhost it listens on all addresses"),
+    *common.CHANGE,
+)  # fmt: skip
 
 
 def run(arguments: argparse.Namespace) -> int:
