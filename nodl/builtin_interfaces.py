@@ -11,7 +11,7 @@ Pure; read by policy derivation and by the reports of inference.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from enum import Enum
 
 from enclave_launch.boundary.light import NamedTuple
@@ -150,9 +150,7 @@ TABLE: tuple[BuiltIn, ...] = (
 def built_in_interfaces(
     distro: str,
     library: ClientLibrary,
-    conditions: frozenset[BuiltinCondition] = frozenset(
-        {BuiltinCondition.ALWAYS, BuiltinCondition.PARAMETERS}
-    ),
+    conditions: Collection[BuiltinCondition] = (BuiltinCondition.ALWAYS, BuiltinCondition.PARAMETERS),
 ) -> tuple[BuiltIn, ...]:
     """The rows that hold under ``conditions``. Raises ``ValueError`` for a distribution we do not know."""
     if distro not in DISTROS:

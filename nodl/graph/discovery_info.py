@@ -18,12 +18,8 @@ GID_SIZES = (24, 16)
 _GUID = 16  # what DDS itself calls things by; more is padding
 _LONGEST_NAME = 256
 _MOST = 4096  # nodes of a participant, or endpoints of a node
-_PLAIN_ENCODINGS = (
-    b"\x00\x00",
-    b"\x00\x01",
-    b"\x00\x06",
-    b"\x00\x07",
-)  # CDR and XCDR2, big and little endian
+# CDR and XCDR2, big and little endian.
+_PLAIN_ENCODINGS = (b"\x00\x00", b"\x00\x01", b"\x00\x06", b"\x00\x07")
 
 Item = TypeVar("Item")
 

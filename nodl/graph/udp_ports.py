@@ -16,9 +16,8 @@ from functools import cached_property
 from ipaddress import ip_address
 from pathlib import Path
 
-_LOCATOR = re.compile(
-    r"udp6?/\[?([0-9a-fA-F.:]+?)\]?:(\d+)(?:@\d+)?\Z"
-)  # of Cyclone DDS's __NetworkAddresses
+# Of Cyclone DDS's __NetworkAddresses.
+_LOCATOR = re.compile(r"udp6?/\[?([0-9a-fA-F.:]+?)\]?:(\d+)(?:@\d+)?\Z")
 _FORMATS = {"udp": 4, "udp6": 16}
 _SOCKET = re.compile(r"socket:\[(\d+)\]\Z")
 

@@ -136,9 +136,8 @@ class _Audit:
         for around in place.around:
             if isinstance(around, ast.stmt) and around not in self._run.executed:
                 if isinstance(function, ast.FunctionDef) and self._was_handed(function):
-                    self._gap(
-                        place.node, f"{function.name} {_LOST}"
-                    )  # a generator: whoever has it may run it
+                    # A generator: whoever has it may run it.
+                    self._gap(place.node, f"{function.name} {_LOST}")
                 return  # control certainly does not get there
             if isinstance(around, ast.ClassDef):
                 cls = around
@@ -154,9 +153,8 @@ class _Audit:
 
     def _was_handed(self, function: ast.FunctionDef) -> bool:
         """Whether others call the function and what it does was not seen: they get a generator."""
-        handed = (
-            getattr(each, "function", each) for each in self._run.callbacks
-        )  # a bound method has its own
+        # A bound method has its own.
+        handed = (getattr(each, "function", each) for each in self._run.callbacks)
         is_handed = any(isinstance(each, FunctionValue) and each.node is function for each in handed)
         return is_handed and function.body[0] not in self._run.executed
 

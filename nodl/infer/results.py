@@ -59,26 +59,25 @@ def _interfaces_of_node(record: NodeRecord, findings: Findings, origin: LaunchKe
         gaps.append(Gap(record.source, f"the namespace {made}{_made_of(record.namespaces)}"))
     if record.created and names != [None] and not all(isinstance(atom, str) for atom in record.names):
         gaps.append(Gap(record.source, f"the name {made}{_made_of(record.names)}"))
-    interfaces = []
-    for name in names:
-        for namespace in _namespaces(record):
-            interface = NodeInterface(
-                package=origin.package,
-                executable=origin.executable,
-                plugin=origin.plugin,
-                name=name,
-                namespace=namespace,
-                endpoints=endpoints,
-                source=record.source,
-                library=ClientLibrary.RCLPY,
-                lifecycle=record.lifecycle and record.communication_interface,
-                parameters=tuple(sorted({*record.parameters, *record.assigned})),
-                gaps=tuple(dict.fromkeys(gaps)),
-                own_rules=rules,
-                global_arguments=_hears_launch(record, findings),
-            )
-            interfaces.append(interface)
-    return interfaces
+    return [
+        NodeInterface(
+            package=origin.package,
+            executable=origin.executable,
+            plugin=origin.plugin,
+            name=name,
+            namespace=namespace,
+            endpoints=endpoints,
+            source=record.source,
+            library=ClientLibrary.RCLPY,
+            lifecycle=record.lifecycle and record.communication_interface,
+            parameters=tuple(sorted({*record.parameters, *record.assigned})),
+            gaps=tuple(dict.fromkeys(gaps)),
+            own_rules=rules,
+            global_arguments=_hears_launch(record, findings),
+        )
+        for name in names
+        for namespace in _namespaces(record)
+    ]
 
 
 def _made_of(value: Value) -> str:

@@ -54,13 +54,11 @@ def infer_paths(paths: Iterable[str | Path], prefixes: Sequence[str] = ()) -> In
         instantiated.update(node for run, _ in runs for node in run.instantiated)
         unsettled = [gap for run, _ in runs for gap in unsettled_places(run, everywhere, instantiated)]
         nodes = [node for run, origin in runs for node in interfaces_of(run.findings, origin)]
-    gaps = dict.fromkeys(Gap(source, why) for run, _ in runs for source, why in run.findings.gaps)
-    gaps.update(dict.fromkeys(unsettled))
+    gaps = [Gap(source, why) for run, _ in runs for source, why in run.findings.gaps]
     cpp_nodes, cpp_gaps = _cpp([file for file in found if file not in files])
-    distinct = tuple(
-        dict.fromkeys([*nodes, *cpp_nodes])
-    )  # one may be found through several files of a program
-    return InferredSystem(distinct, (*gaps, *cpp_gaps), tuple(found))
+    # One may be found through several files of a program.
+    distinct = tuple(dict.fromkeys([*nodes, *cpp_nodes]))
+    return InferredSystem(distinct, (*dict.fromkeys([*gaps, *unsettled]), *cpp_gaps), tuple(found))
 
 
 def _cpp(files: list[str]) -> tuple[list[NodeInterface], list[Gap]]:

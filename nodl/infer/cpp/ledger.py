@@ -277,9 +277,8 @@ class Reach:
             for field in cls.fields.values():
                 self._field(field)
             for method in (m for table in self.run.names.methods.get(cls, {}).values() for m in table):
-                if method.virtual or method.name.startswith(
-                    "operator"
-                ):  # called through a base, or by a sign
+                # Called through a base, or by a sign.
+                if method.virtual or method.name.startswith("operator"):
                     self.waiting.append(method)
 
     def _field(self, field: Field) -> None:

@@ -229,14 +229,8 @@ def _from_dictionary(run: Run, found: dict[Any, Any], call: Call, place: str) ->
 # --- computing ----------------------------------------------------------------------------------------------
 
 
-_ERRORS = (
-    ValueError,
-    TypeError,
-    LookupError,
-    ArithmeticError,
-    AttributeError,
-    re.error,
-)  # of a pure function
+# Of a pure function.
+_ERRORS = (ValueError, TypeError, LookupError, ArithmeticError, AttributeError, re.error)
 
 
 def compute(

@@ -131,6 +131,6 @@ def _built_in(node: NodeInterface) -> Iterator[ExpandedInterface]:
     """What every node of a current distribution (iron and later) has, by client library."""
     base = join(node.namespace or "/", node.name or "*")
     conditions = _OF_EVERY_NODE | ({BuiltinCondition.LIFECYCLE} if node.lifecycle else set())
-    for row in built_in_interfaces(DISTROS[-1], node.library, frozenset(conditions)):
+    for row in built_in_interfaces(DISTROS[-1], node.library, conditions):
         name = row.name.replace("~", base, 1)
         yield ExpandedInterface(row.kind, name, row.type, Certainty.EXACT, node.source, built_in=True)

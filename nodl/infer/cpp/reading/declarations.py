@@ -106,9 +106,8 @@ class Class:
     declared: dict[str, list[Function]] = field(default_factory=dict)  # without body: defaults and virtual
     inherits_constructors: bool = False
     template_defaults: dict[str, str] = field(default_factory=dict)
-    specialises: tuple[str, ...] | None = (
-        None  # arguments as written, of an explicit or partial specialisation
-    )
+    # Arguments as written, of an explicit or partial specialisation.
+    specialises: tuple[str, ...] | None = None
 
     @property
     def line(self) -> int:
@@ -143,9 +142,8 @@ class FileIndex:
     functions: dict[str, list[Function]] = field(default_factory=dict)
     declared: dict[str, list[Function]] = field(default_factory=dict)
     globals: dict[str, list[Global]] = field(default_factory=dict)
-    aliases: dict[str, tuple[str, Scope]] = field(
-        default_factory=dict
-    )  # qualified -> what it stands for, where
+    # Qualified -> what it stands for, where.
+    aliases: dict[str, tuple[str, Scope]] = field(default_factory=dict)
     using: list[str] = field(default_factory=list)  # using namespace
     enums: set[str] = field(default_factory=set)
     enumerators: dict[str, str] = field(default_factory=dict)  # qualified and last name -> qualified

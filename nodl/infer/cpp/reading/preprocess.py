@@ -14,9 +14,8 @@ from itertools import pairwise
 
 from nodl.infer.cpp.reading.macros import Macro, decided, expanded
 
-Include = Callable[
-    [str, bool], "Preprocessed | None"
-]  # name as written, in quotes -> the file, None if not in reach
+# Name as written, in quotes -> the file, None if not in reach.
+Include = Callable[[str, bool], "Preprocessed | None"]
 
 _TOKENS = re.compile(
     r'R"(?P<d>[^\s()\\]{0,16})\((?:.|\n)*?\)(?P=d)"|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])+\'|//[^\n]*|/\*(?:.|\n)*?\*/'

@@ -371,9 +371,8 @@ class Frame:
     loops: list[Loop] = field(default_factory=list)
     blocks: list[dict[str, tuple[bool, Value, str | None, Node | None]]] = field(default_factory=list)
     """For each block that runs: what names that it declares stood for before."""
-    kept: dict[str, Frame] = field(
-        default_factory=dict
-    )  # of a lambda: what it captured of blocks that may have ended
+    # Of a lambda: what it captured of blocks that may have ended.
+    kept: dict[str, Frame] = field(default_factory=dict)
     aliases: dict[str, Node | None] = field(default_factory=dict)
     """References and pointers to plain values: the expression that each stands for, ``None`` if not known."""
     depth: int = 0

@@ -45,9 +45,8 @@ def method_call(run: Machine, site: CallSite) -> Value:
     before = run.store.mark()
     alternatives = []
     for atom in receiver:
-        found.append(
-            _on_atom(run, atom, name, CallSite(run, site.node, callee, frame))
-        )  # runs its arguments anew
+        # Runs its arguments anew.
+        found.append(_on_atom(run, atom, name, CallSite(run, site.node, callee, frame)))
         if len(receiver) > 1:
             alternatives.append(run.store.changes(before))
             run.store.undo(before)

@@ -131,9 +131,8 @@ def _calls_back(run: Machine, values: Sequence[Value], node: Node, frame: Frame)
 
     elements = tuple(join(*items_of(run, atom)[0]) for atom in values[0]) if values else ()
     for atom in (atom for value in values for atom in value if isinstance(atom, Lambda)):
-        run.branches(
-            [partial(_once, run, atom, elements, node, frame), lambda: NEXT]
-        )  # before what follows, or not
+        # Before what follows, or not.
+        run.branches([partial(_once, run, atom, elements, node, frame), lambda: NEXT])
     callee = next(
         (at for at, value in enumerate(values) if any(isinstance(a, Lambda | Bound) for a in value)), 0
     )

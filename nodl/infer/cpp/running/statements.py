@@ -285,9 +285,8 @@ def declaration(run: Machine, node: Node, frame: Frame) -> int:
         if _is_static(node):
             _static_local(run, node, name, kind, initial, frame)
         else:
-            frame.path = (
-                (*path, name) if len(declarators) > 1 else path
-            )  # each variable is an object of its own
+            # Each variable is an object of its own.
+            frame.path = (*path, name) if len(declarators) > 1 else path
             run.local(frame, name, initial(), kind)
             frame.path = path
             bind_reference(run, name, kind, value, frame)
