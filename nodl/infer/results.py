@@ -100,13 +100,8 @@ def _namespaces(record: NodeRecord) -> list[str | None]:
 
 def _plain_texts(value: Value) -> list[str]:
     """The texts of ``value`` with defaults filled in; what stays unknown is left out."""
-    texts: list[str] = []
-    for atom in value:
-        for template in templates(atom):
-            filled = template.fill({})
-            if filled.is_literal and isinstance(atom, str | Text):
-                texts.append(filled.text)
-    return list(dict.fromkeys(texts))
+    filled = (template.fill({}) for atom in value for template in templates(atom))
+    return list(dict.fromkeys(each.text for each in filled if each.is_literal))
 
 
 # --- endpoints ----------------------------------------------------------------------------------------------

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 from enclave_launch.boundary.files import text_or_nothing
 from nodl.infer.cpp.entry import Entry
 from nodl.infer.cpp.program import Sources
-from nodl.infer.cpp.reading.declarations import FileIndex, Function, FunctionParameter
+from nodl.infer.cpp.reading.declarations import FileIndex, FunctionParameter
 from nodl.infer.cpp.syntax import text
 
 _MAIN = re.compile(
@@ -69,11 +69,8 @@ def _made(index: FileIndex) -> re.Match[str] | None:
 def _options_alone(component: str, files: Iterable[FileIndex]) -> FunctionParameter | None:
     """The parameter of the one constructor that takes options, and takes nothing else; ``main`` can call no other."""
     name = component.rpartition("::")[2]
-    found: list[Function] = []
-    for cls in (
-        each for index in files for each in index.classes.get(name, ()) if each.qualified == component
-    ):
-        found += (*cls.methods.get(name, ()), *cls.declared.get(name, ()))
+    classes = (each for index in files for each in index.classes.get(name, ()) if each.qualified == component)
+    found = [each for cls in classes for each in (*cls.methods.get(name, ()), *cls.declared.get(name, ()))]
     taking = [each.parameters for each in found if any("NodeOptions" in p.type for p in each.parameters)]
     alone = len(taking) == 1 == len(taking[0]) and all(each.parameters for each in found)
     return taking[0][0] if alone else None

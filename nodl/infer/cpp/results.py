@@ -96,27 +96,21 @@ def _of_node(
     if record.namespaces and len(namespaces) < len(record.namespaces):
         gaps.append(Gap(record.source, "the namespace of this node is made at run time"))
     depends = _dependence(record, gaps)
-    interfaces = []
-    for name in dict.fromkeys(names):
-        for namespace in dict.fromkeys(namespaces or ["/"]):
-            interface = NodeInterface(
-                package=package, executable=executable, plugin=plugin, name=name, namespace=namespace,
-                endpoints=endpoints, source=record.source, library=ClientLibrary.RCLCPP, lifecycle=record.lifecycle,
-                parameters=tuple(sorted(record.parameters)), gaps=tuple(dict.fromkeys(gaps)),
-                own_rules=rules, global_arguments=record.use_global_arguments, depends=depends,
-            )  # fmt: skip
-            interfaces.append(interface)
-    return interfaces
+    return [
+        NodeInterface(
+            package=package, executable=executable, plugin=plugin, name=name, namespace=namespace,
+            endpoints=endpoints, source=record.source, library=ClientLibrary.RCLCPP, lifecycle=record.lifecycle,
+            parameters=tuple(sorted(record.parameters)), gaps=tuple(dict.fromkeys(gaps)),
+            own_rules=rules, global_arguments=record.use_global_arguments, depends=depends,
+        )
+        for name in dict.fromkeys(names)
+        for namespace in dict.fromkeys(namespaces or ["/"])
+    ]  # fmt: skip
 
 
 def _texts(value: Value, record: AllocatedNode) -> list[str]:
-    found = []
-    for atom in value:
-        for template in _templates(atom, record):
-            filled = template.fill({})
-            if filled.is_literal:
-                found.append(filled.text)
-    return list(dict.fromkeys(found))
+    filled = (template.fill({}) for atom in value for template in _templates(atom, record))
+    return list(dict.fromkeys(each.text for each in filled if each.is_literal))
 
 
 def _endpoint(found: PossibleEndpoint, record: AllocatedNode) -> list[Endpoint]:
@@ -214,15 +208,10 @@ def _conditional_gaps(record: AllocatedNode) -> list[Gap]:
     gaps = []
     for found, when in record.endpoints.items():
         if not _is_certain(found, when, record):
+            kind, symbol = found.kind.value.replace("_", " "), when[0][-1][2]
             for template in _templates(found.name, record):
-                symbol = when[0][-1][2]
-                gaps.append(
-                    Gap(
-                        found.source,
-                        f"{found.kind.value.replace('_', ' ')} {template} is made only where the build says "
-                        f"{symbol}",
-                    )
-                )
+                why = f"{kind} {template} is made only where the build says {symbol}"
+                gaps.append(Gap(found.source, why))
     return gaps
 
 

@@ -136,9 +136,7 @@ def iterated(run: Machine, subject: Value) -> tuple[list[Value], bool]:
     if len(subject) == 1:
         items, exact = items_of(run, subject[0])
         return items, exact
-    found: list[Value] = []
-    for atom in subject:
-        found += items_of(run, atom)[0]
+    found = [item for atom in subject for item in items_of(run, atom)[0]]
     return found or [unknown("an element of something that is not known")], False
 
 
