@@ -5,3 +5,26 @@ XML, YAML and Python launch files all build these objects; ``visit`` walks over 
 ``actions/``, ``substitutions/``, ``events/``, ``parameters/``, ``markup/`` (the front ends' classes). Where upstream
 has each name is one table, ``upstream_paths``; ``install`` puts modules of those names in place while we evaluate.
 """
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from operator import attrgetter
+
+from enclave_launch.boundary.light import TypeVar
+
+_Class = TypeVar("_Class")
+
+
+def read_only(*names: str) -> Callable[[type[_Class]], type[_Class]]:
+    """Make attributes of a class properties, as upstream's are: a launch file cannot set them, and its own subclass may
+    have properties of those names. The class itself keeps the values under private names (``self.__name``)."""
+
+    def of(kept: type[_Class]) -> type[_Class]:
+        for name in names:
+            private = f"_{kept.__name__}__{name}"
+            setattr(kept, private, vars(kept)[name])
+            setattr(kept, name, property(attrgetter(private)))
+        return kept
+
+    return of

@@ -96,9 +96,15 @@ def _withdraw(before: set[str]) -> None:
     for name, module in list(sys.modules.items()):
         if is_public(name) or (name not in before and name.startswith(FALLBACK_NAMES) and _is_ours(module)):
             del sys.modules[name]
-    new = {name for name in sys.modules if name not in before and not name.startswith("enclave_launch")}
+    new = {name for name in sys.modules if name not in before and _may_be_guest(name)}
     for name in _dependents(new, lambda origin: origin.startswith(_OURS) or is_public(origin)):
         _guests[name] = sys.modules.pop(name)
+
+
+def _may_be_guest(name: str) -> bool:
+    """Whether a launch file may have brought it: it is neither of ours nor of Python's own library."""
+    top = name.partition(".")[0]
+    return top != "enclave_launch" and top not in sys.stdlib_module_names
 
 
 def _is_ours(module: ModuleType) -> bool:

@@ -7,6 +7,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, MutableMapping
 
 from enclave_launch.boundary.light import TYPE_CHECKING, Any, NamedTuple
+from enclave_launch.description import read_only
 from enclave_launch.description.events.dispatch import Buckets, EventQueue, HandlerTable, QueuedEvent
 from enclave_launch.host.current import current_host
 from enclave_launch.host.environment import Environment
@@ -57,6 +58,7 @@ MAX_UNFOLDED = 250_000
 """Entities of one walk over a launch file: loops and includes can multiply without end."""
 
 
+@read_only("noninteractive", "is_shutdown")
 class LaunchContext:
     """Launch configurations, environment, locals, events. Upstream's class, plus:
 
@@ -71,7 +73,7 @@ class LaunchContext:
         self, *, argv: Iterable[str] | None = None, noninteractive: bool = False, host: Host | None = None
     ) -> None:
         self.__argv = argv if argv is not None else []
-        self.noninteractive = noninteractive
+        self.__noninteractive = noninteractive
         self.__host = host
         self.__loop: Any = None
         self.__globals: dict[str, Any] = {}
@@ -114,7 +116,7 @@ class LaunchContext:
     # Shutdown and the loop
 
     def _set_is_shutdown(self, state: bool) -> None:
-        self.is_shutdown = state
+        self.__is_shutdown = state
 
     @property
     def asyncio_loop(self) -> Any:
@@ -233,7 +235,7 @@ class LaunchContext:
             environment=self.process_environment.snapshot(),
             handlers=self._event_handlers.save(),
             queue=self._event_queue.save(),
-            is_shutdown=self.is_shutdown,
+            is_shutdown=self.__is_shutdown,
             on_event=self.on_event,
         )
 
@@ -247,7 +249,7 @@ class LaunchContext:
         self.process_environment.assign(saved.environment)
         self._event_handlers.restore(saved.handlers)
         self._event_queue.restore(saved.queue)
-        self.is_shutdown = saved.is_shutdown
+        self.__is_shutdown = saved.is_shutdown
         self.on_event = saved.on_event
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from enclave_launch.boundary.light import TYPE_CHECKING
+from enclave_launch.description import read_only
 from enclave_launch.description.argument_scan import DeclaredArguments, collect_arguments
 from enclave_launch.description.entity import Action, LaunchDescriptionEntity
 from enclave_launch.diagnostics.evaluation import launch_file_deprecated
@@ -15,6 +16,7 @@ if TYPE_CHECKING:
     from enclave_launch.description.launch_context import LaunchContext
 
 
+@read_only("deprecated_reason")
 class LaunchDescription(LaunchDescriptionEntity):
     """Visited, it gives its entities. ``deprecated_reason`` is warned about at each visit."""
 
@@ -28,7 +30,7 @@ class LaunchDescription(LaunchDescriptionEntity):
         deprecated_reason: str | None = None,
     ) -> None:
         self.__entities = list(initial_entities) if initial_entities is not None else []
-        self.deprecated_reason = deprecated_reason
+        self.__deprecated_reason = deprecated_reason
 
     @property
     def entities(self) -> list[LaunchDescriptionEntity]:
@@ -36,7 +38,7 @@ class LaunchDescription(LaunchDescriptionEntity):
 
     @property
     def deprecated(self) -> bool:
-        return self.deprecated_reason is not None
+        return self.__deprecated_reason is not None
 
     def add_entity(self, entity: LaunchDescriptionEntity) -> None:
         self.__entities.append(entity)
@@ -45,9 +47,9 @@ class LaunchDescription(LaunchDescriptionEntity):
         self.add_entity(action)
 
     def visit(self, context: LaunchContext) -> list[LaunchDescriptionEntity]:
-        if self.deprecated_reason is not None:
+        if self.__deprecated_reason is not None:
             file = context.get_locals_as_dict().get("current_launch_file_path")
-            context.host.warn(launch_file_deprecated(file, self.deprecated_reason))
+            context.host.warn(launch_file_deprecated(file, self.__deprecated_reason))
         return self.__entities
 
     def describe_sub_entities(self) -> list[LaunchDescriptionEntity]:

@@ -9,10 +9,12 @@ from __future__ import annotations
 import os
 
 from enclave_launch.boundary.light import Any
+from enclave_launch.description import read_only
 from enclave_launch.description.events.handlers import OnShutdown
 from enclave_launch.description.launch_context import LaunchContext
 
 
+@read_only("ros_context", "ros_node", "ros_executor")
 class ROSAdapter:
     """Holds an rclpy context and a node ``launch_ros_<pid>``, spun by a thread of its own."""
 
@@ -35,23 +37,23 @@ class ROSAdapter:
         import rclpy
         from rclpy.executors import SingleThreadedExecutor
 
-        self.ros_context = rclpy.Context()
-        rclpy.init(args=self.__argv, context=self.ros_context)
-        self.ros_node = rclpy.create_node(f"launch_ros_{os.getpid()}", context=self.ros_context)
-        self.ros_executor = SingleThreadedExecutor(context=self.ros_context)
-        self.ros_executor.add_node(self.ros_node)
-        self.__thread = threading.Thread(target=self.ros_executor.spin, daemon=True)
+        self.__ros_context = rclpy.Context()
+        rclpy.init(args=self.__argv, context=self.__ros_context)
+        self.__ros_node = rclpy.create_node(f"launch_ros_{os.getpid()}", context=self.__ros_context)
+        self.__ros_executor = SingleThreadedExecutor(context=self.__ros_context)
+        self.__ros_executor.add_node(self.__ros_node)
+        self.__thread = threading.Thread(target=self.__ros_executor.spin, daemon=True)
         self.__thread.start()
 
     def shutdown(self) -> None:
         """Raises ``RuntimeError`` when not started."""
         if self.ros_node is None:
             raise RuntimeError("Cannot shutdown a ROS adapter that is not running")
-        self.ros_executor.shutdown()
+        self.__ros_executor.shutdown()
         self.__thread.join()
-        self.ros_node.destroy_node()
-        self.ros_context.try_shutdown()
-        self.ros_node = None
+        self.__ros_node.destroy_node()
+        self.__ros_context.try_shutdown()
+        self.__ros_node = None
 
     @property
     def argv(self) -> list[str]:

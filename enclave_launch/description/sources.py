@@ -7,6 +7,7 @@ from collections.abc import Callable
 from types import ModuleType
 
 from enclave_launch.boundary.light import TYPE_CHECKING
+from enclave_launch.description import read_only
 from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.description.markup.parser import (
     InvalidFrontendLaunchFileError as InvalidFrontendLaunchFileError,
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from enclave_launch.description.launch_description import LaunchDescription
 
 
+@read_only("method")
 class LaunchDescriptionSource:
     """Loads its description once, when first asked with a context. Subclasses say how."""
 
@@ -38,7 +40,7 @@ class LaunchDescriptionSource:
         self.__launch_description = launch_description
         self.__location = normalize_to_list_of_substitutions(location)
         self.__expanded_location: str | None = None
-        self.method = method
+        self.__method = method
 
     def try_get_launch_description_without_context(self) -> LaunchDescription | None:
         """Load it for looking only, if its path can be performed in an empty context; ``None`` if anything fails.

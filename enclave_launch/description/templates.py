@@ -12,6 +12,7 @@ lists of substitutions, to be performed when the action is executed.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from operator import attrgetter
 
 from enclave_launch.boundary.light import TYPE_CHECKING, Any, ClassVar, NamedTuple
 from enclave_launch.description.entity import Action
@@ -72,6 +73,11 @@ def kept(default: Any = _REQUIRED, *, keyword_only: bool = True) -> Any:
     return Template("", default, keyword_only, lambda value: value, None)
 
 
+def _private(name: str) -> str:
+    """Where an instance keeps it: launch files cannot set it, and a subclass of theirs may have its own ``name``."""
+    return f"_Template__{name}"
+
+
 class _Signature:
     """``inspect.signature`` of a class whose constructor comes from its declarations; made when it is asked for."""
 
@@ -102,6 +108,8 @@ class _Templates:
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
         own = {name: item for name, item in vars(cls).items() if isinstance(item, Template)}
+        for name in own:
+            setattr(cls, name, property(attrgetter(_private(name))))
         inherited = {name: item for name, item in cls._declared.items() if name not in own}
         cls._declared = {**inherited, **own}
 
@@ -118,8 +126,9 @@ class _Templates:
                 value = given.get(name, item.default)
             if value is _REQUIRED:
                 raise TypeError(self._missing(given, keywords, name))
-            # The instance's own attribute hides the declaration, which stays on the class.
-            self.__dict__[name] = None if value is None and item.default is None else item.read(value)
+            self.__dict__[_private(name)] = (
+                None if value is None and item.default is None else item.read(value)
+            )
 
     def _by_position(self, arguments: tuple[Any, ...]) -> dict[str, Any]:
         names = [name for name, item in self._declared.items() if not item.keyword_only]
@@ -137,7 +146,7 @@ class _Templates:
             if item.default is _REQUIRED
             and name not in given
             and name not in keywords
-            and name not in vars(self)
+            and _private(name) not in vars(self)
         ]
         kind = "keyword-only" if self._declared[first].keyword_only else "positional"
         plural = "s" if len(missing) > 1 else ""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -140,3 +141,14 @@ def test_later_releases_of_a_series_lose_nothing(feature: Since) -> None:
     for distro in Distro:
         old, new = release_of(distro), release_of(distro, (99,), (99,))
         assert new.has(feature) or not old.has(feature)
+
+
+def test_a_property_of_the_users_own_class_changes_nothing_as_upstream(launch_py: Any) -> None:
+    found = launch_py("""
+        class Mine(EP):
+            @property
+            def shell(self):
+                return True
+        entities = [Mine(cmd=["true"]), EP(cmd=["true"], shell=True)]
+    """)
+    assert [process.shell for process in found.processes] == [False, True]

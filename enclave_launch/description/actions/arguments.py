@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enclave_launch.boundary.light import TYPE_CHECKING, Any
+from enclave_launch.description import read_only
 from enclave_launch.description.entity import Action
 from enclave_launch.description.markup.entity import Entity
 from enclave_launch.description.markup.expose import expose_action
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 
 
 @expose_action("arg")
+@read_only("name", "default_value", "description", "choices")
 class DeclareLaunchArgument(Action):
     """Declares an argument: if nobody has set that launch configuration, the default does.
 
@@ -41,15 +43,15 @@ class DeclareLaunchArgument(Action):
         **kwargs: Any,
     ) -> None:
         super().__init__(**kwargs)
-        self.name = name
-        self.default_value = (
+        self.__name = name
+        self.__default_value = (
             None if default_value is None else normalize_to_list_of_substitutions(default_value)
         )
-        self.choices = choices
+        self.__choices = choices
         self._conditionally_included = False  # set by the argument scan
         if choices is not None:
             _check_default(default_value, choices)
-        self.description = _describe(description, choices)
+        self.__description = _describe(description, choices)
 
     @classmethod
     def parse(cls, entity: Entity, parser: Parser) -> tuple[type[Action], dict[str, Any]]:
@@ -68,14 +70,14 @@ class DeclareLaunchArgument(Action):
 
     def execute(self, context: LaunchContext) -> None:
         configurations = context.launch_configurations
-        if self.name not in configurations:
-            if self.default_value is None:
-                raise RuntimeError(f'Required launch argument "{self.name}" was not provided.')
-            configurations[self.name] = perform_substitutions(context, self.default_value)
-        if self.choices is not None and configurations[self.name] not in self.choices:
+        if self.__name not in configurations:
+            if self.__default_value is None:
+                raise RuntimeError(f'Required launch argument "{self.__name}" was not provided.')
+            configurations[self.__name] = perform_substitutions(context, self.__default_value)
+        if self.__choices is not None and configurations[self.__name] not in self.__choices:
             raise RuntimeError(
-                f'Argument "{self.name}" provided value "{configurations[self.name]}" is not valid. '
-                f"Valid options are: {self.choices}"
+                f'Argument "{self.__name}" provided value "{configurations[self.__name]}" is not valid. '
+                f"Valid options are: {self.__choices}"
             )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enclave_launch.boundary.light import TYPE_CHECKING, Any
+from enclave_launch.description import read_only
 from enclave_launch.description.actions.nodes import Node, parse_remaps
 from enclave_launch.description.entity import Action
 from enclave_launch.description.markup.entity import Entity
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from enclave_launch.source_location import SourceLocation
 
 
+@read_only("node_name", "node_namespace", "parameters", "remappings", "extra_arguments")
 class ComposableNode:
     """Package and plugin with its name, namespace, parameters, remap rules and extra arguments.
 
@@ -50,11 +52,11 @@ class ComposableNode:
     ):
         self.__package = normalize_to_list_of_substitutions(package)
         self.__plugin = normalize_to_list_of_substitutions(plugin)
-        self.node_name = None if name is None else normalize_to_list_of_substitutions(name)
-        self.node_namespace = None if namespace is None else normalize_to_list_of_substitutions(namespace)
-        self.parameters = None if parameters is None else normalize_parameters(parameters)
-        self.remappings = normalize_remap_rules(remappings) if remappings else None
-        self.extra_arguments = normalize_parameters(extra_arguments) if extra_arguments else None
+        self.__node_name = None if name is None else normalize_to_list_of_substitutions(name)
+        self.__node_namespace = None if namespace is None else normalize_to_list_of_substitutions(namespace)
+        self.__parameters = None if parameters is None else normalize_parameters(parameters)
+        self.__remappings = normalize_remap_rules(remappings) if remappings else None
+        self.__extra_arguments = normalize_parameters(extra_arguments) if extra_arguments else None
         self.__condition = condition
 
     @classmethod
@@ -111,6 +113,7 @@ def _parse_extra_argument(entity: Entity, parser: Parser) -> dict[tuple[Substitu
 # ``composable_lifecycle_node``: a component that is a lifecycle node. Only in newer distributions.
 
 
+@read_only("node_autostart")
 class ComposableLifecycleNode(ComposableNode):
     """With ``autostart`` launch configures and activates it once it is loaded."""
 
@@ -118,7 +121,7 @@ class ComposableLifecycleNode(ComposableNode):
 
     def __init__(self, *, autostart: bool = False, **kwargs: Any):
         super().__init__(**kwargs)
-        self.node_autostart = autostart
+        self.__node_autostart = autostart
 
     @classmethod
     def parse(cls, parser: Parser, entity: Entity) -> tuple[type[ComposableLifecycleNode], dict[str, Any]]:

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 
 from enclave_launch.boundary import shell_words
 from enclave_launch.boundary.light import TYPE_CHECKING
+from enclave_launch.description import read_only
 from enclave_launch.description.substitution import normalize_to_list_of_substitutions, perform_substitutions
 from enclave_launch.description.substitutions.variables import LaunchConfiguration
 
@@ -23,6 +24,9 @@ _PREFIX_FILTER: list[Substitution] = [LaunchConfiguration("launch-prefix-filter"
 Variables = list[tuple["list[Substitution]", "list[Substitution]"]]
 
 
+@read_only(
+    "name", "cwd", "env", "additional_env", "arguments", "final_name", "final_cmd", "final_cwd", "final_env"
+)
 class Executable:
     """Describes a process; ``prepare`` performs it. The ``final_...`` members are ``None`` before that."""
 
@@ -54,11 +58,11 @@ class Executable:
         self.__cmd += [normalize_to_list_of_substitutions(word) for word in arguments or ()]
         self.__prefix = _DEFAULT_PREFIX if prefix is None else normalize_to_list_of_substitutions(prefix)
         self.__prefix_filter = _PREFIX_FILTER if prefix is None else None
-        self.name = None if name is None else normalize_to_list_of_substitutions(name)
-        self.cwd = None if cwd is None else normalize_to_list_of_substitutions(cwd)
-        self.env = None if env is None else _normalize(env)
-        self.additional_env = None if additional_env is None else _normalize(additional_env)
-        self.arguments = arguments
+        self.__name = None if name is None else normalize_to_list_of_substitutions(name)
+        self.__cwd = None if cwd is None else normalize_to_list_of_substitutions(cwd)
+        self.__env = None if env is None else _normalize(env)
+        self.__additional_env = None if additional_env is None else _normalize(additional_env)
+        self.__arguments = arguments
 
     @property
     def prefix(self) -> list[Substitution]:
@@ -76,11 +80,13 @@ class Executable:
             prefix = perform_substitutions(context, self.__prefix)
             self.final_prefix = tuple(shell_words.split_words(prefix)) if prefix else ()
             cmd = [*self.final_prefix, *cmd]
-        self.final_cmd = cmd
-        name = os.path.basename(cmd[0]) if self.name is None else perform_substitutions(context, self.name)
-        self.final_name = f"{name}-{context.host.next_process_index()}"
-        self.final_cwd = None if self.cwd is None else perform_substitutions(context, self.cwd)
-        self.final_env = self.__environment(context)
+        self.__final_cmd = cmd
+        name = (
+            os.path.basename(cmd[0]) if self.__name is None else perform_substitutions(context, self.__name)
+        )
+        self.__final_name = f"{name}-{context.host.next_process_index()}"
+        self.__final_cwd = None if self.__cwd is None else perform_substitutions(context, self.__cwd)
+        self.__final_env = self.__environment(context)
 
     def __prefix_applies(self, context: LaunchContext, cmd: list[str]) -> bool:
         if self.__prefix_filter is None:
@@ -90,13 +96,13 @@ class Executable:
 
     def __environment(self, context: LaunchContext) -> dict[str, str]:
         """Each variable sees the environment of the context, not the ones added before it."""
-        if self.env is None:
+        if self.__env is None:
             base = context.process_environment.snapshot()
         else:
-            base = _perform(context, self.env)
-        if not self.additional_env:
+            base = _perform(context, self.__env)
+        if not self.__additional_env:
             return base
-        return {**base, **_perform(context, self.additional_env)}
+        return {**base, **_perform(context, self.__additional_env)}
 
 
 def _normalize(variables: Mapping[SomeSubstitutionsType, SomeSubstitutionsType]) -> Variables:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 
 from enclave_launch.boundary.light import Any, ClassVar
+from enclave_launch.description import read_only
 from enclave_launch.description.actions.events import EmitEvent, RegisterEventHandler
 from enclave_launch.description.actions.flow import OpaqueFunction
 from enclave_launch.description.actions.nodes import Node
@@ -123,6 +124,7 @@ _TRANSITIONS = (
 )
 
 
+@read_only("target_lifecycle_node")
 class OnStateTransition(EventHandler):
     """Fires when everything that is given equals what the event says; ``matcher`` replaces all of it.
 
@@ -144,12 +146,12 @@ class OnStateTransition(EventHandler):
     ):
         if not isinstance(target_lifecycle_node, (LifecycleNode, type(None))):
             raise RuntimeError("OnStateTransition requires a 'LifecycleNode' action as the target")
-        self.target_lifecycle_node = target_lifecycle_node
+        self.__target_lifecycle_node = target_lifecycle_node
         self.__asked = (transition, start_state, goal_state)
         super().__init__(matcher=matcher or self.__given_values_match, entities=entities, **kwargs)
 
     def __given_values_match(self, event: Event) -> bool:
-        if not isinstance(event, StateTransition) or self.target_lifecycle_node not in (None, event.action):
+        if not isinstance(event, StateTransition) or self.__target_lifecycle_node not in (None, event.action):
             return False
         told = (event.transition, event.start_state, event.goal_state)
         return all(asked in (None, value) for asked, value in zip(self.__asked, told, strict=True))
@@ -157,8 +159,8 @@ class OnStateTransition(EventHandler):
     def foresee(self, started: Sequence[Any]) -> Event | None:
         """The first transition of a started lifecycle node that this handler would answer."""
         nodes = [action for action in started if isinstance(action, LifecycleNode)]
-        if self.target_lifecycle_node is not None:
-            nodes = [self.target_lifecycle_node] if self.target_lifecycle_node in nodes else []
+        if self.__target_lifecycle_node is not None:
+            nodes = [self.__target_lifecycle_node] if self.__target_lifecycle_node in nodes else []
         return next(filter(self.matches, _possible_events(nodes)), None)
 
     @property
@@ -167,9 +169,9 @@ class OnStateTransition(EventHandler):
 
     @property
     def matcher_description(self) -> str:
-        if self.target_lifecycle_node is None:
+        if self.__target_lifecycle_node is None:
             return "event == StateTransition"
-        return f"event == StateTransition and event.action == LifecycleNode({hex(id(self.target_lifecycle_node))})"
+        return f"event == StateTransition and event.action == LifecycleNode({hex(id(self.__target_lifecycle_node))})"
 
 
 def _possible_events(nodes: Sequence[LifecycleNode]) -> Iterator[StateTransition]:

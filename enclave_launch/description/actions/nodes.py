@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from enclave_launch.boundary.light import TYPE_CHECKING, Any
+from enclave_launch.description import read_only
 from enclave_launch.description.actions.node_extensions import NodeActionExtension, installed_extensions
 from enclave_launch.description.actions.processes import ExecuteProcess
 from enclave_launch.description.argument_types import ensure_argument_type
@@ -57,6 +58,7 @@ class RosSpecificArgument(Substitution):
 
 
 @expose_action("node")
+@read_only("node_package", "expanded_remapping_rules")
 class Node(ExecuteProcess):
     """Starts ``executable`` of ``package`` (without package: the program as given).
 
@@ -95,7 +97,7 @@ class Node(ExecuteProcess):
         super().__init__(
             cmd=[program, *user_words, "--ros-args", *name_words], **{**kwargs, "name": exec_name}
         )
-        self.node_package = package
+        self.__node_package = package
         self.__executable = executable
         self.__name = None if name is None else normalize_to_list_of_substitutions(name)
         self.__namespace = None if namespace is None else normalize_to_list_of_substitutions(namespace)
@@ -183,7 +185,7 @@ class Node(ExecuteProcess):
         everywhere = context.launch_configurations.get("ros_remaps") or []
         rules = [*everywhere, *performed_remaps(self.__remappings, context)]
         if rules:
-            self.expanded_remapping_rules = rules
+            self.__expanded_remapping_rules = rules
             self.__first_remap = len(self.cmd)
             self.__extend_command(word for rule in rules for word in ("-r", f"{rule[0]}:={rule[1]}"))
 
@@ -210,7 +212,7 @@ class Node(ExecuteProcess):
         parameters = self.__parameters.resolve(self.__name_tokens(), sources, process.cwd)
         return process._replace(
             kind=self.process_kind,
-            package=None if self.node_package is None else _performed(context, self.node_package),
+            package=None if self.__node_package is None else _performed(context, self.__node_package),
             executable=_performed(context, self.__executable),
             name=self.__expanded_name,
             namespace=self.__expanded_namespace,
@@ -224,7 +226,7 @@ class Node(ExecuteProcess):
     def __placed_remaps(self, process: ResolvedProcess) -> Iterator[RemapRule]:
         """The rules of the launch file, each with its place in the file and on the command line."""
         first = len(process.prefix) + self.__first_remap + 1  # "-r" stands before each
-        for number, rule in enumerate(self.expanded_remapping_rules or ()):
+        for number, rule in enumerate(self.__expanded_remapping_rules or ()):
             yield placed(rule, process.location, first + 2 * number)
 
     def __name_tokens(self) -> list[str | None]:

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Mapping
 
 from enclave_launch.boundary import shell_words
 from enclave_launch.boundary.light import TYPE_CHECKING, Any
+from enclave_launch.description import read_only
 from enclave_launch.description.actions.executable import Executable
 from enclave_launch.description.actions.process_attributes import attributes_of
 from enclave_launch.description.entity import Action, LaunchDescriptionEntity, SomeEntitiesType
@@ -45,6 +46,7 @@ _SIGTERM_TIMEOUT = LaunchConfiguration("sigterm_timeout", default=5)
 _SIGKILL_TIMEOUT = LaunchConfiguration("sigkill_timeout", default=5)
 
 
+@read_only("shell", "emulate_tty", "cached_output", "log_cmd", "respawn_delay", "respawn_max_retries")
 class ExecuteLocal(Action):
     """Starts ``process_description`` when executed; may be executed once.
 
@@ -81,18 +83,18 @@ class ExecuteLocal(Action):
     ) -> None:
         super().__init__(**kwargs)
         self.__process_description = process_description
-        self.shell = shell
+        self.__shell = shell
         self.__sigterm_timeout = normalize_to_list_of_substitutions(sigterm_timeout)
         self.__sigkill_timeout = normalize_to_list_of_substitutions(sigkill_timeout)
-        self.emulate_tty = emulate_tty
+        self.__emulate_tty = emulate_tty
         self.__output = _output(os.environ.get("OVERRIDE_LAUNCH_PROCESS_OUTPUT", output))
         self.__output_format = output_format
-        self.cached_output = cached_output
-        self.log_cmd = log_cmd
+        self.__cached_output = cached_output
+        self.__log_cmd = log_cmd
         self.__on_exit = on_exit
         self.__respawn = _respawn(respawn)
-        self.respawn_delay = respawn_delay
-        self.respawn_max_retries = respawn_max_retries
+        self.__respawn_delay = respawn_delay
+        self.__respawn_max_retries = respawn_max_retries
         self.__enclave = None if enclave is None else normalize_to_list_of_substitutions(enclave)
         self.__machine = None if machine is None else normalize_to_list_of_substitutions(machine)
         self.__executed = False
@@ -145,7 +147,7 @@ class ExecuteLocal(Action):
         return self.__captured(1, "stderr")
 
     def __captured(self, stream: int, name: str) -> str:
-        if not self.cached_output:
+        if not self.__cached_output:
             raise RuntimeError(
                 f"cached output must be true to be able to get {name}, proc '{self.__process_description.name}'"
             )
@@ -219,18 +221,20 @@ class ExecuteLocal(Action):
             location=location_of(self, context),
             on_event=context.on_event,
             cwd=description.final_cwd,
-            shell=self.shell is True,  # other true values do not make one, as upstream
+            shell=self.__shell is True,  # other true values do not make one, as upstream
             prefix=description.final_prefix,
             final_environment=description.final_env or {},
             machine=None if self.__machine is None else perform_substitutions(context, self.__machine),
-            respawn=Respawn(self.respawn_delay or 0.0, self.respawn_max_retries) if self.__respawn else None,
+            respawn=Respawn(self.__respawn_delay or 0.0, self.__respawn_max_retries)
+            if self.__respawn
+            else None,
         )
 
     def ros_arguments(self) -> RosArguments:
         """What rcl would find on the prepared command line."""
         description = self.__process_description
         words = words_after_program(
-            description.final_cmd or (), len(description.final_prefix), shell=self.shell is True
+            description.final_cmd or (), len(description.final_prefix), shell=self.__shell is True
         )
         return parse_ros_arguments(words)
 

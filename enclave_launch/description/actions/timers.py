@@ -6,6 +6,7 @@ import collections.abc
 from collections.abc import Iterable
 
 from enclave_launch.boundary.light import TYPE_CHECKING, Any
+from enclave_launch.description import read_only
 from enclave_launch.description.actions.flow import OpaqueFunction
 from enclave_launch.description.argument_types import ensure_argument_type
 from enclave_launch.description.entity import Action, LaunchDescriptionEntity, SomeEntitiesType
@@ -26,6 +27,7 @@ _PERIOD_TYPES = (*SomeSubstitutionsType_types_tuple, float)
 
 
 @expose_action("timer")
+@read_only("period", "actions")
 class TimerAction(Action):
     """Visit ``actions`` once, ``period`` seconds after execution, unless cancelled.
 
@@ -49,8 +51,8 @@ class TimerAction(Action):
         ensure_argument_type(actions, collections.abc.Iterable, "actions", "TimerAction")
         if isinstance(period, str):
             period = float(period)
-        self.period: Any = normalize_typed_substitution(period, float)
-        self.actions = actions
+        self.__period: Any = normalize_typed_substitution(period, float)
+        self.__actions = actions
         self.__cancel_on_shutdown: Any = normalize_typed_substitution(cancel_on_shutdown, bool)
         self.__locals: dict[str, Any] = {}
         self.__configurations: dict[str, Any] | None = None
@@ -72,10 +74,10 @@ class TimerAction(Action):
         return cls, kwargs
 
     def describe(self) -> str:
-        return f"TimerAction(period={self.period}, actions=<actions>)"
+        return f"TimerAction(period={self.__period}, actions=<actions>)"
 
     def describe_conditional_sub_entities(self) -> list[tuple[str, Iterable[LaunchDescriptionEntity]]]:
-        return [(f"{self.period} seconds pass without being canceled", self.actions)]
+        return [(f"{self.__period} seconds pass without being canceled", self.__actions)]
 
     def get_asyncio_future(self) -> Any:
         return self._completed_future
@@ -103,7 +105,7 @@ class TimerAction(Action):
         return None
 
     def _start_waiting(self, context: LaunchContext, mark: str | None) -> None:
-        self.performed_period = float(perform_typed_substitution(context, self.period, float))
+        self.performed_period = float(perform_typed_substitution(context, self.__period, float))
         self._schedule(context, self.performed_period, mark)
 
     def _schedule(self, context: LaunchContext, seconds: float, mark: str | None) -> None:
@@ -120,7 +122,7 @@ class TimerAction(Action):
         """What the timer event gives; called while it is handled."""
         context.extend_locals(self.__locals)
         if self.__configurations is None and self.__environment is None:
-            return self.actions
+            return self.__actions
         return self.__in_kept_state()
 
     def __keep_state(self, context: LaunchContext) -> None:
@@ -145,7 +147,7 @@ class TimerAction(Action):
             context._pop_environment()
             context._pop_launch_configurations()
 
-        return [OpaqueFunction(function=begin), *self.actions, OpaqueFunction(function=end)]
+        return [OpaqueFunction(function=begin), *self.__actions, OpaqueFunction(function=end)]
 
 
 class _OnTimerEvent(BaseEventHandler):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 
 from enclave_launch.boundary.light import TYPE_CHECKING, Any
+from enclave_launch.description import read_only
 from enclave_launch.description.argument_types import ensure_argument_type
 
 if TYPE_CHECKING:
@@ -56,6 +57,7 @@ class IncludeLaunchDescription(Event):
         return self.__launch_description
 
 
+@read_only("reason", "due_to_sigint")
 class Shutdown(Event):
     """``reason`` for the log; ``due_to_sigint``: the children got the signal as well."""
 
@@ -64,8 +66,8 @@ class Shutdown(Event):
     due_to_sigint: bool = False
 
     def __init__(self, *, reason: Any = "reason not given", due_to_sigint: bool = False) -> None:
-        self.reason = reason
-        self.due_to_sigint = due_to_sigint
+        self.__reason = reason
+        self.__due_to_sigint = due_to_sigint
 
 
 class TimerEvent(Event):
@@ -94,6 +96,7 @@ def event_named(name: str) -> Callable[[Event], bool]:
     return lambda event: event.name == name
 
 
+@read_only("process_name", "cwd", "env", "pid")
 class RunningProcessEvent(Event):
     """``process_name`` is NAME-N; ``cmd``, ``cwd``, ``env`` are final."""
 
@@ -114,11 +117,11 @@ class RunningProcessEvent(Event):
         pid: int,
     ) -> None:
         self.__action = action
-        self.process_name = name
+        self.__process_name = name
         self.__cmd = cmd
-        self.cwd = cwd
-        self.env = env
-        self.pid = pid
+        self.__cwd = cwd
+        self.__env = env
+        self.__pid = pid
 
     @property
     def action(self) -> ExecuteLocal:
@@ -133,7 +136,7 @@ class RunningProcessEvent(Event):
         return self.__cmd
 
     def subject(self) -> str:
-        return self.process_name
+        return self.__process_name
 
 
 class ProcessStarted(RunningProcessEvent):
@@ -142,6 +145,7 @@ class ProcessStarted(RunningProcessEvent):
     name = "launch.events.process.ProcessStarted"
 
 
+@read_only("returncode")
 class ProcessExited(RunningProcessEvent):
     """The process has ended with ``returncode``; negative is the number of a signal."""
 
@@ -150,9 +154,10 @@ class ProcessExited(RunningProcessEvent):
 
     def __init__(self, *, returncode: int, **kwargs: Any) -> None:
         super().__init__(**kwargs)
-        self.returncode = returncode
+        self.__returncode = returncode
 
 
+@read_only("text")
 class ProcessIO(RunningProcessEvent):
     """``text`` (bytes) came from, or goes to, the stream with this file descriptor."""
 
@@ -161,7 +166,7 @@ class ProcessIO(RunningProcessEvent):
 
     def __init__(self, *, text: bytes, fd: int, **kwargs: Any) -> None:
         super().__init__(**kwargs)
-        self.text = text
+        self.__text = text
         self.__fd = fd
 
     @property

@@ -6,6 +6,7 @@ import collections.abc
 from collections.abc import Callable, Sequence
 
 from enclave_launch.boundary.light import TYPE_CHECKING, Any, TypeAlias
+from enclave_launch.description import read_only
 from enclave_launch.description.entity import Action, LaunchDescriptionEntity, SomeEntitiesType
 from enclave_launch.description.events.event import (
     Event,
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from enclave_launch.source_location import SourceLocation
 
 
+@read_only("handle_once")
 class BaseEventHandler:
     """Matches events and says what to visit then. ``handle_once`` unregisters it at the first match.
 
@@ -36,7 +38,7 @@ class BaseEventHandler:
 
     def __init__(self, *, matcher: Callable[[Event], bool], handle_once: bool = False) -> None:
         self.__matcher = matcher
-        self.handle_once = handle_once
+        self.__handle_once = handle_once
 
     @property
     def handler_description(self) -> str | None:
@@ -53,14 +55,14 @@ class BaseEventHandler:
         """A line of text, and the entities that are known without an event."""
         return (
             f"{type(self).__name__}(matcher='{self.matcher_description}', "
-            f"handler='{self.handler_description}', handle_once={self.handle_once})",
+            f"handler='{self.handler_description}', handle_once={self.__handle_once})",
             [],
         )
 
     def handle(self, event: Event, context: LaunchContext) -> SomeEntitiesType | None:
         """Subclasses call this first: it makes the event a local and honours ``handle_once``."""
         context.extend_locals({"event": event})
-        if self.handle_once:
+        if self.__handle_once:
             context.unregister_event_handler(self)
         return None
 
@@ -76,6 +78,7 @@ class BaseEventHandler:
         return False
 
 
+@read_only("entities")
 class EventHandler(BaseEventHandler):
     """Gives ``entities`` whenever ``matcher`` holds."""
 
@@ -89,17 +92,17 @@ class EventHandler(BaseEventHandler):
         handle_once: bool = False,
     ) -> None:
         super().__init__(matcher=matcher, handle_once=handle_once)
-        self.entities = entities
+        self.__entities = entities
 
     def describe(self) -> tuple[str, list[Any]]:
         text, entities = super().describe()
-        if self.entities:
-            entities.extend(self.entities)  # type: ignore[arg-type]  # one entity is a TypeError, as upstream
+        if self.__entities:
+            entities.extend(self.__entities)  # type: ignore[arg-type]  # one entity is a TypeError, as upstream
         return text, entities
 
     def handle(self, event: Event, context: LaunchContext) -> SomeEntitiesType | None:
         super().handle(event, context)
-        return self.entities
+        return self.__entities
 
     def foresee(self, started: Sequence[Any]) -> Event | None:
         """The exit, or the first output, of a started process that the matcher takes."""

@@ -6,7 +6,7 @@ import warnings
 from collections.abc import Callable
 
 from enclave_launch.boundary.light import TYPE_CHECKING, Any, ClassVar
-from enclave_launch.description import node_names
+from enclave_launch.description import node_names, read_only
 from enclave_launch.description.events.event import Event
 from enclave_launch.description.lifecycle_msgs import State, Transition
 
@@ -19,6 +19,7 @@ def _constants(message: type, prefix: str) -> dict[int, str]:
     return dict(sorted(named.items()))
 
 
+@read_only("transition_id")
 class ChangeState(Event):
     """``transition_id`` is one of the constants of ``lifecycle_msgs/msg/Transition``."""
 
@@ -40,13 +41,14 @@ class ChangeState(Event):
             known = ", ".join(f"{name}: {value}" for value, name in self.valid_transitions.items())
             raise ValueError(f"given transition_id of '{transition_id}', expected one of {{{known}}}")
         self.__lifecycle_node_matcher = lifecycle_node_matcher
-        self.transition_id = transition_id
+        self.__transition_id = transition_id
 
     @property
     def lifecycle_node_matcher(self) -> Callable[[Any], bool]:
         return self.__lifecycle_node_matcher
 
 
+@read_only("msg")
 class StateTransition(Event):
     """``msg`` is a ``lifecycle_msgs/msg/TransitionEvent`` that ``action``'s node published."""
 
@@ -56,7 +58,7 @@ class StateTransition(Event):
     def __init__(self, *, action: LifecycleNode, msg: Any):
         super().__init__()
         self.__action = action
-        self.msg = msg
+        self.__msg = msg
 
     def subject(self) -> str:
         return self.__action.node_name
@@ -67,19 +69,19 @@ class StateTransition(Event):
 
     @property
     def timestamp(self) -> int:
-        return int(self.msg.timestamp)
+        return int(self.__msg.timestamp)
 
     @property
     def transition(self) -> str:
-        return str(self.msg.transition.label)
+        return str(self.__msg.transition.label)
 
     @property
     def start_state(self) -> str:
-        return str(self.msg.start_state.label)
+        return str(self.__msg.start_state.label)
 
     @property
     def goal_state(self) -> str:
-        return str(self.msg.goal_state.label)
+        return str(self.__msg.goal_state.label)
 
 
 def matches_node_name(node_name: str) -> Callable[[Any], bool]:

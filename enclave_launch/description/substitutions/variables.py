@@ -6,6 +6,7 @@ import collections.abc
 from collections.abc import Sequence
 
 from enclave_launch.boundary.light import TYPE_CHECKING, Any
+from enclave_launch.description import read_only
 from enclave_launch.description.argument_types import ensure_argument_type
 from enclave_launch.description.markup.expose import expose_substitution
 from enclave_launch.description.substitution import (
@@ -111,6 +112,7 @@ def _takes_default() -> bool:
     return current_release().has(Feature.PARAMETER_DEFAULT)
 
 
+@read_only("expression", "description")
 class LocalSubstitution(Substitution):
     """A Python expression on the locals of the context: ``event.process_name``."""
 
@@ -119,15 +121,15 @@ class LocalSubstitution(Substitution):
 
     def __init__(self, expression: str, description: str | None = None) -> None:
         ensure_argument_type(expression, str, "expression", "LocalSubstitution")
-        self.expression = expression
-        self.description = description
+        self.__expression = expression
+        self.__description = description
 
     def describe(self) -> str:
-        return f"LocalVar('{self.expression if self.description is None else self.description}')"
+        return f"LocalVar('{self.__expression if self.__description is None else self.__description}')"
 
     def perform(self, context: LaunchContext) -> str:
         # Only Python launch files, which are code themselves, can make one of these.
-        value: str = eval(f"context.locals.{self.expression}", {"context": context})
+        value: str = eval(f"context.locals.{self.__expression}", {"context": context})
         return value
 
 
