@@ -113,6 +113,9 @@ class _Variadic(Substitution):
 class AnySubstitution(_Variadic):
     """``true`` when at least one is."""
 
+    def __init__(self, *args: SomeSubstitutionsType) -> None:  # its own: Python's error names it, as upstream
+        super().__init__(*args)
+
     def perform(self, context: LaunchContext) -> str:
         return _text(any(self._operands(context)))
 
@@ -120,6 +123,9 @@ class AnySubstitution(_Variadic):
 @expose_substitution("all", feature=Feature.EQUALS_IF)
 class AllSubstitution(_Variadic):
     """``true`` when each is."""
+
+    def __init__(self, *args: SomeSubstitutionsType) -> None:  # its own: Python's error names it, as upstream
+        super().__init__(*args)
 
     def perform(self, context: LaunchContext) -> str:
         return _text(all(self._operands(context)))
