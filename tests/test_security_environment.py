@@ -28,7 +28,7 @@ def test_without_one_it_is_zero() -> None:
 
 
 @pytest.mark.parametrize(
-    "text", ["all", "0-10", "1,2", "-1", "231", " 5", "5x", "٣", "99999999999", "0x1", "5\n"]
+    "text", ["all", "0-10", "1,2", "-1", "231", " 5", "5x", "٣", "99999999999", "0x", "5\n"]
 )
 def test_what_no_process_would_take_signs_nothing(text: str) -> None:
     """Permissions for more domains than one are somebody's decision, never a slip of a variable."""
