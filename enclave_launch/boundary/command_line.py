@@ -10,8 +10,11 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 
 from enclave_launch.boundary.dependencies import missing_dependency
 from enclave_launch.boundary.files import as_path
-from enclave_launch.boundary.light import Any, NoReturn, late_pattern
+from enclave_launch.boundary.light import TYPE_CHECKING, Any, NoReturn, late_pattern
 from enclave_launch.boundary.words import did_you_mean
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 _INVALID_CHOICE = late_pattern(r"^(.*invalid choice: '([^']*)') \(choose from .*\)$", re.DOTALL)
 
@@ -21,9 +24,17 @@ Option = tuple[str, Kind, str]
 """As the help shows it, with its metavar (a positional by its name); what it takes, in argparse's words; what it is
 for."""
 
+
+def given_path(text: str) -> Path:
+    """:raises argparse.ArgumentTypeError: no text, which is what a shell gives for a variable that is not set."""
+    if not text:
+        raise argparse.ArgumentTypeError("an empty path; is a variable of the shell not set?")
+    return as_path(text)
+
+
 FLAG: Kind = {"action": "store_true"}
 TEXT: Kind = {}
-PATH: Kind = {"type": as_path}
+PATH: Kind = {"type": given_path}
 TEXTS: Kind = {"action": "append", "default": []}
 PATHS: Kind = {**TEXTS, **PATH}
 

@@ -58,6 +58,21 @@ def test_each_verb_takes_quiet_or_verbose_but_not_both(command: str, words: list
     assert run(command, *words, "-q", "-v", "x").returncode == 2
 
 
+@pytest.mark.parametrize(
+    ("command", "words"),
+    [
+        ("secure-launch", ["--secure", "--keystore", "", "demo_nodes", "talker_listener.launch.xml"]),
+        ("secure-keystore", ["create", ""]),
+        ("secure-keystore", ["list", ""]),
+    ],
+)
+def test_an_empty_path_is_wrong_usage_and_not_the_current_folder(command: str, words: list[str]) -> None:
+    """``--keystore "$KS"`` where nobody has set ``KS``."""
+    told = run(command, *words)
+    assert told.returncode == 2
+    assert "an empty path; is a variable of the shell not set?" in told.stderr
+
+
 def test_a_quiet_keystore_says_nothing_of_what_went_well(tmp_path: Path) -> None:
     assert run("secure-keystore", "create", "-q", str(tmp_path / "ks")).stdout == ""
     assert run("secure-keystore", "create-enclave", "-q", str(tmp_path / "ks"), "/a").stdout == ""
