@@ -18,7 +18,8 @@ _DECIMAL = late_pattern(r"[-+]?(?:[0-9]{1,17}\.[0-9]{0,17}(?:[eE][-+][0-9]{1,2})
 # Text that stands without quotes, unless it is a word of YAML 1.1 or ": " is in it: "#" may begin a comment.
 _PLAIN_TEXT = late_pattern(r"[A-Za-z_/][ !\"$-~]*(?<![: ])")
 _WORDS = frozenset(("y", "n", "yes", "no", "on", "off", "true", "false", "null"))
-_LONE_SPACE = late_pattern(r"(?<! )(?<!\A') (?! )(?!'\Z)")  # at neither end of what is quoted
+_LONE_SPACE = late_pattern(r"(?<! ) (?! )")
+_LONE_SPACE_IN_QUOTES = late_pattern(r"(?<! )(?<!\A') (?! )(?!'\Z)")  # at neither end of what is quoted
 WIDTH = 80  # a line goes on below at the first lone space beyond
 LONGEST_KEY = 100  # one of 128 characters has a form of its own
 _MOST_KEPT = 64
@@ -153,7 +154,8 @@ class _Writer:
 def _folded(line: str, start: int, indent: str) -> list[str]:
     """The lines that PyYAML makes of one; its value begins at ``start``."""
     lines = []
-    first, *words = _LONE_SPACE.split(line[start:-1])
+    lone_space = _LONE_SPACE_IN_QUOTES if line[start] == "'" else _LONE_SPACE
+    first, *words = lone_space.split(line[start:-1])
     line = line[:start] + first
     for word in words:
         if len(line) > WIDTH:
