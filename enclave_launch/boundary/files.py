@@ -19,9 +19,8 @@ if TYPE_CHECKING:
 MEBIBYTE = 2**20
 DEFAULT_LIMIT = 16 * MEBIBYTE
 
-_FLAGS = (
-    os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK | os.O_NOCTTY
-)  # to open a pipe must not wait for its writer
+# To open a pipe must not wait for its writer.
+_FLAGS = os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK | os.O_NOCTTY
 
 
 def read_bytes(path: str | bytes | os.PathLike[str], limit: int = DEFAULT_LIMIT) -> bytes:

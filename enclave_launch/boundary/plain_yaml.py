@@ -43,12 +43,8 @@ def block_text(values: Any, *, sort_keys: bool = True, tuple_tag: str = TUPLE_TA
         return None
     try:
         return _written(marshal.dumps(values, 2), sort_keys, tuple_tag)
-    except (
-        NeedsPyYAML,
-        TypeError,
-        ValueError,
-        RecursionError,
-    ):  # keys of two types, an object, an endless number
+    # Keys of two types, an object, an endless number.
+    except (NeedsPyYAML, TypeError, ValueError, RecursionError):
         return None
 
 

@@ -9,9 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from xml.parsers import expat
 
-MAX_NESTING = (
-    250  # elements in elements; upstream ends in a RecursionError before, and lxml's limit is near it
-)
+MAX_NESTING = 250
+"""Of elements in elements; upstream ends in a RecursionError before, and lxml's limit is near it."""
 
 
 class RefusedXml(ValueError):

@@ -141,9 +141,8 @@ class _Comparison:
         text = f"a participant {has} is not planned"
         found = self._about(Kind.UNPLANNED_PROCESS, process, text, enclave=enclave)
         if topics and process.participant.pid in self._strangers:
-            return found._replace(
-                certainty=FindingCertainty.FACT
-            )  # whatever name it will have, it is not ours
+            # Whatever name it will have, it is not ours.
+            return found._replace(certainty=FindingCertainty.FACT)
         return found if topics or enclave in self._expected.enclaves else found._replace(level=Level.NOTE)
 
     # one node

@@ -34,9 +34,8 @@ CONTAINER_PACKAGE = "rclcpp_components"
 """Its executables (``component_container``, ``_mt``, ``_isolated``) are containers and nothing else."""
 
 _PLACES = 2  # named in a message
-_CONTAINER_NODE_NAME = (
-    "ComponentManager"  # rclcpp_components/src/component_manager.hpp, the constructor's default
-)
+# rclcpp_components/src/component_manager.hpp, the constructor's default.
+_CONTAINER_NODE_NAME = "ComponentManager"
 
 
 class _Subject(NamedTuple):

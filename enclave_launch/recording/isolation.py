@@ -17,9 +17,8 @@ from enum import Enum
 
 _NEW_USER, _NEW_NET = 0x10000000, 0x40000000  # linux/sched.h
 _GET_FLAGS, _SET_FLAGS, _UP = 0x8913, 0x8914, 0x1  # linux/sockios.h, linux/if.h
-_DOMAINS = range(
-    1, 101
-)  # those whose ports lie below the ephemeral ones (ROS 2 documentation, ROS_DOMAIN_ID)
+# Those whose ports lie below the ephemeral ones (ROS 2 documentation, ROS_DOMAIN_ID).
+_DOMAINS = range(1, 101)
 
 DEVICES_STAY_REAL = "motors, sensors and device files are not kept apart: what the nodes do to them is real"
 

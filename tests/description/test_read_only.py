@@ -12,12 +12,13 @@ with installed():
     from launch.actions import DeclareLaunchArgument, ExecuteProcess, SetEnvironmentVariable, TimerAction
     from launch.events import Shutdown
     from launch.substitutions import LaunchConfiguration
-    from launch_ros.actions import Node
+    from launch_ros.actions import LifecycleNode, Node
     from launch_ros.descriptions import ComposableNode
 
 SHOWN: list[tuple[type, dict[str, Any], str]] = [
     (ExecuteProcess, {"cmd": ["true"]}, "shell"),
     (Node, {"package": "p", "executable": "e"}, "node_package"),
+    (LifecycleNode, {"name": "n", "namespace": "", "package": "p", "executable": "e"}, "node_autostart"),
     (ComposableNode, {"package": "p", "plugin": "P"}, "node_name"),
     (DeclareLaunchArgument, {"name": "rate"}, "default_value"),
     (TimerAction, {"period": 1.0, "actions": []}, "period"),

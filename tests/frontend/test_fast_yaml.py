@@ -106,7 +106,7 @@ def named(text: str) -> io.StringIO:
 @example(
     tree={"a": 1e-10, "b": -1e300, "c": 5e-324, "d": float("inf"), "e": float("nan"), "f": 1e16, "g": -0.0}
 )
-@example(tree={"a": "$" + "x" * 90 + " '"})  # folded before a quote that is no end of a quotation
+@example(tree={"a": "$" + "x" * 90 + " '"})  # its last quote closes nothing: folded before it
 @example(tree=[[], {}, (), [[[]]], ({},), {"a": [{"b": (1, [2])}]}])
 @example(
     tree={

@@ -25,8 +25,9 @@ Variables = list[tuple["list[Substitution]", "list[Substitution]"]]
 
 
 @read_only(
-    "name", "cwd", "env", "additional_env", "arguments", "final_name", "final_cmd", "final_cwd", "final_env"
-)
+    "name", "cwd", "env", "additional_env", "arguments",
+    "final_name", "final_cmd", "final_prefix", "final_cwd", "final_env",
+)  # fmt: skip
 class Executable:
     """Describes a process; ``prepare`` performs it. The ``final_...`` members are ``None`` before that."""
 
@@ -78,8 +79,8 @@ class Executable:
         cmd = [perform_substitutions(context, word) for word in self.__cmd]
         if self.__prefix_applies(context, cmd):
             prefix = perform_substitutions(context, self.__prefix)
-            self.final_prefix = tuple(shell_words.split_words(prefix)) if prefix else ()
-            cmd = [*self.final_prefix, *cmd]
+            self.__final_prefix = tuple(shell_words.split_words(prefix)) if prefix else ()
+            cmd = [*self.__final_prefix, *cmd]
         self.__final_cmd = cmd
         name = (
             os.path.basename(cmd[0]) if self.__name is None else perform_substitutions(context, self.__name)

@@ -34,6 +34,7 @@ _CHANGE_STATE = "lifecycle_msgs/srv/ChangeState"
 
 
 @expose_action("lifecycle_node", feature=Feature.LIFECYCLE_TAGS)
+@read_only("node_autostart")
 class LifecycleNode(Node):
     """Answers ``ChangeState`` events; ``autostart`` (newer distributions) configures and activates."""
 
@@ -51,7 +52,7 @@ class LifecycleNode(Node):
         if autostart is not None and not current_release().has(Feature.LIFECYCLE_AUTOSTART):
             kwargs["autostart"] = autostart  # the base class refuses it, as upstream does
         super().__init__(name=name, namespace=namespace, **kwargs)
-        self.node_autostart = bool(autostart)
+        self.__node_autostart = bool(autostart)
 
     @classmethod
     def parse(
@@ -73,7 +74,7 @@ class LifecycleNode(Node):
         )
         context.register_event_handler(_ChangeStateHandler(self))
         actions = super().execute(context)
-        if not self.node_autostart:
+        if not self.__node_autostart:
             return actions
 
         return [*(actions or ()), autostart_transition(self.node_name)]

@@ -66,9 +66,8 @@ def _environment(entity: Entity, parser: Parser, name: str) -> Any:
     return environment
 
 
-_Attribute = tuple[
-    str, str, Callable[[Entity, "Parser", str], Any]
-]  # attribute, constructor argument, reader
+# The attribute, the argument of the constructor, what reads it.
+_Attribute = tuple[str, str, Callable[[Entity, "Parser", str], Any]]
 
 
 _ATTRIBUTES: tuple[_Attribute, ...] = (
