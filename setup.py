@@ -17,18 +17,19 @@ DATA_FILES = [
     ("share/man/man1", [f"docs/man/{command}.1" for command in COMMANDS]),
 ]
 VERSION = "0.1.0"
-REQUIRES = ["lxml>=4.8", "pyyaml>=5.4", "cryptography>=3.4.8", "pydantic>=1.8"]
+REQUIRES = ["lxml>=4.8", "pyyaml>=5.4", "cryptography>=3.4.8", "asn1crypto>=1.4", "pydantic>=1.8"]
 PACKAGE_DATA = {
+    "enclave_common": ["py.typed"],
     "enclave_launch": ["py.typed", "__init__.pyi", "recording/recorder.c", "report/html/assets/*"],
     "nodl": ["py.typed", "schemas/*", "library/documents/*", "library/documents/*/*", "document/common/*/*"],
     "keystore": ["py.typed", "__init__.pyi", "schemas/*"],
 }
 ENTRY_POINTS = {
     "console_scripts": [
-        "secure-launch = enclave_launch.verb.secure_launch:main",
-        "secure-plan = enclave_launch.verb.secure_plan:main",
-        "secure-keystore = keystore.verb:main",
-        "secure-nodl = nodl.verb:main",
+        "secure-launch = enclave_common.entry:secure_launch",
+        "secure-plan = enclave_common.entry:secure_plan",
+        "secure-keystore = enclave_common.entry:secure_keystore",
+        "secure-nodl = enclave_common.entry:secure_nodl",
     ],
     "launch.frontend.launch_extension": ["enclave_launch = enclave_launch.ros2.attributes"],
     "launch_ros.node_action": [
@@ -46,7 +47,9 @@ else:
     setuptools.setup(
         name=NAME,
         version=VERSION,
-        packages=setuptools.find_packages(include=["enclave_launch*", "nodl*", "keystore*"]),
+        packages=setuptools.find_packages(
+            include=["enclave_common*", "enclave_launch*", "nodl*", "keystore*"]
+        ),
         package_data=PACKAGE_DATA,
         data_files=DATA_FILES,
         python_requires=">=3.10",

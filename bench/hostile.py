@@ -10,12 +10,11 @@ import time
 from collections.abc import Callable
 from typing import Any
 
-from enclave_launch.boundary.shell_words import split_words
-from enclave_launch.boundary.terminal import json_text, printable_lines
+from enclave_common.shell_words import split_words
+from enclave_common.terminal import json_text, printable_lines
+from enclave_common.yaml_reader import load_yaml
 from enclave_launch.frontend.substitution_grammar import parse_template
 from enclave_launch.frontend.xml_tree import parse_launch_xml
-from enclave_launch.frontend.yaml_scalar import load as load_value
-from enclave_launch.frontend.yaml_tree import parse_yaml
 from enclave_launch.ros_rules.parameter_file import sections_of_text
 from enclave_launch.ros_rules.rcl_parameters import section_applies
 from keystore.formats.governance_yaml import parse_governance_yaml
@@ -55,11 +54,11 @@ CASES: list[Case] = [
     ("XML: attributes", parse_launch_xml, lambda n: "<a " + " ".join(f'b{i}="c"' for i in range(n)) + "/>", 50_000),
     ("XML: entities", parse_launch_xml, lambda n: f"{ENTITY}<a b='{'&e;' * n}'/>", 20_000),
     ("XML: elements in elements", parse_launch_xml, lambda n: "<a>" * n, 50_000),
-    ("YAML: flow", parse_yaml, lambda n: "[" + "1," * n + "]", 8_000),
-    ("YAML: depth", parse_yaml, lambda n: "[" * n, 50_000),
-    ("YAML: tabs, the slow scanner", parse_yaml, lambda n: "- 'a\tb'\n" * n, 3_000),
-    ("YAML: value of one word", load_value, lambda n: "x" * n, 400_000),
-    ("YAML: value that is a list", load_value, lambda n: "[" + "1," * n + "]", 8_000),
+    ("YAML: flow", load_yaml, lambda n: "[" + "1," * n + "]", 8_000),
+    ("YAML: depth", load_yaml, lambda n: "[" * n, 50_000),
+    ("YAML: tabs, the slow scanner", load_yaml, lambda n: "- 'a\tb'\n" * n, 3_000),
+    ("YAML: value of one word", load_yaml, lambda n: "x" * n, 400_000),
+    ("YAML: value that is a list", load_yaml, lambda n: "[" + "1," * n + "]", 8_000),
     ("parameter file: alias bomb (levels)", read_parameters, bomb, 8),
     ("parameter file: many sections", read_parameters, sections, 2_000),
     ("section name: wildcards", lambda name: section_applies(name, ("a", "b")), lambda n: "/**" * n + "/x", 50_000),

@@ -1,4 +1,4 @@
-"""The public names of enclave-launch, listed once: ``__init__.py`` reads where each is, type checkers read its type."""
+"""The public names of enclave-launch for type checkers."""
 
 from enclave_launch.enclave import EnclaveScope as EnclaveScope
 from enclave_launch.errors import EnclaveLaunchError as EnclaveLaunchError
@@ -17,6 +17,7 @@ from enclave_launch.options import ResolveOptions as ResolveOptions
 from enclave_launch.options import RunSettings as RunSettings
 from enclave_launch.options import SecurityOptions as SecurityOptions
 from enclave_launch.plan import LaunchPlan as LaunchPlan
+from enclave_launch.running import Launch as Launch
 from enclave_launch.runtime.running_launch import RunningLaunch as RunningLaunch
 from enclave_launch.runtime.running_launch import RunningProcess as RunningProcess
 from enclave_launch.runtime.running_launch import endpoint_seen as endpoint_seen

@@ -2,6 +2,6 @@
 
 import sys
 
-from enclave_launch.verb.secure_launch import main
+from enclave_common.entry import secure_launch
 
-sys.exit(main())
+sys.exit(secure_launch())

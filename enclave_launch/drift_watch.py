@@ -15,42 +15,41 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from datetime import datetime, timezone
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from enclave_launch.drift.compare import Circumstances, Security, compare
 from enclave_launch.drift.expected import expected_in
 from enclave_launch.drift.finding import DriftFinding, Level, finding_document, finding_text
 from enclave_launch.drift.steady import SettlingTimes, Steady
 from enclave_launch.errors import RuntimeFailure
-from enclave_launch.runtime.companion import LaunchCompanion
-from enclave_launch.runtime.run_events import ProcessStarted
+from enclave_launch.runtime.companion import LaunchCompanion, LaunchControl
+from enclave_launch.runtime.run_events import ProcessStarted, RunEvent
 from nodl.graph.json_form import graph_from_document
 from nodl.graph.model import Graph
-
-if TYPE_CHECKING:
-    from enclave_launch.runtime.companion import LaunchControl
-    from enclave_launch.runtime.run_events import RunEvent
 
 _INTERVAL = 1.0  # seconds between two comparisons
 _LONGEST_START = 60.0  # of an observer, on a machine that does much else
 _MOST_PARENTS = 64
+_CANNOT_TELL = 4  # as secure-plan drift
 
 
 class WatchOptions(NamedTuple):
-    """``security`` and ``enclave_directory``: of a secured launch. ``report``: where findings go as JSON lines."""
+    """``security``, ``enclave_directory`` and ``enclaves_now`` (reads the keystore again): of a secured launch.
+    ``report``: where findings go as JSON lines."""
 
     security: Security | None = None
     enclave_directory: Path | None = None
     accepted: tuple[str, ...] = ()
     report: Path | None = None
     patience: SettlingTimes = SettlingTimes()
+    enclaves_now: Callable[[], Mapping[int, str]] | None = None
 
 
 class DriftWatch(LaunchCompanion):
-    """``alarms``: how many there were."""
+    """``alarms``: how many there were; ``blind``: what was planned could not be seen at some time."""
 
     def __init__(self, document: Mapping[str, Any], options: WatchOptions) -> None:
         self._options = options
@@ -62,10 +61,11 @@ class DriftWatch(LaunchCompanion):
         self._task: asyncio.Task[None] | None = None
         self._started: set[int] = set()
         self.alarms = 0
+        self.blind = False
 
     def status(self, of_launch: int) -> int:
-        """The exit status of the whole: the launch's, or 1 where that is 0 and there were alarms."""
-        return of_launch or int(self.alarms > 0)
+        """Return the launch's exit status; if that is 0, 1 after an alarm and 4 if the observer did not see enough."""
+        return of_launch or (1 if self.alarms else _CANNOT_TELL if self.blind else 0)
 
     def opened(self, launch: LaunchControl) -> None:
         """:raises RuntimeFailure: the domain cannot be observed, so nothing is started."""
@@ -106,10 +106,11 @@ class DriftWatch(LaunchCompanion):
         circumstances = Circumstances(
             self._options.security, self._options.accepted, _strangers(graph, self._started), forged
         )
-        findings = compare(self._expected[domain], graph, circumstances)
+        findings = compare(self._expected[domain], graph, circumstances, self._options.enclaves_now)
         change = self._steady[domain].at(time.monotonic(), findings)
         for each in change.new:
             self.alarms += each.level is Level.ALARM
+            self.blind = self.blind or each.level is Level.CANNOT_TELL
             self._tell("new", each)
         for each in change.over:
             self._tell("over", each)

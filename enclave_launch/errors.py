@@ -17,6 +17,7 @@ from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 
 from enclave_launch.source_location import SourceLocation
+from keystore.errors import KeystoreError
 
 
 class EnclaveLaunchError(Exception):
@@ -75,6 +76,4 @@ def translated(caught: type[Exception], told: type[EnclaveLaunchError], before: 
 
 def keystore_errors() -> AbstractContextManager[None]:
     """Raises ``ProvisionError`` in the place of a ``KeystoreError``."""
-    from keystore.errors import KeystoreError  # a plain `ros2 launch` does without
-
     return translated(KeystoreError, ProvisionError)

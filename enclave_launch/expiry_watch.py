@@ -10,17 +10,14 @@ import threading
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from datetime import datetime, timedelta
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
-from enclave_launch.boundary.words import counted, some_of
+from enclave_common.words import counted, some_of
 from enclave_launch.options import Deadline
+from enclave_launch.secured import ProvisionedLaunch
 from keystore.errors import KeystoreError
 from keystore.formats.validity import utc_now
-from keystore.steps.expiry import expires_soon
-
-if TYPE_CHECKING:
-    from enclave_launch.secured import ProvisionedLaunch
-    from keystore.steps.expiry import Expiry
+from keystore.steps.expiry import Expiry, expires_soon
 
 MARGINS = (timedelta(days=7), timedelta(days=1), timedelta(hours=1), timedelta(minutes=5), timedelta(0))
 _LONGEST_SLEEP = timedelta(hours=1)

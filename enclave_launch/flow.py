@@ -14,26 +14,32 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 from enclave_launch.admission.middleware import halves, middleware_of, why_not
-from enclave_launch.boundary.light import TYPE_CHECKING
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.diagnostics.enclaves import middleware_refused
 from enclave_launch.diagnostics.evaluation import program_not_executable
 from enclave_launch.errors import ManifestError
 from enclave_launch.evaluation.evaluate import evaluate
 from enclave_launch.evaluation.programs import missing_programs
-from enclave_launch.host.outcomes import Outcomes
 from enclave_launch.host.plan_host import PlanHost
 from enclave_launch.host.protocol import MISSING_PREFIX
+from enclave_launch.host.user_code_results import RecordedResults
+from enclave_launch.interfaces import InterfaceFinder
+from enclave_launch.middlewares import middleware_notes, middleware_problems
 from enclave_launch.options import ResolveOptions, RunSettings, SecurityOptions
 from enclave_launch.plan import EvaluatedLaunch, LaunchPlan, LaunchSource, mixed_enclaves, on_zenoh
 from enclave_launch.planner import Planner
 from enclave_launch.prefixes import ament_prefixes
+from enclave_launch.process import Evaluation
+from enclave_launch.security_environment import SecuritySettings
+from enclave_launch.served_domains import with_domains
+from keystore.disk.share_files import LaunchHold
+from keystore.steps.options import ProvisionOptions
 from nodl.ament_index import search_prefixes
 
 if TYPE_CHECKING:
-    from enclave_launch.process import Evaluation
     from enclave_launch.running import Launch
     from enclave_launch.runtime.running_launch import RunningLaunch
     from enclave_launch.secured import ProvisionedLaunch
@@ -50,8 +56,6 @@ def resolve(
     Raises ``LaunchFileError`` (file, line, element, include chain) and ``ManifestError``. What a secure start must
     refuse is in ``plan.problems``.
     """
-    from enclave_launch.interfaces import InterfaceFinder
-
     chosen = options or ResolveOptions()
     evaluated = evaluate_launch(launch_file, arguments, options=chosen)
     source, evaluation = evaluated.source, evaluated.evaluation
@@ -66,8 +70,6 @@ def resolve(
 
 
 def _told_of_middlewares(plan: LaunchPlan) -> LaunchPlan:
-    from enclave_launch.review.middlewares import middleware_notes, middleware_problems
-
     return plan._replace(
         problems=(*plan.problems, *middleware_problems(plan, os.environ)),
         warnings=(*plan.warnings, *middleware_notes(plan)),
@@ -96,12 +98,14 @@ def evaluate_launch(
 
     Raises ``LaunchFileError`` as ``resolve``.
     """
-    source = launch_source(launch_file, arguments, options=options)._replace(outcomes=Outcomes())
+    source = launch_source(launch_file, arguments, options=options)._replace(
+        user_code_results=RecordedResults()
+    )
     with ament_prefixes(source.prefixes):
         evaluation = evaluate(
             source.launch_file,
             source.arguments,
-            host=PlanHost(source.host_options, outcomes=source.outcomes),
+            host=PlanHost(source.host_options, user_code_results=source.user_code_results),
             launch_configurations=source.launch_configurations,
         )
     return EvaluatedLaunch(source, evaluation)
@@ -144,16 +148,12 @@ def provision(
     while the result lives. Raises ``ManifestError`` for a plan with problems (nothing is written then) and
     ``ProvisionError``.
     """
-    from enclave_launch.secured import (
+    from enclave_launch.secured import (  # cryptography
         ProvisionedLaunch,
         launch_owner,
         provision_policies,
         provision_with_zenoh,
     )
-    from enclave_launch.security_environment import SecuritySettings
-    from enclave_launch.served_domains import with_domains
-    from keystore.disk.share_files import LaunchHold
-    from keystore.steps.options import ProvisionOptions
 
     if plan.problems:
         raise ManifestError("\n".join((*map(str, plan.problems), "nothing was started or written")))
@@ -177,15 +177,9 @@ def run(launch: Launch, *, options: RunSettings | None = None) -> int:
     launch, ``LaunchFileError`` for a program that cannot be executed. An unsecured launch starts the others, as launch
     does, and gives 1 in the end.
     """
-    from enclave_launch.runtime.warden_process import WardenProcess
+    from enclave_launch.running import run_launched  # asyncio
 
-    settings = options or RunSettings()
-    with WardenProcess(
-        interactive=not settings.noninteractive
-    ) as warden:  # starts up while we import what drives it
-        from enclave_launch.running import run_launched
-
-        return run_launched(launch, settings, warden)
+    return run_launched(launch, options or RunSettings())
 
 
 def start(launch: Launch, *, options: RunSettings | None = None) -> RunningLaunch:
@@ -193,13 +187,13 @@ def start(launch: Launch, *, options: RunSettings | None = None) -> RunningLaunc
 
     Signals stay the caller's. Raises as ``run``.
     """
-    from enclave_launch.running import start_launched
+    from enclave_launch.running import start_launched  # asyncio
 
     return start_launched(launch, options or RunSettings())
 
 
 async def run_async(launch: Launch, *, options: RunSettings | None = None) -> int:
     """The same inside a running event loop; signals stay the caller's, cancelling ends every process first."""
-    from enclave_launch.running import run_launched_async
+    from enclave_launch.running import run_launched_async  # asyncio
 
     return await run_launched_async(launch, options or RunSettings())

@@ -6,24 +6,23 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from enclave_launch.admission import AdmissionOptions
-from enclave_launch.boundary.files import as_path
-from enclave_launch.boundary.light import TYPE_CHECKING, Any, NamedTuple
 from enclave_launch.enclave import EnclaveScope
 from enclave_launch.errors import UsageError, translated
 from enclave_launch.host.protocol import HostOptions
 from enclave_launch.plan import PlanOptions
 from enclave_launch.policy import PolicyOptions
+from enclave_launch.policy.node_permissions import ALSO
 from keystore.errors import KeystoreError
+from keystore.formats.policy_xml import PolicyDocument, read_policy
+from keystore.steps.options import ProvisionOptions
 
 if TYPE_CHECKING:
-    from datetime import datetime
-    from pathlib import Path
-
     from enclave_launch.runtime.companion import LaunchCompanion
-    from keystore.formats.policy_xml import PolicyDocument
-    from keystore.steps.options import ProvisionOptions
 
 
 class _ResolveOptions(NamedTuple):
@@ -63,9 +62,9 @@ class ResolveOptions(_ResolveOptions):
             paths = ("prefixes", "manifests", "library_folders", "source_folders")
             names = ("also", "accept_prefixes", "accept_middlewares")
             return options._replace(
-                **{name: tuple(map(as_path, _several(getattr(options, name)))) for name in paths},
+                **{name: tuple(map(Path, _several(getattr(options, name)))) for name in paths},
                 **{name: _several(getattr(options, name)) for name in names},
-                policy=None if options.policy is None else as_path(options.policy),
+                policy=None if options.policy is None else Path(options.policy),
                 enclave_scope=EnclaveScope(options.enclave_scope),
             )
 
@@ -85,7 +84,6 @@ class ResolveOptions(_ResolveOptions):
 def _check_also(names: tuple[str, ...]) -> None:
     if not names:
         return
-    from enclave_launch.policy.node_permissions import ALSO
 
     unknown = [name for name in names if name not in ALSO]
     if unknown:
@@ -97,8 +95,6 @@ def _several(given: Any) -> tuple[Any, ...]:
 
 
 def _read_policy(path: Path) -> PolicyDocument:
-    from keystore.formats.policy_xml import read_policy
-
     with translated(KeystoreError, UsageError):
         return read_policy(path)
 

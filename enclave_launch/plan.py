@@ -7,7 +7,9 @@ The values: ``planner`` makes a ``LaunchPlan``, which the dry run prints, ``prov
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from enum import Enum
 from types import MappingProxyType
+from typing import TYPE_CHECKING, NamedTuple
 
 from enclave_launch.admission import AdmissionOptions
 from enclave_launch.admission.middleware import DEFAULT as DEFAULT_MIDDLEWARE
@@ -19,11 +21,10 @@ from enclave_launch.admission.middleware import (
     mixed_pairs,
     vendor_of,
 )
-from enclave_launch.boundary.light import TYPE_CHECKING, NamedTuple, TextEnum
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.enclave import EnclaveAssignment, EnclaveScope
-from enclave_launch.host.outcomes import Outcomes
 from enclave_launch.host.protocol import HostOptions
+from enclave_launch.host.user_code_results import RecordedResults
 from enclave_launch.policy import DerivedPolicy, PolicyOptions, RunningNode
 from enclave_launch.process import UNSPECIFIED_NODE_NAME, Evaluation, ResolvedComponent, ResolvedProcess
 from enclave_launch.ros_rules.parameter_value import ParameterValue
@@ -34,9 +35,11 @@ if TYPE_CHECKING:
     from enclave_launch.planner import Planner
 
 
-class InterfaceOrigin(TextEnum):
+class InterfaceOrigin(str, Enum):
     """Where the interfaces of a node come from; the first that knows it decides, in this order. Manifests that were
     learnt from runs are ``RECORDED`` wherever they lie."""
+
+    __str__ = str.__str__
 
     NAMED = "--nodl"
     PACKAGE = "manifest of the package"
@@ -213,7 +216,8 @@ class LaunchSource(NamedTuple):
     """What was asked for: enough to evaluate it once more, live, with the same results.
 
     ``launch_file`` and ``prefixes`` are absolute; ``launch_configurations`` are set before the file is included;
-    ``host_options`` are those of the evaluation's host; ``outcomes`` what the user's code gave when it was evaluated.
+    ``host_options`` are those of the evaluation's host; ``user_code_results`` are the
+    results of the user's code from the evaluation.
     """
 
     launch_file: str
@@ -221,7 +225,7 @@ class LaunchSource(NamedTuple):
     prefixes: tuple[str, ...] = ()
     launch_configurations: Mapping[str, str] = MappingProxyType({})
     host_options: HostOptions = HostOptions()
-    outcomes: Outcomes | None = None
+    user_code_results: RecordedResults | None = None
 
 
 class EvaluatedLaunch(NamedTuple):

@@ -38,6 +38,7 @@ from enclave_launch.plan import (
 )
 from enclave_launch.policy import DerivedPolicy, RunningNode
 from enclave_launch.source_location import SourceLocation
+from keystore.formats.subject import common_name
 
 
 def problems(
@@ -134,7 +135,6 @@ def failing_handshakes(processes: Iterable[PlannedProcess]) -> Iterator[Diagnost
     pairs = mixed_enclaves(processes)
     if not pairs:
         return
-    from keystore.formats.subject import common_name
 
     subjects = {path: common_name(path) for pair in pairs for path in pair}
     for pair in failing(pairs, subjects):

@@ -6,12 +6,12 @@ Takes an ``Evaluation`` and a way to look up node interfaces; gives a ``LaunchPl
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from typing import NamedTuple
 
 import enclave_launch.plan_remarks as plan_remarks
 from enclave_launch.admission import prefix_refusals, refusals, remarks
 from enclave_launch.admission.middleware import middleware_of
 from enclave_launch.admission.variables import domain_of
-from enclave_launch.boundary.light import NamedTuple
 from enclave_launch.diagnostics import Code
 from enclave_launch.diagnostics.evaluation import not_foreseeable
 from enclave_launch.enclave import EnclaveScope, assign_enclave

@@ -5,13 +5,10 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
+from pathlib import Path
 
-from enclave_launch.boundary.environment import environment_with
-from enclave_launch.boundary.light import TYPE_CHECKING
+from enclave_common.environment import environment_with
 from nodl.ament_index import PREFIX_VARIABLE
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 
 def ament_prefixes(prefixes: Sequence[Path | str]) -> AbstractContextManager[None]:

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
+from typing import Literal, NamedTuple
 
-from enclave_launch.boundary.light import Literal, NamedTuple
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.source_location import SourceLocation

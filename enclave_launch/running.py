@@ -1,7 +1,8 @@
 """The last step: a planned or provisioned launch becomes processes. Joins the plan with the runtime.
 
-The file is visited by a host that starts processes; what the user's code gave for the plan is taken from there
-(``host.outcomes``). Behind the gate each process is held against the plan. Starts processes; nothing comes after.
+The file is visited by a host that starts processes; the results that the user's code gave for the plan are replayed
+(``host.user_code_results``). Behind the gate each process is compared with the plan. Starts processes; nothing comes
+after.
 """
 
 from __future__ import annotations
@@ -10,35 +11,33 @@ import os
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
-from typing import TYPE_CHECKING, Union
+from typing import Union
 
-from enclave_launch.boundary.terminal import warn
+from enclave_common.dependencies import installed
+from enclave_common.terminal import warn
 from enclave_launch.evaluation.programs import check_programs
+from enclave_launch.expiry_watch import watched
+from enclave_launch.options import RunSettings
 from enclave_launch.plan import EvaluatedLaunch, LaunchPlan, LaunchSource
-from enclave_launch.runtime.companion import Together
+from enclave_launch.runtime.companion import LaunchCompanion, Together
 from enclave_launch.runtime.gate import EnclaveGate, PlannedGate
 from enclave_launch.runtime.live_launch import LiveLaunch, run_launch
 from enclave_launch.runtime.run_events import Observer
-
-if TYPE_CHECKING:
-    from enclave_launch.options import RunSettings
-    from enclave_launch.runtime.companion import LaunchCompanion
-    from enclave_launch.runtime.running_launch import RunningLaunch
-    from enclave_launch.runtime.warden_process import WardenProcess
-    from enclave_launch.secured import ProvisionedLaunch
-
+from enclave_launch.runtime.running_launch import RunningLaunch
+from enclave_launch.runtime.warden_process import WardenProcess
+from enclave_launch.secured import PlanProvider, ProvisionedLaunch, zenoh_router
 
 Launch = Union[LaunchSource, EvaluatedLaunch, LaunchPlan, "ProvisionedLaunch"]
 _UNSECURED = (LaunchSource, EvaluatedLaunch, LaunchPlan)
 
 
-def run_launched(launch: Launch, settings: RunSettings, warden: WardenProcess) -> int:
+def run_launched(launch: Launch, settings: RunSettings) -> int:
     """Block until all is over. Before anything was started raises ``RuntimeFailure``, and, for a provisioned launch,
     ``LaunchFileError`` for a program that is not there."""
     live = _live(launch, settings)
     with _expiry_watch(launch):
         _check_programs(launch)
-        with _zenoh_router(launch):
+        with _zenoh_router(launch), WardenProcess(interactive=not settings.noninteractive) as warden:
             return run_launch(live(warden=warden))
 
 
@@ -53,8 +52,6 @@ async def run_launched_async(launch: Launch, settings: RunSettings) -> int:
 
 def start_launched(launch: Launch, settings: RunSettings) -> RunningLaunch:
     """In a thread of its own. Raises as ``run_launched``, before anything was started."""
-    from enclave_launch.runtime.running_launch import RunningLaunch
-
     live = _live(launch, settings)
     _check_programs(launch)
 
@@ -84,7 +81,6 @@ def _expiry_watch(launch: Launch) -> AbstractContextManager[None]:
     """Warns while a provisioned launch runs that what its processes use is about to end."""
     if isinstance(launch, _UNSECURED):
         return nullcontext()
-    from enclave_launch.expiry_watch import watched
 
     return watched(launch, warn)
 
@@ -93,7 +89,6 @@ def _zenoh_router(launch: Launch) -> AbstractContextManager[object]:
     """Before the first process, where one is on Zenoh."""
     if isinstance(launch, _UNSECURED) or launch.zenoh is None:
         return nullcontext()
-    from enclave_launch.secured import zenoh_router
 
     return zenoh_router(launch, warn)
 
@@ -118,7 +113,6 @@ def _gate(launch: Launch, settings: RunSettings) -> EnclaveGate | None:
     """What stands before each process; ``None`` for a launch that was asked to run unsecured."""
     if isinstance(launch, _UNSECURED):
         return None
-    from enclave_launch.secured import PlanProvider  # brings the keystore: not for a launch without it
 
     evaluation = launch.plan.evaluation
     return PlannedGate(
@@ -138,12 +132,14 @@ def _companion(launch: Launch, settings: RunSettings) -> LaunchCompanion | None:
 
 
 def _recording(launch: Launch, settings: RunSettings) -> LaunchCompanion | None:
-    """Who records the launch; where it is secured, refusals are explained. A secured launch that nobody asked to
-    record goes on where that is not possible."""
+    """Return what records the launch: refusals of a secured one are explained. If recording was not requested, the
+    launch goes on without it where it is not possible or not installed."""
     secured = not isinstance(launch, _UNSECURED)
     if settings.record is False or (settings.record is None and not secured):
         return None
-    from enclave_launch.recording.denials import Explainer
+    if settings.record is None and not installed("enclave_launch.recording"):
+        return None
+    from enclave_launch.recording.denials import Explainer  # an add-on: recording
     from enclave_launch.recording.learning import new_run
     from enclave_launch.recording.recording import Recording
 

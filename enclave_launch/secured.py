@@ -11,15 +11,17 @@ import socket
 import sys
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from enclave_launch.admission.middleware import failing, middleware_of
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.diagnostics.enclaves import enclave_of_several_launches, handshake_fails
 from enclave_launch.errors import ProvisionError, RuntimeFailure, keystore_errors
+from enclave_launch.middlewares import zenoh_enclaves
 from enclave_launch.plan import LaunchPlan, PlannedProcess, mixed_enclaves, on_zenoh
 from enclave_launch.process import ResolvedProcess
 from enclave_launch.runtime.gate import StartAdditions, identity
+from enclave_launch.runtime.zenoh_router import RouterPlace, ZenohRouter, find_router, missing_router
 from enclave_launch.security_environment import (
     OVERRIDE,
     SecuritySettings,
@@ -41,11 +43,14 @@ from keystore.steps.comparison import differences
 from keystore.steps.options import ProvisionOptions, ProvisionReport
 from keystore.steps.provisioning import provision
 from keystore.steps.sharing import shared_enclaves
+from keystore.steps.zenoh_configuration import (
+    ZenohReport,
+    router_differences,
+    session_differences,
+    write_zenoh,
+)
+from keystore.steps.zenoh_denials import RouterLogExplainer
 from nodl.ament_index import search_prefixes
-
-if TYPE_CHECKING:
-    from enclave_launch.runtime.zenoh_router import ZenohRouter
-    from keystore.steps.zenoh_configuration import ZenohReport
 
 
 class ProvisionedLaunch(NamedTuple):
@@ -94,9 +99,6 @@ def provision_with_zenoh(
     settings: SecuritySettings, plan: LaunchPlan, options: ProvisionOptions
 ) -> tuple[ProvisionOptions, ProvisionReport, ZenohReport]:
     """As ``provision_policies``, and the configuration of what is on Zenoh. Gives the options that were used, too."""
-    from enclave_launch.review.middlewares import zenoh_enclaves
-    from keystore.steps.zenoh_configuration import write_zenoh
-
     wanted = zenoh_enclaves(plan, os.environ)
     options = options._replace(types={path: types_text(types) for path, types in wanted.items()})
     report = provision_policies(settings, plan, options)
@@ -122,9 +124,6 @@ def told_of_shares(plan: LaunchPlan, keystore: str) -> LaunchPlan:
 
 def zenoh_router(launch: ProvisionedLaunch, say: Callable[[str], None]) -> ZenohRouter:
     """The router of a launch with processes on Zenoh; entering it starts or finds one."""
-    from enclave_launch.runtime.zenoh_router import RouterPlace, ZenohRouter, find_router
-    from keystore.steps.zenoh_configuration import router_differences
-
     zenoh = launch.zenoh
     assert zenoh is not None, "asked only where processes are on Zenoh"
 
@@ -155,7 +154,6 @@ def _explained(
     has two lines for each message that passes, too."""
     if "interceptor" not in environment.get("RUST_LOG", ""):
         return lambda line: False
-    from keystore.steps.zenoh_denials import RouterLogExplainer
 
     explainer = RouterLogExplainer(keystore)
 
@@ -169,8 +167,6 @@ def _explained(
 
 def check_router(plan: LaunchPlan, keystore: str) -> None:
     """Before keys are made. Raises ``RuntimeFailure`` where no router is installed and nobody answers in its place."""
-    from enclave_launch.runtime.zenoh_router import find_router, missing_router
-
     if not on_zenoh(plan, os.environ) or find_router(search_prefixes(plan.planner.source.prefixes)):
         return
     with keystore_errors():
@@ -276,8 +272,6 @@ class PlanProvider:
         try:
             wrong = differences(keystore, policy, options=self._options)
             if (zenoh := self._launch.zenoh) is not None and enclave in self._on_zenoh:
-                from keystore.steps.zenoh_configuration import session_differences
-
                 wrong = (*wrong, *session_differences(keystore, enclave, zenoh.router))
         except KeystoreError as error:
             raise ProvisionError(

@@ -9,10 +9,10 @@ rcl stay, so that it ends without its enclave, and is secured should it load a D
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import NamedTuple
 
 from enclave_launch.admission.middleware import ZENOH
 from enclave_launch.admission.variables import ZENOH_CLEARED, ZENOH_SESSION
-from enclave_launch.boundary.light import NamedTuple
 from enclave_launch.enclave import AssignmentReason
 from enclave_launch.plan import PlannedProcess
 from keystore.disk import layout

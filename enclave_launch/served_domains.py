@@ -8,15 +8,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from enclave_launch.admission.variables import domain_of
-from enclave_launch.boundary.light import TYPE_CHECKING
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.diagnostics.enclaves import domain_not_served
 from enclave_launch.errors import ManifestError
 from enclave_launch.plan import LaunchPlan, enclave_domains
 from keystore.formats.domains import Domains
-
-if TYPE_CHECKING:
-    from keystore.steps.options import ProvisionOptions
+from keystore.steps.options import ProvisionOptions
 
 
 def with_domains(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from enclave_launch.boundary.light import NamedTuple
+from typing import NamedTuple
 
 
 class SourceLocation(NamedTuple):

@@ -9,12 +9,126 @@
 
 Each room imports those below it, none above.
 The public functions below are loaded when first used, so that a launch imports only what its path needs:
-``provision`` of a keystore in which nothing changed imports neither ``cryptography`` nor lxml. The verbs of
+``provision`` of a keystore in which nothing changed imports no XML parser. The verbs of
 ``secure-keystore`` call the same functions.
 """
 
 from __future__ import annotations
 
-from enclave_launch.boundary.public_names import public_names
+from importlib import import_module
+from typing import Any
 
-__getattr__, __dir__ = public_names(__name__, __file__)
+_MODULES = {
+    "keystore.disk.share_files": ("LaunchHold",),
+    "keystore.errors": ("KeystoreError",),
+    "keystore.formats.hosts": (
+        "Hosts",
+        "load_hosts",
+    ),
+    "keystore.formats.subject": ("SubjectScheme",),
+    "keystore.signing.ca_access": (
+        "CaAccess",
+        "Secret",
+    ),
+    "keystore.steps.bundle": (
+        "PublicFiles",
+        "export",
+    ),
+    "keystore.steps.creation": (
+        "CreateOptions",
+        "CreateReport",
+        "ImportedCa",
+        "create_keystore",
+    ),
+    "keystore.steps.expiry": (
+        "Expiry",
+        "StatusReport",
+        "expires_soon",
+        "status",
+    ),
+    "keystore.steps.fleet": (
+        "FleetReport",
+        "fleet_status",
+    ),
+    "keystore.steps.governance": (
+        "GovernanceOptions",
+        "set_governance",
+    ),
+    "keystore.steps.host_bundles": (
+        "BundleOptions",
+        "HostBundle",
+        "export_hosts",
+    ),
+    "keystore.steps.host_keys": (
+        "RequestOptions",
+        "request",
+    ),
+    "keystore.steps.importing": (
+        "ImportOptions",
+        "ImportReport",
+        "import_bundle",
+    ),
+    "keystore.steps.options": (
+        "EnclaveReport",
+        "ProvisionOptions",
+        "ProvisionReport",
+    ),
+    "keystore.steps.provisioning": (
+        "apply_policy",
+        "create_enclave",
+        "create_enclaves",
+        "drop_shares",
+        "list_enclaves",
+        "provision",
+    ),
+    "keystore.steps.removal": (
+        "RemoveOptions",
+        "RemoveReport",
+        "remove",
+    ),
+    "keystore.steps.renewal": (
+        "RenewOptions",
+        "renew",
+    ),
+    "keystore.steps.request_signing": (
+        "SigningOptions",
+        "accept_certificates",
+        "sign_requests",
+    ),
+    "keystore.steps.rollover": (
+        "Step",
+        "roll_over",
+    ),
+    "keystore.steps.sharing": (
+        "LaunchShares",
+        "list_shares",
+    ),
+    "keystore.steps.tool_enclaves": (
+        "ToolEnclave",
+        "create_tool_enclave",
+    ),
+    "keystore.verification": (
+        "Finding",
+        "Requirements",
+        "Severity",
+        "VerifyReport",
+        "verify",
+    ),
+}
+"""The public names of each module. ``__init__.pyi`` says the same to type checkers; a test compares the two."""
+_MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
+__all__ = sorted(_MODULE_OF)
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name when it is first used (PEP 562)."""
+    if name not in _MODULE_OF:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(_MODULE_OF[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """List the public names."""
+    return __all__

@@ -1,4 +1,4 @@
-"""The public names of keystore, listed once: ``__init__.py`` reads where each is, type checkers read its type."""
+"""The public names of keystore for type checkers."""
 
 from keystore.disk.share_files import LaunchHold as LaunchHold
 from keystore.errors import KeystoreError as KeystoreError

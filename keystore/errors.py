@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from os import PathLike
 
-from enclave_launch.boundary.terminal import quoted
+from enclave_common.terminal import quoted
 
 
 class KeystoreError(Exception):

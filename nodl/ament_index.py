@@ -13,16 +13,17 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple
 
-from enclave_launch.boundary.files import is_program, read_text
-from enclave_launch.boundary.light import NamedTuple, late_pattern
+from enclave_common.files import read_text
 
 PREFIX_VARIABLE = "AMENT_PREFIX_PATH"
 INDEX_FOLDER = os.path.join("share", "ament_index", "resource_index")
-_LAUNCH_FILE = late_pattern(r"launch\.(py|xml|ya?ml)$")  # ros2launch/api/api.py, is_launch_file
-_PACKAGE_VERSION = late_pattern(r"<version\b[^<>]*>\s*([0-9]+(?:\.[0-9]+)*)\s*</version>")
-_PACKAGE_NAME = late_pattern("[a-zA-Z0-9][a-zA-Z0-9_-]+", re.ASCII)  # REP 127 with its exemptions
+_LAUNCH_FILE = re.compile(r"launch\.(py|xml|ya?ml)$")  # ros2launch/api/api.py, is_launch_file
+_PACKAGE_VERSION = re.compile(r"<version\b[^<>]*>\s*([0-9]+(?:\.[0-9]+)*)\s*</version>")
+_PACKAGE_NAME = re.compile("[a-zA-Z0-9][a-zA-Z0-9_-]+", re.ASCII)  # REP 127 with its exemptions
 
 
 class PackageNotFoundError(KeyError):
@@ -163,7 +164,7 @@ def executable_path(package: str, executable: str, prefixes: Sequence[str]) -> s
             folder,
         )
     found = executable if os.path.dirname(executable) else os.path.join(folder, executable)
-    if not is_program(found):
+    if shutil.which(found) is None:
         raise ExecutableNotInstalledError(
             f"executable '{executable}' not found on the libexec directory '{folder}' ", executable, folder
         )

@@ -13,8 +13,8 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from enum import Enum
+from typing import NamedTuple
 
-from enclave_launch.boundary.light import NamedTuple
 from nodl.node_interface import ClientLibrary, EndpointKind
 
 DISTROS = ("foxy", "galactic", "humble", "iron", "jazzy", "kilted", "lyrical", "rolling")

@@ -21,15 +21,15 @@ The author of the package has to act on all of them.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
-from enclave_launch.boundary.light import TYPE_CHECKING
+from typing_extensions import Self
+
 from nodl.source_ref import SourceRef
+from nodl.types import Node
 
 if TYPE_CHECKING:
     from lxml import etree
-    from typing_extensions import Self
-
-    from nodl.types import Node
 
 
 class NoDLError(Exception):

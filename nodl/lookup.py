@@ -17,16 +17,13 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable, Sequence
 from functools import partial
+from pathlib import Path
+from typing import NamedTuple
 
-from enclave_launch.boundary.files import as_path
-from enclave_launch.boundary.light import TYPE_CHECKING, NamedTuple
 from nodl.ament_index import INDEX_FOLDER, PackageNotFoundError, list_resources, package_share_directory
-from nodl.document import RESOURCE_TYPE, V1_SUFFIX, V2_SUFFIXES, ManifestNode, read_document, resource_key
+from nodl.document import RESOURCE_TYPE, V1_SUFFIX, V2_SUFFIXES, read_document, resource_key
 from nodl.errors import ConflictingNoDLError
-from nodl.node_interface import NodeInterface
-
-if TYPE_CHECKING:
-    from pathlib import Path
+from nodl.node_interface import ManifestNode, NodeInterface
 
 
 class Lookup(NamedTuple):
@@ -136,7 +133,7 @@ def _files(path: str) -> list[str]:
     if not os.path.isdir(path):
         return [path]
     suffixes = (V1_SUFFIX, *(suffix for suffix in V2_SUFFIXES if suffix.startswith(".nodl.")))
-    return sorted(str(file) for file in as_path(path).rglob("*.nodl.*") if file.name.endswith(suffixes))
+    return sorted(str(file) for file in Path(path).rglob("*.nodl.*") if file.name.endswith(suffixes))
 
 
 def _program(node: ManifestNode) -> str:

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any, NamedTuple
 
-from enclave_launch.boundary.light import Any, NamedTuple
 from nodl.names import InvalidNameError, expand_name
 
 Edit = tuple[str, tuple[str, ...]]
@@ -25,6 +25,8 @@ CONDITIONS: dict[str, Callable[..., bool]] = {
     "only if different": lambda text, other: text != other,
     "only if true": lambda text: text.lower() == "true",
     "only if false": lambda text: text.lower() != "true",
+    "only if among": lambda text, *others: text in others,
+    "only if not among": lambda text, *others: text not in others,
 }
 """Edits that keep a name where they hold and drop it elsewhere."""
 

@@ -12,17 +12,16 @@ from __future__ import annotations
 
 import re
 
-from enclave_launch.boundary.light import late_pattern
-from enclave_launch.boundary.terminal import quoted
+from enclave_common.terminal import quoted
 
 MAX_NODE_NAME_LENGTH = 255
 MAX_NAMESPACE_LENGTH = 245
 MAX_NAME_LENGTH = 247
 
 _TOKEN = r"[A-Za-z_][A-Za-z0-9_]*"
-_ABSOLUTE = late_pattern(rf"(?:/{_TOKEN})+\Z")
-_PLAIN = late_pattern(rf"(~?/)?{_TOKEN}(?:/{_TOKEN})*\Z")  # what nearly every name looks like
-_SUBSTITUTION = late_pattern(r"\{([^{}]*)\}")
+_ABSOLUTE = re.compile(rf"(?:/{_TOKEN})+\Z")
+_PLAIN = re.compile(rf"(~?/)?{_TOKEN}(?:/{_TOKEN})*\Z")  # what nearly every name looks like
+_SUBSTITUTION = re.compile(r"\{([^{}]*)\}")
 _WILDCARDS = frozenset("*?[]")
 
 

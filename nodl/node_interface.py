@@ -7,7 +7,11 @@ whoever derives permissions from them no longer asks where they came from, but c
 
 from __future__ import annotations
 
-from enclave_launch.boundary.light import TYPE_CHECKING, NamedTuple, TextEnum
+from collections.abc import Mapping
+from enum import Enum
+from types import MappingProxyType
+from typing import TYPE_CHECKING, NamedTuple
+
 from nodl.name_template import NameTemplate
 from nodl.source_ref import SourceRef
 
@@ -15,8 +19,10 @@ if TYPE_CHECKING:
     from nodl.dependence import Dependence
 
 
-class EndpointKind(TextEnum):
+class EndpointKind(str, Enum):
     """The six ways in which a ROS 2 node takes part in communication."""
+
+    __str__ = str.__str__
 
     PUBLISHER = "publisher"
     SUBSCRIPTION = "subscription"
@@ -47,8 +53,10 @@ class EndpointKind(TextEnum):
         return f"{self.value}s"
 
 
-class Certainty(TextEnum):
+class Certainty(str, Enum):
     """How far a name can be trusted."""
+
+    __str__ = str.__str__
 
     EXACT = "exact"  # a manifest says so, or the source has one constant
     FROM_DEFAULT = "from default"  # a parameter's default, used because the launch file sets no value
@@ -85,8 +93,10 @@ class Gap(NamedTuple):
     why: str
 
 
-class ClientLibrary(TextEnum):
+class ClientLibrary(str, Enum):
     """Which ROS client library a node is written with; decides its built-in interfaces."""
+
+    __str__ = str.__str__
 
     RCLCPP = "rclcpp"
     RCLPY = "rclpy"
@@ -107,7 +117,7 @@ class NodeInterface(NamedTuple):
     same options. ``global_arguments``: the node listens to the arguments of its process, so that a launch can rename
     and remap it and give it parameters; ``None``: not known. ``parameter_services``: the program does not switch them
     off. ``depends``: what varies with its start. ``runs``: of a recorded node, how many it was seen in; ``incomplete``:
-    why they may not have shown all of it.
+    why they may not have shown all of it. ``parameters_complete``: its description says that ``parameters`` lists all.
     """
 
     package: str | None
@@ -128,3 +138,20 @@ class NodeInterface(NamedTuple):
     depends: Dependence | None = None
     runs: int = 0
     incomplete: tuple[str, ...] = ()
+    parameters_complete: bool = False
+
+
+class ManifestNode(NamedTuple):
+    """One node as one document describes it, in ``version`` 1 or 2 of NoDL. ``parameter_types``: declared parameters
+    with the type as written.
+
+    ``explicit_executable``: the document itself says which executable or plugin runs the node (always in
+    v1; in v2 only through our extension), rather than the name under which it was registered.
+    ``included``: files that were merged in, to know what the description depends on.
+    """
+
+    interface: NodeInterface
+    version: int
+    parameter_types: Mapping[str, str] = MappingProxyType({})
+    explicit_executable: bool = True
+    included: tuple[str, ...] = ()

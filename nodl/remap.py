@@ -12,23 +12,26 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from contextlib import suppress
+from enum import Enum
+from typing import NamedTuple
 
-from enclave_launch.boundary.light import NamedTuple, TextEnum, late_pattern
 from nodl.names import InvalidNameError, expand_name, join, shown, validate_full_name
 
 _TOKEN = r"[A-Za-z_][A-Za-z0-9_]*"  # that it holds no "__" is checked apart
-_NAME = late_pattern(rf"(?:~/|/)?{_TOKEN}(?:/{_TOKEN})*\Z")
-_PREFIX = late_pattern(rf"({_TOKEN}):(?!//)")
-_NODE_NAME = late_pattern(rf"{_TOKEN}\Z")
-_NAMESPACE = late_pattern(rf"/\Z|(?:/{_TOKEN})+/?\Z")
+_NAME = re.compile(rf"(?:~/|/)?{_TOKEN}(?:/{_TOKEN})*\Z")
+_PREFIX = re.compile(rf"({_TOKEN}):(?!//)")
+_NODE_NAME = re.compile(rf"{_TOKEN}\Z")
+_NAMESPACE = re.compile(rf"/\Z|(?:/{_TOKEN})+/?\Z")
 
 ACTION_SERVICES = ("send_goal", "cancel_goal", "get_result")
 ACTION_TOPICS = ("feedback", "status")
 _LONGEST_PART = "cancel_goal"
 
 
-class RemapKind(TextEnum):
+class RemapKind(str, Enum):
     """What a rule applies to; the value of a name rule is its written prefix."""
+
+    __str__ = str.__str__
 
     ANY_NAME = ""
     TOPIC = "rostopic://"

@@ -6,8 +6,7 @@ Inside this project the model is ``nodl.node_interface``; these are made from it
 from __future__ import annotations
 
 from enum import Enum, unique
-
-from enclave_launch.boundary.light import Any, TypeVar
+from typing import Any, TypeVar
 
 
 @unique

@@ -10,12 +10,12 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import IO
 
-from enclave_launch.boundary.files import read_bytes
+from enclave_common.files import read_bytes
 from nodl.ament_index import package_share_directory, search_prefixes
-from nodl.document import V1_SUFFIX, ManifestNode
+from nodl.document import V1_SUFFIX
 from nodl.document.v1 import parse_v1
 from nodl.errors import DuplicateNodeError, ExecutableNotFoundError, InvalidNoDLError, NoNoDLFilesError
-from nodl.node_interface import Endpoint
+from nodl.node_interface import Endpoint, ManifestNode
 from nodl.source_ref import SourceRef
 from nodl.types import Action, Node, Parameter, PubSubRole, ServerClientRole, Service, Topic
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from functools import partial
 from xml.parsers import expat
 
-from enclave_launch.boundary.xml_tree import RefusedXml, XmlElement, collect_elements
+from enclave_common.xml_tree import RefusedXml, XmlElement, collect_elements
 from nodl.errors import InvalidXMLError
 from nodl.source_ref import SourceRef
 

@@ -1,18 +1,19 @@
-"""YAML (or JSON) text -> plain values that remember their line. Safe against what YAML can be abused for.
+"""Parse YAML (or JSON) into plain values that know their line.
 
 Only the standard scalar types, no tags that make objects; duplicate keys are errors; aliases are allowed
-but what they unfold to is limited, as are size and depth. Pure; PyYAML does the scanning.
+but what they unfold to is limited, as are size and depth.
 """
 
 from __future__ import annotations
 
-from enclave_launch.boundary.light import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
+
+import yaml
+
+from enclave_common.yaml_reader import compose_yaml, construct, line_of
 from nodl.errors import InvalidYAMLError
 from nodl.names import shown
 from nodl.source_ref import SourceRef
-
-if TYPE_CHECKING:
-    import yaml
 
 MAX_BYTES = 1_000_000
 MAX_NODES = 100_000
@@ -48,18 +49,15 @@ YamlValue = YamlScalar | YamlList | YamlMap
 
 
 def parse_yaml(text: bytes, file: str) -> YamlValue:
-    """The one document of ``text``. Raises ``InvalidYAMLError`` with file:line."""
-    import yaml
-
+    """Parse the one document of ``text``. Raises ``InvalidYAMLError`` with file:line."""
     if len(text) > MAX_BYTES:
         raise InvalidYAMLError.at(SourceRef(file), f"larger than the allowed {MAX_BYTES} bytes")
-    loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
     try:
-        root = yaml.compose(text, Loader=loader)
+        root = compose_yaml(text.decode("utf-8"))
     except yaml.MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else 0
         raise InvalidYAMLError.at(SourceRef(file, line), f"not well-formed YAML: {error.problem}") from None
-    except (yaml.YAMLError, UnicodeDecodeError, RecursionError) as error:
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
         raise InvalidYAMLError.at(SourceRef(file), f"not readable as YAML: {error}") from None
     if root is None:
         raise InvalidYAMLError.at(SourceRef(file), "the document is empty")
@@ -72,8 +70,6 @@ class _Builder:
         self._nodes = 0
 
     def build(self, node: yaml.Node, depth: int) -> YamlValue:
-        import yaml
-
         source = self._at(node)
         self._nodes += 1
         if self._nodes > MAX_NODES or depth > MAX_DEPTH:
@@ -82,6 +78,7 @@ class _Builder:
             return self._mapping(node, source, depth)
         if isinstance(node, yaml.SequenceNode):
             return YamlList(tuple(self.build(child, depth + 1) for child in node.value), source)
+        assert isinstance(node, yaml.ScalarNode)  # a node is one of three
         return self._scalar(node, source)
 
     def _mapping(self, node: yaml.MappingNode, source: SourceRef, depth: int) -> YamlMap:
@@ -119,7 +116,7 @@ class _Builder:
             raise InvalidYAMLError.at(value.source, "a key must be text")
         return value.value
 
-    def _scalar(self, node: yaml.Node, source: SourceRef) -> YamlScalar:
+    def _scalar(self, node: yaml.ScalarNode, source: SourceRef) -> YamlScalar:
         text = str(node.value)
         if len(text) > _MAX_SCALAR:
             raise InvalidYAMLError.at(source, f"a value is longer than {_MAX_SCALAR} characters")
@@ -127,36 +124,10 @@ class _Builder:
             return YamlScalar(text, source)
         if node.tag not in _SCALAR_TAGS:
             raise InvalidYAMLError.at(source, f"tag {shown(node.tag)} is not allowed")
-        return YamlScalar(_plain(node.tag.rpartition(":")[2], text, source), source)
+        try:
+            return YamlScalar(construct(node), source)
+        except (ValueError, OverflowError, yaml.YAMLError):
+            raise InvalidYAMLError.at(source, f"{shown(text[:40])} is not a number we can read") from None
 
     def _at(self, node: yaml.Node) -> SourceRef:
-        return SourceRef(self._file, node.start_mark.line + 1)
-
-
-def _plain(kind: str, text: str, source: SourceRef) -> str | int | float | bool | None:
-    """The value of a scalar by the YAML 1.1 rules that PyYAML resolves with."""
-    if kind == "str":
-        return text
-    if kind == "null":
-        return None
-    if kind == "bool":
-        return text.lower() in ("yes", "true", "on")
-    try:
-        return _integer(text) if kind == "int" else _real(text)
-    except ValueError:
-        raise InvalidYAMLError.at(source, f"{shown(text[:40])} is not a number we can read") from None
-
-
-def _integer(text: str) -> int:
-    digits = text.replace("_", "")
-    if ":" in digits or len(digits) > 64:
-        raise ValueError(digits)
-    sign, body = (-1, digits[1:]) if digits[:1] == "-" else (1, digits.lstrip("+"))
-    if body.startswith("0") and body[1:].isdigit():
-        return sign * int(body, 8)
-    return sign * int(body, 0)
-
-
-def _real(text: str) -> float:
-    value = text.replace("_", "").lower()
-    return float(value.replace(".inf", "inf").replace(".nan", "nan"))
+        return SourceRef(self._file, line_of(node))

@@ -3,28 +3,32 @@
 from __future__ import annotations
 
 import ast
+import importlib
 import os
 import re
 import subprocess
 import sys
 from collections.abc import Iterator
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
 
-from bench.synthetic_stack import write_nodes
-
 ROOT = Path(__file__).parent.parent
-PACKAGES = ("enclave_launch", "nodl", "keystore")
+PACKAGES = ("enclave_launch", "nodl", "keystore", "enclave_common")
 
-# Which of our packages a package may import; arrows point one way. All three stand on the boundary room.
-BOUNDARY = "enclave_launch.boundary"
-ALLOWED = {"enclave_launch": {"nodl", "keystore"}, "nodl": set[str](), "keystore": set[str]()}
+# Which of our packages a package may import; arrows point one way.
+SHARED = "enclave_common"
+ALLOWED = {
+    "enclave_launch": {"nodl", "keystore", SHARED},
+    "nodl": {SHARED},
+    "keystore": {SHARED},
+    SHARED: set[str](),
+}
 
 # The floors of each package, lowest first: a room imports its own modules and those of the floors below it.
 FLOORS: dict[str, tuple[set[str], ...]] = {
     "enclave_launch": (
-        {"boundary"},
         {"source_location"},
         {"diagnostics"},
         {"ros_rules"},
@@ -36,7 +40,7 @@ FLOORS: dict[str, tuple[set[str], ...]] = {
         {"plan"},
         {"plan_remarks"},
         {"planner"},
-        {"options", "prefixes", "security_environment", "served_domains"},
+        {"options", "prefixes", "security_environment", "served_domains", "middlewares"},
         {"interfaces"},
         {"review"},
         {"deployment"},
@@ -109,17 +113,7 @@ def test_arrows_between_the_packages_point_one_way(package: str) -> None:
         f"{path.relative_to(ROOT)} imports {name}"
         for path in sources(package)
         for name in imports_of(path)
-        if name.split(".")[0] in forbidden and not f"{name}.".startswith(f"{BOUNDARY}.")
-    ]
-    assert wrong == []
-
-
-def test_the_boundary_room_imports_nothing_of_ours() -> None:
-    wrong = [
-        f"{path.relative_to(ROOT)} imports {name}"
-        for path in sources(BOUNDARY.replace(".", "/"))
-        for name in imports_of(path)
-        if name.split(".")[0] in PACKAGES and not f"{name}.".startswith(f"{BOUNDARY}.")
+        if name.split(".")[0] in forbidden
     ]
     assert wrong == []
 
@@ -137,7 +131,7 @@ def runtime_imports_of(path: Path) -> Iterator[str]:
             yield node.module
 
 
-@pytest.mark.parametrize("package", PACKAGES)
+@pytest.mark.parametrize("package", sorted(FLOORS))
 def test_each_room_stands_on_the_rooms_below_it(package: str) -> None:
     floor = {room: number for number, rooms in enumerate(FLOORS[package]) for room in rooms}
     wrong = []
@@ -152,6 +146,29 @@ def test_each_room_stands_on_the_rooms_below_it(package: str) -> None:
             if floor[target] >= floor[room] and (package, room, target) not in UPWARD:
                 wrong.append(f"{path.relative_to(ROOT)} imports {name}")
     assert wrong == []
+
+
+# Rooms whose modules do not need each other in a circle, not even for the type checker or inside of a function.
+WITHOUT_CIRCLES = ("description", "evaluation", "frontend", "host", "ros_rules")
+
+
+def test_the_rooms_of_evaluation_have_no_circle_of_imports() -> None:
+    files = [path for room in WITHOUT_CIRCLES for path in sources(f"enclave_launch/{room}")]
+    known = {
+        ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path
+        for path in files
+    }
+    graph = {
+        name: {each for each in _modules_named_by(path) if each in known} for name, path in known.items()
+    }
+    TopologicalSorter(graph).prepare()  # raises CycleError, which names the circle
+
+
+def _modules_named_by(path: Path) -> Iterator[str]:
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            yield node.module
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
 
 
 @pytest.mark.parametrize("folder", sorted(PURE))
@@ -173,7 +190,7 @@ def test_only_the_disk_room_of_the_keystore_makes_files_that_may_hold_a_key() ->
 
 
 def test_every_module_can_be_imported() -> None:
-    """Names that only a type checker has in ``boundary/light.py`` are not to be needed at run time."""
+    """No module depends on names that only a type checker has, or on another having been imported first."""
     files = [path.relative_to(ROOT).with_suffix("") for package in PACKAGES for path in sources(package)]
     needs_upstream = ROOT / "enclave_launch" / "ros2"
     modules = [
@@ -195,14 +212,14 @@ def modules_loaded_by(arguments: list[str], **environment: str) -> set[str]:
         "sys.exit(status)\n"
     )
     run = subprocess.run(
-        [sys.executable, "-S", "-c", code],
+        [sys.executable, "-c", code],
         capture_output=True, text=True, check=True, cwd=ROOT, env={**os.environ, **environment},
     )  # fmt: skip
     return set(run.stderr.split())
 
 
 @pytest.mark.parametrize("form", ["tree", "json"])
-def test_a_dry_run_imports_only_what_its_path_needs(form: str) -> None:
+def test_a_dry_run_imports_no_heavy_package(form: str) -> None:
     loaded = modules_loaded_by(
         [
             "--dry-run",
@@ -215,19 +232,8 @@ def test_a_dry_run_imports_only_what_its_path_needs(form: str) -> None:
         ]
     )
     assert {"nodl.document.v1", "enclave_launch.plan"} <= loaded
-    heavy = {"cryptography", "pydantic", "asyncio", "yaml", "lxml", "hashlib", "cyclonedds", "tree_sitter"}
-    slow_to_define = {"dataclasses", "inspect", "typing"}  # see ``boundary.light``
-    assert loaded.isdisjoint(heavy | slow_to_define)
-
-
-def test_where_there_is_nothing_to_read_no_reader_is_imported(tmp_path: Path) -> None:
-    """A compiled node without sources that the library does not know: ``bench/resolve.py`` has what that saves."""
-    loaded = modules_loaded_by(["--dry-run", str(write_nodes(tmp_path, 2))], AMENT_PREFIX_PATH=str(tmp_path))
-    assert {"nodl.infer.executable", "nodl.library"} <= loaded
-    readers = {"nodl.infer.cpp.reading.project", "nodl.document.v2", "nodl.document.v1", "json"}
-    assert loaded.isdisjoint(readers)
-    late = {"shutil", "traceback", "signal", "threading", "shlex", "enclave_launch.policy.node_permissions"}
-    assert loaded.isdisjoint(late)  # docs/speed.md has what each takes
+    heavy = {"cryptography", "pydantic", "lxml", "cyclonedds", "tree_sitter"}
+    assert loaded.isdisjoint(heavy)
 
 
 def named_in_architecture() -> list[str]:
@@ -260,3 +266,15 @@ def test_a_public_class_has_its_name_alone() -> None:
                 homes.setdefault(node.name, []).append(str(path.relative_to(ROOT)))
     twice = {name for name, places in homes.items() if len(places) > 1}
     assert twice == AS_UPSTREAM_HAS_IT | AS_THE_PLAN_HAS_IT | IN_BOTH_KINDS_OF_INFERENCE
+
+
+@pytest.mark.parametrize("package", ["enclave_launch", "keystore"])
+def test_the_stub_of_a_package_lists_its_public_names(package: str) -> None:
+    stub = (ROOT / package / "__init__.pyi").read_text(encoding="utf-8")
+    listed = re.findall(r"^from (\S+) import (\w+) as \2$", stub, re.MULTILINE)
+    module = importlib.import_module(package)
+    assert sorted(name for _, name in listed) == module.__all__
+    for home, name in listed:
+        assert getattr(module, name) is getattr(importlib.import_module(home), name)
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = module.nothing

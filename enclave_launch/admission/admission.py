@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
 from enclave_launch.admission.middleware import VARIABLE, ZENOH, Vendor, middleware_of, vendor_of, why_not
 from enclave_launch.admission.variables import domain_of, overridden, own_security, preloaded
 from enclave_launch.admission.wrappers import obstacles
-from enclave_launch.boundary.light import NamedTuple
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.diagnostics import enclaves as diagnostics
 from enclave_launch.errors import UsageError

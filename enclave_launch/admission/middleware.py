@@ -14,19 +14,20 @@ known beforehand, and a subject that is chosen well avoids them.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
+from enum import Enum
+from typing import NamedTuple
 
-from enclave_launch.boundary.light import TYPE_CHECKING, NamedTuple, TextEnum
-
-if TYPE_CHECKING:
-    from keystore.formats.subject import Half
+from keystore.formats.subject import Half, guid_prefix
 
 VARIABLE = "RMW_IMPLEMENTATION"
 DEFAULT = "rmw_fastrtps_cpp"
 _DEFAULT_OF = {"galactic": "rmw_cyclonedds_cpp"}
 
 
-class Vendor(TextEnum):
+class Vendor(str, Enum):
     """Whose DDS speaks; decides who can authenticate whom."""
+
+    __str__ = str.__str__
 
     CYCLONE = "Cyclone DDS"
     FAST = "Fast DDS"
@@ -97,8 +98,6 @@ def mixed_pairs(members: Iterable[EnclaveProcess]) -> tuple[Pair, ...]:
 def failing(pairs: Iterable[Pair], subjects: Mapping[str, str]) -> Iterator[Pair]:
     """Those that never authenticate, or only by chance. ``subjects``: common name by enclave; a pair of which one is
     not known counts as good."""
-    from keystore.formats.subject import guid_prefix
-
     for pair in pairs:
         fast, cyclone = subjects.get(pair.fast), subjects.get(pair.cyclone)
         if pair.fast == pair.cyclone or (fast and cyclone and guid_prefix(fast) <= guid_prefix(cyclone)):
@@ -107,8 +106,6 @@ def failing(pairs: Iterable[Pair], subjects: Mapping[str, str]) -> Iterator[Pair
 
 def halves(pairs: Iterable[Pair]) -> dict[str, Half]:
     """Where each enclave should sort so that Cyclone begins every handshake; none for enclaves of both."""
-    from keystore.formats.subject import Half
-
     found = tuple(pair for pair in pairs if pair.fast != pair.cyclone)
     fast, cyclone = {pair.fast for pair in found}, {pair.cyclone for pair in found}
     return {**dict.fromkeys(fast - cyclone, Half.HIGH), **dict.fromkeys(cyclone - fast, Half.LOW)}

@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from typing import NamedTuple
 
-from enclave_launch.boundary.environment import domain_id
-from enclave_launch.boundary.files import text_or_nothing
-from enclave_launch.boundary.light import NamedTuple, late_pattern
+from enclave_common.environment import domain_id
+from enclave_common.files import text_or_nothing
 from enclave_launch.errors import UsageError
 from keystore.errors import printable
 from keystore.formats.domains import HIGHEST_ID
@@ -39,7 +39,7 @@ _CONFIGURATIONS = (
     "FASTDDS_DEFAULT_PROFILES_FILE",
     "NDDS_QOS_PROFILES",
 )
-_SECURITY = late_pattern(r"<\s*(?:DDS)?Security\b|dds\.sec\.", re.IGNORECASE)
+_SECURITY = re.compile(r"<\s*(?:DDS)?Security\b|dds\.sec\.", re.IGNORECASE)
 _PRELOAD = ("LD_PRELOAD", "LD_AUDIT")
 
 

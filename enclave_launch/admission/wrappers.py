@@ -7,9 +7,10 @@ in the reviewed table below, every program of it (``nice -n 5 gdb --args``), or 
 from __future__ import annotations
 
 import re
+import shlex
 from collections.abc import Collection, Iterator, Sequence
+from typing import NamedTuple
 
-from enclave_launch.boundary.light import NamedTuple, late_pattern
 from enclave_launch.process import ResolvedProcess
 from enclave_launch.ros_rules.ros_arguments import shell_words
 
@@ -24,7 +25,7 @@ class Keeper(NamedTuple):
 
 
 def _keeper(values: str = "", words: int = 0, changes: str | None = None) -> Keeper:
-    return Keeper(frozenset(values.split()), words, late_pattern(changes) if changes else None)
+    return Keeper(frozenset(values.split()), words, re.compile(changes) if changes else None)
 
 
 _DEBUGGER_COMMAND = r"(?i).*\benv"  # gdb "unset environment", "set env", lldb "settings ... env-vars"
@@ -167,7 +168,6 @@ def _shell_operator(text: str) -> str | None:
     """The first thing in ``text`` that makes it more than one program with its words."""
     if len(text) > _LONGEST:
         return f"more than {_LONGEST} characters"
-    import shlex
 
     lexer = shlex.shlex(text, posix=True, punctuation_chars=";&|()")
     lexer.whitespace_split = True

@@ -7,12 +7,14 @@ from collections.abc import Iterable, Mapping
 from datetime import datetime
 from typing import NamedTuple
 
+from enclave_common.words import some_of
 from enclave_launch.errors import ProvisionError, keystore_errors
 from keystore.disk import layout, safe_files
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.view import KeystoreView
 from keystore.steps.expiry import status
 
+_NAMED = 5
 PUBLIC_FILES = tuple(name for name in layout.RUNTIME_FILES if name != layout.KEY)
 
 
@@ -66,6 +68,13 @@ def _enclave(view: KeystoreView, enclave: str) -> EnclaveMaterial:
     directory = layout.enclave_directory(enclave)
     names = (*PUBLIC_FILES, *([layout.ENCLAVE_CRL] if view.has_crl else []))
     public = {}
+    known = view.enclaves()
+    if enclave not in known:
+        raise ProvisionError(
+            f"the keystore {view.root} has no enclave {enclave}; it has {some_of(known, _NAMED) or 'none'}; provision "
+            "it first (secure-launch --secure, secure-keystore apply-policy), or give the --enclave-scope that it was "
+            "provisioned with"
+        )
     for name in names:
         content = safe_files.read_if_there(view.root, f"{directory}/{name}")
         if content is None:

@@ -10,8 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from operator import attrgetter
-
-from enclave_launch.boundary.light import TypeVar
+from typing import TypeVar
 
 _Class = TypeVar("_Class")
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import os
 import warnings
+from pathlib import Path
+from typing import Literal
 
-from enclave_launch.boundary.files import as_path
-from enclave_launch.boundary.light import TYPE_CHECKING, Literal
 from enclave_launch.host.current import current_host
 from nodl import ament_index
 from nodl.ament_index import INDEX_FOLDER as RESOURCE_INDEX_SUBFOLDER
@@ -15,9 +15,6 @@ from nodl.ament_index import PREFIX_VARIABLE as AMENT_PREFIX_PATH_ENV_VAR
 from nodl.ament_index import InvalidResourceNameError as InvalidResourceNameError
 from nodl.ament_index import InvalidResourceTypeNameError as InvalidResourceTypeNameError
 from nodl.ament_index import PackageNotFoundError as PackageNotFoundError
-
-if TYPE_CHECKING:
-    from pathlib import Path
 
 __all__ = ["AMENT_PREFIX_PATH_ENV_VAR", "RESOURCE_INDEX_SUBFOLDER"]
 
@@ -46,7 +43,7 @@ def get_resource_types() -> set[str]:
 
 
 def has_resource(resource_type: str, resource_name: str) -> str | Literal[False]:
-    """The prefix, or ``False``."""
+    """Return the prefix, or False."""
     return ament_index.find_resource(resource_type, resource_name, get_search_paths()) or False
 
 
@@ -68,4 +65,4 @@ def get_package_share_directory(package_name: str, print_warning: bool = True) -
 
 
 def get_package_share_path(package_name: str, print_warning: bool = True) -> Path:
-    return as_path(get_package_share_directory(package_name, print_warning))
+    return Path(get_package_share_directory(package_name, print_warning))

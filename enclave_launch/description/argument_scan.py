@@ -8,16 +8,10 @@ everything below at each include; here each file is summed up once (``LoadCache`
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from typing import Any, NamedTuple
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any, NamedTuple
-from enclave_launch.description.actions.arguments import DeclareLaunchArgument
-from enclave_launch.description.actions.configurations import ResetLaunchConfigurations
-from enclave_launch.description.actions.includes import IncludeLaunchDescription
+from enclave_launch.description.entity import ScanRole
 from enclave_launch.host.current import current_host
-
-if TYPE_CHECKING:
-    from enclave_launch.description.launch_description import LaunchDescription
-
 
 MISSING_ARGUMENT = "Included launch description missing required argument"
 REQUIRED_ARGUMENT = "Required launch argument"
@@ -43,12 +37,12 @@ class DeclaredArguments(NamedTuple):
     given: list[str | None]
 
 
-def check_is_description(description: LaunchDescription) -> None:
-    """Whatever a Python file returned is asked as upstream asks it, so that ``None`` or a list fails alike."""
+def check_is_description(description: Any) -> None:
+    """Raise as upstream for a Python file that returned no description: ``None`` or a list."""
     description.get_launch_arguments_with_include_launch_description_actions  # noqa: B018
 
 
-def check_required_arguments(description: LaunchDescription, given: list[str]) -> None:
+def check_required_arguments(description: Any, given: list[str]) -> None:
     """Raise ``RuntimeError`` unless each required argument is given by the include itself or on the way to it.
 
     Configurations that happen to be set do not count, as upstream.
@@ -80,23 +74,23 @@ def _known(names: list[str | None]) -> list[str]:
     return [name for name in names if name is not None]
 
 
-def _summarize(description: LaunchDescription) -> DeclaredArguments:
+def _summarize(description: Any) -> DeclaredArguments:
     known: DeclaredArguments | None = getattr(description, "argument_summary", None)
     if known is not None:
         return known
     summary = DeclaredArguments({}, [])
     for entity, conditional in _walk(description.describe_sub_entities(), False):
-        if isinstance(entity, DeclareLaunchArgument):
+        if _role(entity) is ScanRole.ARGUMENT:
             conditional = conditional or entity.condition is not None
             entity._conditionally_included = conditional
             required = entity.default_value is None and not conditional
             summary.declared.setdefault(entity.name, Declared(required, entity.description))
-        elif isinstance(entity, IncludeLaunchDescription):
+        elif _role(entity) is ScanRole.INCLUDE:
             _add_include(summary, entity)
     return summary
 
 
-def _add_include(summary: DeclaredArguments, include: IncludeLaunchDescription) -> None:
+def _add_include(summary: DeclaredArguments, include: Any) -> None:
     names = include.argument_names_without_context()
     given: list[str | None] = [None] if names is None else list(names)
     nested = current_host().loads.summary(include.launch_description_source, _summarize)
@@ -108,39 +102,40 @@ def _add_include(summary: DeclaredArguments, include: IncludeLaunchDescription) 
     summary.given.extend(given)
 
 
+def _role(entity: object) -> ScanRole | None:
+    role: ScanRole | None = getattr(entity, "scan_role", None)
+    return role
+
+
 def _walk(entities: Iterable[Any], conditional: bool) -> Iterator[tuple[Any, bool]]:
     """Every entity that the scan meets, and whether it stands in a conditional offer.
 
     Includes are not entered: what is below one is the business of its own summary.
     """
     for entity in entities:
-        if isinstance(entity, ResetLaunchConfigurations):
+        if _role(entity) is ScanRole.RESET:
             return
         yield entity, conditional
-        if isinstance(entity, IncludeLaunchDescription):
+        if _role(entity) is ScanRole.INCLUDE:
             continue
         yield from _walk(entity.describe_sub_entities(), False)
         for _, offered in entity.describe_conditional_sub_entities():
             yield from _walk(offered, True)
 
 
-def collect_arguments(
-    description: LaunchDescription, conditional: bool
-) -> list[tuple[DeclareLaunchArgument, list[IncludeLaunchDescription] | None]]:
-    """The declarations themselves, each with the list of includes that all below one include share."""
-    found: dict[str, tuple[DeclareLaunchArgument, list[IncludeLaunchDescription] | None]] = {}
+def collect_arguments(description: Any, conditional: bool) -> list[tuple[Any, list[Any] | None]]:
+    """Return the declarations, each with the list of includes that all below one include share."""
+    found: dict[str, tuple[Any, list[Any] | None]] = {}
 
-    def collect(
-        entities: Iterable[Any], conditional: bool, includes: list[IncludeLaunchDescription] | None
-    ) -> None:
+    def collect(entities: Iterable[Any], conditional: bool, includes: list[Any] | None) -> None:
         for entity in entities:
-            if isinstance(entity, ResetLaunchConfigurations):
+            if _role(entity) is ScanRole.RESET:
                 return
-            if isinstance(entity, DeclareLaunchArgument) and entity.name not in found:
+            if _role(entity) is ScanRole.ARGUMENT and entity.name not in found:
                 entity._conditionally_included = conditional or entity.condition is not None
                 found[entity.name] = (entity, includes)
             below = includes
-            if isinstance(entity, IncludeLaunchDescription):
+            if _role(entity) is ScanRole.INCLUDE:
                 below = [] if includes is None else includes
                 below.append(entity)
             collect(entity.describe_sub_entities(), False, below)

@@ -5,24 +5,23 @@ from __future__ import annotations
 import collections.abc
 import os
 from collections.abc import Iterable
-
-from enclave_launch.boundary.light import Any
+from typing import Any
 
 
 def isclassinstance(obj: object) -> bool:
-    """Has ``obj`` a class? Every object has; upstream's name for it."""
+    """Return True if ``obj`` has a class, as every object has; upstream's name for it."""
     return hasattr(obj, "__class__")
 
 
 def is_a(obj: object, entity_type: type) -> bool:
-    """Is ``obj`` an instance of the class ``entity_type``?"""
+    """Return True if ``obj`` is an instance of the class ``entity_type``."""
     if not isinstance(entity_type, type):
         raise RuntimeError(f"entity_type '{obj}' is not a class")
     return isinstance(obj, entity_type)
 
 
 def is_a_subclass(obj: object, entity_type: type) -> bool:
-    """Is ``obj`` an instance or a subclass of ``entity_type``?"""
+    """Return True if ``obj`` is an instance or a subclass of ``entity_type``."""
     if isinstance(obj, entity_type):
         return True
     return isinstance(obj, type) and issubclass(obj, entity_type)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterable
+from typing import TYPE_CHECKING
 
-from enclave_launch.boundary.light import TYPE_CHECKING
 from enclave_launch.description.substitution import normalize_to_list_of_substitutions, perform_substitutions
 from enclave_launch.host.current import current_release
 from enclave_launch.ros_rules.distro import Feature

@@ -5,18 +5,18 @@ from __future__ import annotations
 import collections.abc
 import sys
 from collections.abc import Iterable
+from enum import Enum
 from types import FrameType
+from typing import TYPE_CHECKING, Any
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any
+from enclave_launch.description.conditions import Condition, IfCondition, UnlessCondition
 from enclave_launch.description.events.event import ExecutionComplete
 from enclave_launch.host.user_code import executed_once, is_users
 from enclave_launch.source_location import SourceLocation
 
 if TYPE_CHECKING:
-    from enclave_launch.description.conditions import Condition
     from enclave_launch.description.launch_context import LaunchContext
-    from enclave_launch.description.markup.entity import Entity
-    from enclave_launch.description.markup.parser import Parser
+    from enclave_launch.description.markup.entity import Entity, Parser
 
 
 _OURS = "enclave_launch."
@@ -28,6 +28,14 @@ _BUILDERS = (
 )
 
 
+class ScanRole(Enum):
+    """What an entity is for the scan of a description's arguments."""
+
+    ARGUMENT = "argument"
+    INCLUDE = "include"
+    RESET = "reset"
+
+
 class LaunchDescriptionEntity:
     """Visited when launching; described when only looked at.
 
@@ -36,13 +44,14 @@ class LaunchDescriptionEntity:
     """
 
     source_location: SourceLocation | None = None
+    scan_role: ScanRole | None = None
     built_by_front_end = False  # built anew for each evaluation, unlike what a Python file builds
 
     def describe(self) -> str:
         raise NotImplementedError()
 
     def describe_sub_entities(self) -> list[LaunchDescriptionEntity]:
-        """The entities that a visit will always give, as far as known without a context."""
+        """Return the entities that a visit will always give, as far as known without a context."""
         return []
 
     def describe_conditional_sub_entities(self) -> list[tuple[str, Iterable[LaunchDescriptionEntity]]]:
@@ -54,12 +63,12 @@ class LaunchDescriptionEntity:
         return None
 
     def get_asyncio_future(self) -> Any:
-        """A future that is done when what the visit began has ended; ``None``: nothing goes on."""
+        """Return a future that is done when what the visit began has ended; None if nothing goes on."""
         return None
 
 
 def creation_location(element: str) -> SourceLocation | None:
-    """The nearest calling frame outside of our own code; ``None`` when a front end or a visit builds the object."""
+    """Return the nearest calling frame outside of our own code; None if a front end or a visit builds the object."""
     frame: FrameType | None = sys._getframe(2)
     while frame is not None:
         name: str = frame.f_globals.get("__name__", "")
@@ -107,7 +116,7 @@ class Action(LaunchDescriptionEntity):
 
     @classmethod
     def parse(cls, entity: Entity, parser: Parser) -> tuple[type[Action], dict[str, Any]]:
-        """The constructor arguments that every element has: ``if`` and ``unless``."""
+        """Parse the constructor arguments that every element has: ``if`` and ``unless``."""
         given = entity.given
         if "if" not in given and "unless" not in given:
             return Action, {}
@@ -117,8 +126,6 @@ class Action(LaunchDescriptionEntity):
             return Action, {}
         if if_text is not None and unless_text is not None:
             raise RuntimeError("if and unless conditions can't be used simultaneously")
-        from enclave_launch.description.conditions import IfCondition, UnlessCondition
-
         if if_text is not None:
             return Action, {"condition": IfCondition(parser.parse_substitution(if_text))}
         return Action, {"condition": UnlessCondition(parser.parse_substitution(unless_text or ""))}
@@ -131,7 +138,7 @@ class Action(LaunchDescriptionEntity):
         return repr(self)
 
     def get_sub_entities(self) -> list[LaunchDescriptionEntity]:
-        """The entities that ``execute`` will give, as far as known without a context."""
+        """Return the entities that ``execute`` will give, as far as known without a context."""
         return []
 
     def describe_sub_entities(self) -> list[LaunchDescriptionEntity]:

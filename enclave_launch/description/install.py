@@ -11,9 +11,11 @@ import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from importlib.abc import MetaPathFinder
 from types import ModuleType
+from typing import TYPE_CHECKING
 
-from enclave_launch.boundary.light import TYPE_CHECKING
+from enclave_launch.description.public_modules import exists, public_module, spec_of
 
 if TYPE_CHECKING:
     from importlib.machinery import ModuleSpec
@@ -57,8 +59,8 @@ def installed(prefixes: Sequence[str] = ()) -> Iterator[None]:
         _depth -= 1
 
 
-class _Finder:
-    """A meta path finder; not derived from ``importlib.abc``, whose import costs more than all of this."""
+class _Finder(MetaPathFinder):
+    """Finds the modules of the table for some packages."""
 
     def __init__(self, names: tuple[str, ...]) -> None:
         self._names = names
@@ -68,8 +70,6 @@ class _Finder:
     ) -> ModuleSpec | None:
         if fullname.partition(".")[0] not in self._names:
             return None
-        from enclave_launch.description.public_modules import spec_of  # XML and YAML files need none
-
         return spec_of(fullname)
 
 
@@ -78,7 +78,7 @@ _FALLBACK_FINDER = _Finder(FALLBACK_NAMES)
 
 
 def is_public(module: str) -> bool:
-    """Is it one of the names we take over, or a submodule?"""
+    """Return True for one of the names we take over, or a submodule."""
     return module.partition(".")[0] in PUBLIC_NAMES
 
 
@@ -102,19 +102,17 @@ def _withdraw(before: set[str]) -> None:
 
 
 def _may_be_guest(name: str) -> bool:
-    """Whether a launch file may have brought it: it is neither of ours nor of Python's own library."""
+    """Return True if a launch file may have imported it: it is neither ours nor of the standard library."""
     top = name.partition(".")[0]
     return top != "enclave_launch" and top not in sys.stdlib_module_names
 
 
 def _is_ours(module: ModuleType) -> bool:
-    from enclave_launch.description.public_modules import exists, public_module
-
     return exists(module.__name__) and module is public_module(module.__name__)
 
 
 def _dependents(names: set[str], belongs: Callable[[str], bool]) -> set[str]:
-    """Of ``names``, the modules of each top-level package in which some module holds such an object."""
+    """Return, of ``names``, the modules of each top-level package in which some module holds such an object."""
     tops = {name.partition(".")[0] for name in names if _holds(sys.modules[name], belongs)} - {
         "enclave_launch"
     }
@@ -132,7 +130,7 @@ def _holds(module: ModuleType, belongs: Callable[[str], bool]) -> bool:
 
 
 def _python_folders(prefixes: Sequence[str]) -> Iterator[str]:
-    """Where colcon and Debian put the Python packages of an install prefix."""
+    """Yield the folders in which colcon and Debian put the Python packages of an install prefix."""
     for prefix in prefixes:
         for base, leaf in (("lib", "site-packages"), ("local/lib", "dist-packages")):
             try:

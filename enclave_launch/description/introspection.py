@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.actions.events import EmitEvent, RegisterEventHandler
 from enclave_launch.description.actions.log import LogInfo
 from enclave_launch.description.actions.processes import ExecuteProcess
@@ -20,7 +20,7 @@ _INDENT = "    "
 
 
 def indent(lines: Iterable[str], indention: str = _INDENT) -> list[str]:
-    """Each line with ``indention`` before it."""
+    """Return each line with ``indention`` before it."""
     return [f"{indention}{line}" for line in lines]
 
 
@@ -39,12 +39,12 @@ def tree_like_indent(lines: Iterable[str]) -> list[str]:
 
 
 def format_substitutions(substitutions: SomeSubstitutionsType) -> str:
-    """The descriptions of substitutions, joined."""
+    """Return the descriptions of substitutions, joined."""
     return " + ".join(sub.describe() for sub in normalize_to_list_of_substitutions(substitutions))
 
 
 def format_entities(entities: Iterable[Any]) -> list[str]:
-    """The lines of each entity in turn."""
+    """Return the lines of each entity in turn."""
     lines: list[str] = []
     for entity in entities:
         lines += format_action(entity) if isinstance(entity, Action) else [f"Unknown entity('{entity}')"]
@@ -52,14 +52,14 @@ def format_entities(entities: Iterable[Any]) -> list[str]:
 
 
 def format_event_handler(event_handler: BaseEventHandler) -> list[str]:
-    """One line about the handler, then its entities, indented."""
+    """Return one line about the handler, then its entities, indented."""
     text, entities = event_handler.describe()
     items = [entities] if isinstance(entities, LaunchDescriptionEntity) else entities
     return [text, *indent(format_entities(items))]
 
 
 def format_action(action: Action) -> list[str]:
-    """The lines of one action."""
+    """Return the lines of one action."""
     if isinstance(action, LogInfo):
         return [f"LogInfo({format_substitutions(action.msg)})"]
     if isinstance(action, EmitEvent):

@@ -5,19 +5,23 @@ from __future__ import annotations
 import os
 from collections import deque
 from collections.abc import Callable, Iterable, MutableMapping
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any, NamedTuple
 from enclave_launch.description import read_only
-from enclave_launch.description.events.dispatch import Buckets, EventQueue, HandlerTable, QueuedEvent
+from enclave_launch.description.events.queue import Buckets, EventQueue, Handler, HandlerTable, QueuedEvent
 from enclave_launch.host.current import current_host
 from enclave_launch.host.environment import Environment
 from enclave_launch.host.protocol import Host
 
 if TYPE_CHECKING:
-    from enclave_launch.description.actions.includes import OpenFile
     from enclave_launch.description.events.event import Event
-    from enclave_launch.description.events.handlers import BaseEventHandler
-    from enclave_launch.description.substitution import Substitution
+
+OpenFile = tuple[str, dict[str, Any], dict[str, str]]
+"""A file that is being visited, with the launch configurations and the environment in which it was entered."""
+
+
+class _Substitution(Protocol):
+    def perform(self, context: LaunchContext, /) -> str: ...
 
 
 class ContextState(NamedTuple):
@@ -92,6 +96,7 @@ class LaunchContext:
         self.includes: tuple[str, ...] = ()
         self.open_files: tuple[OpenFile, ...] = ()
         self.unfolded = 0  # entities visited and copied in the walk in progress
+        self.simulated_time = False  # asked for by set_use_sim_time, for launch's own clock
         self._timer_handler_installed = False
 
     @property
@@ -105,7 +110,7 @@ class LaunchContext:
         return self.__argv
 
     def count_unfolded(self, entities: int) -> None:
-        """Note that the walk in progress visits or copies so many more. Raises ``RuntimeError`` beyond all measure."""
+        """Count the entities that the walk in progress visits or copies. Raises ``RuntimeError`` for too many."""
         self.unfolded += entities
         if self.unfolded > MAX_UNFOLDED:
             raise RuntimeError(
@@ -126,7 +131,7 @@ class LaunchContext:
         self.__loop = loop
 
     def add_completion_future(self, completion_future: Any) -> None:
-        """The launch is not idle before this is done."""
+        """Keep the launch from being idle before this future is done."""
         self._completion_futures.append(completion_future)
 
     # Locals
@@ -199,14 +204,14 @@ class LaunchContext:
         return self._event_handlers.would_match(event)
 
     def awaits_completion(self) -> bool:
-        """Could any handler take an ``ExecutionComplete``? A cheap first answer for each action visited."""
+        """Return True if a handler may take an ``ExecutionComplete``: a cheap first answer for each action visited."""
         return self._event_handlers.awaits("launch.events.ExecutionComplete")
 
-    def register_event_handler(self, event_handler: BaseEventHandler, append: bool = False) -> None:
-        """The newest handler is asked first; with ``append`` this one is asked last."""
+    def register_event_handler(self, event_handler: Handler, append: bool = False) -> None:
+        """Register a handler. The newest is asked first; with ``append`` this one is asked last."""
         self._event_handlers.register(event_handler, append)
 
-    def unregister_event_handler(self, event_handler: BaseEventHandler) -> None:
+    def unregister_event_handler(self, event_handler: Handler) -> None:
         """Raises ``ValueError`` when it is not registered."""
         self._event_handlers.unregister(event_handler)
 
@@ -216,7 +221,7 @@ class LaunchContext:
     async def emit_event(self, event: Event) -> None:
         self.emit_event_sync(event)
 
-    def perform_substitution(self, substitution: Substitution) -> str:
+    def perform_substitution(self, substitution: _Substitution) -> str:
         return substitution.perform(self)
 
     # Hypothetical events: what a dry run tries out leaves no trace

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
 
-from enclave_launch.boundary.light import TYPE_CHECKING
 from enclave_launch.description import read_only
 from enclave_launch.description.argument_scan import DeclaredArguments, collect_arguments
 from enclave_launch.description.entity import Action, LaunchDescriptionEntity
 from enclave_launch.diagnostics.evaluation import launch_file_deprecated
 
 if TYPE_CHECKING:
-    from enclave_launch.description.actions.arguments import DeclareLaunchArgument
-    from enclave_launch.description.actions.includes import IncludeLaunchDescription
     from enclave_launch.description.launch_context import LaunchContext
 
 
@@ -55,15 +53,15 @@ class LaunchDescription(LaunchDescriptionEntity):
     def describe_sub_entities(self) -> list[LaunchDescriptionEntity]:
         return self.__entities
 
-    def get_launch_arguments(self, conditional_inclusion: bool = False) -> list[DeclareLaunchArgument]:
-        """The arguments that can be found without executing anything; the first declaration of each name."""
+    def get_launch_arguments(self, conditional_inclusion: bool = False) -> list[Any]:
+        """Return the first ``DeclareLaunchArgument`` of each name that can be found without executing anything."""
         found = self.get_launch_arguments_with_include_launch_description_actions(conditional_inclusion)
         return [argument for argument, _ in found]
 
     def get_launch_arguments_with_include_launch_description_actions(
         self, conditional_inclusion: bool = False
-    ) -> list[tuple[DeclareLaunchArgument, list[IncludeLaunchDescription] | None]]:
-        """As ``get_launch_arguments``, each with the includes on the way to it (``None``: none).
+    ) -> list[tuple[Any, list[Any] | None]]:
+        """Return the arguments as ``get_launch_arguments``, each with the includes on the way to it (None: none).
 
         That list is shared by everything below one include of this description, as upstream.
         """

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import signal
 from collections.abc import Callable, Iterable
+from signal import SIGINT, SIGTERM
 from types import TracebackType
+from typing import TYPE_CHECKING, Any
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.actions.events import EmitEvent
 from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.description.launch_description import LaunchDescription
@@ -34,7 +35,7 @@ class LaunchService:
 
     @property
     def context(self) -> LaunchContext:
-        """The context before the run; a run makes its own."""
+        """Return the context before the run; a run makes its own."""
         return self.__context
 
     def include_launch_description(self, launch_description: LaunchDescription) -> None:
@@ -50,7 +51,7 @@ class LaunchService:
         return asyncio.run(self.__run(shutdown_when_idle, handle_interrupt=True))
 
     async def run_async(self, *, shutdown_when_idle: bool = True) -> int:
-        """As ``run``, inside a running loop, and without touching signals."""
+        """Run as ``run`` does, inside a running loop and without touching signals."""
         return await self.__run(shutdown_when_idle, handle_interrupt=False)
 
     def shutdown(self, force_sync: bool = False) -> None:
@@ -73,7 +74,6 @@ class LaunchService:
     @staticmethod
     async def __run_with_signals(service: LiveLaunch) -> int:
         import asyncio
-        from signal import SIGINT, SIGTERM
 
         loop = asyncio.get_running_loop()
         for number in (SIGINT, SIGTERM):
@@ -114,7 +114,7 @@ class AsyncSafeSignalManager:
 
 
 def create_future(loop: Any) -> Any:
-    """A future of ``loop``, or of the loop that is running."""
+    """Create a future of ``loop``, or of the loop that is running."""
     if loop is None:
         import asyncio
 

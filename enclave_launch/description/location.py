@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from enclave_launch.boundary.light import TYPE_CHECKING
+from typing import TYPE_CHECKING
+
 from enclave_launch.frontend import error_location
 from enclave_launch.source_location import SourceLocation
 
 if TYPE_CHECKING:
-    from enclave_launch.description.entity import LaunchDescriptionEntity
     from enclave_launch.description.launch_context import LaunchContext
 
 
@@ -18,7 +18,7 @@ _MARK = "_enclave_launch_place"
 
 
 def location_of(entity: object, context: LaunchContext) -> SourceLocation:
-    """The place of ``entity``; the file being evaluated when it is not known itself."""
+    """Return the place of ``entity``; the file being evaluated if it is not known itself."""
     place: SourceLocation | None = getattr(entity, "source_location", None)
     if place is None:
         file = context.open_files[-1][0] if context.open_files else OUTSIDE
@@ -26,15 +26,14 @@ def location_of(entity: object, context: LaunchContext) -> SourceLocation:
     return SourceLocation(place.file, place.line, place.element, context.includes)
 
 
-def includes_below(include: LaunchDescriptionEntity, context: LaunchContext) -> tuple[str, ...]:
-    """The chain for what ``include`` brings in. The include that stands for the command line does not count."""
-    if include.source_location is None:
-        return context.includes
-    return (*context.includes, str(include.source_location))
+def includes_below(include: object, context: LaunchContext) -> tuple[str, ...]:
+    """Return the chain of includes below ``include``. The one that stands for the command line does not count."""
+    place = getattr(include, "source_location", None)
+    return context.includes if place is None else (*context.includes, str(place))
 
 
 def annotate(error: BaseException, entity: object, context: LaunchContext) -> None:
-    """Note on ``error`` which entity raised it; the innermost note stays.
+    """Record on ``error`` which entity raised it; the innermost record stays.
 
     An error in a file that an include was about to load stands in that file, not at the include.
     """
@@ -50,6 +49,6 @@ def annotate(error: BaseException, entity: object, context: LaunchContext) -> No
 
 
 def place_of(error: BaseException) -> SourceLocation | None:
-    """What ``annotate`` noted."""
+    """Return what ``annotate`` recorded."""
     place: SourceLocation | None = getattr(error, _MARK, None)
     return place

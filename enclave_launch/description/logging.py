@@ -6,9 +6,13 @@ the runtime's business; nothing here creates a file.
 
 from __future__ import annotations
 
+import logging
 import os
+import socket
+from datetime import datetime
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.host.current import current_host
 
 if TYPE_CHECKING:
@@ -16,16 +20,14 @@ if TYPE_CHECKING:
 
 
 def get_logger(name: str | None = None) -> logging.Logger:
-    """The logger of this name, ``launch`` without one. Silent unless the application sets logging up."""
-    import logging
-
+    """Return the logger of this name, ``launch`` without one; silent unless the application sets logging up."""
     root = logging.getLogger("launch")
     if not root.handlers:
         root.addHandler(logging.NullHandler())
     logger = root if name is None else logging.getLogger(name)
-    outcomes = current_host().outcomes
-    if outcomes is not None:
-        outcomes.listen(logger)
+    results = current_host().user_code_results
+    if results is not None:
+        results.listen(logger)
     return logger
 
 
@@ -95,19 +97,12 @@ def _base() -> str:
 
 
 def _run_name() -> str:
-    import socket
-    from datetime import datetime
-
     return f"{datetime.now():%Y-%m-%d-%H-%M-%S-%f}-{socket.gethostname()}-{os.getpid()}"
 
 
 def __getattr__(name: str) -> Any:
     if name == "LaunchLogger":
-        import logging
-
         return logging.getLoggerClass()
     if name == "handlers":
-        from importlib import import_module
-
         return import_module(f"{__name__}.handlers")
     raise AttributeError(f"module 'launch.logging' has no attribute {name!r}")

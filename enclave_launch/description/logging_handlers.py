@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import logging.handlers
-
-from enclave_launch.boundary.light import Any
+from typing import Any
 
 StreamHandler = logging.StreamHandler
 FileHandler = logging.FileHandler
 
 
 def with_per_logger_formatting(cls: type[Any]) -> type[Any]:
-    """A handler class with ``setFormatterFor(logger, formatter)``."""
+    """Derive a handler class with ``setFormatterFor(logger, formatter)``."""
 
     class PerLogger(cls):  # type: ignore[misc]
         def __init__(self, *args: Any, **kwargs: Any) -> None:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any
 
-from enclave_launch.boundary.light import Any
 from enclave_launch.description.argument_types import ensure_argument_type
 from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.description.substitution import (
@@ -55,12 +55,12 @@ def validate_namespace(namespace: str) -> None:
 
 
 def is_root_namespace(ns: str) -> bool:
-    """Is it ``/``?"""
+    """Return True for ``/``."""
     return ns == "/"
 
 
 def is_namespace_absolute(ns: str) -> bool:
-    """Does it begin with ``/``?"""
+    """Return True if it begins with ``/``."""
     return ns.startswith("/")
 
 
@@ -75,7 +75,7 @@ def add_node_name(context: LaunchContext, node_name: str) -> None:
 
 
 def get_node_name_count(context: LaunchContext, node_name: str) -> int:
-    """How many nodes with this fully qualified name were counted."""
+    """Return how many nodes with this fully qualified name were counted."""
     return _counts(context)[node_name]
 
 
@@ -91,7 +91,7 @@ def warn_about_repeats(context: LaunchContext, node_name: str, started_by: str) 
 
 
 def _counts(context: LaunchContext) -> Counter[str]:
-    """The table lives in the context's globals, where third-party code may look for it."""
+    """Return the table of counts, from the context's globals, where third-party code may look for it."""
     counts: Counter[str] | None = getattr(context.locals, _GLOBAL, None)
     if counts is None:
         counts = Counter()
@@ -156,5 +156,5 @@ def performed_remaps(rules: Iterable[Sequence[Any]], context: LaunchContext) -> 
 
 
 def placed(rule: Sequence[str], default: SourceLocation, word: int | None = None) -> ResolvedRule:
-    """The value that policies are derived from; ``default`` is where a plain pair counts as written."""
+    """Return the value that policies are derived from; ``default`` is the place of a plain pair."""
     return ResolvedRule(rule[0], rule[1], getattr(rule, "location", None) or default, word)

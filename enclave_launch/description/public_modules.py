@@ -9,10 +9,11 @@ import sys
 from collections.abc import Iterable
 from functools import cache
 from importlib import import_module
+from importlib.abc import Loader
 from importlib.machinery import ModuleSpec
 from types import ModuleType
+from typing import Any, NamedTuple
 
-from enclave_launch.boundary.light import Any, NamedTuple, cast
 from enclave_launch.description.upstream_paths import GATES, PATHS
 from enclave_launch.host.current import current_release
 
@@ -35,14 +36,14 @@ class UpstreamModule(NamedTuple):
 
 
 def exists(name: str) -> bool:
-    """Is ``name`` (``launch.actions.node``) a module of the table?"""
+    """Return True if ``name`` (``launch.actions.node``) is a module of the table."""
     package, _, leaf = name.rpartition(".")
     return name in PATHS or leaf in PATHS.get(package, ())
 
 
 @cache
 def public_module(name: str) -> ModuleType:
-    """The module of that name; always the same object."""
+    """Return the module of that name; always the same object."""
     module = ModuleType(name, f"API of upstream's ``{name}``; see ``enclave_launch.description``.")
     names = _names_of(name)
     below = _modules_below(name)
@@ -70,7 +71,7 @@ def public_module(name: str) -> ModuleType:
     return module
 
 
-class _Loader:
+class _Loader(Loader):
     """Gives the module that the table describes, the same object each time."""
 
     def create_module(self, spec: ModuleSpec) -> ModuleType:
@@ -83,12 +84,12 @@ class _Loader:
 
 
 def spec_of(name: str) -> ModuleSpec | None:
-    """What the import system asks for; ``None`` for a module that the table has not."""
-    return ModuleSpec(name, cast(Any, _Loader())) if exists(name) else None
+    """Return the spec that the import system asks for; None for a module that is not in the table."""
+    return ModuleSpec(name, _Loader()) if exists(name) else None
 
 
 def hidden_modules(name: str) -> Iterable[str]:
-    """The modules below package ``name`` that a name of the package hides.
+    """Return the modules below package ``name`` that a name of the package hides.
 
     Importing one later would bind it in its package, over the function (``launch_ros.utilities.evaluate_parameters``).
     """
@@ -97,7 +98,7 @@ def hidden_modules(name: str) -> Iterable[str]:
 
 
 def _names_of(name: str) -> dict[str, str]:
-    """Each name of the module and the module of ours that has it."""
+    """Return each name of the module and the module of ours that has it."""
     if name in PATHS:
         rows = [_row(text) for text in PATHS[name].values()]
         names = {shared: row.module for row in rows for shared in row.shared}

@@ -7,8 +7,9 @@ never does: what would be asked of the node is recorded as a ``LauncherCall`` in
 from __future__ import annotations
 
 import os
+import threading
+from typing import Any
 
-from enclave_launch.boundary.light import Any
 from enclave_launch.description import read_only
 from enclave_launch.description.events.handlers import OnShutdown
 from enclave_launch.description.launch_context import LaunchContext
@@ -32,8 +33,6 @@ class ROSAdapter:
         """Raises ``RuntimeError`` when already started, ``ImportError`` without rclpy."""
         if self.ros_node is not None:
             raise RuntimeError("Cannot start a ROS adapter that is already running")
-        import threading
-
         import rclpy
         from rclpy.executors import SingleThreadedExecutor
 
@@ -61,7 +60,7 @@ class ROSAdapter:
 
 
 def get_ros_adapter(context: LaunchContext) -> ROSAdapter:
-    """The adapter of this launch, made on first use and shut down with it."""
+    """Return the adapter of this launch, made on first use and shut down with it."""
     adapter: ROSAdapter | None = getattr(context.locals, "ros_adapter", None)
     if adapter is None:
         adapter = started = ROSAdapter()
@@ -71,5 +70,5 @@ def get_ros_adapter(context: LaunchContext) -> ROSAdapter:
 
 
 def get_ros_node(context: LaunchContext) -> Any:
-    """The rclpy node of this launch."""
+    """Return the rclpy node of this launch."""
     return get_ros_adapter(context).ros_node

@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from types import ModuleType
+from typing import TYPE_CHECKING
 
-from enclave_launch.boundary.light import TYPE_CHECKING
 from enclave_launch.description import read_only
 from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.description.markup.parser import (
@@ -18,7 +18,7 @@ from enclave_launch.description.substitution import (
     normalize_to_list_of_substitutions,
     perform_substitutions,
 )
-from enclave_launch.frontend import error_location
+from enclave_launch.frontend import error_location, python_file
 from enclave_launch.host.current import current_host
 
 if TYPE_CHECKING:
@@ -30,6 +30,7 @@ class LaunchDescriptionSource:
     """Loads its description once, when first asked with a context. Subclasses say how."""
 
     method: str = ""
+    is_file = False  # its location is the path of a launch file
 
     def __init__(
         self,
@@ -58,7 +59,7 @@ class LaunchDescriptionSource:
             return None
 
     def location_without_context(self) -> str | None:
-        """The path, performed in an empty context; ``None`` when it cannot, or when there is nothing to load."""
+        """Return the path, performed in an empty context; None if that fails, or if there is nothing to load."""
         if self.__launch_description is not None:
             return None
         try:
@@ -67,13 +68,13 @@ class LaunchDescriptionSource:
             return None
 
     def expand(self, context: LaunchContext) -> str:
-        """The path, performed at the first call."""
+        """Return the path, performed at the first call."""
         if self.__expanded_location is None:
             self.__expanded_location = perform_substitutions(context, self.__location)
         return self.__expanded_location
 
     def get_launch_description(self, context: LaunchContext) -> LaunchDescription:
-        """The description, loaded if necessary."""
+        """Return the description, loaded if necessary."""
         location = self.expand(context)
         if self.__launch_description is None:
             known = context.host.loads.take(self, location)
@@ -90,7 +91,7 @@ class LaunchDescriptionSource:
 
     @property
     def location(self) -> str:
-        """The path once it is known, before that its substitutions as text."""
+        """Return the path once it is known, before that its substitutions as text."""
         if self.__expanded_location is None:
             return " + ".join(str(sub) for sub in self.__location)
         return self.__expanded_location
@@ -102,8 +103,6 @@ class InvalidPythonLaunchFileError(Exception):
 
 def load_python_launch_file_as_module(python_launch_file_path: str) -> ModuleType:
     """Execute the file as a module that ``sys.modules`` does not hold; raises whatever it raises."""
-    from enclave_launch.frontend import python_file
-
     return python_file.run(python_launch_file_path, allowed=not current_host().no_python)
 
 
@@ -113,11 +112,11 @@ def get_launch_description_from_python_launch_file(python_launch_file_path: str)
     Raises ``InvalidPythonLaunchFileError`` without that function, ``PythonRefused`` under ``--no-python``,
     and whatever the file raises, with the place in the file noted on it (``error_location``).
     """
-    outcomes = current_host().outcomes
-    if outcomes is None:
+    results = current_host().user_code_results
+    if results is None:
         return _run_python_launch_file(python_launch_file_path)
     key = ("python file", os.path.abspath(python_launch_file_path))
-    return outcomes.call(key, lambda: _run_python_launch_file(python_launch_file_path))
+    return results.call(key, lambda: _run_python_launch_file(python_launch_file_path))
 
 
 def _run_python_launch_file(python_launch_file_path: str) -> LaunchDescription:
@@ -130,8 +129,6 @@ def _run_python_launch_file(python_launch_file_path: str) -> LaunchDescription:
             )
         description: LaunchDescription = module.generate_launch_description()
     except Exception as error:  # foreign code may raise anything; it goes on, with its place noted
-        from enclave_launch.frontend import python_file
-
         error_location.mark_at(error, python_file.user_frame(error, python_launch_file_path))
         raise
     return description
@@ -178,6 +175,8 @@ def get_launch_description_from_any_launch_file(
 class PythonLaunchDescriptionSource(LaunchDescriptionSource):
     """Runs the file; its own exceptions come out unchanged."""
 
+    is_file = True
+
     def __init__(self, launch_file_path: SomeSubstitutionsType) -> None:
         super().__init__(None, launch_file_path, "interpreted python launch file")
 
@@ -187,6 +186,8 @@ class PythonLaunchDescriptionSource(LaunchDescriptionSource):
 
 class FrontendLaunchDescriptionSource(LaunchDescriptionSource):
     """Any front end may read the file. ``parser`` is accepted and, as upstream, not used."""
+
+    is_file = True
 
     def __init__(
         self,
@@ -205,6 +206,8 @@ class FrontendLaunchDescriptionSource(LaunchDescriptionSource):
 class AnyLaunchDescriptionSource(LaunchDescriptionSource):
     """Tries the loaders in the order that the file name suggests. A relative path starts at the current
     working directory."""
+
+    is_file = True
 
     def __init__(self, launch_file_path: SomeSubstitutionsType) -> None:
         super().__init__(None, launch_file_path, "interpreted launch file")

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import collections.abc
 from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
 
-from enclave_launch.boundary.files import MEBIBYTE
-from enclave_launch.boundary.light import TYPE_CHECKING, Any
+from enclave_common.files import MEBIBYTE
 from enclave_launch.host.current import current_release
 from enclave_launch.host.user_code import is_users, once
 from enclave_launch.ros_rules.distro import Feature
@@ -67,18 +67,18 @@ SomeSubstitutionsType = str | Substitution | collections.abc.Iterable[str | Subs
 SomeSubstitutionsType_types_tuple = (str, Substitution, collections.abc.Iterable)
 
 
-def perform_substitutions(context: LaunchContext, subs: Iterable[Substitution]) -> str:
+def perform_substitutions(context: LaunchContext, subs: Iterable[Substitution], limit: int = MAX_TEXT) -> str:
     """Perform each and concatenate.
 
-    Raises ``TypeError`` where one does not give text, ``SubstitutionFailure`` for more than ``MAX_TEXT`` characters.
+    Raises ``TypeError`` where one does not give text, ``SubstitutionFailure`` for more than ``limit`` characters.
     """
     if type(subs) is list and len(subs) == 1:
         text = subs[0].perform(context)
         text = text if type(text) is str else "".join((text,))
     else:
         text = "".join([sub.perform(context) for sub in subs])
-    if len(text) > MAX_TEXT:
-        raise SubstitutionFailure(f"substitutions give a text of more than {MAX_TEXT} characters")
+    if len(text) > limit:
+        raise SubstitutionFailure(f"substitutions give a text of more than {limit} characters")
     return text
 
 
@@ -110,10 +110,10 @@ def _normalize(item: object) -> Substitution:
 
 
 def _is_path(value: object) -> bool:
-    """Is it a ``pathlib`` path, on a distribution that takes one for text?"""
+    """Return True for a ``pathlib`` path, on a distribution that takes one for text."""
     return hasattr(value, "joinpath") and current_release().has(Feature.PATHLIB_IS_TEXT)
 
 
 def _is_substitution(value: object) -> bool:
-    """Is it a substitution, or a class of substitutions, which upstream takes as well?"""
+    """Return True for a substitution, or a class of substitutions, which upstream takes as well."""
     return isinstance(value, Substitution) or (isinstance(value, type) and issubclass(value, Substitution))

@@ -12,17 +12,17 @@ lists of substitutions, to be performed when the action is executed.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from inspect import Parameter, Signature
 from operator import attrgetter
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any, ClassVar, NamedTuple
 from enclave_launch.description.entity import Action
 from enclave_launch.description.substitution import Substitution, normalize_to_list_of_substitutions
 
 if TYPE_CHECKING:
     import inspect
 
-    from enclave_launch.description.markup.entity import Entity
-    from enclave_launch.description.markup.parser import Parser
+    from enclave_launch.description.markup.entity import Entity, Parser
     from enclave_launch.description.substitution import SomeSubstitutionsType
 
 _REQUIRED: Any = object()
@@ -39,7 +39,7 @@ class Template(NamedTuple):
     data_type: Any
 
     def parse(self, name: str, entity: Entity, parser: Parser) -> Any:
-        """The constructor argument that ``entity`` gives, ``None`` without one."""
+        """Parse the constructor argument that ``entity`` gives; None without one."""
         if self.attribute == "":
             return None
         attribute = self.attribute or name
@@ -82,8 +82,6 @@ class _Signature:
     """``inspect.signature`` of a class whose constructor comes from its declarations; made when it is asked for."""
 
     def __get__(self, instance: object, owner: type[_Templates]) -> inspect.Signature:
-        from inspect import Parameter, Signature
-
         if owner.__init__ not in (TemplateAction.__init__, TemplateSubstitution.__init__):
             raise AttributeError("__signature__")
         parameters = [
@@ -199,5 +197,5 @@ class TemplateSubstitution(_Templates, Substitution):
 
 
 def described(substitutions: Sequence[Substitution]) -> str:
-    """The descriptions joined as upstream joins them: ``'a' + LaunchConfig('b')``."""
+    """Join the descriptions as upstream does: ``'a' + LaunchConfig('b')``."""
     return " + ".join([sub.describe() for sub in substitutions])

@@ -10,15 +10,15 @@ Allowed are ``int``, ``float``, ``bool``, ``str`` and uniform ``List``s of them.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any, List  # noqa: UP035  (upstream names typing.List)
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any
+from enclave_common.yaml_reader import load_yaml
 from enclave_launch.description.argument_types import ensure_argument_type
 from enclave_launch.description.substitution import (
     Substitution,
     normalize_to_list_of_substitutions,
     perform_substitutions,
 )
-from enclave_launch.frontend import yaml_scalar
 from enclave_launch.host.current import current_release
 from enclave_launch.ros_rules.distro import Feature
 
@@ -30,16 +30,14 @@ ScalarTypesTuple = (int, float, bool, str)
 
 
 def is_typing_list(data_type: Any) -> bool:
-    """Whether ``data_type`` is ``typing.List`` or a subscription of it or of ``list``."""
-    from typing import List  # noqa: UP035  (upstream names typing.List)
-
+    """Return True if ``data_type`` is ``typing.List`` or a subscription of it or of ``list``."""
     return data_type is List or (  # noqa: UP006
         getattr(data_type, "__origin__", None) is list and hasattr(data_type, "__args__")
     )
 
 
 def is_valid_scalar_type(data_type: Any) -> bool:
-    """Whether ``data_type`` is one of ``ScalarTypesTuple``."""
+    """Return True if ``data_type`` is one of ``ScalarTypesTuple``."""
     return data_type in ScalarTypesTuple
 
 
@@ -54,7 +52,7 @@ def extract_type(data_type: Any) -> tuple[Any, bool]:
 
 
 def is_instance_of_valid_type(value: Any, *, can_be_str: bool = False) -> bool:
-    """Whether ``value`` is an allowed scalar or a uniform list, with ``can_be_str`` also mixed with text.
+    """Return True for an allowed scalar or a uniform list, with ``can_be_str`` also mixed with text.
 
     The first item that is not text decides the type; a bool passes as int but not the other way round.
     """
@@ -70,7 +68,7 @@ def is_instance_of_valid_type(value: Any, *, can_be_str: bool = False) -> bool:
 
 
 def is_instance_of(value: Any, data_type: Any = None, *, can_be_str: bool = False) -> bool:
-    """Whether ``value`` is a ``data_type`` (``None``: any allowed type), or text where ``can_be_str``."""
+    """Return True for a ``data_type`` (None: any allowed type), or for text if ``can_be_str``."""
     if data_type is None:
         return is_instance_of_valid_type(value, can_be_str=can_be_str)
     scalar_type, is_list = extract_type(data_type)
@@ -108,7 +106,7 @@ def _from_yaml(value: str, complaint: str, can_be_str: bool) -> Any:
     if not value:
         return value
     try:
-        result = yaml_scalar.load(value)
+        result = load_yaml(value)
     except Exception as error:  # PyYAML also lets ValueError, OverflowError and others of its converters out
         if can_be_str:
             return value
@@ -139,7 +137,7 @@ def _bool_from_yaml(value: str, can_be_str: bool) -> Any:
 
 
 def coerce_list(value: list[str], data_type: Any = None, *, can_be_str: bool = False) -> Any:
-    """Each text of a list -> scalar ``data_type``; ``ValueError`` when the result is not uniform."""
+    """Convert each text of a list to ``data_type``. Raises ``ValueError`` if the result is not uniform."""
     ensure_argument_type(value, list, "value", "coerce_list")
     result = [coerce_to_type(item, data_type, can_be_str=can_be_str) for item in value]
     if not is_instance_of_valid_type(result, can_be_str=can_be_str):
@@ -159,7 +157,7 @@ def get_typed_value(value: str | list[str], data_type: Any, *, can_be_str: bool 
 
 
 def is_substitution(x: Any) -> bool:
-    """Whether ``x`` is a substitution, or a mix of text and at least one substitution."""
+    """Return True for a substitution, or a mix of text and at least one substitution."""
     if isinstance(x, Substitution):
         return True
     if not isinstance(x, Iterable) or len(x) == 0:  # type: ignore[arg-type]  # as upstream: needs a length
@@ -174,7 +172,7 @@ def is_substitution(x: Any) -> bool:
 
 
 def is_normalized_substitution(x: Any) -> bool:
-    """Whether ``x`` is a non-empty list of substitutions only."""
+    """Return True for a non-empty list of substitutions only."""
     return isinstance(x, list) and len(x) > 0 and all(isinstance(item, Substitution) for item in x)
 
 

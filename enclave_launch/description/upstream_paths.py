@@ -90,9 +90,9 @@ PATHS: dict[str, dict[str, str]] = {
         "on_action_event_base": "events.handlers: | OnActionEventBase",
         "on_execution_complete": "events.handlers: OnExecutionComplete",
         "on_include_launch_description": "events.handlers: OnIncludeLaunchDescription",
-        "on_process_exit": "events.process_handlers: OnProcessExit",
-        "on_process_io": "events.process_handlers: OnProcessIO",
-        "on_process_start": "events.process_handlers: OnProcessStart",
+        "on_process_exit": "actions.processes: OnProcessExit",
+        "on_process_io": "actions.processes: OnProcessIO",
+        "on_process_start": "actions.processes: OnProcessStart",
         "on_shutdown": "events.handlers: OnShutdown",
     },
     "launch.events": {

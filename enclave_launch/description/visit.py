@@ -1,22 +1,27 @@
-"""The depth-first walk over a description, without recursion so that depth costs no stack.
+"""Visit a description depth-first, and let handlers answer events.
 
-Each entity is visited, then all that its visit gave, then its next sibling.
+The walk takes no recursion, so that depth costs no stack: each entity is visited, then all that its visit gave, then
+its next sibling. Events are handled one at a time, by every handler that matches.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator
+from typing import TYPE_CHECKING, Any
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any
-from enclave_launch.description.actions.includes import IncludeLaunchDescription, OpenFile, opened
+from enclave_launch.description.actions.includes import IncludeLaunchDescription, opened
+from enclave_launch.description.entity import LaunchDescriptionEntity
 from enclave_launch.description.location import annotate, includes_below
 
 if TYPE_CHECKING:
-    from enclave_launch.description.entity import LaunchDescriptionEntity
-    from enclave_launch.description.launch_context import LaunchContext
+    from enclave_launch.description.events.event import Event
+    from enclave_launch.description.events.queue import Handler
+    from enclave_launch.description.launch_context import LaunchContext, OpenFile
 
 
-Surroundings = tuple[tuple[str, ...], tuple[OpenFile, ...]]
+AND_THEN = ", then "  # between an event and the one that it led to
+
+Surroundings = tuple[tuple[str, ...], "tuple[OpenFile, ...]"]
 
 
 def visit_all(entity: LaunchDescriptionEntity, context: LaunchContext) -> list[Any]:
@@ -29,7 +34,7 @@ def visit_all(entity: LaunchDescriptionEntity, context: LaunchContext) -> list[A
     before = context.unfolded
     stack: list[tuple[Iterator[LaunchDescriptionEntity], Surroundings]] = [(iter((entity,)), outside)]
     current: LaunchDescriptionEntity | None = entity
-    outcomes = context.host.outcomes
+    results = context.host.user_code_results
     try:
         while stack:
             siblings, (context.includes, context.open_files) = stack[-1]
@@ -38,8 +43,8 @@ def visit_all(entity: LaunchDescriptionEntity, context: LaunchContext) -> list[A
                 stack.pop()
                 continue
             context.count_unfolded(1)
-            if outcomes is not None and not current.built_by_front_end:
-                outcomes.remember_state(current)
+            if results is not None and not current.built_by_front_end:
+                results.remember_state(current)
             sub_entities = current.visit(context)
             future = current.get_asyncio_future()
             if future is not None:
@@ -66,3 +71,46 @@ def visit_all_entities_and_collect_futures(
 ) -> list[tuple[LaunchDescriptionEntity, Any]]:
     """Visit ``entity`` and all below; give each entity that goes on, with its future."""
     return visit_all(entity, context)
+
+
+def handle_next(context: LaunchContext, describe: Callable[[Handler, Event], str | None]) -> list[Any]:
+    """Take one event from the queue through all its handlers; give the futures of what was begun.
+
+    ``describe`` names a handler's turn for ``context.on_event`` (``None``: as the event's own mark).
+    """
+    event, mark = context._event_queue.get_nowait()
+    futures: list[Any] = []
+    for handler in context._event_handlers.matching(event):
+        futures.extend(run_handler(context, handler, event, chain(mark, describe(handler, event))))
+    return futures
+
+
+def run_handler(context: LaunchContext, handler: Handler, event: Event, mark: str | None) -> list[Any]:
+    """Let one handler answer ``event``: its entities are visited with the event's own locals."""
+    before = context.on_event
+    context._push_locals()
+    context.on_event = mark
+    try:
+        futures: list[Any] = []
+        for entity in _entities(handler.handle(event, context)):
+            futures.extend(visit_all(entity, context))
+        return futures
+    finally:
+        context.on_event = before
+        context._pop_locals()
+
+
+def _entities(result: Any) -> Iterable[Any]:
+    for entity in result if isinstance(result, Iterable) else (result,):
+        if entity is None:
+            continue
+        if not isinstance(entity, LaunchDescriptionEntity):
+            raise RuntimeError(f"expected a LaunchDescriptionEntity from event_handler, got '{entity}'")
+        yield entity
+
+
+def chain(mark: str | None, next_mark: str | None) -> str | None:
+    """``timer 2`` inside ``OnProcessExit a-1`` is ``OnProcessExit a-1, then timer 2``."""
+    if mark is None or next_mark is None:
+        return mark or next_mark
+    return f"{mark}{AND_THEN}{next_mark}"

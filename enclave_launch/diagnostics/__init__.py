@@ -7,12 +7,16 @@ SARIF), tests compare it. Whether it stops ``--secure`` is said by the list it s
 
 from __future__ import annotations
 
-from enclave_launch.boundary.light import NamedTuple, TextEnum
+from enum import Enum
+from typing import NamedTuple
+
 from enclave_launch.source_location import SourceLocation
 
 
-class Code(TextEnum):
+class Code(str, Enum):
     """Stable names, for programs; ``meaning`` says what all diagnostics of a code have in common."""
+
+    __str__ = str.__str__
 
     meaning: str
 
@@ -29,6 +33,7 @@ class Code(TextEnum):
     )
     INCLUDE_LEFT_OUT = "include-left-out", "An included file belongs to a package that is not installed"
     LAUNCH_FILE_DEPRECATED = "launch-file-deprecated", "A launch description calls itself deprecated"
+    ROS_TIMER_ON_WALL_TIME = "ros-timer-on-wall-time", "A timer on simulated time fires on wall time"
     LOG_LEVEL_MISSING = "log-level-missing", "The action log needs a level since this distribution"
     NODE_NAME_REPEATED = "node-name-repeated", "Several nodes have the same fully qualified name"
     NOT_FORESEEABLE = "not-foreseeable", "An action only exists once a callback has run"
@@ -92,6 +97,7 @@ class Code(TextEnum):
 
     def __new__(cls, value: str, meaning: str = "") -> Code:
         code = str.__new__(cls, value)
+        code._value_ = value
         code.meaning = meaning
         return code
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from enclave_launch.boundary.words import some_of
+from enclave_common.words import some_of
 from enclave_launch.diagnostics import Code, Diagnostic
 from enclave_launch.source_location import SourceLocation
 

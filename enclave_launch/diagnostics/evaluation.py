@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from enclave_launch.boundary.terminal import quoted
-from enclave_launch.boundary.words import did_you_mean
+from enclave_common.terminal import quoted
+from enclave_common.words import did_you_mean
 from enclave_launch.diagnostics import Code, Diagnostic
 from enclave_launch.source_location import SourceLocation
 
@@ -48,6 +48,16 @@ def log_level_missing() -> Diagnostic:
     return Diagnostic(
         Code.LOG_LEVEL_MISSING, "log", "the action log now expects a level; log_info is the one without"
     )
+
+
+def ros_timer_on_wall_time(seconds: float, location: SourceLocation | None) -> Diagnostic:
+    """Report that launch's own clock was set to simulated time, which a timer does not follow here."""
+    text = (
+        f"set_use_sim_time was asked for: real launch waits {seconds:g} s of the simulated time on /clock, "
+        f"here the timer fires after {seconds:g} s of wall time"
+    )
+    remedy = "use an event instead (on_exit, on_output), or a period that is right on wall time"
+    return Diagnostic(Code.ROS_TIMER_ON_WALL_TIME, "ros_timer", text, location, remedy)
 
 
 def node_name_repeated(node: str, count: int, started_by: str) -> Diagnostic:

@@ -1,4 +1,4 @@
-"""Plan and graph → findings. Pure.
+"""Plan and graph → findings.
 
 A node is known by its final name, its process by what DDS-Security proves: the GUID of a secured participant begins
 with a hash of its certificate's subject, so a table of the keystore's certificates says which enclave it is in.
@@ -7,11 +7,12 @@ with a hash of its certificate's subject, so a table of the keystore's certifica
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import product
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
+from enclave_common.words import counted
 from enclave_launch.drift.expected import Expected, ExpectedNode
 from enclave_launch.drift.finding import DriftFinding, FindingCertainty, Kind, Level, finding
 from enclave_launch.policy.derivation import LIST_NAMES
@@ -25,6 +26,10 @@ from nodl.graph.wire_names import ros_type
 from nodl.node_interface import EndpointKind
 
 _TOPICS = (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION)
+_REACH_IT = (
+    "look where it talks: with ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST if its nodes use the loopback interface only, "
+    "else with its ROS_DOMAIN_ID, ROS_STATIC_PEERS and CYCLONEDDS_URI"
+)
 _OR_PLAN_IT = "or plan it: in the launch file or its manifests; or accept it"
 
 
@@ -48,10 +53,25 @@ class Circumstances(NamedTuple):
 
 
 def compare(
-    expected: Expected, graph: Graph, circumstances: Circumstances | None = None
+    expected: Expected,
+    graph: Graph,
+    circumstances: Circumstances | None = None,
+    enclaves_now: Callable[[], Mapping[int, str]] | None = None,
 ) -> list[DriftFinding]:
-    """Every difference, in the order of processes and names."""
-    return list(_Comparison(expected, graph, circumstances or Circumstances()).findings())
+    """List every difference, in the order of processes and names.
+
+    ``enclaves_now`` reads the table of enclaves again: one that is made while somebody watches is not of another CA.
+    """
+    given = circumstances or Circumstances()
+    found = list(_Comparison(expected, graph, given).findings())
+    if (
+        given.security is None
+        or enclaves_now is None
+        or all(each.kind is not Kind.OTHER_CA for each in found)
+    ):
+        return found
+    now = given.security._replace(enclaves=enclaves_now())
+    return list(_Comparison(expected, graph, given._replace(security=now)).findings())
 
 
 class _Comparison:
@@ -68,10 +88,42 @@ class _Comparison:
     def findings(self) -> Iterator[DriftFinding]:
         for text in self._forged:
             yield finding(Kind.FORGED_LIST, text.split()[1], text)
+        hidden = self._out_of_sight()
+        if hidden is not None:
+            yield hidden
+            for process in self._processes:
+                facts = self._unproved(process) if self._security else ()
+                yield from (each for each in facts if each.kind is not Kind.NOT_AUTHENTICATED)
+            return
         for process in self._processes:
             yield from self._of_process(process)
         yield from self._counts()
         yield from self._meeting()
+
+    def _out_of_sight(self) -> DriftFinding | None:
+        """Return why the observer cannot compare: no node and no endpoint of a program is visible to it."""
+        if not any(node.always for node in self._expected.nodes.values()):
+            return None
+        if any(process.nodes or any(process.endpoints) for process in self._processes):
+            return None
+        participants = counted(len(self._processes), "participant")
+        if self._security is not None and not self._security.authenticated:
+            text = "the observer is in no enclave, so no secured participant shows it what it has"
+            remedy = "give --enclave, of a tool enclave made with secure-keystore tool-enclave KEYSTORE --for observe"
+        elif not self._processes:
+            text = "no participant was discovered in this domain"
+            remedy = f"if the launch runs, {_REACH_IT}"
+        else:
+            text = f"{participants} discovered, and nothing of what they have"
+            remedy = _REACH_IT
+            if self._security is None:
+                remedy += "; if the system is secured, give --keystore and --enclave"
+            else:
+                remedy += (
+                    "; or the observer's enclave is not trusted there: another CA, revoked, other governance"
+                )
+        found = finding(Kind.OUT_OF_SIGHT, "", text, remedy=remedy)
+        return found._replace(level=Level.CANNOT_TELL)
 
     def _is_accepted(self, node: GraphNode) -> bool:
         return any(covers(pattern, node.fqn) for pattern in self._accepted)
@@ -135,15 +187,24 @@ class _Comparison:
         return self._about(kind, process, text, names, enclave=enclave, remedy=f"stop it, {_OR_PLAN_IT}")
 
     def _nameless(self, process: GraphProcess, enclave: str) -> DriftFinding:
-        """Without endpoints it can do nothing: an observer, or what is just starting."""
+        """Report a participant without nodes.
+
+        One that shows only the middleware's own endpoints is a note: an observer, or a program that is starting. One
+        that shows none at all may have any.
+        """
         topics = sorted({endpoint.topic for endpoint in process.endpoints})
-        has = f"with {', '.join(topics[:5])}" if topics else "without endpoints"
-        text = f"a participant {has} is not planned"
+        if topics:
+            text = f"a participant with {', '.join(topics[:5])} is not planned"
+        elif process.visible:
+            text = "a participant without endpoints is not planned"
+        else:
+            text = "a participant is not planned, and this observer sees none of its endpoints"
         found = self._about(Kind.UNPLANNED_PROCESS, process, text, enclave=enclave)
         if topics and process.participant.pid in self._strangers:
             # Whatever name it will have, it is not ours.
             return found._replace(certainty=FindingCertainty.FACT)
-        return found if topics or enclave in self._expected.enclaves else found._replace(level=Level.NOTE)
+        harmless = process.visible and not topics and enclave not in self._expected.enclaves
+        return found._replace(level=Level.NOTE) if harmless else found
 
     # one node
 
@@ -217,8 +278,6 @@ class _Comparison:
     # all together
 
     def _counts(self) -> Iterator[DriftFinding]:
-        if self._security is not None and not self._security.authenticated:
-            return  # nobody's nodes are seen
         running = Counter(node.fqn for process in self._processes for node in process.nodes)
         for fqn, planned in sorted(self._expected.nodes.items()):
             count = sum(times for name, times in running.items() if covers(fqn, name))

@@ -1,4 +1,4 @@
-"""One difference between a plan and what runs, and how it is told to people and to monitoring. Pure."""
+"""One difference between a plan and what runs, and how it is reported to people and to monitoring."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from enum import Enum
 from typing import Any, NamedTuple
 
-from enclave_launch.boundary.words import counted
+from enclave_common.words import counted
 from nodl.graph.model import Graph
 
 
@@ -29,15 +29,18 @@ class Kind(str, Enum):
     ENCLAVE_OF_ANOTHER = "enclave-of-another"
     STRANGER = "stranger"
     FORGED_LIST = "forged-list"
+    OUT_OF_SIGHT = "out-of-sight"
 
     def __str__(self) -> str:
         return self.value
 
 
 class Level(str, Enum):
-    """``NOTE``: what descriptions leave open, so that it may be as it should be."""
+    """``CANNOT_TELL``: the observer does not see enough to compare. ``NOTE``: descriptions leave it open, so it may be
+    as planned."""
 
     ALARM = "alarm"
+    CANNOT_TELL = "cannot-tell"
     NOTE = "note"
 
     def __str__(self) -> str:
@@ -77,6 +80,7 @@ _CERTAINTY = {
     Kind.REPEATED_NODE: FindingCertainty.WHEN_SETTLED,
     Kind.MISSING_NODE: FindingCertainty.ABSENCE,
     Kind.MISSING_ENDPOINT: FindingCertainty.ABSENCE,
+    Kind.OUT_OF_SIGHT: FindingCertainty.ABSENCE,
 }
 """Of the kinds that discovery could still take back: nodes are named after participants, and who was killed is there
 until its lease ends (10 s on Cyclone DDS, 20 s on Fast DDS), so that a respawned process overlaps with it."""
@@ -100,19 +104,26 @@ def finding_text(finding: DriftFinding) -> str:
 
 def drift_text(findings: Sequence[DriftFinding], graph: Graph) -> str:
     """A report: what is different, alarms first, and what was looked at."""
-    ordered = sorted(findings, key=lambda each: (each.level is Level.NOTE, each.kind.value, each.subject))
+    levels = list(Level)
+    ordered = sorted(findings, key=lambda each: (levels.index(each.level), each.kind.value, each.subject))
     seen = f"{len(graph.processes)} participants, {sum(1 for _ in graph.nodes)} nodes"
     alarms = sum(each.level is Level.ALARM for each in findings)
-    summary = counted(alarms, "alarm") if alarms else "as planned"
+    if alarms:
+        summary = counted(alarms, "alarm")
+    elif any(each.level is Level.CANNOT_TELL for each in findings):
+        summary = "cannot tell whether it is as planned"
+    else:
+        summary = "as planned"
     return "\n".join([*map(finding_text, ordered), f"{summary}; seen: {seen}"]) + "\n"
 
 
 def drift_document(findings: Iterable[DriftFinding], graph: Graph) -> dict[str, Any]:
-    """``drift`` is what the exit status says: whether there is an alarm."""
+    """Build the JSON document. ``drift``: there is an alarm; ``complete``: nothing was out of the observer's sight."""
     rows = [finding_document(each) for each in findings]
     return {
         "version": 1,
         "drift": any(row["level"] == Level.ALARM.value for row in rows),
+        "complete": all(row["level"] != Level.CANNOT_TELL.value for row in rows),
         "participants": len(graph.processes),
         "nodes": sorted(node.fqn for node in graph.nodes),
         "findings": rows,

@@ -16,7 +16,9 @@ Rules, from the design article "ROS 2 Security Enclaves" (section Runtime):
 
 from __future__ import annotations
 
-from enclave_launch.boundary.light import NamedTuple, TextEnum
+from enum import Enum
+from typing import NamedTuple
+
 from enclave_launch.errors import LaunchFileError
 from enclave_launch.process import (
     UNSPECIFIED_NODE_NAME,
@@ -28,8 +30,10 @@ from keystore.errors import EnclaveTooDeep, InvalidEnclaveNameError
 from keystore.formats.enclave_name import validate_enclave_name
 
 
-class EnclaveScope(TextEnum):
+class EnclaveScope(str, Enum):
     """``--enclave-scope``: the enclave of a process whose launch file names none."""
+
+    __str__ = str.__str__
 
     NAMESPACE = "namespace"
     NODE = "node"
@@ -37,8 +41,10 @@ class EnclaveScope(TextEnum):
     LAUNCH = "launch"
 
 
-class AssignmentReason(TextEnum):
+class AssignmentReason(str, Enum):
     """Why a process has its enclave; the value is the text shown in the tree."""
+
+    __str__ = str.__str__
 
     ARGUMENT = "--enclave in its own ROS arguments"
     ABSOLUTE = "absolute enclave attribute"

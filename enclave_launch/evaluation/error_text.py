@@ -9,10 +9,10 @@ from __future__ import annotations
 import os
 import re
 import sys
+from typing import cast
 
-from enclave_launch.boundary.dependencies import missing_dependency
-from enclave_launch.boundary.light import cast
-from enclave_launch.boundary.words import did_you_mean
+from enclave_common.dependencies import missing_dependency
+from enclave_common.words import did_you_mean
 from enclave_launch.description.argument_scan import MISSING_ARGUMENT, REQUIRED_ARGUMENT
 from enclave_launch.description.conditions import InvalidConditionExpressionError
 from enclave_launch.description.launch_context import WatchedConfigurations
@@ -28,7 +28,7 @@ from nodl.ament_index import (
     installed_packages,
 )
 
-_OWN_PACKAGES = ("enclave_launch", "nodl", "keystore", "boundary")
+_OWN_PACKAGES = ("enclave_launch", "nodl", "keystore", "enclave_common")
 
 _TYPE = re.compile(r"'<class '(\w+)'>'")  # upstream's "of type '<class 'str'>'"
 
@@ -38,7 +38,7 @@ _PLACE = re.compile(r": line \d+(, column \d+)?$")  # at the end of what XML par
 
 
 def error_text(error: BaseException) -> str:
-    """One message: what is wrong and, where there is something to do about it, what."""
+    """Return one message: what is wrong and, if something can be done about it, what."""
     error = getattr(error, "orig_exc", error)  # of a template: the complaint of the substitution in it
     text = _PLACE.sub("", _TYPE.sub(r"\1", _text(error).strip()))
     return text + _next_step(error, text) if text else type(error).__name__

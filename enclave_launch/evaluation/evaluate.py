@@ -5,16 +5,20 @@ The visit and the events run against a ``PlanHost``; our process is left as it w
 
 from __future__ import annotations
 
-import gc
 import os
-import sys
+import sysconfig
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
+from typing import TYPE_CHECKING, Any
 
 import enclave_launch
-from enclave_launch.boundary.light import TYPE_CHECKING, Any
-from enclave_launch.boundary.words import did_you_mean
+import keystore
+import nodl
+from enclave_common.words import did_you_mean
+from enclave_launch.description.actions.includes import IncludeLaunchDescription
 from enclave_launch.description.argument_scan import check_is_description
+from enclave_launch.description.events.event import IncludeLaunchDescription as IncludeEvent
+from enclave_launch.description.events.handlers import OnIncludeLaunchDescription
 from enclave_launch.description.install import installed
 from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.description.launch_description import LaunchDescription
@@ -26,9 +30,11 @@ from enclave_launch.description.sources import (
 )
 from enclave_launch.diagnostics.evaluation import argument_unknown
 from enclave_launch.errors import EnclaveLaunchError, LaunchFileError
-from enclave_launch.evaluation.stage import STAGE
-from enclave_launch.frontend import error_location
-from enclave_launch.frontend.fast_yaml import libyaml_for_launch_files
+from enclave_launch.evaluation.active_environment import ENVIRONMENT_SWITCH
+from enclave_launch.evaluation.error_text import error_text
+from enclave_launch.evaluation.explore import Explorer
+from enclave_launch.frontend import error_location, python_file
+from enclave_launch.frontend.libyaml import libyaml_for_launch_files
 from enclave_launch.host.current import active_host
 from enclave_launch.host.environment import environment_untouched
 from enclave_launch.host.plan_host import PlanHost
@@ -40,8 +46,6 @@ if TYPE_CHECKING:
     from enclave_launch.diagnostics import Diagnostic
 
 Arguments = Sequence[tuple[str, str]]
-
-_evaluated = False
 
 
 class EvaluationError(LaunchFileError):
@@ -64,18 +68,14 @@ def evaluate(
 
     Raises ``EvaluationError`` (file, line, element, include chain; ``cause`` is launch's own exception).
     """
-    from enclave_launch.description.events.event import IncludeLaunchDescription
-    from enclave_launch.description.events.handlers import OnIncludeLaunchDescription
-    from enclave_launch.evaluation.explore import Explorer
-
     host = host or PlanHost()
     path = os.path.abspath(launch_file)
-    with evaluation_surroundings(host), _collector_paused():
+    with evaluation_surroundings(host):
         context = LaunchContext(host=host)
         context.launch_configurations.update(launch_configurations or {})
         try:
             context.register_event_handler(OnIncludeLaunchDescription())
-            context.emit_event_sync(IncludeLaunchDescription(top_description(path, arguments)))
+            context.emit_event_sync(IncludeEvent(top_description(path, arguments)))
             Explorer(context, host).run()
             host.warnings.extend(_unknown_arguments(arguments, context.configurations_looked_at))
         except EnclaveLaunchError:
@@ -83,15 +83,13 @@ def evaluate(
         except Exception as error:  # launch files run code of their own: any exception is theirs
             raise _evaluation_error(error, path, host) from error
         finally:
-            if host.outcomes is not None:
-                host.outcomes.stop_listening()
+            if host.user_code_results is not None:
+                host.user_code_results.stop_listening()
     return _evaluation(host)
 
 
 def top_description(path: str, arguments: Arguments) -> Any:
-    """The description that ``ros2 launch`` makes around a file: it includes the file with the arguments."""
-    from enclave_launch.description.actions.includes import IncludeLaunchDescription
-
+    """Build the description that ``ros2 launch`` makes around a file: it includes the file with the arguments."""
     include = IncludeLaunchDescription(AnyLaunchDescriptionSource(path), launch_arguments=arguments)
     include.source_location = None
     return LaunchDescription([include])
@@ -99,7 +97,7 @@ def top_description(path: str, arguments: Arguments) -> Any:
 
 @contextmanager
 def read_description(launch_file: str | os.PathLike[str], host: PlanHost) -> Iterator[LaunchDescription]:
-    """The description in ``launch_file``, loaded but not visited; usable within the block.
+    """Load the description in ``launch_file`` without visiting it; usable within the block.
 
     Raises ``EvaluationError`` as ``evaluate``.
     """
@@ -120,7 +118,7 @@ def evaluation_surroundings(host: Host) -> Iterator[None]:
     """What evaluation needs around it, undone at the end: our packages under their public names, the host in
     place, the environment as it was."""
     with ExitStack() as stack:
-        stack.enter_context(STAGE.cleared())
+        stack.enter_context(ENVIRONMENT_SWITCH.restored())
         stack.enter_context(environment_untouched())
         stack.enter_context(active_host(host))
         stack.enter_context(installed(host.prefixes()))
@@ -129,34 +127,9 @@ def evaluation_surroundings(host: Host) -> Iterator[None]:
         yield
 
 
-@contextmanager
-def _collector_paused() -> Iterator[None]:
-    """Evaluation builds much and drops little: looking for garbage meanwhile only costs time.
-
-    Descriptions are full of cycles, so from the second evaluation of a process on, the one before is cleared
-    away first: memory stays flat. What is left in the end counts as old, or the next new object would have
-    all of it searched.
-    """
-    global _evaluated
-    enabled = gc.isenabled()
-    if enabled and _evaluated:
-        gc.collect()
-    _evaluated = True
-    gc.disable()
-    try:
-        yield
-    finally:
-        if enabled:
-            gc.freeze()
-            gc.unfreeze()  # puts everything into the oldest generation
-            gc.enable()
-
-
 def forget_elements_of_launch_files() -> None:
-    """What a launch file exposed (``expose_action``) is its own."""
-    python_file = sys.modules.get("enclave_launch.frontend.python_file")
-    if python_file is not None:  # else none was run
-        expose.forget(python_file.MODULE_NAME)
+    """Unregister the elements that launch files exposed (``expose_action``)."""
+    expose.forget(python_file.MODULE_NAME)
 
 
 def parse_arguments(words: Sequence[str]) -> list[tuple[str, str]]:
@@ -200,8 +173,6 @@ def _evaluation_error(error: Exception, path: str, host: PlanHost) -> Evaluation
 
 def launch_file_error(error: Exception, path: str) -> EvaluationError:
     """What the visit of the launch file at ``path`` raised, with its place, its include chain and what to do next."""
-    from enclave_launch.evaluation.error_text import error_text
-
     location, helper = _location(error, path)
     where = f" (in {helper.file}:{helper.line})" if helper else ""
     return EvaluationError(error_text(error_location.likeliest(error)) + where, location, error)
@@ -224,12 +195,7 @@ def _location(error: Exception, path: str) -> tuple[SourceLocation, SourceLocati
 
 
 def _user_frame(error: BaseException) -> SourceLocation | None:
-    """The innermost frame that is neither ours nor of the standard library: the user's own."""
-    import sysconfig
-
-    import keystore
-    import nodl
-
+    """Return the innermost frame of the user's own code, neither ours nor of the standard library."""
     packages = (enclave_launch.__file__, nodl.__file__, keystore.__file__)
     ours = tuple(os.path.dirname(os.path.abspath(file)) + os.sep for file in packages if file)
     library = sysconfig.get_paths()["stdlib"]

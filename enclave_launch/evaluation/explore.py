@@ -8,9 +8,10 @@ put back afterwards: one supposition must not colour the next. What a handler st
 
 from __future__ import annotations
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any
+
 from enclave_launch.description.actions.events import EmitEvent
-from enclave_launch.description.events.dispatch import AND_THEN, chain, run_handler
+from enclave_launch.description.actions.processes import OnProcessExit
 from enclave_launch.description.events.event import (
     Event,
     ProcessStarted,
@@ -18,8 +19,11 @@ from enclave_launch.description.events.event import (
     TimerEvent,
     process_event_arguments,
 )
-from enclave_launch.description.events.handlers import BaseEventHandler, EventHandler
+from enclave_launch.description.events.handlers import EventHandler
+from enclave_launch.description.events.queue import Handler
 from enclave_launch.description.location import location_of, place_of
+from enclave_launch.description.visit import AND_THEN, chain, run_handler
+from enclave_launch.evaluation.error_text import error_text
 from enclave_launch.host.user_code import only_acts
 from enclave_launch.process import Reaction, Unforeseeable
 from nodl.ament_index import ExecutableNotInstalledError, PackageNotFoundError
@@ -83,7 +87,7 @@ class Explorer:
         return True
 
     def _leave_open(self, written: object) -> None:
-        """What the chain goes on to start is not followed, since it may have no end."""
+        """Report that the chain of events is not followed further, since it may have no end."""
         what = f"what comes after {_LONGEST_CHAIN} events that each led to the next"
         self._host.unforeseeable(Unforeseeable(what, location_of(written, self._context)))
 
@@ -104,7 +108,7 @@ class Explorer:
         self._kept.append(event)
         self._context._event_queue.put_nowait(event, mark)
 
-    def _run(self, handler: BaseEventHandler, event: Event, mark: str | None) -> None:
+    def _run(self, handler: Handler, event: Event, mark: str | None) -> None:
         self._remember(handler)
         self._note(handler, event)
         mark = chain(mark, _label(handler, event))
@@ -117,11 +121,11 @@ class Explorer:
             return
         run_handler(self._context, handler, event, mark)
 
-    def _remember(self, handler: BaseEventHandler) -> None:
+    def _remember(self, handler: Handler) -> None:
         self._fired.add(id(handler))
         self._kept.append(handler)
 
-    def _note(self, handler: BaseEventHandler, event: Event | None) -> None:
+    def _note(self, handler: Handler, event: Event | None) -> None:
         """For those who carry the plan out without launch: an engine knows nothing of the file's reactions."""
         is_timer = isinstance(event, TimerEvent)
         if handler.internal and not is_timer:
@@ -182,8 +186,6 @@ class Explorer:
 
     def _note_failure(self, event: Event, error: Exception) -> None:
         """A handler that fails would end the launch at that moment; before it, nobody can be sure."""
-        from enclave_launch.evaluation.error_text import error_text
-
         place = place_of(error) or location_of(event, self._context)
         what = f"what {event.name.rpartition('.')[2]} {event.subject()}".rstrip()
         self._host.unforeseeable(Unforeseeable(f"{what} would lead to: {error_text(error)}", place))
@@ -197,11 +199,11 @@ class Explorer:
                 what = f"entities of {type(handler).__name__}, whose event cannot be told"
                 self._host.unforeseeable(Unforeseeable(what, self._place(handler)))
 
-    def _place(self, handler: BaseEventHandler) -> Any:
+    def _place(self, handler: Handler) -> Any:
         return location_of(handler, self._context)
 
 
-def _label(handler: BaseEventHandler, event: Event) -> str | None:
+def _label(handler: Handler, event: Event) -> str | None:
     """``OnProcessExit talker-1``, ``timer 2.5``; ``None`` for what is launch's own working."""
     if isinstance(event, TimerEvent):
         return f"timer {event.subject()}" if handler.internal else None
@@ -212,10 +214,8 @@ def _label(handler: BaseEventHandler, event: Event) -> str | None:
     return f"{name} {event.subject()}".rstrip()
 
 
-def _ends_with(handler: BaseEventHandler) -> str | None:
-    """The process at whose end the handler ends the launch, and does nothing else."""
-    from enclave_launch.description.events.process_handlers import OnProcessExit
-
+def _ends_with(handler: Handler) -> str | None:
+    """Return the process at whose end the handler ends the launch; None if the handler does something else."""
     details = getattr(handler.target, "process_details", None)
     if type(handler) is not OnProcessExit or handler.computes() or not details:
         return None
@@ -227,8 +227,8 @@ def _ends_with(handler: BaseEventHandler) -> str | None:
     return str(details["name"]) if ends and all(ends) else None
 
 
-def _is_ours(handler: BaseEventHandler) -> bool:
-    """Is the callback part of this package, registered by one of its actions?"""
+def _is_ours(handler: Handler) -> bool:
+    """Return True if the callback is part of this package, registered by one of its actions."""
     callback = getattr(handler, "callback", None)
     return getattr(callback, "__module__", "").startswith("enclave_launch.")
 

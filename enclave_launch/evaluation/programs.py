@@ -6,15 +6,15 @@ Looks at the file system; asked before anything starts.
 from __future__ import annotations
 
 import os
+import shutil
 from collections.abc import Iterable
 
-from enclave_launch.boundary.files import is_program
 from enclave_launch.errors import LaunchFileError
 from enclave_launch.process import ResolvedProcess
 
 
 def missing_programs(processes: Iterable[ResolvedProcess]) -> list[tuple[ResolvedProcess, LaunchFileError]]:
-    """Each process whose program cannot be executed, with the error, not raised.
+    """Return each process whose program cannot be executed, with the error, not raised.
 
     The program is the first word of the command, a prefix such as ``gdb`` included. What a shell would run
     is the shell's business.
@@ -42,10 +42,6 @@ def check_programs(processes: Iterable[ResolvedProcess]) -> None:
 
 
 def _can_be_executed(program: str, path: str) -> bool:
-    if os.path.dirname(program):
-        return is_program(program)
-    import shutil  # brings four ways to compress along
-
     return shutil.which(program, path=path) is not None
 
 

@@ -15,7 +15,7 @@ _ATTRIBUTE = "enclave_launch_location"
 
 
 def mark(error: BaseException, entity: object) -> None:
-    """Note that ``error`` came from ``entity``; the innermost, first note is kept.
+    """Record that ``error`` came from ``entity``; the first, innermost record stays.
 
     An error in a template knows its text, not its place: the attribute with that text is searched for.
     """
@@ -28,19 +28,19 @@ def mark(error: BaseException, entity: object) -> None:
 
 
 def mark_at(error: BaseException, location: SourceLocation | None) -> None:
-    """Note the place of ``error`` unless it has one."""
+    """Record the place of ``error`` unless it has one."""
     if location is not None and not hasattr(error, _ATTRIBUTE):
         setattr(error, _ATTRIBUTE, location)
 
 
 def location_of(error: BaseException) -> SourceLocation | None:
-    """The place noted on ``error``, or on the likeliest of the attempts that it lists."""
+    """Return the place recorded on ``error``, or on the likeliest of the attempts that it lists."""
     location: SourceLocation | None = getattr(likeliest(error), _ATTRIBUTE, None)
     return location
 
 
 def likeliest(error: BaseException) -> BaseException:
-    """Of the attempts that an ``InvalidLaunchFileError`` lists, the one to show; else ``error`` itself.
+    """Return the one attempt to show of those that an ``InvalidLaunchFileError`` lists; else ``error`` itself.
 
     The first, because the file name decides the order, unless it says that the text is no XML at all.
     """
@@ -51,7 +51,7 @@ def likeliest(error: BaseException) -> BaseException:
 
 
 def frames(error: BaseException) -> Iterator[TracebackType]:
-    """The steps of the traceback of ``error``, outermost first."""
+    """Yield the steps of the traceback of ``error``, outermost first."""
     step = error.__traceback__
     while step is not None:
         yield step
@@ -59,7 +59,7 @@ def frames(error: BaseException) -> Iterator[TracebackType]:
 
 
 def _is_no_xml(error: BaseException) -> bool:
-    """Whether expat met something else than ``<`` first."""
+    """Return True if expat met something else than ``<`` first."""
     return isinstance(error, SyntaxError) and getattr(error, "code", None) == _XML_ERROR_SYNTAX
 
 

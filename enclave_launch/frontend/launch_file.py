@@ -8,17 +8,15 @@ from __future__ import annotations
 
 import io
 import os
-from collections import OrderedDict
 from collections.abc import Callable
+from functools import lru_cache
+from typing import Any, TextIO, TypeVar
 
-from enclave_launch.boundary.files import check_regular, read_text
-from enclave_launch.boundary.light import Any, TextIO, TypeVar
+from enclave_common.files import check_regular, read_text
 
 MAX_CHARACTERS = 64 * 2**20  # of one launch file; a generated file with 100,000 nodes has about a third
-_MAX_KEPT_CHARACTERS = 32 * 2**20  # text of all kept files; their trees take about ten times that
 
 Tree = TypeVar("Tree")
-Stamp = tuple[str, int, int, int]  # path, device and inode mixed in by ino, mtime in ns, size
 
 
 class LaunchFileTooLarge(ValueError):
@@ -49,18 +47,14 @@ class LaunchFile:
         return result
 
     def open(self) -> TextIO:
-        """The text as a file, for front ends that want one."""
+        """Return the text as a file, for front ends that want one."""
         file = io.StringIO(self.text)
         file.name = self.name  # as a file from open() has it; front ends look at it
         return file
 
 
-_kept: OrderedDict[Stamp, LaunchFile] = OrderedDict()
-_kept_characters = 0
-
-
 def read(file: str | bytes | os.PathLike[str] | TextIO) -> LaunchFile:
-    """The file at a path, from memory while it is unchanged, or the rest of an open file.
+    """Read the file at a path, cached while it is unchanged, or the rest of an open file.
 
     Raises ``OSError``, ``UnicodeDecodeError``, ``LaunchFileTooLarge``.
     """
@@ -68,36 +62,16 @@ def read(file: str | bytes | os.PathLike[str] | TextIO) -> LaunchFile:
         return LaunchFile(str(getattr(file, "name", "")), _limited(file.read()))
     path = os.fsdecode(file)
     status = check_regular(path)
-    stamp = (path, status.st_ino, status.st_mtime_ns, status.st_size)
-    kept = _kept.get(stamp)
-    if kept is not None:
-        _kept.move_to_end(stamp)
-        return kept
-    return _keep(stamp, LaunchFile(path, _read_text(path)))
+    return _version(path, status.st_ino, status.st_mtime_ns, status.st_size)
 
 
-def forget() -> None:
-    """Drop everything kept."""
-    global _kept_characters
-    _kept.clear()
-    _kept_characters = 0
-
-
-def _read_text(path: str) -> str:
-    return _limited(read_text(path, limit=4 * MAX_CHARACTERS))
+@lru_cache(maxsize=256)
+def _version(path: str, *_state: int) -> LaunchFile:
+    """Read one version of a file."""
+    return LaunchFile(path, _limited(read_text(path, limit=4 * MAX_CHARACTERS)))
 
 
 def _limited(text: str) -> str:
     if len(text) > MAX_CHARACTERS:
         raise LaunchFileTooLarge(f"the file has more than {MAX_CHARACTERS} characters")
     return text
-
-
-def _keep(stamp: Stamp, file: LaunchFile) -> LaunchFile:
-    global _kept_characters
-    _kept[stamp] = file
-    _kept_characters += len(file.text)
-    while _kept_characters > _MAX_KEPT_CHARACTERS and len(_kept) > 1:
-        _, dropped = _kept.popitem(last=False)
-        _kept_characters -= len(dropped.text)
-    return file

@@ -11,9 +11,9 @@ from functools import lru_cache
 from importlib.machinery import SourceFileLoader
 from importlib.util import module_from_spec, spec_from_loader
 from types import CodeType, ModuleType
+from typing import Any
 
-from enclave_launch.boundary.files import check_regular, read_bytes
-from enclave_launch.boundary.light import Any
+from enclave_common.files import check_regular, read_bytes
 from enclave_launch.frontend.error_location import frames
 from enclave_launch.source_location import SourceLocation
 
@@ -41,7 +41,7 @@ def run(path: str, *, allowed: bool) -> ModuleType:
 
 
 def user_frame(error: BaseException, path: str) -> SourceLocation | None:
-    """Where in ``path`` the exception came from: the innermost of that file's own frames."""
+    """Return where in ``path`` the exception came from: the innermost of that file's own frames."""
     if isinstance(error, SyntaxError) and error.filename == path:
         return SourceLocation(path, error.lineno or 0)
     lines = [step.tb_lineno for step in frames(error) if step.tb_frame.f_code.co_filename == path]

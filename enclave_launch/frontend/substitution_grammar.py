@@ -1,4 +1,4 @@
-"""The ``$(name arg ...)`` language: text -> ``Template`` -> text. Pure; knows no substitution class.
+"""The ``$(name arg ...)`` language: text -> ``Template`` -> text. Knows no substitution class.
 
 A template is a sequence of texts and calls. An argument is a template again, in one of three contexts:
 
@@ -18,8 +18,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-
-from enclave_launch.boundary.light import NamedTuple, TypeAlias, late_pattern
+from typing import NamedTuple, TypeAlias
 
 MAX_NESTING = 128  # where upstream ends in a RecursionError, too
 
@@ -118,7 +117,7 @@ def called_names(template: Template) -> Iterator[str]:
 
 
 def print_template(template: Template) -> str:
-    """A text that parses to ``template``; ``ValueError`` for one that no text parses to."""
+    """Return a text that parses to ``template``. Raises ``ValueError`` for one that no text parses to."""
     text = "".join(_print_part(part, _TOP) for part in template)
     if parse_template(text) != template:
         raise ValueError(f"no text stands for the template {template!r}")
@@ -135,20 +134,20 @@ class _Context(NamedTuple):
     quote: str = ""
 
 
-_ESCAPED = late_pattern(r"\\(.)")
+_ESCAPED = re.compile(r"\\(.)")
 _NAME_TEXT = r"[A-Za-z][A-Za-z0-9_-]*"
-_NAME = late_pattern(_NAME_TEXT)
-_PLAIN_CALL = late_pattern(rf"""\$\(({_NAME_TEXT})((?: [^ '"\\$()]+)*)\)""")  # most calls; the same anywhere
+_NAME = re.compile(_NAME_TEXT)
+_PLAIN_CALL = re.compile(rf"""\$\(({_NAME_TEXT})((?: [^ '"\\$()]+)*)\)""")  # most calls; the same anywhere
 _DOLLAR = r"\$(?!\()|(?<=\\)\$"  # a dollar that begins no call
 _PARENTHESIS = r"(?<=\\)[()]"
 
-_UNQUOTED_ARGUMENT = late_pattern(rf"""(?:[^ '"\\$()]+|\\["']|{_PARENTHESIS}|{_DOLLAR}|\\)+""")
-_TOP = _Context("substitution", late_pattern(rf"(?:[^$]+|{_DOLLAR})+"), _UNQUOTED_ARGUMENT, may_quote=True)
+_UNQUOTED_ARGUMENT = re.compile(rf"""(?:[^ '"\\$()]+|\\["']|{_PARENTHESIS}|{_DOLLAR}|\\)+""")
+_TOP = _Context("substitution", re.compile(rf"(?:[^$]+|{_DOLLAR})+"), _UNQUOTED_ARGUMENT, may_quote=True)
 _QUOTED = {
     quote: _Context(
         f"{name}_quoted_substitution",
-        late_pattern(rf"(?:[^{quote}\\$]+|\\{quote}|{_DOLLAR}|\\)+"),
-        late_pattern(rf"(?:[^ {quote}\\$()]+|\\{quote}|{_PARENTHESIS}|{_DOLLAR}|\\)+"),
+        re.compile(rf"(?:[^{quote}\\$]+|\\{quote}|{_DOLLAR}|\\)+"),
+        re.compile(rf"(?:[^ {quote}\\$()]+|\\{quote}|{_PARENTHESIS}|{_DOLLAR}|\\)+"),
         may_quote=False,
         quote=quote,
     )

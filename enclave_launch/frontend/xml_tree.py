@@ -1,4 +1,4 @@
-"""The XML of launch files -> elements with line numbers. Pure.
+"""The XML of launch files -> elements with line numbers.
 
 Parsed by expat, as upstream does through ElementTree: same dialect, same messages, right line numbers in long
 files, and less time than lxml takes to build a tree and give it to Python. Unlike ElementTree we keep the
@@ -9,14 +9,15 @@ entity that the file declares must be short, the entities in it included, so tha
 
 from __future__ import annotations
 
+import re
 from functools import partial
+from xml.etree.ElementTree import ParseError
 from xml.parsers import expat
 
-from enclave_launch.boundary.light import late_pattern
-from enclave_launch.boundary.xml_tree import RefusedXml, XmlElement, collect_elements
+from enclave_common.xml_tree import RefusedXml, XmlElement, collect_elements
 
 MAX_ENTITY_LENGTH = 256  # characters of one declared entity
-_REFERENCE = late_pattern("&([^;&#]+);")
+_REFERENCE = re.compile("&([^;&#]+);")
 _PREDEFINED = dict.fromkeys(("lt", "gt", "amp", "apos", "quot"), " ")
 _UNKNOWN = " " * (MAX_ENTITY_LENGTH + 1)
 
@@ -57,14 +58,14 @@ def _check_entity(
 
 
 def _longer(name: str, value: str, declared: dict[str, str]) -> bool:
-    """Whether ``value`` is too long with the entities in it; one that is not declared yet is not known to be plain."""
+    """Return True if ``value`` is too long with the entities in it; one that is not declared yet may be anything."""
     text = _REFERENCE.sub(lambda match: declared.get(match[1], _UNKNOWN), value)
     declared.setdefault(name, text)
     return len(text) > MAX_ENTITY_LENGTH
 
 
 def _refuse_skipped_entity(parser: expat.XMLParserType, name: str, is_parameter: bool) -> None:
-    """An entity that an external DTD might have declared; none is read."""
+    """Refuse an entity that an external DTD might have declared; none is read."""
     if is_parameter:
         return
     position = (parser.CurrentLineNumber, parser.CurrentColumnNumber)
@@ -73,9 +74,7 @@ def _refuse_skipped_entity(parser: expat.XMLParserType, name: str, is_parameter:
 
 
 def _parse_error(message: str, code: int, position: tuple[int, int]) -> SyntaxError:
-    """What ElementTree raises; imported only now, because a good file does not need it."""
-    from xml.etree.ElementTree import ParseError
-
+    """Build the error that ElementTree raises."""
     error = ParseError(message)
     error.code = code
     error.position = position

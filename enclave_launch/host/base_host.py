@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import os
+import random
+import shutil
+import socket
+import subprocess
 import sys
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.diagnostics.evaluation import (
     executable_not_built,
@@ -20,21 +24,21 @@ from enclave_launch.ros_rules.distro import Distro, choose_release
 from nodl import ament_index
 
 if TYPE_CHECKING:
-    from enclave_launch.description.argument_scan import DeclaredArguments
-    from enclave_launch.description.launch_description import LaunchDescription
-    from enclave_launch.description.sources import LaunchDescriptionSource
-    from enclave_launch.host.outcomes import Outcomes
+    from enclave_launch.host.protocol import DescriptionSource, UserCodeResults
+
+
+T = TypeVar("T")
 
 
 class BaseHost:
     """What a dry run and a live run have in common: reading the ament index, running commands, warnings."""
 
-    def __init__(self, options: HostOptions, outcomes: Outcomes | None = None) -> None:
+    def __init__(self, options: HostOptions, user_code_results: UserCodeResults | None = None) -> None:
         named = os.environ.get("ROS_DISTRO")
         self.release = choose_release(options.distro, named, ament_index.search_prefixes())
         self.allow_missing_packages = options.allow_missing_packages
         self.no_python = options.no_python
-        self.outcomes = outcomes
+        self.user_code_results = user_code_results
         self.warnings: list[Diagnostic] = []
         known = [distro.value for distro in Distro]
         if named and not options.distro and named not in known:
@@ -91,8 +95,6 @@ class BaseHost:
         return self.allow_missing_packages and path.startswith(f"{MISSING_PREFIX}/")
 
     def find_program(self, name: str) -> str | None:
-        import shutil
-
         found = shutil.which(name)
         if found is None and self.allow_missing_packages:
             return f"{MISSING_PREFIX}/bin/{name}"
@@ -102,26 +104,21 @@ class BaseHost:
         self, command: Sequence[str], *, merge_stderr: bool = False, at_event: bool = False
     ) -> CommandResult:
         """With ``--allow-missing-packages`` a program that is not there "writes" a marked placeholder."""
-        if self.allow_missing_packages and command:
-            import shutil
-
-            if shutil.which(command[0]) is None:
-                program = os.path.basename(command[0])
-                self.warn(program_not_installed(program))
-                return CommandResult(0, f"<output of {program}, which is not installed>", "")
+        if self.allow_missing_packages and command and shutil.which(command[0]) is None:
+            program = os.path.basename(command[0])
+            self.warn(program_not_installed(program))
+            return CommandResult(0, f"<output of {program}, which is not installed>", "")
         return self._run_command(command, merge_stderr, at_event)
 
     def _run_command(self, command: Sequence[str], merge_stderr: bool, at_event: bool) -> CommandResult:
-        if self.outcomes is None:
+        if self.user_code_results is None:
             return self._run_now(command, merge_stderr)
         key = ("command", tuple(command), merge_stderr)
-        return self.outcomes.call(
+        return self.user_code_results.call(
             key, lambda: self._run_now(command, merge_stderr), at_event=at_event, worth=_succeeded
         )
 
     def _run_now(self, command: Sequence[str], merge_stderr: bool) -> CommandResult:
-        import subprocess
-
         result = subprocess.run(
             list(command),
             stdout=subprocess.PIPE,
@@ -143,36 +140,27 @@ class BaseHost:
     def anonymous_name(self, name: str) -> str:
         """``name_host_pid_random``. Two hosts with the same seed give the same names in the same order, so
         that a live run has the names of the plan it follows."""
-        if self.outcomes is None:
+        if self.user_code_results is None:
             return self._new_anonymous_name(name)
-        return self.outcomes.call(("anonymous name", name), lambda: self._new_anonymous_name(name))
+        return self.user_code_results.call(("anonymous name", name), lambda: self._new_anonymous_name(name))
 
     def _new_anonymous_name(self, name: str) -> str:
-        import random
-        import socket
-
         if self._anonymous_random is None:
             self._anonymous_random = random.Random(self._anonymous_seed)
         number = self._anonymous_random.randint(0, sys.maxsize)
         full = f"{name}_{socket.gethostname()}_{os.getpid()}_{number}"
         return full.translate(str.maketrans("-.:", "___"))
 
-    def log_directory(self) -> str:
-        from enclave_launch.description.logging import launch_config
-
-        return launch_config.log_dir
+    def log_directory(self) -> str | None:
+        return None
 
 
 def _succeeded(result: CommandResult) -> bool:
-    """What a command of an event could not say when it was asked for the plan, it may say at the event."""
+    """Return True for a result to record; a command that failed for the plan may succeed at its event."""
     return result.returncode == 0 and not result.stderr
 
 
 Key = tuple[type, str]
-
-
-class CyclicIncludeError(RuntimeError):
-    """A launch file that includes itself, directly or through others, without end."""
 
 
 class LoadCache:
@@ -180,16 +168,14 @@ class LoadCache:
 
     def __init__(self) -> None:
         self._seen: dict[str, str] | None = None
-        self._summaries: dict[Key, DeclaredArguments | None] = {}
-        self._unvisited: dict[Key, LaunchDescription] = {}
-        self._in_progress: list[Key] = []
+        self._summaries: dict[Key, Any] = {}
+        self._unvisited: dict[Key, Any] = {}
+        self._in_progress: set[Key] = set()
 
-    def summary(
-        self, source: LaunchDescriptionSource, summarize: Callable[[LaunchDescription], DeclaredArguments]
-    ) -> DeclaredArguments | None:
-        """What ``source`` declares; ``None`` when it cannot be loaded without a context.
+    def summary(self, source: DescriptionSource, summarize: Callable[[Any], T]) -> T | None:
+        """Return what ``source`` declares; None if it cannot be loaded without a context, or is being summed up.
 
-        Raises ``CyclicIncludeError`` where upstream runs out of stack.
+        A file may include itself under a condition that ends. It declares nothing new then.
         """
         self._drop_outdated()
         location = source.location_without_context()
@@ -197,34 +183,34 @@ class LoadCache:
             description = source.try_get_launch_description_without_context()
             return None if description is None else summarize(description)
         key = (type(source), location)
+        if key in self._in_progress:
+            return None
         if key not in self._summaries:
             self._summaries[key] = self._summarize(key, source, summarize)
-        return self._summaries[key]
+        known: T | None = self._summaries[key]
+        return known
 
     def _summarize(
         self,
         key: Key,
-        source: LaunchDescriptionSource,
-        summarize: Callable[[LaunchDescription], DeclaredArguments],
-    ) -> DeclaredArguments | None:
-        if key in self._in_progress:
-            cycle = [location for _, location in [*self._in_progress[self._in_progress.index(key) :], key]]
-            raise CyclicIncludeError("launch files include each other without end: " + " -> ".join(cycle))
-        self._in_progress.append(key)
+        source: DescriptionSource,
+        summarize: Callable[[Any], T],
+    ) -> T | None:
+        self._in_progress.add(key)
         try:
             description = source.try_get_launch_description_without_context()
             if description is None:
                 return None
             summary = summarize(description)
         finally:
-            self._in_progress.pop()
+            self._in_progress.discard(key)
         if not _runs_python(key[1]):
             description.argument_summary = summary
             self._unvisited[key] = description
         return summary
 
-    def take(self, source: LaunchDescriptionSource, location: str) -> LaunchDescription | None:
-        """A description of the file at ``location`` that was built and not visited yet, to be visited now."""
+    def take(self, source: DescriptionSource, location: str) -> Any:
+        """Return a description of the file at ``location`` that was built and not visited yet; None without one."""
         self._drop_outdated()
         return self._unvisited.pop((type(source), location), None)
 

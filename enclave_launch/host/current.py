@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from typing import TYPE_CHECKING
 
-from enclave_launch.boundary.light import TYPE_CHECKING
 from enclave_launch.host.plan_host import PlanHost
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ _current: ContextVar[Host | None] = ContextVar("enclave_launch_host", default=No
 
 
 def current_host() -> Host:
-    """The host of the evaluation in progress; where none is, a fresh dry-run host (library use of the classes)."""
+    """Return the host of the evaluation in progress; without one a new dry-run host (library use of the classes)."""
     host = _current.get()
     if host is None:
         host = PlanHost()
@@ -26,7 +26,7 @@ def current_host() -> Host:
 
 
 def current_release() -> Release:
-    """The release that parsing and construction follow; execution asks ``context.host.release``."""
+    """Return the release that parsing and construction follow; execution asks ``context.host.release``."""
     return current_host().release
 
 

@@ -15,7 +15,7 @@ _last: tuple[dict[bytes, bytes], dict[str, str]] | None = None
 
 
 def environment_snapshot() -> dict[str, str]:
-    """The variables of this moment. Shared between calls while nothing changes: do not modify."""
+    """Return the current variables. Shared between calls while nothing changes: do not modify."""
     global _last
     raw: dict[bytes, bytes] | None = getattr(os.environ, "_data", None)
     if raw is None:
@@ -34,11 +34,11 @@ class Environment:
         self._changes: tuple[dict[str, str], dict[str, str]] | None = None
 
     def snapshot(self) -> dict[str, str]:
-        """As ``environment_snapshot``."""
+        """Return ``environment_snapshot()``."""
         return environment_snapshot()
 
     def changes(self) -> dict[str, str]:
-        """The variables that differ from ``start``; shared like ``snapshot``."""
+        """Return the variables that differ from ``start``; shared like ``snapshot``."""
         now = environment_snapshot()
         if self._changes is None or self._changes[0] is not now:
             self._changes = now, changed(self.start, now)
@@ -66,13 +66,13 @@ class Environment:
 
 
 def changed(before: Mapping[str, str], after: Mapping[str, str]) -> dict[str, str]:
-    """The entries of ``after`` that ``before`` has not, or has with another value."""
+    """Return the entries of ``after`` that ``before`` has not, or has with another value."""
     return {name: value for name, value in after.items() if before.get(name) != value}
 
 
 @contextmanager
 def environment_untouched() -> Iterator[None]:
-    """Whatever the block does to ``os.environ`` is undone."""
+    """Undo whatever the block does to ``os.environ``."""
     environment = Environment()
     try:
         yield

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import heapq
 from collections.abc import Callable, Coroutine, Sequence
+from typing import TYPE_CHECKING, Any, NoReturn
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any, NoReturn
 from enclave_launch.host.base_host import BaseHost
 from enclave_launch.host.protocol import Completion, HostOptions
 
 if TYPE_CHECKING:
-    from enclave_launch.description.actions.lifecycle import LifecycleNode
-    from enclave_launch.description.actions.processes import ExecuteLocal
-    from enclave_launch.description.launch_context import LaunchContext
-    from enclave_launch.host.outcomes import Outcomes
+    from enclave_launch.host.protocol import ExecuteLocal, LaunchContext, LifecycleNode, UserCodeResults
     from enclave_launch.process import (
         LauncherCall,
         Reaction,
@@ -27,10 +24,14 @@ class PlanHost(BaseHost):
     """The dry run's world: everything is recorded, nothing is started or written."""
 
     def __init__(
-        self, options: HostOptions | None = None, *, outcomes: Outcomes | None = None, **given: Any
+        self,
+        options: HostOptions | None = None,
+        *,
+        user_code_results: UserCodeResults | None = None,
+        **given: Any,
     ) -> None:
         """``given``: fields of ``HostOptions``, for callers that have only some."""
-        super().__init__(options or HostOptions(**given), outcomes)
+        super().__init__(options or HostOptions(**given), user_code_results)
         self.processes: list[ResolvedProcess] = []
         self.started: list[ExecuteLocal] = []  # action of each process, same order
         self.components: list[ResolvedComponent] = []
@@ -65,7 +66,7 @@ class PlanHost(BaseHost):
         self.calls.append(call)
 
     def change_state(self, node: LifecycleNode, transition_id: int, context: LaunchContext) -> None:
-        """Nothing is started in a dry run, so nothing changes its state."""
+        """Do nothing: a dry run starts nothing that could change its state."""
 
     def unforeseeable(self, item: Unforeseeable) -> None:
         self.unforeseen.append(item)

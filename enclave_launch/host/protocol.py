@@ -7,19 +7,22 @@ for real, driven by the very same evaluation.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-
-from enclave_launch.boundary.light import TYPE_CHECKING, Any, NamedTuple, Protocol
+from collections.abc import Callable, Hashable, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
 
 if TYPE_CHECKING:
-    from enclave_launch.description.actions.lifecycle import LifecycleNode
-    from enclave_launch.description.actions.processes import ExecuteLocal
-    from enclave_launch.description.launch_context import LaunchContext
+    import logging
+
     from enclave_launch.diagnostics import Diagnostic
-    from enclave_launch.host.base_host import LoadCache
-    from enclave_launch.host.outcomes import Outcomes
     from enclave_launch.process import LauncherCall, ResolvedComponent, ResolvedProcess, Unforeseeable
     from enclave_launch.ros_rules.distro import Release
+
+# Types of ``description``, which is the floor above and knows this one.
+LaunchContext = Any
+ExecuteLocal = Any
+LifecycleNode = Any
+
+T = TypeVar("T")
 
 MISSING_PREFIX = "/missing"
 """``--allow-missing-packages``: package ``p`` is taken to be installed in ``/missing/p``, a program in
@@ -54,20 +57,64 @@ class Completion(Protocol):
     def add_done_callback(self, callback: Callable[[Any], object], /) -> None: ...
 
 
+class UserCodeResults(Protocol):
+    """Results of the user's code, recorded in a dry run and given again by the start that follows it."""
+
+    def call(
+        self,
+        key: Hashable,
+        function: Callable[[], T],
+        context: LaunchContext | None = None,
+        *,
+        at_event: bool = False,
+        worth: Callable[[T], bool] = ...,
+    ) -> T:
+        """Call ``function``, or return what it gave when it was called with ``key`` before."""
+
+    def keep(self, *objects: object) -> tuple[int, ...]:
+        """Return the ids of the objects, as part of a key."""
+
+    def remember_state(self, entity: object) -> None:
+        """Record the state of an object that is about to be visited."""
+
+    def listen(self, logger: logging.Logger) -> None:
+        """Record what user code logs."""
+
+    def stop_listening(self) -> None:
+        """End the recording of logs."""
+
+
+class DescriptionSource(Protocol):
+    """Where a launch description comes from."""
+
+    def location_without_context(self) -> str | None: ...
+    def try_get_launch_description_without_context(self) -> Any: ...
+
+
+class LoadedDescriptions(Protocol):
+    """Launch descriptions loaded so far, and what they declare."""
+
+    def summary(self, source: DescriptionSource, summarize: Callable[[Any], T]) -> T | None:
+        """Return what ``source`` declares."""
+
+    def take(self, source: DescriptionSource, location: str) -> Any:
+        """Return a description that was loaded and not visited yet; None without one."""
+
+
 class Host(Protocol):
     """What evaluation may ask of the world."""
 
     release: Release
     no_python: bool
     allow_missing_packages: bool
-    outcomes: Outcomes | None
+    user_code_results: UserCodeResults | None
 
     @property
     def loop(self) -> Any:
-        """The event loop behind ``context.asyncio_loop``: asyncio's when live, a virtual clock in a dry run."""
+        """Return the event loop behind ``context.asyncio_loop``: asyncio's when live, a virtual clock in a dry run."""
 
     @property
-    def loads(self) -> LoadCache:
+    def loads(self) -> LoadedDescriptions:
         """Launch files parsed so far."""
 
     def prefixes(self) -> tuple[str, ...]:
@@ -81,10 +128,10 @@ class Host(Protocol):
         ``ament_index.ExecutableNotInstalledError``."""
 
     def is_missing(self, path: str) -> bool:
-        """Is ``path`` inside the placeholder of a package that is not installed?"""
+        """Return True if ``path`` is inside the placeholder of a package that is not installed."""
 
     def find_program(self, name: str) -> str | None:
-        """Its path on the ``PATH``; ``None`` when it is not there."""
+        """Return its path on the ``PATH``; None if it is not there."""
 
     def run_command(
         self, command: Sequence[str], *, merge_stderr: bool = False, at_event: bool = False
@@ -96,10 +143,10 @@ class Host(Protocol):
         """Keep ``text`` for a process about to start; give the path to pass (``<params:N>`` in a dry run)."""
 
     def parameter_file(self, path: str) -> str | None:
-        """The text of a file written by ``write_parameter_file``, ``None`` for any other path."""
+        """Return the text of a file written by ``write_parameter_file``; None for any other path."""
 
     def started_so_far(self) -> int:
-        """A number that grows with everything that is started or scheduled."""
+        """Return a number that grows with everything that is started or scheduled."""
 
     def next_process_index(self) -> int:
         """N of the process name NAME-N, from 1."""
@@ -113,19 +160,19 @@ class Host(Protocol):
         """Load them one after another, once their container's service is there. Does not wait."""
 
     def launcher_call(self, call: LauncherCall) -> None:
-        """Note a ROS service that launch itself must call."""
+        """Record a ROS service that launch itself must call."""
 
     def change_state(self, node: LifecycleNode, transition_id: int, context: LaunchContext) -> None:
         """Ask a started lifecycle node for a transition. Does not wait."""
 
     def unforeseeable(self, item: Unforeseeable) -> None:
-        """Note something only known at run time."""
+        """Record something only known at run time."""
 
     def warn(self, warning: Diagnostic) -> None:
         """Tell the person; the same once."""
 
     def anonymous_name(self, name: str) -> str:
-        """A name nobody else has, made from ``name``."""
+        """Return a unique name made from ``name``."""
 
-    def log_directory(self) -> str:
-        """Where this run's log files go. Creates nothing."""
+    def log_directory(self) -> str | None:
+        """Return the folder of this run's log files; None in a dry run, which makes none."""

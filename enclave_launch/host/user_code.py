@@ -1,14 +1,16 @@
-"""Calling the user's code: once for plan and start together (``outcomes``), and for a plan only where it can tell it
-something.
+"""Call the user's code: once for plan and start together (``user_code_results``), and for a plan only where the plan
+learns something from it.
 """
 
 from __future__ import annotations
 
+import dis
+import inspect
 from collections.abc import Callable, Hashable, Iterable
 from functools import wraps
 from types import CodeType
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any, TypeVar
 from enclave_launch.description.events.event import Shutdown
 from enclave_launch.description.location import location_of
 from enclave_launch.diagnostics.evaluation import function_called_again
@@ -22,52 +24,52 @@ _OURS = "enclave_launch."
 
 
 def is_users(function: object) -> bool:
-    """Is it code of the launch file or of a package it imports, and not ours?"""
+    """Return True for code of the launch file or of a package it imports, False for ours."""
     return not str(getattr(_inner(function), "__module__", "")).startswith(_OURS)
 
 
 def called_once(
     owner: object, function: object, call: Callable[[], T], context: LaunchContext, *more: Hashable
 ) -> T:
-    """``call()``, which calls ``function`` of ``owner``: the user's is called once for plan and start together.
+    """Return ``call()``, which calls ``function`` of ``owner``; the user's is called once for plan and start together.
 
-    At an event what it gave in the plan holds while all that it looked at is as it was then.
+    At an event, the result of the plan is used if all that the function read is unchanged.
     """
-    outcomes = context.host.outcomes
-    if outcomes is None or not is_users(function):
+    results = context.host.user_code_results
+    if results is None or not is_users(function):
         return call()
-    key = (getattr(function, "__qualname__", ""), *outcomes.keep(owner), *more)
-    return outcomes.call(key, call, context, at_event=context.on_event is not None)
+    key = (getattr(function, "__qualname__", ""), *results.keep(owner), *more)
+    return results.call(key, call, context, at_event=context.on_event is not None)
 
 
 def called_for_entities(
     owner: object, function: object, call: Callable[[], T], context: LaunchContext, *more: Hashable
 ) -> T | None:
-    """As ``called_once``, of a function that is asked for entities.
+    """Call, as ``called_once``, a function that returns entities.
 
-    What a plan learns nothing from is not called for it, nor what a shutdown calls: it may clear away what is still
-    needed. What was called for it in vain is told.
+    A function from which a plan learns nothing is not called for it, nor one that a shutdown calls: it may remove what
+    is still needed. A function that was called for the plan and returned nothing is reported.
     """
     if context.on_event is None or not is_users(function):
         return called_once(owner, function, call, context, *more)
     if only_acts(function):
         return None
     if _at_shutdown(context):
-        _tell_unforeseeable(owner, function, context)
+        _report_unforeseeable(owner, function, context)
         return None
     result = called_once(owner, function, call, context, *more)
     if result is None or result == []:
-        _tell_called_again(owner, function, context)
+        _report_called_again(owner, function, context)
     return result
 
 
 def once(method: Callable[..., T]) -> Callable[..., T]:
-    """``perform(self, context)`` of a substitution class that is not ours, called once for plan and start together."""
+    """Wrap ``perform(self, context)`` of a foreign substitution class: called once for plan and start together."""
     return _wrapped(method, called_once)
 
 
 def executed_once(method: Callable[..., T]) -> Callable[..., T | None]:
-    """``execute(self, context)`` of an action class that is not ours, likewise."""
+    """Wrap ``execute(self, context)`` of a foreign action class: called once for plan and start together."""
     return _wrapped(method, called_for_entities)
 
 
@@ -85,12 +87,12 @@ def _at_shutdown(context: LaunchContext) -> bool:
     return isinstance(context.get_locals_as_dict().get("event"), Shutdown)
 
 
-def _tell_unforeseeable(owner: object, function: object, context: LaunchContext) -> None:
+def _report_unforeseeable(owner: object, function: object, context: LaunchContext) -> None:
     what = f"what {_name(function)} gives when the launch ends"
     context.host.unforeseeable(Unforeseeable(what, location_of(owner, context)))
 
 
-def _tell_called_again(owner: object, function: object, context: LaunchContext) -> None:
+def _report_called_again(owner: object, function: object, context: LaunchContext) -> None:
     context.host.warn(
         function_called_again(_name(function), str(context.on_event), location_of(owner, context))
     )
@@ -119,9 +121,9 @@ _STORES = frozenset(("STORE_SUBSCR", "DELETE_SUBSCR", "STORE_ATTR", "STORE_GLOBA
 
 
 def only_acts(function: object) -> bool:
-    """Does ``function`` give nothing, by its code, and change nothing that the launch or other functions may see?
+    """Return True if ``function``, by its code, returns nothing and changes nothing that the launch may see.
 
-    Then a plan learns nothing from it, and what it does belongs to the moment of its event alone.
+    A plan learns nothing from it; it is called when its event happens.
     """
     inner = _inner(function)
     code = getattr(getattr(inner, "__func__", inner), "__code__", None)
@@ -129,9 +131,6 @@ def only_acts(function: object) -> bool:
 
 
 def _gives_nothing(code: CodeType) -> bool:
-    import dis
-    import inspect
-
     if code.co_flags & (inspect.CO_GENERATOR | inspect.CO_COROUTINE | inspect.CO_ASYNC_GENERATOR):
         return False
     before: dis.Instruction | None = None
@@ -149,8 +148,6 @@ def _loads_none(instruction: Any) -> bool:
 
 
 def _changes(code: CodeType) -> bool:
-    import dis
-
     return any(
         set(each.co_names) & _CHANGES or any(step.opname in _STORES for step in dis.get_instructions(each))
         for each in _with_inner(code)

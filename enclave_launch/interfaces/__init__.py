@@ -9,8 +9,9 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from functools import cached_property
+from typing import TYPE_CHECKING, NamedTuple
 
-from enclave_launch.boundary.light import TYPE_CHECKING, NamedTuple
+from enclave_common.dependencies import installed
 from enclave_launch.errors import ManifestError, translated
 from enclave_launch.interfaces.library_access import LibraryAccess
 from enclave_launch.interfaces.started_program import StartedProgram
@@ -18,13 +19,13 @@ from enclave_launch.options import ResolveOptions
 from enclave_launch.plan import Found, InterfaceOrigin, Missing
 from enclave_launch.process import Evaluation, ResolvedComponent, ResolvedProcess
 from nodl.errors import NoDLError
-from nodl.infer.cpp.reach import SourcesInReach
 from nodl.lookup import Lookup, ManifestLookup
 from nodl.name_template import UnknownPart
 from nodl.node_interface import ClientLibrary, Endpoint, NodeInterface
 from nodl.source_ref import SourceRef
 
 if TYPE_CHECKING:
+    from nodl.infer.cpp.reach import SourcesInReach
     from nodl.infer.executable import InferredExecutable
 
 SOURCE_VARIABLE = "SECURE_LAUNCH_SOURCE"
@@ -67,6 +68,7 @@ class InterfaceFinder:
         self._lookup = ManifestLookup(prefixes, self._options.manifests)
         self._library = LibraryAccess(prefixes, self._options, distro, launch)
         self._known: dict[_Subject, Found | Missing] = {}
+        self._infers = self._options.infer and installed("nodl.infer")
 
     def __call__(
         self, started: ResolvedProcess | ResolvedComponent, container: ResolvedProcess | None = None
@@ -104,9 +106,9 @@ class InterfaceFinder:
         self, subject: _Subject, manifest: Lookup, started: StartedProgram
     ) -> tuple[tuple[Endpoint, ...], bool]:
         """What an installed manifest leaves out, where the sources of the compiled program are in reach."""
-        if not self._options.infer or manifest.named or not self._sources.hold(subject.package):
+        if not self._infers or manifest.named or not self._sources.hold(subject.package):
             return (), False
-        from nodl.infer.report.comparison import lacking
+        from nodl.infer.report.comparison import lacking  # an add-on: inference
 
         analysed = self._inferred(subject, started, compiled_only=True)
         if not analysed:
@@ -128,6 +130,8 @@ class InterfaceFinder:
         searched += [f"--nodl describes {', '.join(manifest.described)}"] if manifest.described else []
         analysed = self._inferred(subject, started)
         searched += [analysed.why] if analysed is not None and analysed.why else []
+        if self._options.infer and not self._infers:
+            searched.append("inference is not part of this installation")
         inferred = analysed.interfaces if analysed is not None else ()
         of_this_start = analysed is not None and analysed.of_this_start
         if inferred and all(map(_complete, inferred)):
@@ -144,9 +148,9 @@ class InterfaceFinder:
     def _inferred(
         self, subject: _Subject, started: StartedProgram, *, compiled_only: bool = False
     ) -> InferredExecutable | None:
-        if not self._options.infer or subject.package is None:
+        if not self._infers or subject.package is None:
             return None
-        from nodl.infer.executable import infer_executable
+        from nodl.infer.executable import infer_executable  # an add-on: inference
 
         if self._options.progress is not None:
             self._options.progress(str(subject))
@@ -162,6 +166,8 @@ class InterfaceFinder:
 
     @cached_property
     def _sources(self) -> SourcesInReach:
+        from nodl.infer.cpp.reach import SourcesInReach  # an add-on: inference
+
         named = [str(folder) for folder in self._options.source_folders]
         named += [folder for folder in os.environ.get(SOURCE_VARIABLE, "").split(os.pathsep) if folder]
         return SourcesInReach(self._prefixes, named)

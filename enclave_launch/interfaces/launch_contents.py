@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from enclave_launch.boundary.shell_words import split_words
+from enclave_common.shell_words import split_words
 from enclave_launch.interfaces.situation import parameters_of_node
 from enclave_launch.policy.program_inputs import own_words
 from enclave_launch.process import Evaluation, ResolvedProcess

@@ -9,17 +9,17 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from functools import cached_property
 
-from enclave_launch.boundary.light import TYPE_CHECKING
 from enclave_launch.errors import UsageError
+from enclave_launch.interfaces.launch_contents import launched
+from enclave_launch.interfaces.situation import situation_of
 from enclave_launch.options import ResolveOptions
 from enclave_launch.policy.program_inputs import own_words
 from enclave_launch.process import Evaluation, ResolvedComponent, ResolvedProcess
 from nodl.ament_index import list_resources, package_version
+from nodl.dependence import Launched, Situation
+from nodl.dependence.apply import applied, own_name
+from nodl.library import SHIPPED, Hit, Library, LibraryDocuments
 from nodl.node_interface import NodeInterface
-
-if TYPE_CHECKING:
-    from nodl.dependence import Launched, Situation
-    from nodl.library import Hit, Library
 
 _FURTHER = 32
 
@@ -45,8 +45,6 @@ class LibraryAccess:
 
     @cached_property
     def _library(self) -> Library:
-        from nodl.library import SHIPPED, Library
-
         return Library(self._folders, SHIPPED if self._enabled else None)
 
     @cached_property
@@ -55,8 +53,6 @@ class LibraryAccess:
 
     @cached_property
     def _launched(self) -> Launched:
-        from enclave_launch.interfaces.launch_contents import launched
-
         assert self._launch is not None
         return launched(self._launch)
 
@@ -92,9 +88,6 @@ class LibraryAccess:
         container: ResolvedProcess | None,
         depth: int = 0,
     ) -> Iterator[NodeInterface]:
-        from nodl.dependence.apply import applied
-        from nodl.library import LibraryDocuments
-
         named = self._named(interface, started)
         documents = LibraryDocuments(self._library, self._distro)
         done = applied(named, self._situation(named, started, container), documents)
@@ -106,8 +99,6 @@ class LibraryAccess:
         """A program that makes its node's name from its command line has it before launch's rules apply."""
         if interface.depends is None or not (interface.depends.node_name or interface.depends.random_name):
             return interface
-        from nodl.dependence import Situation
-        from nodl.dependence.apply import own_name
 
         words = tuple(own_words(started)) if isinstance(started, ResolvedProcess) else ()
         name = own_name(interface, Situation(self._distro, "", "", started.parameters, words))
@@ -119,8 +110,6 @@ class LibraryAccess:
         started: ResolvedProcess | ResolvedComponent,
         container: ResolvedProcess | None,
     ) -> Situation:
-        from enclave_launch.interfaces.situation import situation_of
-
         installed = self._installed if (started.package or "") in self._installed else None
         situation = situation_of(started, container, interface, self._distro, installed)
         return situation if self._launch is None else situation._replace(launched=self._launched)

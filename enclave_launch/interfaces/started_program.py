@@ -7,13 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from enclave_launch.boundary.light import TYPE_CHECKING
+from enclave_launch.interfaces.situation import situation_of
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
+from nodl.dependence import Situation
 from nodl.node_interface import NodeInterface
 from nodl.source_ref import SourceRef
-
-if TYPE_CHECKING:
-    from nodl.dependence import Situation
 
 
 class StartedProgram:
@@ -36,8 +34,6 @@ class StartedProgram:
         return situation.node, situation.namespace
 
     def _situation(self, node: str | None) -> Situation:
-        from enclave_launch.interfaces.situation import situation_of
-
         started = self._started
         interface = NodeInterface(
             package=started.package,

@@ -4,22 +4,35 @@ Takes the running nodes, gives a ``DerivedPolicy``; next are the plan, the repor
 All nodes of one enclave are united (that is what DDS enforces), each keeps its own profile (that is what
 a person reviews). Sorted and free of repetitions: the same launch gives the same bytes, and taking a node
 away takes exactly its permissions away. Time is linear in nodes and interfaces.
+
+``--policy FILE`` is merged over what was derived (``merge_policy_file``): more permissions, wildcards, denials. Only
+the enclaves of this launch are taken. Names become absolute: ``chatter`` and a derived ``/chatter`` are one rule.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Literal, NamedTuple
 from enclave_launch.diagnostics import Diagnostic
-from enclave_launch.diagnostics.permissions import permissions_large, policy_answers
+from enclave_launch.diagnostics.permissions import (
+    permissions_large,
+    policy_answers,
+    policy_denies_need,
+    policy_enclave_unused,
+    policy_file,
+)
+from enclave_launch.policy.node_permissions import NodePermissions, Reason, node_permissions
 from enclave_launch.policy.running_node import RunningNode
+from enclave_launch.source_location import SourceLocation
+from keystore.formats.permissions import dds_rules
+from keystore.formats.permissions_names import full_name
+from keystore.formats.permissions_patterns import can_meet
+from keystore.formats.permissions_size import expected_concern
 from keystore.formats.policy import EnclavePolicy, Operation, Policy, Profile, Qualifier, Rule
+from keystore.formats.policy_xml import PolicyDocument
 
 if TYPE_CHECKING:
-    from enclave_launch.policy.node_permissions import NodePermissions, Reason
-    from keystore.formats.policy_xml import PolicyDocument
-
     Reasons = dict[Rule, list[Reason]]
 
 ListName = Literal["publish", "subscribe", "call_services", "serve_services", "call_actions", "serve_actions"]
@@ -99,14 +112,9 @@ def derive_policy(
     chosen = options or PolicyOptions()
     collection = _Collection({path: {} for path in also}, {}, [], [])
     for node in nodes:
-        # Where nothing is known, not needed.
-        from enclave_launch.policy.node_permissions import node_permissions
-
         collection.add(node_permissions(node, distro=distro, options=chosen), chosen.policy_file)
     derived = collection.result()
     if chosen.policy_file is not None:
-        from enclave_launch.policy.policy_file import merge_policy_file
-
         derived = merge_policy_file(derived, chosen.policy_file)
     concerns = _size_warnings(derived.policy.enclaves)
     return derived._replace(warnings=_unique((*derived.warnings, *concerns)))
@@ -160,7 +168,6 @@ def _size_warnings(enclaves: Iterable[EnclavePolicy]) -> list[Diagnostic]:
     large = [enclave for enclave in enclaves if sum(len(p.rules) for p in enclave.profiles) > _MANY_RULES]
     if not large:
         return []
-    from keystore.formats.permissions_size import expected_concern
 
     concerns = ((enclave.path, expected_concern(enclave)) for enclave in large)
     return [permissions_large(path, concern.text) for path, concern in concerns if concern]
@@ -201,3 +208,77 @@ def _answered(document: PolicyDocument | None, node: RunningNode, operation: Ope
 
 def _unique(diagnostics: Iterable[Diagnostic]) -> tuple[Diagnostic, ...]:
     return tuple(dict.fromkeys(diagnostics))
+
+
+Added = Mapping[tuple[str, str], Mapping[Rule, Reason]]  # (namespace, node) -> rule with its full name ->
+
+
+def merge_policy_file(derived: DerivedPolicy, document: PolicyDocument) -> DerivedPolicy:
+    """Union by enclave and profile, with the reasons of both. Warnings: the document's own, unused enclaves, denials of
+    needs."""
+    theirs = {enclave.path: enclave for enclave in document.policy.enclaves}
+    ours = {enclave.path for enclave in derived.policy.enclaves}
+    warnings = [policy_file("policy file", text) for text in (*document.warnings, *document.notes)]
+    warnings += [policy_enclave_unused(path) for path in theirs if path not in ours]
+    enclaves: list[EnclavePolicy] = []
+    merged_reasons = {path: dict(by_rule) for path, by_rule in derived.reasons.items()}
+    for enclave in derived.policy.enclaves:
+        other = theirs.get(enclave.path)
+        if other is None:
+            enclaves.append(enclave)
+            continue
+        added = _absolute(other, document)
+        merged = EnclavePolicy(enclave.path, _union(enclave, added))
+        enclaves.append(merged)
+        known = merged_reasons.setdefault(enclave.path, {})
+        for rules in added.values():
+            for rule, reason in rules.items():
+                known[rule] = (*known.get(rule, ()), reason)
+        warnings.extend(_denials(enclave.path, known))
+        hazards = dds_rules(merged).hazards
+        warnings.extend(policy_file(enclave.path, f"enclave {enclave.path}: {hazard}") for hazard in hazards)
+    return derived._replace(
+        policy=Policy(tuple(enclaves)), reasons=merged_reasons, warnings=(*derived.warnings, *warnings)
+    )
+
+
+def _absolute(enclave: EnclavePolicy, document: PolicyDocument) -> Added:
+    return {
+        (profile.ns, profile.node): {
+            Rule(rule.operation, rule.qualifier, full_name(rule.expression, profile)): Reason(
+                node=f"{profile.ns.rstrip('/')}/{profile.node}",
+                origin="policy file",
+                place=document.places[enclave.path, profile.ns, profile.node, rule],
+                written=rule.expression,
+            )
+            for rule in profile.rules
+        }
+        for profile in enclave.profiles
+    }
+
+
+def _union(enclave: EnclavePolicy, added: Added) -> tuple[Profile, ...]:
+    profiles = {(profile.ns, profile.node): set(profile.rules) for profile in enclave.profiles}
+    for key, rules in added.items():
+        profiles.setdefault(key, set()).update(rules)
+    return tuple(Profile(ns, node, tuple(sorted(rules))) for (ns, node), rules in sorted(profiles.items()))
+
+
+def _denials(path: str, reasons: Mapping[Rule, tuple[Reason, ...]]) -> list[Diagnostic]:
+    """A warning for each derived permission that a denial takes away: the node will miss it."""
+    denials = [(rule, why) for rule, why in reasons.items() if rule.qualifier is Qualifier.DENY]
+    return [
+        policy_denies_need(
+            f"{denial.operation.verb} {denial.expression}",
+            path,
+            need.node,
+            f"{rule.operation.verb} {rule.expression}",
+            need.place,
+            SourceLocation.read(why[0].place),
+        )
+        for denial, why in denials
+        for rule, needs in reasons.items()
+        if rule.qualifier is Qualifier.ALLOW and rule.operation is denial.operation
+        for need in needs[:1]
+        if need.origin != "policy file" and can_meet(denial.expression, rule.expression)
+    ]

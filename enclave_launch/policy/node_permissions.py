@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from functools import lru_cache
+from typing import TYPE_CHECKING, Literal, NamedTuple
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Literal, NamedTuple
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.diagnostics.permissions import (
     action_remap_idle,

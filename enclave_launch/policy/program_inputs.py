@@ -9,8 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from types import MappingProxyType
+from typing import NamedTuple
 
-from enclave_launch.boundary.light import NamedTuple
 from enclave_launch.process import ResolvedProcess
 from enclave_launch.ros_rules.ros_arguments import is_bare_rule
 from nodl.name_template import NameTemplate, ParameterPart, Part, UnknownPart

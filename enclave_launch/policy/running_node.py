@@ -11,8 +11,8 @@ the container's command line (rclcpp_components/component_manager.cpp), unless `
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Literal, NamedTuple
 
-from enclave_launch.boundary.light import Literal, NamedTuple
 from enclave_launch.errors import LaunchFileError
 from enclave_launch.policy.program_inputs import ProgramInputs, environment_inputs, program_inputs
 from enclave_launch.process import ResolvedComponent, ResolvedProcess

@@ -5,7 +5,8 @@ DDS enforces the union of an enclave; in a container all nodes even share memory
 
 from __future__ import annotations
 
-from enclave_launch.boundary.light import NamedTuple
+from typing import NamedTuple
+
 from enclave_launch.policy.derivation import DerivedPolicy
 from keystore.formats.policy import Qualifier, Rule
 

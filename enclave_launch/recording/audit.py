@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 from typing import NamedTuple
 
-from enclave_launch.boundary.terminal import printable
+from enclave_common.terminal import printable
 from enclave_launch.plan import LaunchPlan
 from enclave_launch.recording.grants import WORDS, Need, PlannedGrants
 from enclave_launch.recording.listeners import Listener

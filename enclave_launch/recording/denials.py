@@ -10,22 +10,20 @@ from __future__ import annotations
 import re
 import time
 from collections import deque
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
+from enclave_common.files import read_text
+from enclave_common.terminal import printable
 from enclave_launch.admission.middleware import ZENOH
-from enclave_launch.boundary.files import read_text
-from enclave_launch.boundary.terminal import printable
 from enclave_launch.plan import LaunchPlan
 from enclave_launch.recording.grants import WORDS, Description, Need, PlannedGrants
 from enclave_launch.recording.listeners import Listener
+from enclave_launch.recording.patches import Patch, manifest_patch, policy_patch
 from enclave_launch.recording.reasons import MIXED_MIDDLEWARES, NOT_AS_PLANNED, Cause, cause_of
 from enclave_launch.runtime.run_events import ProcessOutput, RunEvent
 from nodl.record.asked import REFUSED, Asked, EndpointRole, role_of
 from nodl.record.assembly import RecordedNode, RecordedProcess
 from nodl.record.lines import EndpointMade, Initialised, Line, NodeMade
-
-if TYPE_CHECKING:
-    from enclave_launch.recording.patches import Patch
 
 _PATIENCE = 0.3
 """Seconds to wait for what a middleware prints about a participant that was not made: it goes another way."""
@@ -176,8 +174,6 @@ def _name(process: RecordedProcess) -> str:
 
 def _patch(need: Need, asked: Asked, described: Description) -> Patch:
     """In the node's manifest where it is a file that can be read, else in a policy file."""
-    from enclave_launch.recording.patches import manifest_patch, policy_patch  # once something is refused
-
     source = described.node.interface.source if described.node is not None else None
     if source is not None and _MANIFEST.search(source.file):
         try:

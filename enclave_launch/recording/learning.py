@@ -18,7 +18,9 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import NamedTuple
 
-from enclave_launch.boundary.new_file import write_bytes
+import yaml
+
+from enclave_common.new_file import write_bytes
 from enclave_launch.errors import ManifestError, translated
 from enclave_launch.recording.listeners import Listener
 from enclave_launch.recording.recording import Recording
@@ -140,8 +142,6 @@ def _drop_other_form(folder: Path, files: dict[Path, LearntNode]) -> None:
 
 
 def _manifest(node: LearntNode, path: Path) -> str:
-    import yaml
-
     try:
         before = path.read_text(encoding="utf-8") if path.exists() else ""
         return manifest_text(node, before)

@@ -1,8 +1,8 @@
 """The record of one launch: every process gets the recorder, what it writes is read as it grows.
 
-Goes along with a launch (``runtime.companion``). The record lies in a folder of its own that only who knows its name
-can enter: processes of other users must be able to write there, strangers must not. Reads and writes the record; next
-are the listeners: learning, audit, denials.
+Goes along with a launch (``runtime.companion``). Each process has a file of its own in a folder that only who knows its
+name can enter: processes of other users must be able to write there, strangers must not. Next are the listeners:
+learning, audit, denials.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from enclave_launch.recording.build import RECORD_VARIABLE, recorder_library, wi
 from enclave_launch.recording.listeners import EndpointEvents, Listener
 from enclave_launch.recording.markers import Marked, MarkerRun
 from enclave_launch.recording.programs import look_at_command
+from enclave_launch.recording.record_files import RecordFiles
 from enclave_launch.ros_rules.ros_arguments import parse_ros_arguments
 from enclave_launch.runtime.companion import LaunchControl
 from enclave_launch.runtime.process_tree import ProcessSpec
@@ -79,6 +80,7 @@ class Recording:
         self._lost: list[str] = []
         self._untold: list[tuple[float, Line]] = []
         self._folder: Path | None = None
+        self._files: RecordFiles
         self._task: asyncio.Task[None] | None = None
         self._launch: LaunchControl
 
@@ -100,7 +102,7 @@ class Recording:
                 raise RuntimeFailure(f"nothing can be recorded: {error}") from error
             self.say_warning(f"a refusal of DDS will not be explained: {error}")
             return
-        self._write(self.run)
+        self._add(self.run)
         self._task = asyncio.get_running_loop().create_task(self._watch())
 
     def _make_folder(self) -> None:
@@ -108,9 +110,8 @@ class Recording:
         self._folder.chmod(0o711)
         shutil.copyfile(recorder_library(), self._library)
         self._library.chmod(0o755)
-        self._file.touch()
-        self._file.chmod(0o622)
         self._try_it()
+        self._files = RecordFiles(self._folder)
 
     def _remove_folder(self) -> None:
         if self._folder is not None:
@@ -127,7 +128,12 @@ class Recording:
         if self._markers is not None:
             self._marked[process.process_name] = self._markers.mark(process, spec.cmd)
             spec = spec._replace(cmd=self._marked[process.process_name].cmd)
-        worn = with_recorder(spec.environment, str(self._library), str(self._file), program.sanitizer)
+        try:
+            record = self._files.path_of(process.process_name)
+        except OSError as error:
+            self._not_recorded(process.process_name, f"its record cannot be created: {error}")
+            return spec
+        worn = with_recorder(spec.environment, str(self._library), str(record), program.sanitizer)
         return spec._replace(environment=worn)
 
     def happened(self, event: RunEvent) -> None:
@@ -136,7 +142,9 @@ class Recording:
             if any(each.process == event.name for each in self.unrecorded):
                 self.unheard.add(event.pid)
             process = self._processes[event.name]
-            self._write(_started(process, event.pid, self._marked.get(event.name)))
+            if self._folder is not None:
+                self._files.started(event.name, event.pid)
+            self._add(_started(process, event.pid, self._marked.get(event.name)))
         elif isinstance(event, ProcessExited):
             self.running.pop(event.pid, None)
         elif isinstance(event, LaunchOver) and self._folder is not None:
@@ -147,7 +155,7 @@ class Recording:
 
     def loading(self, components: Sequence[ResolvedComponent]) -> None:
         for component in components:
-            self._write(_component(component))
+            self._add(_component(component))
 
     async def closed(self) -> None:
         if self._folder is None:
@@ -158,6 +166,7 @@ class Recording:
         try:
             self._look_once_more()
             self._tell(float("inf"))
+            self._take(self._files.unfinished())
             self._reader.close()
             self.record.complaints = [*self._reader.complaints, *(Complaint(0, why) for why in self._lost)]
             self._name_the_silent()
@@ -176,37 +185,27 @@ class Recording:
         assert self._folder is not None
         return self._folder / "recorder.so"
 
-    @property
-    def _file(self) -> Path:
-        assert self._folder is not None
-        return self._folder / "record"
-
     def _try_it(self) -> None:
         """One program with the recorder, before any node depends on it: a folder without execution, or a libc of
         another kind, is told now."""
-        environment = {**os.environ, "LD_PRELOAD": str(self._library), RECORD_VARIABLE: str(self._file)}
+        trial = self._library.with_name("trial")
+        trial.touch()
+        environment = {**os.environ, "LD_PRELOAD": str(self._library), RECORD_VARIABLE: str(trial)}
         ran = subprocess.run(
             ["/bin/sh", "-c", ":"], env=environment, capture_output=True, text=True, check=False
         )
-        heard = self._file.read_bytes()
-        self._file.write_bytes(b"")
+        heard = trial.read_bytes()
+        trial.unlink()
         if b'"what":"loaded"' not in heard:
             said = ran.stderr.strip() or "the dynamic linker did not load it"
             raise RuntimeFailure(
                 f"the recorder does not work here: {said}; set TMPDIR to a folder from which programs may be run"
             )
 
-    def _write(self, line: RecordedRun | StartedProcess | LoadedComponent) -> None:
-        """What cannot be written must not disturb the launch; it is told once."""
-        if self._folder is None:
-            return
-        try:
-            with open(
-                self._file, "ab", opener=lambda path, flags: os.open(path, flags & ~os.O_CREAT)
-            ) as file:
-                file.write(line_text(line))
-        except OSError as error:
-            self._lose(f"the record of this launch cannot be written any more: {error}")
+    def _add(self, line: RecordedRun | StartedProcess | LoadedComponent) -> None:
+        """Add what the launcher itself knows."""
+        if self._folder is not None:
+            self._take(line_text(line))
 
     async def _watch(self) -> None:
         try:
@@ -219,16 +218,19 @@ class Recording:
             self._lose(f"the record of this launch cannot be read any more: {error}")
 
     def _look(self) -> None:
-        with self._file.open("rb") as file:
-            file.seek(len(self.data))
-            new = file.read()
-        self.data += new
+        self._take(self._files.new_lines())
+        for report in self._files.reports:
+            self._lose(report)
+        self._files.reports.clear()
+        self._tell(time.monotonic())
+
+    def _take(self, lines: bytes) -> None:
+        self.data += lines
         now = time.monotonic()
-        for line in self._reader.feed(new):
+        for line in self._reader.feed(lines):
             if not isinstance(line, RecordedRun):
                 self.record.add(line)
                 self._untold.append((now, line))
-        self._tell(now)
 
     def _tell(self, now: float) -> None:
         """Listeners hear of a line once it is known which process of the launch it comes from: a process may speak

@@ -9,7 +9,7 @@ from __future__ import annotations
 import html
 from collections.abc import Iterator
 
-from enclave_launch.boundary.terminal import printable
+from enclave_common.terminal import printable
 from enclave_launch.report.graph import NO_ENCLAVE, OUTWARD, ChannelUse, EnclaveGraph
 from enclave_launch.review.document import Kind
 

@@ -6,14 +6,11 @@ is code and runs to give its description. Texts as ``ros2 launch --show-args`` a
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING
 
-from enclave_launch.boundary.terminal import printable
+from enclave_common.terminal import printable
+from enclave_launch.description.actions.arguments import DeclareLaunchArgument
 from enclave_launch.description.introspection import LaunchIntrospector
-
-if TYPE_CHECKING:
-    from enclave_launch.description.actions.arguments import DeclareLaunchArgument
-    from enclave_launch.description.launch_description import LaunchDescription
+from enclave_launch.description.launch_description import LaunchDescription
 
 
 def arguments_text(description: LaunchDescription) -> str:

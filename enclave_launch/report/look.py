@@ -1,16 +1,19 @@
 """How text for people is laid out: for the width of a terminal and in colour there, whole and plain in a pipe.
 
-Everything that launch files chose is escaped before it is coloured (``boundary.terminal``), so that the only control
+Everything that launch files chose is escaped before it is coloured (``terminal``), so that the only control
 characters in a report are ours.
 """
 
 from __future__ import annotations
 
 import os
+import re
+import shutil
+import textwrap
 from collections.abc import Iterable, Mapping, Sequence
+from typing import NamedTuple, TextIO
 
-from enclave_launch.boundary.light import NamedTuple, TextIO, late_pattern
-from enclave_launch.boundary.terminal import message, printable, short_paths
+from enclave_common.terminal import message, printable, short_paths
 from enclave_launch.diagnostics import Diagnostic
 
 _NARROWEST = 40
@@ -19,11 +22,11 @@ _FOLDED = 3  # lines of one list of names
 
 _RESET, _BOLD, _RED, _YELLOW, _CYAN = "\033[0m", "\033[1m", "\033[1;31m", "\033[33m", "\033[36m"
 _COLOURS = (
-    (late_pattern(r"^error(?: under --secure)?:"), _RED),
-    (late_pattern(r"^warning:"), _YELLOW),
-    (late_pattern(r"(?<=── )enclave \S+"), _BOLD),
-    (late_pattern(r"(?<=── )\[[^\]]+\]"), _CYAN),
-    (late_pattern(r"permissions unknown"), _YELLOW),
+    (re.compile(r"^error(?: under --secure)?:"), _RED),
+    (re.compile(r"^warning:"), _YELLOW),
+    (re.compile(r"(?<=── )enclave \S+"), _BOLD),
+    (re.compile(r"(?<=── )\[[^\]]+\]"), _CYAN),
+    (re.compile(r"permissions unknown"), _YELLOW),
 )
 
 
@@ -46,7 +49,6 @@ class Look(NamedTuple):
         if self.width is None:
             return [self.painted(first + text)]
         room = max(self.width, len(first) + _NARROWEST)
-        import textwrap
 
         lines = textwrap.wrap(
             text, room, initial_indent=first, subsequent_indent=further,
@@ -101,8 +103,6 @@ def look_for(stream: TextIO, environment: Mapping[str, str], *, verbose: bool = 
     folder = os.path.join(os.getcwd(), "")
     if not stream.isatty():
         return Look(full=verbose, folder=folder)
-
-    import shutil  # slow to import, and only a terminal needs it
 
     plain = bool(environment.get("NO_COLOR")) or environment.get("TERM") == "dumb"
     return Look(shutil.get_terminal_size().columns, not plain, verbose, folder)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 
-from enclave_launch.boundary.terminal import printable
+from enclave_common.terminal import printable
 from enclave_launch.report.contents import ReportContents
 from enclave_launch.report.diagrams import mermaid
 from enclave_launch.report.graph import ChannelUse, EnclaveGraph, evidence_text

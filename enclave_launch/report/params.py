@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 
 import yaml
 
-from enclave_launch.boundary.terminal import printable_lines
+from enclave_common.terminal import printable_lines
 from enclave_launch.plan import LaunchPlan
 from enclave_launch.ros_rules.parameter_value import ParameterValue
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from enclave_launch.boundary.terminal import json_text
+from enclave_common.terminal import json_text
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.plan import LaunchPlan, PlannedComponent, PlannedProcess
 from enclave_launch.policy.derivation import LIST_NAMES, allowed_names
@@ -154,8 +154,8 @@ def _program(interface: NodeInterface) -> str:
 
 
 def _declared(interface: NodeInterface) -> list[str] | None:
-    """A description without any parameter says nothing of them; one with gaps may not say all."""
-    return None if interface.gaps or not interface.parameters else sorted(interface.parameters)
+    """Return the declared parameters, or None if the description does not say that it lists all of them."""
+    return sorted(interface.parameters) if interface.parameters_complete and not interface.gaps else None
 
 
 def _interface(rule: Rule, reason: Reason) -> dict[str, object]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
-from enclave_launch.boundary.words import counted
+from enclave_common.words import counted, some_of
 from enclave_launch.review.document import OPERATIONS, GrantedName, PlanDocument, Told
 from enclave_launch.review.information_flow import FlowGraph, FlowStep, opened_by_sharing, reached_from
 from enclave_launch.review.similarity import Merge, Split
@@ -31,20 +31,59 @@ def _enclave(plan: PlanDocument, path: str) -> Iterator[str]:
         yield f"  and {hidden} that every node has"
 
 
-def findings_text(judged: Judged) -> str:
-    """One paragraph each, open ones first, and a last line that counts them."""
+def findings_text(judged: Judged, *, verbose: bool = False) -> str:
+    """Return a paragraph for each finding, open ones first, and a last line that counts them.
+
+    Unless ``verbose``, open findings of a code in ``_FOLDED`` are one paragraph, those of ``_SUMMED_UP`` are counted.
+    """
+    ordered = sorted(judged, key=lambda item: (item[1] is not None, item[0].severity))
     lines: list[str] = []
-    for told, accepted in sorted(judged, key=lambda item: (item[1] is not None, item[0].severity)):
+    summed_up: list[str] = []
+    for told, accepted, others in _folded(ordered, verbose):
+        if told.code in _SUMMED_UP and accepted is None and not verbose:
+            summed_up.append(f"{1 + len(others)} {told.code}")
+            continue
         place = f"{told.file}:{told.line}: " if told.file else ""
         head = f"accepted ({accepted})" if accepted is not None else told.severity
-        lines.append(f"{head}: {place}{told.text} [{told.code}]")
+        text = told.text
+        if others:
+            subjects = dict.fromkeys(each.subject for each in (told, *others))
+            text = f"{text} (and {len(others)} more of this kind, about {some_of(subjects, _NAMED)})"
+        lines.append(f"{head}: {place}{text} [{told.code}]")
         if told.remedy and accepted is None:
             lines.append(f"  {told.remedy}")
+    lines.append(_count(judged) + (f" ({', '.join(summed_up)}; -v lists them)" if summed_up else ""))
+    return "\n".join(lines) + "\n"
+
+
+_NAMED = 5
+_FOLDED = frozenset({
+    "container-elsewhere", "enclave-shared", "executable-not-built", "executable-without-enclave", "include-left-out",
+    "interface-unknown", "library-version", "no-manifest", "no-publisher", "no-server", "no-subscriber",
+    "node-name-unknown", "package-not-installed", "parameter-file-missing", "parameter-unknown", "pattern-accepted",
+    "program-not-installed", "remap-dead", "wildcard",
+})  # fmt: skip
+"""Codes with one cause and often many subjects; what is wrong with a keystore is reported one by one."""
+_SUMMED_UP = frozenset({"enclave-shared", "library-version"})
+"""Codes of which a plan has many that are as they are meant to be."""
+
+
+def _folded(ordered: Judged, verbose: bool) -> Iterator[tuple[Told, str | None, list[Told]]]:
+    """Yield each finding with those that are reported together with it."""
+    groups: dict[object, list[tuple[Told, str | None]]] = {}
+    for number, (told, accepted) in enumerate(ordered):
+        alone = verbose or accepted is not None or told.code not in _FOLDED
+        key = number if alone else (told.severity, told.code)
+        groups.setdefault(key, []).append((told, accepted))
+    for (told, accepted), *others in groups.values():
+        yield told, accepted, [other for other, _ in others]
+
+
+def _count(judged: Judged) -> str:
     open_ones = [told for told, accepted in judged if accepted is None]
     errors = sum(told.severity == "error" for told in open_ones)
     accepted_ones = f", {len(judged) - len(open_ones)} accepted" if len(judged) > len(open_ones) else ""
-    lines.append(f"{counted(errors, 'error')}, {counted(len(open_ones) - errors, 'warning')}{accepted_ones}")
-    return "\n".join(lines) + "\n"
+    return f"{counted(errors, 'error')}, {counted(len(open_ones) - errors, 'warning')}{accepted_ones}"
 
 
 def findings_document(judged: Judged) -> dict[str, object]:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
+import shlex
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
-from enclave_launch.boundary.light import NamedTuple
-from enclave_launch.boundary.words import counted
+from enclave_common.words import counted
 from enclave_launch.plan import InterfaceOrigin, LaunchPlan, PlannedComponent, PlannedProcess
 from enclave_launch.policy.derivation import LIST_NAMES, allowed_names
 from enclave_launch.policy.sharing import Gain, gains_by_sharing
@@ -73,7 +74,6 @@ def _process(item: PlannedProcess, plan: LaunchPlan) -> Branch:
 def _behind(prefix: Sequence[str]) -> str:
     if not prefix:
         return ""
-    import shlex
 
     return f", behind {shlex.join(prefix)}"
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import launch_ros.actions
 from launch import Action
@@ -24,10 +24,10 @@ from launch.descriptions import Executable
 from launch.frontend import expose
 from launch.utilities import normalize_to_list_of_substitutions, perform_substitutions
 
+from enclave_launch.ros2.observation import observe_executable
+from enclave_launch.ros2.session import EnclaveSession
 from enclave_launch.ros_rules.namespaces import enclave_scope, push_enclave_scope
-
-if TYPE_CHECKING:
-    from enclave_launch.ros2.session import EnclaveSession
+from enclave_launch.security_environment import OVERRIDE
 
 KEY = "enclave_launch_session"
 """Where a secured launch is kept: in launch's own context, so that several launches in one program stay apart."""
@@ -112,9 +112,6 @@ def _securing(prepare: Callable[..., None]) -> Callable[..., None]:
         prepare(self, context, action)
         session = session_of(context)
         if session is not None:
-            from enclave_launch.ros2.observation import observe_executable
-            from enclave_launch.security_environment import OVERRIDE  # a plain launch does without the plan
-
             grant = getattr(action, GRANT, None) or session.enter(observe_executable(action, context))
             self.final_env.pop(OVERRIDE, None)  # rcl lets it win over --enclave
             self.final_env.update(grant.environment)

@@ -9,6 +9,7 @@ from typing import Any
 from launch_ros.actions.node import NodeActionExtension
 
 from enclave_launch.ros2 import attributes  # accepted by the time a node is executed, too
+from enclave_launch.ros2.observation import loads_components, observe_node
 
 
 class EnclaveNodeActionExtension(NodeActionExtension):  # type: ignore[misc]  # untyped without ROS
@@ -22,8 +23,6 @@ class EnclaveNodeActionExtension(NodeActionExtension):  # type: ignore[misc]  # 
         if session is None:
             return [], ros_specific_arguments
         from launch.substitutions import TextSubstitution
-
-        from enclave_launch.ros2.observation import loads_components, observe_node
 
         process = observe_node(node_action, context, ros_specific_arguments)
         grant = session.enter(process, loads_components=loads_components(node_action))

@@ -14,7 +14,7 @@ import launch_ros.actions
 from launch.descriptions import executable as executable_description
 from launch.utilities import normalize_to_list_of_substitutions, perform_substitutions
 
-from enclave_launch.boundary.shell_words import split_words
+from enclave_common.shell_words import split_words
 from enclave_launch.description.actions.processes import first_word
 from enclave_launch.process import (
     UNSPECIFIED_NODE_NAME,

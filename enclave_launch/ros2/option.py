@@ -20,12 +20,21 @@ from typing import Any
 
 from ros2launch.option import OptionExtension
 
-from enclave_launch.boundary.command_line import add_options
-from enclave_launch.boundary.terminal import safe_output, stdout_is_for_the_plan
+from enclave_common.command_line import add_options
+from enclave_common.terminal import safe_output, stdout_is_for_the_plan
 from enclave_launch.errors import EnclaveLaunchError, UsageError
+from enclave_launch.flow import resolve
 from enclave_launch.ros2 import attributes  # noqa: F401  # ``enclave=`` in Python launch files, secured or not
-from enclave_launch.verb.options import DENIALS, LOOKING, POLICY, add_security_options, build_parser
-from enclave_launch.verb.secure_launch import resolve_options, show_plan, start
+from enclave_launch.verb.options import (
+    DENIALS,
+    LOOKING,
+    POLICY,
+    add_security_options,
+    build_parser,
+    resolve_options,
+)
+from enclave_launch.verb.secure_launch import show_plan
+from enclave_launch.verb.start import start
 from enclave_launch.verb.target import LaunchTarget
 from enclave_launch.verb.usage import FOR_PLAN, FOR_SECURE, CommandLine, check_needs_secure, check_views
 
@@ -88,8 +97,6 @@ def names_keystore(words: Sequence[str]) -> bool:
 
 def _looked_at(args: argparse.Namespace) -> int:
     """As ``secure-launch --dry-run`` and its like: the plan is printed, nothing starts. Gives the exit status."""
-    from enclave_launch.flow import resolve  # 78 modules that a plain `ros2 launch` does without
-
     path, arguments = target_of(args)
     keystore = os.path.abspath(args.keystore) if getattr(args, SECURE) and args.keystore else None
     with stdout_is_for_the_plan():

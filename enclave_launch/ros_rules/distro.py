@@ -14,17 +14,20 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterator, Sequence
+from enum import Enum
 from functools import lru_cache
+from typing import NamedTuple
 
-from enclave_launch.boundary.files import read_text
-from enclave_launch.boundary.light import NamedTuple, TextEnum
+from enclave_common.files import read_text
 
 Version = tuple[int, ...]
 ALWAYS: Version = (0,)
 
 
-class Distro(TextEnum):
+class Distro(str, Enum):
     """The distributions that are known, oldest first; the last is the default."""
+
+    __str__ = str.__str__
 
     HUMBLE = "humble"
     JAZZY = "jazzy"
@@ -165,7 +168,7 @@ class Release(NamedTuple):
 
 @lru_cache(maxsize=32)
 def release_of(distro: Distro, launch: Version | None = None, launch_ros: Version | None = None) -> Release:
-    """The release of ``distro`` with these versions, by default those of the reference snapshots."""
+    """Return the release of ``distro`` with these versions, by default those of the reference snapshots."""
     default_launch, default_ros = _VERSIONS[distro]
     launch, launch_ros = launch or default_launch, launch_ros or default_ros
     features = frozenset(

@@ -1,4 +1,4 @@
-"""How namespaces join, and the enclave scope that follows from pushed namespaces and enclaves. Pure.
+"""How namespaces join, and the enclave scope that follows from pushed namespaces and enclaves.
 
 The launch configurations ``ros_namespace`` (upstream's) and ``ros_enclave_scope`` (ours) carry the scope, so
 groups and includes scope both alike. ``ros_enclave_scope`` is set by the first explicit push of an enclave;
@@ -9,8 +9,7 @@ push of a namespace joins its enclave text, or else its namespace, in the way na
 from __future__ import annotations
 
 from collections.abc import Mapping, MutableMapping
-
-from enclave_launch.boundary.light import Any, overload
+from typing import Any, overload
 
 NAMESPACE = "ros_namespace"
 ENCLAVE_SCOPE = "ros_enclave_scope"
@@ -36,12 +35,12 @@ def make_namespace_absolute(ns: str) -> str: ...
 @overload
 def make_namespace_absolute(ns: str | None) -> str | None: ...
 def make_namespace_absolute(ns: str | None) -> str | None:
-    """A leading slash where it is missing; ``None`` stays ``None``."""
+    """Add a leading slash if it is missing; None stays None."""
     return ns if ns is None or ns.startswith("/") else f"/{ns}"
 
 
 def enclave_scope(launch_configurations: Mapping[str, Any]) -> str | None:
-    """The absolute scope in force, ``None`` when neither an enclave nor a namespace was pushed."""
+    """Return the absolute scope in force; None if neither an enclave nor a namespace was pushed."""
     scope: str | None = launch_configurations.get(ENCLAVE_SCOPE)
     return make_namespace_absolute(launch_configurations.get(NAMESPACE) if scope is None else scope)
 

@@ -1,4 +1,4 @@
-"""Where the output of a process goes: ``output=`` of a process action. Pure.
+"""Where the output of a process goes: ``output=`` of a process action.
 
 Rules and messages of launch/logging/__init__.py (``get_output_loggers``).
 """
@@ -6,8 +6,7 @@ Rules and messages of launch/logging/__init__.py (``get_output_loggers``).
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-
-from enclave_launch.boundary.light import Literal
+from typing import Literal
 
 Source = Literal["stdout", "stderr", "both"]
 OutputSetting = str | Mapping[str, str | Iterable[str]]

@@ -1,4 +1,4 @@
-"""Parameter files and values of ``-p`` as rcl reads them: what libyaml finds in, sections of parameters out. Pure.
+"""Parameter files and values of ``-p`` as rcl reads them: what libyaml finds in, sections of parameters out.
 
 rcl takes less than YAML has, and in places something else: several documents are one file; aliases are refused, so are
 a value before ``ros__parameters``, a parameter without a value, a list of two types. No node starts that is given what
@@ -7,16 +7,17 @@ rcl refuses. Rules of ros2/rcl ``rcl_yaml_param_parser`` (``parse.c``, ``namespa
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
 from functools import lru_cache
+from typing import Any
 
 import yaml
 
-from enclave_launch.boundary.light import Any
-from enclave_launch.boundary.plain_yaml import QUOTES, known_parts
-from enclave_launch.boundary.yaml_nodes import EventParser, refuse_deep_nesting
+from enclave_common.files import MEBIBYTE
+from enclave_common.yaml_reader import LIBYAML_LOADER, MAX_NESTING
 from enclave_launch.ros_rules.parameter_value import ParameterValue, Scalar, plain_scalar, type_slot
+
+MAX_BYTES = 128 * MEBIBYTE  # of one parameter file
 
 Section = Mapping[str, ParameterValue]
 
@@ -30,6 +31,8 @@ _KINDS = {
     yaml.SequenceEndEvent: "]",
     yaml.AliasEvent: "*",
 }
+_BEGINS, _ENDS = ("{", "["), ("}", "]")
+_QUOTES = ("'", '"')
 _LONGEST_TOKEN, _LONGEST_NODE_NAME = 244, 255
 
 
@@ -43,22 +46,14 @@ def sections_of_text(text: str) -> Mapping[str, Section]:
 
     Raises ``RefusedParameters``, and ``yaml.YAMLError`` for what is not YAML.
     """
-    known = known_parts(text)
-    if known is not None:
-        with suppress(RefusedParameters):  # which is said with its line
-            return _sections(known)
-    return _sections(parts_of(text))
-
-
-def _sections(parts: Iterable[tuple[Any, ...]]) -> Mapping[str, Section]:
     reader = _FileReader()
-    for part in parts:
-        reader.take(*part)
+    for kind, scalar, style, line in parts_of(text):
+        reader.take(kind, scalar, style, line)
     return reader.sections()
 
 
 def value_of_text(text: str) -> ParameterValue | None:
-    """The value of ``-p NAME:=text``; ``None`` for a comment alone. Raises as ``sections_of_text``."""
+    """Return the value of ``-p NAME:=text``; None for a comment alone. Raises as ``sections_of_text``."""
     if not text:
         raise RefusedParameters("the value is missing")
     slots: _Slots = {}
@@ -76,13 +71,24 @@ def value_of_text(text: str) -> ParameterValue | None:
 
 
 def parts_of(text: str) -> Iterator[tuple[str, str, str, int]]:
-    """As ``known_parts``, each with its line; ``*`` is an alias, and the style of a tagged text its tag."""
-    refuse_deep_nesting(text)
+    """Yield kind, text, style and line of each event: ``scalar``, ``{`` and ``}``, ``[`` and ``]``, ``*`` for an alias.
+
+    The style of a scalar that is tagged as text, and stands without quotes, is its tag.
+    """
     event: Any
-    for event in yaml.parse(text, Loader=EventParser):
+    depth = 0
+    for event in yaml.parse(text, Loader=LIBYAML_LOADER):
         kind = _KINDS.get(type(event))
+        if kind in _BEGINS:
+            depth += 1
+            if depth > MAX_NESTING:
+                raise RefusedParameters(
+                    f"line {event.start_mark.line + 1}: nested more than {MAX_NESTING} deep"
+                )
+        elif kind in _ENDS:
+            depth -= 1
         if kind == "scalar":
-            style = event.tag if event.tag == _TEXT_TAG and event.style not in QUOTES else event.style
+            style = event.tag if event.tag == _TEXT_TAG and event.style not in _QUOTES else event.style
             yield kind, event.value, style, event.start_mark.line + 1
         elif kind:
             yield kind, "", "", event.start_mark.line + 1
@@ -155,7 +161,7 @@ class _Section:
         self._index: dict[str, int] = {}
 
     def find(self, name: str) -> int:
-        """Where ``name`` stands; it is added where it does not."""
+        """Return the index of ``name``, added if it is new."""
         at = self._index.get(name)
         if at is None:
             at = self._index[name] = len(self.names)
@@ -189,7 +195,7 @@ class _FileReader:
     def sections(self) -> Mapping[str, Section]:
         return {name: section.read() for name, section in self._sections.items()}
 
-    def take(self, kind: str, text: str, style: str, line: int = 0) -> None:
+    def take(self, kind: str, text: str, style: str, line: int) -> None:
         """Raises ``RefusedParameters``."""
         if kind == "scalar":
             if self._key_is_next:
@@ -269,7 +275,7 @@ class _FileReader:
 
 
 def _scalar_of(text: str, style: str, line: int) -> Scalar:
-    quoted = style in QUOTES
+    quoted = style in _QUOTES
     if not quoted and not text:
         raise _refused(line, "a parameter has no value")
     return text if quoted or style == _TEXT_TAG else plain_scalar(text)

@@ -1,13 +1,10 @@
 """The values that a ROS 2 parameter can have (``rcl_interfaces/msg/ParameterValue``), and which of them a plain YAML
-scalar is for rcl. Pure."""
+scalar is for rcl."""
 
 from __future__ import annotations
 
 import math
 import re
-
-from enclave_launch.boundary.light import late_pattern
-from enclave_launch.boundary.plain_yaml import decimal
 
 Scalar = bool | int | float | str
 ParameterValue = Scalar | bytes | tuple[Scalar | bytes, ...]
@@ -17,12 +14,12 @@ _BOOLEANS = {
     **dict.fromkeys(("N", "n", "no", "No", "NO", "false", "False", "FALSE", "off", "Off", "OFF"), False),
 }
 # strtoll with base 0 and strtod; the blanks they skip are those of ASCII
-_INTEGER = late_pattern(r"\s*[+-]?(?:0[xX][0-9a-fA-F]+|0[0-7]*|[1-9][0-9]*)", re.ASCII)
-_DOUBLE = late_pattern(
+_INTEGER = re.compile(r"\s*[+-]?(?:0[xX][0-9a-fA-F]+|0[0-7]*|[1-9][0-9]*)", re.ASCII)
+_DOUBLE = re.compile(
     r"\s*[+-]?(?:(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][+-]?[0-9]+)?|inf(?:inity)?|nan)",
     re.IGNORECASE | re.ASCII,
 )
-_NAMED_DOUBLE = late_pattern(r"([+-]?)\.(inf|Inf|INF)|()\.(nan|NaN|NAN)")
+_NAMED_DOUBLE = re.compile(r"([+-]?)\.(inf|Inf|INF)|()\.(nan|NaN|NAN)")
 _BEGIN_NUMBERS = frozenset("+-.0123456789 \t\n\v\f\r")
 _NAMES_OF_NUMBERS = frozenset(("inf", "infinity", "nan"))
 _MOST_DIGITS = 25  # of a number in 64 bits, in whichever base
@@ -37,19 +34,17 @@ def type_slot(value: ParameterValue) -> int:
 
 
 def plain_scalar(text: str) -> Scalar:
-    """A plain YAML scalar by the rules of rcl's parser (``parse.c``, ``get_value``), which are not YAML 1.1's."""
+    """Type a plain YAML scalar by the rules of rcl's parser (``parse.c``, ``get_value``), which are not YAML 1.1's."""
     if text in _BOOLEANS:
         return _BOOLEANS[text]
     if text[:1] not in _BEGIN_NUMBERS and text.lower() not in _NAMES_OF_NUMBERS:
         return text
-    if (plain := decimal(text)) is not None:
-        return plain
     number = _strtoll(text) if _INTEGER.fullmatch(text) else None
     return _strtod(text) if number is None else number
 
 
 def _strtoll(text: str) -> int | None:
-    """``None`` outside of 64 bits."""
+    """Return None outside of 64 bits."""
     digits = text.strip().lstrip("+-")
     base = 16 if digits[:2] in ("0x", "0X") else 8 if digits.startswith("0") else 10
     if len(digits) > _MOST_DIGITS:

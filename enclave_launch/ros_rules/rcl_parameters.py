@@ -15,9 +15,18 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache
+from typing import Any, NamedTuple, TypeVar
 
-from enclave_launch.boundary.files import read_text
-from enclave_launch.boundary.light import Any, NamedTuple, TypeVar
+import yaml
+
+from enclave_common.files import read_text
+from enclave_common.yaml_reader import load_yaml
+from enclave_launch.ros_rules.parameter_file import (
+    MAX_BYTES,
+    RefusedParameters,
+    sections_of_text,
+    value_of_text,
+)
 from enclave_launch.ros_rules.parameter_value import ParameterValue, Scalar, plain_scalar, type_slot
 from enclave_launch.ros_rules.ros_arguments import ParameterFileArgument, ParameterRule
 
@@ -88,7 +97,7 @@ def _sections_of(
 
 
 def section_applies(section: str, fqn_tokens: Sequence[str | None]) -> bool:
-    """Whether a section of a parameter file is for the node with these name tokens."""
+    """Return True if a section of a parameter file is for the node with these name tokens."""
     if section == EVERY_NODE:
         return True
     return _matches([token for token in section.split("/") if token], fqn_tokens)
@@ -108,7 +117,7 @@ def _matches(pattern: Sequence[str], tokens: Sequence[str | None]) -> bool:
 
 
 def as_rcl_reads(value: Any) -> ParameterValue:
-    """A value that launch writes with PyYAML, as rcl's parser reads it back.
+    """Return a value that launch writes with PyYAML, as rcl's parser reads it back.
 
     The two disagree on a few plain words: PyYAML writes the text ``1e3`` without quotes, rcl reads 1000.0.
     """
@@ -123,42 +132,32 @@ def _item_as_rcl_reads(value: Scalar | bytes) -> Scalar | bytes:
     typed = plain_scalar(value) if isinstance(value, str) else value
     if typed is value or isinstance(typed, str):
         return value
-    from yaml import safe_load
-
-    return typed if isinstance(safe_load(str(value)), str) else value
+    return typed if isinstance(load_yaml(str(value)), str) else value
 
 
 def _value_of_rule(rule: ParameterRule) -> ParameterValue | None:
-    """``None`` where rcl takes the rule and no value comes of it. Raises ``UnreadableParameters``."""
+    """Return the value; None if rcl takes the rule and no value comes of it. Raises ``UnreadableParameters``."""
     letters = rule.value.translate(_WITHOUT_MARKS)
     if letters.isascii() and letters.isalnum():
         return plain_scalar(rule.value)
-    from enclave_launch.ros_rules.parameter_file import value_of_text
-
     return _read(f"-p {rule.name}:={rule.value}", rule.value, value_of_text)
 
 
 @lru_cache(maxsize=256)
 def _read_cached(path: str, _modified: int, _size: int) -> Mapping[str, Section]:
     try:
-        text = read_text(path)
+        text = read_text(path, MAX_BYTES)
     except (OSError, UnicodeDecodeError) as error:
         raise UnreadableParameters(path, str(error)) from error
     return parameters_of_text(text, path)
 
 
 def parameters_of_text(text: str, path: str) -> Mapping[str, Section]:
-    """The sections of the parameter file ``path``. Raises ``UnreadableParameters`` for what rcl refuses."""
-    from enclave_launch.ros_rules.parameter_file import sections_of_text
-
+    """Read the sections of the parameter file ``path``. Raises ``UnreadableParameters`` for what rcl refuses."""
     return _read(path, text, sections_of_text)
 
 
 def _read(what: str, text: str, read: Callable[[str], Read]) -> Read:
-    import yaml
-
-    from enclave_launch.ros_rules.parameter_file import RefusedParameters
-
     try:
         return read(text)
     except RefusedParameters as error:

@@ -8,9 +8,9 @@ outside of them a word with ``:=`` is still taken as a remap rule (deprecated th
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
-from enclave_launch.boundary.light import NamedTuple
-from enclave_launch.boundary.shell_words import split_words
+from enclave_common.shell_words import split_words
 from nodl.remap import InvalidRemapRuleError, parse_rule
 
 _REMAP = ("-r", "--remap")
@@ -61,17 +61,17 @@ def parse_ros_arguments(arguments: Sequence[str]) -> RosArguments:
 
 
 def remap_arguments(arguments: Sequence[str]) -> dict[int, str]:
-    """The remap rules of ``parse_ros_arguments``, in their order, each by the index of its word."""
+    """Return the remap rules of ``parse_ros_arguments``, in their order, each by the index of its word."""
     return {index: value for index, flag, value in _flags(arguments) if flag in _REMAP}
 
 
 def words_after_program(cmd: Sequence[str], prefix_length: int, *, shell: bool) -> list[str]:
-    """The words that the program itself gets; a shell cuts its command line anew."""
+    """Return the words that the program itself gets; a shell splits its command line again."""
     return (shell_words(cmd) if shell else list(cmd))[prefix_length + 1 :]
 
 
 def shell_words(cmd: Sequence[str]) -> list[str]:
-    """The words of a command that goes through a shell. What the shell would refuse stays as it is."""
+    """Split a command that goes through a shell. What the shell would refuse stays as it is."""
     try:
         return split_words(" ".join(cmd))
     except ValueError:
@@ -79,7 +79,7 @@ def shell_words(cmd: Sequence[str]) -> list[str]:
 
 
 def _flags(arguments: Sequence[str]) -> Iterator[tuple[int, str, str]]:
-    """Each ROS argument: the index of its value, its flag and the value; a deprecated bare rule comes as ``-r``."""
+    """Yield of each ROS argument the index of its value, its flag and the value; a deprecated bare rule is ``-r``."""
     inside = False
     words = enumerate(arguments)
     for index, word in words:
@@ -96,7 +96,7 @@ def _flags(arguments: Sequence[str]) -> Iterator[tuple[int, str, str]]:
 
 
 def is_bare_rule(word: str) -> bool:
-    """Whether rcl takes ``word`` outside of its arguments as a remap rule; what does not parse is the program's own."""
+    """Return True if rcl takes ``word`` outside of its arguments as a remap rule."""
     if ":=" not in word:
         return False
     try:

@@ -16,7 +16,7 @@ import signal
 from collections.abc import Callable, Iterator, Mapping
 from typing import NamedTuple
 
-from enclave_launch.boundary.files import read_bytes
+from enclave_common.files import read_bytes
 from enclave_launch.runtime.warden import children_by_parent, descendants, proc_is_ours
 
 FIRST_LOOK = 0.25  # seconds after a start; then ever rarer

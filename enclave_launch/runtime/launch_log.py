@@ -17,7 +17,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Literal, NamedTuple
 
-from enclave_launch.boundary.terminal import printable, printable_lines
+from enclave_common.terminal import printable, printable_lines
 from enclave_launch.errors import RuntimeFailure
 from enclave_launch.runtime.overlap import Overlap
 from enclave_launch.runtime.sinks import FileSink, ScreenSink, Sink, SinkWriter

@@ -13,13 +13,17 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from enclave_launch.description.actions.lifecycle import LifecycleNode
+from enclave_launch.description.actions.processes import ExecuteLocal
+from enclave_launch.description.events.lifecycle import StateTransition
+from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.errors import EnclaveLaunchError, RuntimeFailure
 from enclave_launch.host.base_host import BaseHost
-from enclave_launch.host.outcomes import Outcomes
 from enclave_launch.host.protocol import HostOptions
+from enclave_launch.host.user_code_results import RecordedResults
 from enclave_launch.process import LauncherCall, ResolvedComponent, ResolvedProcess, Unforeseeable
 from enclave_launch.runtime.companion import LaunchCompanion
 from enclave_launch.runtime.environment_watch import EnvironmentWatch, Unplanned, Watched
@@ -29,11 +33,6 @@ from enclave_launch.runtime.live_process import LiveProcess
 from enclave_launch.runtime.process_tree import ProcessSpec, ProcessTree
 from enclave_launch.runtime.ros_services import ALTERNATIVE, RosServices
 from enclave_launch.runtime.run_events import Observer, ProcessOver, ProcessPlanned
-
-if TYPE_CHECKING:
-    from enclave_launch.description.actions.lifecycle import LifecycleNode
-    from enclave_launch.description.actions.processes import ExecuteLocal
-    from enclave_launch.description.launch_context import LaunchContext
 
 
 class LiveHost(BaseHost):
@@ -52,9 +51,9 @@ class LiveHost(BaseHost):
         observe: Observer,
         companion: LaunchCompanion | None,
         options: HostOptions,
-        outcomes: Outcomes | None,
+        user_code_results: RecordedResults | None,
     ) -> None:
-        super().__init__(options, outcomes)
+        super().__init__(options, user_code_results)
         self._observe = observe
         self._loop = asyncio.get_running_loop()
         self._tree = tree
@@ -137,7 +136,6 @@ class LiveHost(BaseHost):
         services = self._services()
         if services is None:
             return
-        from enclave_launch.description.events.lifecycle import StateTransition
 
         node: Any = action
         services.watch_state(

@@ -21,17 +21,17 @@ from datetime import datetime, timezone
 from signal import SIGINT, Signals
 from typing import Any
 
-from enclave_launch.description.events.dispatch import handle_next
 from enclave_launch.description.events.event import IncludeLaunchDescription, Shutdown
 from enclave_launch.description.events.handlers import OnIncludeLaunchDescription, OnShutdown
 from enclave_launch.description.launch_context import LaunchContext
+from enclave_launch.description.visit import handle_next
 from enclave_launch.errors import EnclaveLaunchError, RuntimeFailure
+from enclave_launch.evaluation.active_environment import ENVIRONMENT_SWITCH, LaunchEnvironment
 from enclave_launch.evaluation.evaluate import (
     forget_elements_of_launch_files,
     launch_file_error,
     top_description,
 )
-from enclave_launch.evaluation.stage import STAGE, Actor
 from enclave_launch.host.current import active_host
 from enclave_launch.options import RunSettings
 from enclave_launch.plan import LaunchSource
@@ -113,7 +113,9 @@ class LiveLaunch:
         self._failed = False
         self._services: RosServices | None = None
         self.warden_pid: int | None = None
-        self._actor = Actor(lambda: prepend_prefixes(source.prefixes), lambda: self._host.prefixes())
+        self._environment = LaunchEnvironment(
+            lambda: prepend_prefixes(source.prefixes), lambda: self._host.prefixes()
+        )
         self._log: LaunchLog
         self._host: LiveHost
         self._context: LaunchContext
@@ -129,14 +131,16 @@ class LiveLaunch:
             tree.on_interrupt = lambda: self.on_signal(SIGINT)
             await stack.enter_async_context(tree)
             stack.enter_context(many_descriptors())
-            with STAGE.cleared():
+            with ENVIRONMENT_SWITCH.restored():
                 if self._needs_ros_services:
                     self.services()  # what is missing for them is said before anything starts
                 stack.callback(self._close_services)
                 self._log = self._open_log(tree)
             stack.callback(self._log.close)
-            stack.enter_context(captured_logging(self._log, lambda: STAGE.is_on(self._actor)))
-            companion, outcomes = self._settings.companion, self._source.outcomes
+            stack.enter_context(
+                captured_logging(self._log, lambda: ENVIRONMENT_SWITCH.is_active(self._environment))
+            )
+            companion, results = self._settings.companion, self._source.user_code_results
             if companion is not None:
                 companion.opened(self)
                 stack.push_async_callback(companion.closed)
@@ -151,12 +155,12 @@ class LiveLaunch:
                 companion=companion,
                 options=self._source.host_options,
                 # What the dry run noted, for the first run that follows it.
-                outcomes=outcomes if outcomes is not None and outcomes.rewind() else None,
+                user_code_results=results if results is not None and results.rewind() else None,
             )
             stack.push_async_callback(self._host.close)
             stack.enter_context(active_host(self._host))
             stack.callback(forget_elements_of_launch_files)
-            stack.callback(STAGE.leave, self._actor)
+            stack.callback(ENVIRONMENT_SWITCH.leave, self._environment)
             return await self._run_until_over(tree)
 
     def shut_down(self, reason: str, *, due_to_sigint: bool = False) -> None:
@@ -194,7 +198,7 @@ class LiveLaunch:
         recorded = companion is not None and companion.records
         self._observe(LaunchStarted(str(self._log.directory), recorded))
         self._look_at_clock()
-        with STAGE.turn(self._actor):
+        with ENVIRONMENT_SWITCH.active(self._environment):
             self._begin()
         if tree.lost is not None:
             lost = RuntimeFailure("the warden process was killed, and all processes with it")
@@ -251,7 +255,7 @@ class LiveLaunch:
             if self._settings.debug:
                 name = getattr(queue.next, "process_name", None)
                 self.say("DEBUG", f"processing event: {queue.next.name}{f' of {name}' if name else ''}")
-            with STAGE.turn(self._actor):
+            with ENVIRONMENT_SWITCH.active(self._environment):
                 self._futures += [future for _, future in handle_next(self._context, lambda *_: None)]
             await asyncio.sleep(0)
             return

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable, Mapping
 from signal import Signals
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from enclave_launch.description.actions.processes import ExecuteLocal
 from enclave_launch.description.conditions import evaluate_condition_expression
 from enclave_launch.description.events.event import (
     ProcessExited,
@@ -23,6 +24,7 @@ from enclave_launch.description.events.event import (
     SignalProcess,
 )
 from enclave_launch.description.events.handlers import EventHandler, OnShutdown
+from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.description.substitution import normalize_to_list_of_substitutions, perform_substitutions
 from enclave_launch.process import ResolvedProcess
 from enclave_launch.runtime import run_events
@@ -31,10 +33,6 @@ from enclave_launch.runtime.process_tree import Hold, ProcessSpec, ProcessTree, 
 from enclave_launch.runtime.routing import DEFAULT_FORMAT, OutputRouter
 from enclave_launch.runtime.run_events import Observer
 from enclave_launch.runtime.supervision import LifeRules, Patience, ProcessEnd, SupervisedProcess
-
-if TYPE_CHECKING:
-    from enclave_launch.description.actions.processes import ExecuteLocal
-    from enclave_launch.description.launch_context import LaunchContext
 
 Prepare = Callable[[ResolvedProcess], Awaitable[ProcessSpec]]
 

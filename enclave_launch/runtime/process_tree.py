@@ -11,6 +11,7 @@ import contextlib
 import errno
 import os
 import signal
+import termios
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from types import MappingProxyType
@@ -331,8 +332,6 @@ def _open_output(emulate_tty: bool) -> tuple[int, int]:
     """Our end and the child's end of one output stream."""
     if not emulate_tty:
         return os.pipe()
-    import termios
-
     ours, theirs = os.openpty()
     mode = termios.tcgetattr(theirs)
     mode[1] &= ~termios.OPOST  # lines end as the process wrote them, without a carriage return

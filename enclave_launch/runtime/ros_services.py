@@ -15,7 +15,7 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from enclave_launch.boundary.environment import environment_with
+from enclave_common.environment import environment_with
 from enclave_launch.errors import RuntimeFailure
 from enclave_launch.policy.launcher import LAUNCHER_NODE
 from enclave_launch.process import ResolvedComponent

@@ -10,7 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
-from enclave_launch.boundary.terminal import printable
+from enclave_common.terminal import printable
 from enclave_launch.ros_rules.output import Routes
 from enclave_launch.runtime.launch_log import LaunchLog
 from enclave_launch.runtime.process_tree import Hold, Stream

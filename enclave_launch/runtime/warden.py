@@ -44,11 +44,10 @@ import socket
 import struct
 import sys
 import time
+from collections.abc import Callable, Mapping
+from typing import Any
 
 TYPE_CHECKING = False  # ``typing`` costs start-up time and is not needed to run
-if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
-    from typing import Any
 
 HEADER = struct.Struct("!I")
 PR_SET_PDEATHSIG = 1  # linux/prctl.h

@@ -1,7 +1,4 @@
-"""The warden as a running process, and our end of its socket. Starts it; ``process_tree`` talks to it.
-
-Apart from the tree and without ``asyncio``, so that it starts up while the launcher still imports that.
-"""
+"""The warden as a running process, and our end of its socket. Starts it; ``process_tree`` talks to it."""
 
 from __future__ import annotations
 

@@ -4,18 +4,15 @@ from __future__ import annotations
 
 import argparse
 import sys
-from typing import TYPE_CHECKING
 
-from enclave_launch.boundary.terminal import warn
+from enclave_common.terminal import warn
 from enclave_launch.errors import RuntimeFailure, translated
 from enclave_launch.flow import run
+from enclave_launch.options import RunSettings
+from enclave_launch.plan import LaunchPlan
 from enclave_launch.recording.audit import Audit, audit_json, audit_text
 from enclave_launch.recording.learning import new_run
 from enclave_launch.recording.recording import Recording
-
-if TYPE_CHECKING:
-    from enclave_launch.options import RunSettings
-    from enclave_launch.plan import LaunchPlan
 
 
 def audit_launch(plan: LaunchPlan, options: argparse.Namespace, settings: RunSettings) -> int:

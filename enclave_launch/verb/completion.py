@@ -1,6 +1,6 @@
 """What a shell offers after Tab for the words that name a launch: packages, launch files, launch arguments.
 
-The shell asks through argcomplete, as for ``ros2`` (``boundary.command_line.complete``). Nothing of a launch file is
+The shell asks through argcomplete, as for ``ros2`` (``command_line.complete``). Nothing of a launch file is
 executed for it: the arguments of a Python file, which only running it would tell, are not offered.
 """
 
@@ -10,8 +10,12 @@ import argparse
 import os
 from collections.abc import Iterable, Sequence
 
-from enclave_launch.boundary.command_line import complete_with, parsers
+from enclave_common.command_line import complete_with, parsers
 from enclave_launch.errors import EnclaveLaunchError
+from enclave_launch.evaluation.evaluate import read_description
+from enclave_launch.host.plan_host import PlanHost
+from enclave_launch.host.protocol import HostOptions
+from enclave_launch.verb.target import find_target
 from nodl import ament_index
 
 
@@ -45,11 +49,6 @@ def _launch_files(package: str, prefixes: Sequence[str]) -> Iterable[str]:
 
 
 def _arguments(words: Sequence[str], prefixes: Sequence[str]) -> Iterable[str]:
-    from enclave_launch.evaluation.evaluate import read_description
-    from enclave_launch.host.plan_host import PlanHost
-    from enclave_launch.host.protocol import HostOptions
-    from enclave_launch.verb.target import find_target
-
     given = {word.partition(":=")[0] for word in words if ":=" in word}
     try:
         target = find_target([word for word in words if ":=" not in word], prefixes)

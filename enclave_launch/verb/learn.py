@@ -7,9 +7,8 @@ import os
 import sys
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from enclave_launch.boundary.words import counted
+from enclave_common.words import counted
 from enclave_launch.errors import UsageError
 from enclave_launch.recording.isolation import DEVICES_STAY_REAL, isolate
 from enclave_launch.recording.learning import (
@@ -22,12 +21,10 @@ from enclave_launch.recording.learning import (
 )
 from enclave_launch.recording.markers import MarkerRun, questions
 from enclave_launch.recording.recording import Recording
+from enclave_launch.runtime.companion import LaunchCompanion
+from enclave_launch.verb.target import LaunchTarget
 from keystore.errors import KeystoreError
 from keystore.formats.validity import parse_duration
-
-if TYPE_CHECKING:
-    from enclave_launch.runtime.companion import LaunchCompanion
-    from enclave_launch.verb.target import LaunchTarget
 
 Start = Callable[["LaunchCompanion"], int]
 """Run the launch with a companion; gives the exit status."""

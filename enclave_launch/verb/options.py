@@ -5,9 +5,10 @@ from __future__ import annotations
 import argparse
 import os
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from pathlib import Path
 
-from enclave_launch.boundary.command_line import (
+from enclave_common.command_line import (
     FLAG,
     PATH,
     PATHS,
@@ -20,13 +21,16 @@ from enclave_launch.boundary.command_line import (
     add_version,
     one_of,
 )
-from enclave_launch.boundary.files import as_path
+from enclave_launch.enclave import EnclaveScope
+from enclave_launch.errors import UsageError, translated
+from enclave_launch.options import ResolveOptions
 from enclave_launch.ros_rules.distro import Distro
 
 DESCRIPTION = """\
 Launch a ROS 2 launch file (XML, YAML or Python), with or without ROS installed.
-With --secure every process gets an enclave with the least permissions that let it work:
-keys, certificates and signed permissions are made from the launch file before anything starts.
+With --secure every process starts in an enclave with the least permissions that its nodes need: keys,
+certificates and signed permissions are made from the launch file before anything starts. Processes of
+one namespace share an enclave, unless --enclave-scope says otherwise.
 """
 
 EPILOG = """\
@@ -48,6 +52,7 @@ def names_of(options: Iterable[Option]) -> frozenset[str]:
 SECURITY: tuple[Option, ...] = (
     ("--secure", FLAG, "give every process its enclave; refuse to start otherwise"),
     ("--keystore DIR", PATH, "keystore to use (default: ROS_SECURITY_KEYSTORE); created when it does not exist"),
+    ("--provision-only", FLAG, "make keys, certificates and permissions as planned; start nothing"),
     ("--no-create-keystore", FLAG, "an absent keystore is an error"),
     ("--strategy", one_of("Enforce", "Permissive"), "ROS_SECURITY_STRATEGY of the processes (default: Enforce)"),
     ("--domain-id IDS", TEXT,
@@ -186,6 +191,38 @@ def add_security_options(group: argparse._ArgumentGroup) -> None:
     keystore = os.environ.get("ROS_SECURITY_KEYSTORE")
     for action in group._group_actions:
         if action.dest == "keystore" and keystore:
-            action.default = as_path(keystore)
+            action.default = Path(keystore)
     add_options(group.add_mutually_exclusive_group(), PASSPHRASE)
     add_options(group, LATE)
+
+
+def resolve_options(options: argparse.Namespace) -> ResolveOptions:
+    """What the options say about evaluation and permissions."""
+    return ResolveOptions(
+        prefixes=tuple(options.prefix),
+        manifests=tuple(options.nodl),
+        policy=options.policy,
+        distro=options.distro,
+        enclave_scope=EnclaveScope(options.enclave_scope),
+        infer=options.missing_nodl in ("infer", "analysis"),
+        library=options.missing_nodl in ("infer", "library"),
+        library_folders=tuple(options.library),
+        source_folders=tuple(options.source),
+        accept_patterns=options.accept_patterns,
+        allow_missing_packages=options.allow_missing_packages,
+        also=tuple(options.also),
+        accept_prefixes=tuple(options.accept_prefix),
+        accept_middlewares=tuple(options.accept_middleware),
+        no_python=options.no_python,
+        launch_configurations=_launch_prefix(options),
+    )
+
+
+def _launch_prefix(options: argparse.Namespace) -> Mapping[str, str]:
+    pattern = options.launch_prefix_filter
+    with translated(
+        re.error, UsageError, f"--launch-prefix-filter {pattern!r} is not a regular expression: "
+    ):
+        re.compile(pattern or "")
+    given = {"launch-prefix": options.launch_prefix, "launch-prefix-filter": pattern}
+    return {name: value for name, value in given.items() if value is not None}

@@ -3,23 +3,29 @@
 from __future__ import annotations
 
 import argparse
+from collections import Counter
 from collections.abc import Iterator
 from datetime import timedelta
 
-from enclave_launch.boundary.terminal import ProgressBar, wanted
-from enclave_launch.boundary.words import counted, some_of
+from enclave_common.terminal import ProgressBar, wanted
+from enclave_common.words import counted, some_of
 from enclave_launch.errors import UsageError, keystore_errors, translated
 from enclave_launch.options import SecurityOptions
+from enclave_launch.plan import LaunchPlan
+from enclave_launch.policy.sharing import gains_by_sharing
 from enclave_launch.secured import ProvisionedLaunch
 from keystore.errors import InvalidInputError
 from keystore.formats.domains import Domains
 from keystore.formats.subject import SubjectScheme
 from keystore.formats.validity import later, parse_duration, parse_end, utc_now
 from keystore.signing.ca_access import CaAccess, Secret
+from keystore.steps.creation import CreateOptions
 from keystore.steps.expiry import expires_soon
 from keystore.steps.options import ProvisionOptions
+from keystore.steps.signing_process import SigningProcess
 
 _LISTED = 8
+_NAMED = 3
 _NEW_KEYSTORE = "governance signed"
 
 
@@ -33,8 +39,6 @@ def security_options(options: argparse.Namespace) -> SecurityOptions:
 def _provision_options(options: argparse.Namespace) -> ProvisionOptions:
     subjects, creation = None, None
     if options.compatible_subjects:
-        from keystore.steps.creation import CreateOptions  # much to import, and rarely needed
-
         subjects, creation = SubjectScheme.COMPATIBLE, CreateOptions(subjects=SubjectScheme.COMPATIBLE)
     now = utc_now()
     until = parse_end(options.valid_for, now) if options.valid_for else None
@@ -49,8 +53,18 @@ def _provision_options(options: argparse.Namespace) -> ProvisionOptions:
         subjects=subjects,
         revoke=not options.no_revoke,
         access=CaAccess(passphrase=_passphrase(options)),
+        signing=vars(options).get("signing"),
         progress=ProgressBar("enclaves") if wanted(options.quiet) else None,
     )
+
+
+def sign_elsewhere(options: argparse.Namespace, keystore: str) -> None:
+    """Where a passphrase is given, a process of its own signs: launch files run in this one. Called before they do."""
+    if _passphrase(options) is None or vars(options).get("signing") is not None:
+        return
+
+    with translated(InvalidInputError, UsageError):
+        options.signing = SigningProcess.start(keystore, _provision_options(options))
 
 
 def _passphrase(options: argparse.Namespace) -> Secret | None:
@@ -69,6 +83,21 @@ def created_notices(launch: ProvisionedLaunch) -> Iterator[str]:
     new = [enclave.enclave for enclave in report.enclaves if "created" in enclave.actions]
     if new:
         yield f"{counted(len(new), 'enclave')} created: {some_of(new, _LISTED, ' ')}"
+
+
+def sharing_notices(plan: LaunchPlan) -> Iterator[str]:
+    """Yield, for each enclave that several processes share, what each node may do only because of that."""
+    processes = Counter(process.enclave.path for process in plan.processes if process.enclave is not None)
+    gains: dict[str, list[str]] = {}
+    for gain in gains_by_sharing(plan.derived):
+        rules = (f"{rule.operation.verb} {rule.expression}" for rule in gain.gained)
+        gains.setdefault(gain.enclave, []).append(f"{gain.node} may also {some_of(rules, _NAMED)}")
+    for enclave, number in sorted(processes.items()):
+        if number > 1 and enclave in gains:
+            yield (
+                f"enclave {enclave} is shared by {number} processes: {some_of(gains[enclave], _NAMED, '; ')}; "
+                "--enclave-scope node gives each node its own"
+            )
 
 
 def repair_notices(launch: ProvisionedLaunch) -> Iterator[str]:

@@ -6,13 +6,18 @@ below its share directory, unless the first is a file that exists: then argument
 
 from __future__ import annotations
 
+import argparse
 import os
 from collections.abc import Sequence
+from typing import NamedTuple
 
-from enclave_launch.boundary.light import NamedTuple
-from enclave_launch.boundary.words import did_you_mean
+from enclave_common.terminal import ProgressLine, wanted
+from enclave_common.words import did_you_mean
 from enclave_launch.errors import UsageError, translated
 from enclave_launch.evaluation import evaluate
+from enclave_launch.flow import resolve
+from enclave_launch.plan import LaunchPlan
+from enclave_launch.verb.options import resolve_options
 from nodl import ament_index
 
 
@@ -69,3 +74,24 @@ def parse_arguments(words: Sequence[str]) -> tuple[tuple[str, str], ...]:
     """``name:=value`` words. Raises ``UsageError`` with upstream's message for anything else."""
     with translated(RuntimeError, UsageError):
         return tuple(evaluate.parse_arguments(words))
+
+
+def planned(target: LaunchTarget, options: argparse.Namespace, keystore: str | None) -> LaunchPlan:
+    """Plan ``target``; with a keystore, warn about enclaves shared with other launches there."""
+    plan = resolve_target(target, options)
+    if keystore is None or not os.path.isdir(keystore):
+        return plan
+    from enclave_launch.secured import told_of_shares  # cryptography
+
+    return told_of_shares(plan, keystore)
+
+
+def resolve_target(target: LaunchTarget, options: argparse.Namespace) -> LaunchPlan:
+    """Plan ``target``, with a progress line on a terminal."""
+    line = ProgressLine("analysing") if wanted(options.quiet) else None
+    try:
+        chosen = resolve_options(options)._replace(progress=line)
+        return resolve(target.launch_file, target.arguments, options=chosen)
+    finally:
+        if line is not None:
+            line.clear()

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Collection, Iterable, Mapping, Sequence
+from typing import NamedTuple
 
-from enclave_launch.boundary.light import NamedTuple
 from enclave_launch.errors import UsageError
 from enclave_launch.verb.options import DENIALS, LATE, PASSPHRASE, POLICY, SECURITY, names_of
 
@@ -59,6 +59,10 @@ def check_options(line: CommandLine, parser: argparse.ArgumentParser) -> None:
     elif looks or options.audit or options.learn is not None:
         raise UsageError(
             "--watch is for a launch that runs as planned: it is not for --dry-run, --audit or --learn"
+        )
+    if options.provision_only and (looks or options.learn is not None or options.watch):
+        raise UsageError(
+            "--provision-only writes the keystore and starts nothing: give it with --secure alone"
         )
     if not options.secure:
         check_needs_secure(actions, given & FOR_SECURE)

@@ -3,22 +3,21 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from enclave_launch.drift.compare import Security
 from enclave_launch.drift.expected import out_of_sight
 from enclave_launch.drift_watch import DriftWatch, WatchOptions
 from enclave_launch.errors import ProvisionError, UsageError, translated
 from enclave_launch.flow import run
+from enclave_launch.options import RunSettings
+from enclave_launch.plan import LaunchPlan
 from enclave_launch.report.plan_json import plan_document
+from enclave_launch.secured import ProvisionedLaunch
 from keystore.errors import KeystoreError
 from keystore.steps.tool_enclaves import enclaves_by_guid, provide_watcher
-
-if TYPE_CHECKING:
-    from enclave_launch.options import RunSettings
-    from enclave_launch.plan import LaunchPlan
-    from enclave_launch.secured import ProvisionedLaunch
 
 
 def watch_plain_launch(plan: LaunchPlan, options: argparse.Namespace, settings: RunSettings) -> int:
@@ -36,7 +35,16 @@ def watch_of_secured_launch(launch: ProvisionedLaunch, options: argparse.Namespa
         enclave = provide_watcher(root, launch.options)
         security = Security(enclaves_by_guid(root))
     directory = Path(root) / "enclaves" / enclave.lstrip("/")
-    return DriftWatch(document, _options(options, security, directory))
+    watched = _options(options, security, directory)
+    return DriftWatch(document, watched._replace(enclaves_now=partial(_enclaves_now, root, security)))
+
+
+def _enclaves_now(root: str, security: Security) -> Mapping[int, str]:
+    """Read the keystore's table again; a keystore that cannot be read leaves the one of the start."""
+    try:
+        return enclaves_by_guid(root)
+    except KeystoreError:
+        return security.enclaves
 
 
 def _seen_document(plan: LaunchPlan) -> dict[str, object]:

@@ -13,12 +13,14 @@ import tarfile
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from enclave_launch.boundary.files import read_bytes
+from enclave_common.files import read_bytes
 from keystore.disk.store import Content, Link
 from keystore.errors import DamagedKeystoreError, StorageError, printable
 
 MAX_ARCHIVE = 256_000_000
 """Bytes; some 20 000 enclaves."""
+MAX_ENTRY = 8_000_000
+"""Bytes of one file, as large as a file of a keystore may be."""
 
 
 def archive_bytes(files: Mapping[str, Content | Link], *, compressed: bool = False) -> bytes:
@@ -49,25 +51,34 @@ def read_bundle(bundle: Path) -> dict[str, bytes]:
 
 
 def read_archive(content: bytes, place: str) -> dict[str, bytes]:
-    """Name -> bytes of each regular file. Raises DamagedKeystoreError for what is cut off, names a file twice, or
-    holds anything but files and directories."""
-    found: dict[str, bytes] = {}
+    """Returns name -> bytes of each regular file.
+
+    All names and sizes are checked before the content of any file is taken. Raises DamagedKeystoreError for what is cut
+    off, names a file twice, or holds anything but plain files and directories.
+    """
     try:
         with tarfile.open(fileobj=io.BytesIO(content), mode="r:") as archive:
-            for entry in archive:
-                if entry.isdir():
-                    continue
-                if not entry.isreg() or entry.name in found:
-                    raise DamagedKeystoreError(f"{place}: {entry.name!r} is not a file of its own")
-                stream = archive.extractfile(entry)
-                data = stream.read() if stream is not None else b""
-                if len(data) != entry.size:
-                    raise DamagedKeystoreError(f"{place} is cut off within {entry.name!r}; copy it again")
-                found[entry.name] = data
-    except (tarfile.TarError, EOFError, OSError, ValueError) as error:
+            entries = _plain_files(archive, len(content), place)
+    except (tarfile.TarError, EOFError, OSError, ValueError, OverflowError) as error:
         raise DamagedKeystoreError(
             f"{place} is not a bundle, or is cut off ({error}); copy it again"
         ) from None
+    return {name: content[one.offset_data : one.offset_data + one.size] for name, one in entries.items()}
+
+
+def _plain_files(archive: tarfile.TarFile, available: int, place: str) -> dict[str, tarfile.TarInfo]:
+    """Every entry but directories, by name. A sparse file is not plain: some bytes stand for any size."""
+    found: dict[str, tarfile.TarInfo] = {}
+    for entry in archive:
+        if entry.isdir():
+            continue
+        if entry.type not in (tarfile.REGTYPE, tarfile.AREGTYPE) or entry.issparse() or entry.name in found:
+            raise DamagedKeystoreError(f"{place}: {entry.name!r} is not a plain file of its own")
+        if not 0 <= entry.size <= MAX_ENTRY:
+            raise DamagedKeystoreError(f"{place}: {entry.name!r} is larger than {MAX_ENTRY} bytes")
+        if entry.offset_data + entry.size > available:
+            raise DamagedKeystoreError(f"{place} is cut off within {entry.name!r}; copy it again")
+        found[entry.name] = entry
     return found
 
 

@@ -1,58 +1,41 @@
-"""The CRL on disk: its dates and number (cheap: asked before a launch), and whom it lists."""
+"""The CRL on disk: its dates and number, and whom it lists."""
 
 from __future__ import annotations
 
-from datetime import datetime, timezone
-from typing import TYPE_CHECKING
+from datetime import datetime
+from functools import lru_cache
+
+from cryptography import x509
+from cryptography.exceptions import UnsupportedAlgorithm
+from cryptography.hazmat.primitives.serialization import Encoding
 
 from keystore.disk import layout, safe_files
 from keystore.disk.view import KeystoreView
 from keystore.errors import DamagedKeystoreError, printable
-from keystore.formats import der
+from keystore.formats.certificate import NOT_OUR_FORM, CertificateFacts, moment
 from keystore.formats.register import Register
 from keystore.formats.role import Role
 from keystore.formats.validity import Validity
 
-if TYPE_CHECKING:
-    from cryptography import x509
-
-_CRL_NUMBER = der.object_identifier("2.5.29.20")
-_EXTENSIONS = 0xA0
-
 
 def crl_validity(view: KeystoreView) -> Validity:
-    """thisUpdate and nextUpdate of the CRL (RFC 5280 section 5.1). Raises DamagedKeystoreError."""
-    try:
-        times = [part for part in _fields(view) if part.tag in (der.UTC_TIME, der.GENERALIZED_TIME)]
-        return Validity(der.time_value(times[0]), der.time_value(times[1]))
-    except (IndexError, der.DerError):
-        raise DamagedKeystoreError(f"{printable(view.root / layout.CRL)} is not a CRL with an end") from None
+    """Returns thisUpdate and nextUpdate of the CRL (RFC 5280 section 5.1). Raises DamagedKeystoreError."""
+    crl = load_crl(view)
+    return Validity(moment(crl, "last_update"), moment(crl, "next_update"))
 
 
 def crl_number(view: KeystoreView) -> int:
-    """CRLNumber (RFC 5280 section 5.2.3), 0 without one. The signature is not checked. Raises DamagedKeystoreError."""
+    """Returns the CRLNumber (RFC 5280 section 5.2.3), 0 without one. Raises DamagedKeystoreError."""
     try:
-        holder = next((part for part in _fields(view) if part.tag == _EXTENSIONS), None)
-        extensions = holder.children()[0].children() if holder is not None else []
-        for extension in extensions:
-            name, *_, value = extension.children()
-            if name.whole == _CRL_NUMBER:
-                return int.from_bytes(der.parse(value.content).content, "big")
+        return load_crl(view).extensions.get_extension_for_class(x509.CRLNumber).value.crl_number
+    except x509.ExtensionNotFound:
         return 0
-    except (IndexError, ValueError):
-        raise DamagedKeystoreError(f"{printable(view.root / layout.CRL)} is not a readable CRL") from None
-
-
-def _fields(view: KeystoreView) -> list[der.Element]:
-    """Of TBSCertList."""
-    body = safe_files.read(view.root, layout.CRL).split(b"-----BEGIN X509 CRL-----")[1].split(b"-----END")[0]
-    return der.parse(der.from_base64(body)).children()[0].children()
 
 
 def crl_problem(view: KeystoreView, register: Register | None, now: datetime) -> str | None:
-    """Why the CRL on disk is not the one to use; None when it is, or when there is rightly none.
+    """Says why the CRL on disk is not the one to use; None when it is, or when there is rightly none.
 
-    Without a register (a host that signs nothing) only its dates count. Reads dates and number, not the signature.
+    Without a register (a host that signs nothing) it only has to be whole, signed, and of today.
     """
     if register is not None and register.crl_published != view.has_crl:
         return (
@@ -71,32 +54,55 @@ def crl_problem(view: KeystoreView, register: Register | None, now: datetime) ->
 
 
 def revoked_serials(view: KeystoreView) -> dict[int, datetime]:
-    """Serial -> date of revocation, from a CRL whose signature was checked; empty without one."""
+    """Returns serial -> date of revocation, from a CRL whose signature was checked; empty without one."""
     if not view.has_crl:
         return {}
-    crl = load_crl(view)
-    return {entry.serial_number: _revoked_at(entry) for entry in crl}
-
-
-def _revoked_at(entry: x509.RevokedCertificate) -> datetime:
-    """cryptography before 42 gives the time of RFC 5280, which is UTC, without a zone."""
-    if hasattr(entry, "revocation_date_utc"):
-        return entry.revocation_date_utc
-    return entry.revocation_date.replace(tzinfo=timezone.utc)
+    return {entry.serial_number: moment(entry, "revocation_date") for entry in load_crl(view)}
 
 
 def load_crl(view: KeystoreView) -> x509.CertificateRevocationList:
-    """Raises DamagedKeystoreError when it is unreadable or not signed by the identity CA."""
-    from cryptography import x509
-    from cryptography.exceptions import UnsupportedAlgorithm
+    """Reads the CRL; raises DamagedKeystoreError unless the file is exactly a CRL that the identity CA signed."""
+    return read_crl(
+        safe_files.read(view.root, layout.CRL), view.ca(Role.IDENTITY), printable(view.root / layout.CRL)
+    )
 
-    place = printable(view.root / layout.CRL)
-    try:
-        crl = x509.load_pem_x509_crl(safe_files.read(view.root, layout.CRL))
-        key = x509.load_der_x509_certificate(view.ca(Role.IDENTITY).der).public_key()
-        valid = crl.is_signature_valid(key)  # type: ignore[arg-type]
-    except (ValueError, TypeError, UnsupportedAlgorithm):
-        raise DamagedKeystoreError(f"{place} is not a readable CRL; remove it and revoke again") from None
-    if not valid:
+
+def read_crl(pem: bytes, ca: CertificateFacts, place: str) -> x509.CertificateRevocationList:
+    """Reads a file that holds one CRL by ``ca`` with an end, and nothing else. Raises DamagedKeystoreError."""
+    crl = _parsed(pem)
+    if crl is None:
+        raise DamagedKeystoreError(f"{place} is not a readable CRL; remove it and revoke again")
+    if not is_crl(pem):
+        raise DamagedKeystoreError(f"{place} is not a CRL as it should be: {NOT_OUR_FORM}")
+    if not _is_signed(pem, ca):
         raise DamagedKeystoreError(f"{place} is not signed by the identity CA; remove it and revoke again")
     return crl
+
+
+def is_crl(pem: bytes) -> bool:
+    """Returns whether a file is exactly one CRL, by whomever."""
+    crl = _parsed(pem)
+    return crl is not None and crl.public_bytes(Encoding.PEM) == pem
+
+
+@lru_cache(maxsize=4)  # a launch asks for the same file before each of its processes
+def _parsed(pem: bytes) -> x509.CertificateRevocationList | None:
+    """A CRL with all that is asked of it; None for anything else."""
+    try:
+        crl = x509.load_pem_x509_crl(pem)
+        _ = crl.issuer, crl.extensions, moment(crl, "last_update"), moment(crl, "next_update")
+        _ = [moment(entry, "revocation_date") for entry in crl]
+    except (ValueError, TypeError, AttributeError, UnsupportedAlgorithm):
+        return None
+    return crl
+
+
+@lru_cache(maxsize=4)
+def _is_signed(pem: bytes, ca: CertificateFacts) -> bool:
+    crl = _parsed(pem)
+    assert crl is not None, "parsed before"
+    try:
+        key = ca.certificate.public_key()
+        return crl.issuer == ca.certificate.subject and crl.is_signature_valid(key)  # type: ignore[arg-type]
+    except (TypeError, ValueError, UnsupportedAlgorithm):
+        return False

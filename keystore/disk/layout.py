@@ -20,6 +20,7 @@ from keystore.formats.role import Role
 PUBLIC, PRIVATE, ENCLAVES = "public", "private", "enclaves"
 STAGING = ".staging"
 LOCK = ".lock"
+GITIGNORE = ".gitignore"
 SETTINGS = "secure-keystore.json"
 GOVERNANCE_XML = "enclaves/governance.xml"
 GOVERNANCE = "enclaves/governance.p7s"

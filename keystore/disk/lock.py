@@ -9,6 +9,7 @@ from __future__ import annotations
 import fcntl
 import os
 import shlex
+import socket
 import stat
 import sys
 import time
@@ -99,8 +100,6 @@ def _busy(descriptor: int, root: Path, timeout: float) -> KeystoreBusyError:
 
 def _sign_in(descriptor: int) -> None:
     """The program's name, never its arguments. Best effort: a full disk must not keep anyone from reading."""
-    import socket
-
     program = os.path.basename(sys.argv[0] if sys.argv else "python")
     text = f"{program} (pid {os.getpid()} on {socket.gethostname()}) since {iso(utc_now())}\n"
     try:

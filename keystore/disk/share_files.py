@@ -51,6 +51,16 @@ class LaunchHold:
         self.enclaves: set[str] = set()
         self._descriptor: int | None = None
 
+    @property
+    def descriptor(self) -> int | None:
+        """What holds the lock, to be given to a process that acts for this launch; None without one."""
+        return self._descriptor
+
+    def adopt(self, descriptor: int) -> None:
+        """Take part in the hold of another process, which gave ``descriptor``; closed with this object."""
+        self.close()
+        self._descriptor = descriptor
+
     def take(self) -> None:
         """Repeatable; does nothing where no lock can be: no keystore yet, a bundle, a keystore that others own."""
         if self._descriptor is None:

@@ -1,7 +1,7 @@
 """Documents that this keystore signed: the governance in force, and what may be signed again.
 
-Cheap, for it is asked before a launch: which domains the governance covers, whether it stands. What is about to be
-signed again must have been signed by us before: by the present permissions CA, by one of the trust bundle during a
+What is in force has exactly the form that we write. What is about to be signed again may have another one, such as
+SROS2's, but must have been signed by us before: by the present permissions CA, by one of the trust bundle during a
 roll-over, or by a retired one.
 """
 
@@ -24,38 +24,51 @@ _IDS = re.compile(rb"<id>\s*(\d{1,3})\s*</id>|<min>\s*(\d{1,3})\s*</min>\s*<max>
 
 
 def signed_governance(view: KeystoreView) -> smime.SignedDocument:
-    """What is in force (``governance.p7s``), not checked."""
+    """Reads what is in force (``governance.p7s``); its signature is not checked. Raises DamagedKeystoreError."""
     place = printable(view.root / layout.GOVERNANCE)
     return smime.read(safe_files.read(view.root, layout.GOVERNANCE), place)
 
 
 def governance_domains(view: KeystoreView) -> Domains:
-    """The domains the governance in force lists, read cheaply; raises DamagedKeystoreError when there are none."""
-    return _listed_domains(signed_governance(view), view)
+    """Returns the domains that the governance lists; raises DamagedKeystoreError when there are none.
+
+    Of a governance that has to be signed again, too.
+    """
+    place = printable(view.root / layout.GOVERNANCE)
+    return _listed_domains(
+        smime.read_any(safe_files.read(view.root, layout.GOVERNANCE), place).document, view
+    )
 
 
-def _listed_domains(signed: smime.SignedDocument, view: KeystoreView) -> Domains:
-    found = _IDS.findall(signed.document)
+def _listed_domains(document: bytes, view: KeystoreView) -> Domains:
+    found = _IDS.findall(document)
     if not found:
         raise DamagedKeystoreError(f"{printable(view.root / layout.GOVERNANCE)} lists no domain")
     return Domains(tuple((int(one or low), int(one or high)) for one, low, high in found))
 
 
 def governance_stands(view: KeystoreView, domains: Domains | None, register: Register | None = None) -> bool:
-    """Cheaply: signed by the present permissions CA, the one signed last as far as the register is here to say so,
-    and each of ``domains`` is listed in it."""
-    signed = signed_governance(view)
+    """Returns whether the present permissions CA signed the governance, it is the one signed last as far as the
+    register is here to say so, and it lists each of ``domains``."""
+    try:
+        signed = signed_governance(view)
+        smime.check(signed, [view.ca(Role.PERMISSIONS)], layout.GOVERNANCE)
+    except DamagedKeystoreError:
+        return False
     if not signed.embeds(view.ca(Role.PERMISSIONS).der):
         return False
     if register is not None and register.governance and signed.document != register.governance:
         return False
-    return domains is None or _listed_domains(signed, view).covers(domains)
+    return domains is None or _listed_domains(signed.document, view).covers(domains)
 
 
 def trusted_document(view: KeystoreView, relative: str) -> bytes:
-    """The XML inside a ``.p7s``; raises DamagedKeystoreError when none of this keystore's CAs signed it."""
+    """Returns the XML inside a ``.p7s``; raises DamagedKeystoreError when none of this keystore's CAs signed it.
+
+    It is to be signed again, or compared with the register: the file may have another form than ours.
+    """
     place = printable(view.root / relative)
-    signed = smime.read(safe_files.read(view.root, relative), place)
+    signed = smime.read_any(safe_files.read(view.root, relative), place)
     smime.check(signed, list(own_permissions_cas(view)), place)
     return signed.document
 

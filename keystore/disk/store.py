@@ -13,13 +13,15 @@ the same for all of them at once: no name ever points at content that is not on 
 
 from __future__ import annotations
 
+import ctypes
 import errno
 import os
 import shutil
 import stat
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from datetime import datetime
 from pathlib import Path
 
 from keystore.disk import layout, lock, safe_files
@@ -66,6 +68,8 @@ class Store:
         """False on a host that issues nothing, and before the first thing is issued."""
         self.register = present or Register()
         """What was issued so far; each ``Batch.record`` replaces it."""
+        self.clock: datetime | None = None
+        """What the machine's clock said when this was opened; None where the caller gave the time."""
         self.notes: list[str] = []
         """What was done to the keystore itself while opening it, for the report."""
 
@@ -159,6 +163,8 @@ class Batch:
     def record(self, register: Register) -> None:
         """Write the register, before everything else of this batch: what is issued is on record before it is seen."""
         place = self._place()
+        if self._store.clock is not None:
+            register = replace(register, written=self._store.clock)
         self._write(place, Content(register_json(register), PRIVATE_MODE))
         self._moves.insert(0, (place, layout.REGISTER))
         self.recorded = register
@@ -313,8 +319,6 @@ def _fsync_path(path: Path | str) -> None:
 
 def _sync_file_system(path: Path) -> bool:
     """syncfs(2) of the file system that holds ``path``; False where there is none, so that fsync must do."""
-    import ctypes
-
     syncfs = getattr(ctypes.CDLL(None, use_errno=True), "syncfs", None)
     if syncfs is None:
         return False

@@ -11,6 +11,7 @@ the old one or the new one, whole. What a dead run left is never seen and cleare
 from __future__ import annotations
 
 import os
+import re
 import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -23,6 +24,7 @@ from keystore.errors import NotAKeystoreError, StorageError, printable
 
 PENDING = "pending"
 _STAGING = ".staging"
+_VERSION = re.compile(r"[0-9]+(\.[0-9]+)?")
 
 
 class Versions:
@@ -66,12 +68,19 @@ class Versions:
         return staging
 
     def switch(self, number: int) -> None:
-        """Put what was staged in force, then delete what was before: its keys are no longer used."""
+        """Puts what was staged in force, then deletes what was before: its keys are no longer used.
+
+        Beside a version with this number, which is being restored, the new one is ``NUMBER.1`` and so on.
+        """
         link = self.folder / f"{_STAGING}.link"
         try:
             _sync_tree(self.folder / _STAGING)
-            os.rename(self.folder / _STAGING, self.folder / str(number))
-            os.symlink(f"{self.folder.name}/{number}", link)
+            name, repeat = str(number), 0
+            while os.path.lexists(self.folder / name):
+                repeat += 1
+                name = f"{number}.{repeat}"
+            os.rename(self.folder / _STAGING, self.folder / name)
+            os.symlink(f"{self.folder.name}/{name}", link)
             _sync(self.folder)
             os.rename(link, self.root)
             _sync(self.root.parent)
@@ -85,8 +94,8 @@ class Versions:
 
     def _is_ours(self) -> bool:
         target = os.readlink(self.root) if self.root.is_symlink() else ""
-        folder, _, number = target.partition("/")
-        return folder == self.folder.name and number.isascii() and number.isdigit()
+        folder, _, version = target.partition("/")
+        return folder == self.folder.name and _VERSION.fullmatch(version) is not None
 
     def _clear(self) -> None:
         kept = {PENDING, layout.LOCK, *([self.current.name] if self.current else [])}

@@ -1,4 +1,4 @@
-"""A keystore as it stands on disk, read only and without ``cryptography``: what the other modules ask.
+"""A keystore as it stands on disk, read only: what the other modules ask.
 
 A view caches what does not change while the lock is held (CA certificates, settings); make a new one after
 writing. It proves nothing about signatures, see ``keystore.verify`` for that.
@@ -9,12 +9,13 @@ from __future__ import annotations
 import os
 import shlex
 from collections.abc import Iterable
+from datetime import datetime
 from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from keystore.disk import layout, safe_files
+from keystore.disk.settings import KeystoreSettings
 from keystore.errors import (
     DamagedKeystoreError,
     InvalidEnclaveNameError,
@@ -27,13 +28,9 @@ from keystore.errors import (
 from keystore.formats.certificate import CertificateFacts, read_certificate, read_certificates
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.role import Role
-
-if TYPE_CHECKING:
-    from datetime import datetime
-
-    from keystore.disk.settings import KeystoreSettings
-    from keystore.signing.authority import Authority
-    from keystore.signing.ca_access import CaAccess
+from keystore.signing.authority import Authority, authority_of
+from keystore.signing.ca_access import CaAccess
+from keystore.signing.signer import open_signer
 
 _OWN_ENTRIES = frozenset({
     layout.PUBLIC, layout.PRIVATE, layout.ENCLAVES, layout.STAGING, layout.LOCK, layout.SETTINGS, layout.ZENOH,
@@ -91,8 +88,6 @@ class KeystoreView:
 
     @cached_property
     def settings(self) -> KeystoreSettings:
-        from keystore.disk.settings import KeystoreSettings
-
         text = safe_files.read_if_there(self.root, layout.SETTINGS)
         if text is None:
             return KeystoreSettings()
@@ -111,8 +106,6 @@ class KeystoreView:
         for role in Role:
             name = layout.ca_cert(role)
             bundles[role] = read_certificates(safe_files.read(self.root, name), printable(self.root / name))
-            if not bundles[role]:
-                raise DamagedKeystoreError(f"{printable(self.root / name)} holds no certificate")
         return bundles
 
     def refuse_ended(self, now: datetime, *roles: Role) -> None:
@@ -134,9 +127,6 @@ class KeystoreView:
 
     def authority(self, role: Role, access: CaAccess) -> Authority:
         """The CA ready to sign; raises SigningUnavailableError where its key is not, or does not open."""
-        from keystore.signing.authority import authority_of
-        from keystore.signing.signer import open_signer
-
         name = self.key_file(role)
         if name is None:
             raise SigningUnavailableError(
@@ -145,8 +135,7 @@ class KeystoreView:
             )
         reference = safe_files.read_private(self.root, name)
         signer = open_signer(reference, printable(self.root / name), access)
-        cert = safe_files.read(self.root, layout.ca_cert(role))
-        return authority_of(cert, signer, printable(self.root / layout.ca_cert(role)))
+        return authority_of(self.ca(role), signer, printable(self.root / layout.ca_cert(role)))
 
     @cached_property
     def has_crl(self) -> bool:

@@ -41,7 +41,7 @@ from keystore.formats.zenoh.configuration import (
 from keystore.formats.zenoh.grants import grants_of_topics
 from keystore.formats.zenoh.rules import access_rules
 from keystore.formats.zenoh.types import types_of_shares
-from keystore.signing.public_key import key_matches
+from keystore.signing.public_key import issued_by, key_matches
 
 _WRITTEN_BY = "secure-keystore"
 
@@ -128,7 +128,7 @@ def identity_problem(view: KeystoreView, due: datetime) -> str | None:
     if pem is None:
         return "its certificate is missing"
     facts, ca = read_certificate(pem, printable(view.root / layout.ZENOH_ROUTER_CERT)), view.ca(Role.IDENTITY)
-    if facts.common_name != ROUTER_NAME or not facts.names_issuer(ca):
+    if facts.common_name != ROUTER_NAME or not issued_by(facts, ca):
         return "its certificate is not one that the identity CA issued for a router"
     if facts.validity.not_after < min(due, ca.validity.not_after):
         return f"its certificate ends {iso(facts.validity.not_after)}"

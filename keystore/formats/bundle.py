@@ -11,19 +11,29 @@ CAs; and of each enclave what the register of the CA holds: serial, hash of the 
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Mapping
 from datetime import datetime
 from typing import Any, NamedTuple
 
-from keystore.errors import DamagedKeystoreError, KeystoreError
+from keystore.errors import DamagedKeystoreError, InvalidInputError, KeystoreError, printable
 from keystore.formats.enclave_name import validate_enclave_name
-from keystore.formats.hosts import refuse_host_name
 from keystore.formats.register import lines_json
 from keystore.formats.role import Role
 from keystore.formats.validity import iso, parse_moment
 
+_HOST = re.compile(r"[A-Za-z0-9](?:[A-Za-z0-9._-]{0,61}[A-Za-z0-9])?\Z")
 TYPE = "enclave-launch bundle"
 _VERSION = 1
+
+
+def refuse_host_name(name: str, where: str) -> None:
+    """Raises InvalidInputError for what cannot name a file, a Compose service and a Kubernetes node."""
+    if not _HOST.match(name):
+        raise InvalidInputError(
+            f"{where}: {printable(name)} is not a host name: 1 to 63 of letters, digits, '.', '_' and '-', "
+            "a letter or digit first and last"
+        )
 
 
 class BundledEnclave(NamedTuple):
@@ -99,6 +109,33 @@ def parse_manifest(text: bytes, place: str) -> Manifest:
         if isinstance(error, KeystoreError):
             raise
         raise DamagedKeystoreError(f"{place} is not the manifest of a bundle") from None
+
+
+_ROLES = {"identity": Role.IDENTITY, "permissions": Role.PERMISSIONS}
+
+
+def pin(role: Role, digest: str) -> str:
+    """Writes which CA may do what: ``identity=SHA256`` or ``permissions=SHA256``."""
+    return f"{role.value.removesuffix('_ca')}={digest}"
+
+
+def pins_of(named: Iterable[str]) -> dict[Role, frozenset[str]]:
+    """Reads what ``pin`` writes; colons and capitals, as openssl writes them, are taken too.
+
+    Raises InvalidInputError for a fingerprint without a role, and for a role without a CA.
+    """
+    found: dict[Role, set[str]] = {role: set() for role in Role}
+    for one in named:
+        role, _, digest = one.partition("=")
+        if role not in _ROLES or not digest:
+            raise InvalidInputError(
+                f"--require-ca {printable(one)}: say what that CA may do, identity=SHA256 or permissions=SHA256, as "
+                "secure-keystore export prints it"
+            )
+        found[_ROLES[role]].add(digest.replace(":", "").lower())
+    if missing := [role.value.removesuffix("_ca") for role in Role if not found[role]]:
+        raise InvalidInputError(f"no CA is named for {missing[0]}: --require-ca {missing[0]}=SHA256")
+    return {role: frozenset(listed) for role, listed in found.items()}
 
 
 def _enclave(row: list[Any]) -> BundledEnclave:

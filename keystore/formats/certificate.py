@@ -1,187 +1,185 @@
-"""What the keystore wants to know about a certificate, read without ``cryptography``. Pure.
+"""What the keystore wants to know of a certificate, and the one form that a certificate file may have.
 
-Nothing here proves anything: signatures are checked by ``keystore.verify``. These facts serve status, the
-comparison before a launch, and finding out which subject an enclave already has.
+Everything is read by ``cryptography``. A file of a keystore is PEM exactly as ``cryptography`` writes it: whatever else
+stands in such a file, another reader may take for the certificate.
 """
 
 from __future__ import annotations
 
-from functools import lru_cache
-from typing import NamedTuple
+import re
+from dataclasses import dataclass, field
+from datetime import datetime, timezone
+from functools import cached_property, lru_cache
+from typing import Any, TypeVar
+
+from cryptography import x509
+from cryptography.exceptions import UnsupportedAlgorithm
+from cryptography.hazmat.primitives.serialization import Encoding, PublicFormat
+from cryptography.x509.oid import ExtendedKeyUsageOID
 
 from keystore.errors import DamagedKeystoreError
-from keystore.formats import der
 from keystore.formats.validity import Validity
 
-_COMMON_NAME = der.object_identifier("2.5.4.3")
-_SUBJECT_KEY_ID = der.object_identifier("2.5.29.14")
-_AUTHORITY_KEY_ID = der.object_identifier("2.5.29.35")
-_EXTENDED_KEY_USAGE = der.object_identifier("2.5.29.37")
-_SUBJECT_ALT_NAME = der.object_identifier("2.5.29.17")
-_KEY_USAGE = der.object_identifier("2.5.29.15")
-_EMAIL_PROTECTION = der.object_identifier("1.3.6.1.5.5.7.3.4")
-_ANY_USAGE = der.object_identifier("2.5.29.37.0")
-_EXTENSIONS = 0xA3
-_BEGIN, _END = b"-----BEGIN CERTIFICATE-----", b"-----END CERTIFICATE-----"
+_BLOCK = re.compile(rb"-----BEGIN CERTIFICATE-----\r?\n.*?-----END CERTIFICATE-----\r?\n?", re.DOTALL)
+_Extension = TypeVar("_Extension", bound=x509.ExtensionType)
+NOT_OUR_FORM = (
+    "it is not in the form that secure-keystore writes, so DDS implementations may read something else"
+)
 
 
-class CertificateFacts(NamedTuple):
-    """``issuer``, ``subject`` and ``public_key`` are DER. Extensions are read when asked for: most questions
-    before a launch do not concern them."""
+@dataclass(frozen=True)
+class CertificateFacts:
+    """A certificate whose fields can all be read; ``read_der`` makes it."""
 
-    der: bytes
-    serial: int
-    issuer: bytes
-    subject: bytes
-    common_name: str | None
-    name_parts: int
-    validity: Validity
-    public_key: bytes
-    extensions: bytes
-    """DER of the Extensions sequence, empty without any."""
+    certificate: x509.Certificate = field(repr=False)
 
     def __repr__(self) -> str:
         return f"CertificateFacts({self.common_name!r}, serial={self.serial})"
 
-    @property
-    def subject_key_id(self) -> bytes | None:
-        return _subject_key_id(self.extensions)
+    @cached_property
+    def der(self) -> bytes:
+        return self.certificate.public_bytes(Encoding.DER)
 
     @property
-    def authority_key_id(self) -> bytes | None:
-        """The keyIdentifier [0] of AuthorityKeyIdentifier."""
+    def pem(self) -> bytes:
+        """The file's form."""
+        return self.certificate.public_bytes(Encoding.PEM)
+
+    @property
+    def serial(self) -> int:
+        return self.certificate.serial_number
+
+    @cached_property
+    def issuer(self) -> bytes:
+        """The issuer's name in DER."""
+        return self.certificate.issuer.public_bytes()
+
+    @cached_property
+    def subject(self) -> bytes:
+        """The subject's name in DER."""
+        return self.certificate.subject.public_bytes()
+
+    @cached_property
+    def common_name(self) -> str | None:
+        """The common name; None unless there is exactly one."""
+        found = self.certificate.subject.get_attributes_for_oid(x509.NameOID.COMMON_NAME)
+        return str(found[0].value) if len(found) == 1 else None
+
+    @property
+    def name_parts(self) -> int:
+        return len(list(self.certificate.subject))
+
+    @cached_property
+    def validity(self) -> Validity:
+        return Validity(
+            moment(self.certificate, "not_valid_before"), moment(self.certificate, "not_valid_after")
+        )
+
+    @cached_property
+    def public_key(self) -> bytes:
+        """The SubjectPublicKeyInfo in DER."""
+        return self.certificate.public_key().public_bytes(Encoding.DER, PublicFormat.SubjectPublicKeyInfo)
+
+    def extension(self, kind: type[_Extension]) -> _Extension | None:
+        """The extension of that class; None without one."""
         try:
-            parts = der.parse(_by_oid(self.extensions)[_AUTHORITY_KEY_ID]).children()
-        except (KeyError, der.DerError):
+            return self.certificate.extensions.get_extension_for_class(kind).value
+        except x509.ExtensionNotFound:
             return None
-        return next((part.content for part in parts if part.tag == 0x80), None)
 
     @property
     def can_sign_mail(self) -> bool:
         """Whether OpenSSL's S/MIME purpose accepts it: then, below a shared CA, its key can sign permissions."""
-        try:
-            return _can_sign_mail(_by_oid(self.extensions))
-        except der.DerError:
-            return True
+        extended, usage = self.extension(x509.ExtendedKeyUsage), self.extension(x509.KeyUsage)
+        signs_mail = {ExtendedKeyUsageOID.EMAIL_PROTECTION, ExtendedKeyUsageOID.ANY_EXTENDED_KEY_USAGE}
+        if extended is not None and not signs_mail & set(extended):
+            return False
+        return usage is None or usage.digital_signature or usage.content_commitment
 
     @property
     def names_hosts(self) -> bool:
         """Whether it has alternative names: a TLS client accepts its holder as a server of these hosts."""
-        try:
-            return _SUBJECT_ALT_NAME in _by_oid(self.extensions)
-        except der.DerError:
-            return True
-
-    def names_issuer(self, ca: CertificateFacts) -> bool:
-        """Whether this certificate says that ``ca`` issued it (names and, where present, key identifiers)."""
-        if self.issuer != ca.subject:
-            return False
-        if ca.subject_key_id is None or ca.subject_key_id in self.extensions:
-            return True  # the quick look: 160 bits do not occur by accident
-        return self.authority_key_id in (None, ca.subject_key_id)
+        return self.extension(x509.SubjectAlternativeName) is not None
 
 
-def pem_blocks(pem: bytes) -> list[bytes]:
-    """DER of each certificate in a PEM file; text around the blocks is skipped. Raises DerError."""
-    found = []
-    for part in pem.split(_BEGIN)[1:]:
-        body, end, _ = part.partition(_END)
-        if not end:
-            raise der.DerError("a PEM block without its end line")
-        try:
-            found.append(der.from_base64(body))
-        except der.DerError as error:
-            raise der.DerError("a PEM block that is not base64") from error
-    return found
-
-
-def read_pem(pem: bytes) -> CertificateFacts:
-    """Facts of the first certificate of a PEM file, as Cyclone DDS reads it. Raises DerError."""
-    blocks = pem_blocks(pem)
-    if not blocks:
-        raise der.DerError("no PEM certificate in it")
-    return read_der(blocks[0])
+def moment(value: Any, name: str) -> datetime:
+    """A date of a certificate or CRL; cryptography before 42 gives those of RFC 5280, which are UTC, without a zone."""
+    if hasattr(value, f"{name}_utc"):
+        found: datetime = getattr(value, f"{name}_utc")
+        return found
+    plain: datetime = getattr(value, name)
+    return plain.replace(tzinfo=timezone.utc)
 
 
 def read_der(data: bytes) -> CertificateFacts:
-    """Raises DerError when ``data`` is not an X.509 v3 certificate."""
+    """Reads a certificate with all its fields; raises ValueError where one cannot be read."""
     try:
-        return _read(data)
-    except (IndexError, ValueError) as error:
-        raise error if isinstance(error, der.DerError) else der.DerError(str(error)) from error
+        return _complete(x509.load_der_x509_certificate(data))
+    except (
+        TypeError,
+        UnsupportedAlgorithm,
+        x509.UnsupportedGeneralNameType,
+        x509.DuplicateExtension,
+    ) as error:
+        raise ValueError(str(error)) from error
 
 
-def read_certificate(pem: bytes, place: str) -> CertificateFacts:
-    """The first certificate of a PEM file; raises DamagedKeystoreError naming ``place``."""
-    try:
-        return read_pem(pem)
-    except der.DerError as error:
-        raise DamagedKeystoreError(f"{place} is not a usable certificate: {error}") from None
+def _complete(certificate: x509.Certificate) -> CertificateFacts:
+    """``cryptography`` reads fields when they are asked for: ask for each."""
+    facts = CertificateFacts(certificate)
+    _ = facts.issuer, facts.subject, facts.validity, facts.public_key
+    _ = certificate.extensions, certificate.signature_hash_algorithm
+    return facts
+
+
+def read_certificate(pem: bytes, place: str = "the certificate") -> CertificateFacts:
+    """Reads a file that holds one certificate; raises DamagedKeystoreError for any other content."""
+    found = read_certificates(pem, place)
+    if len(found) != 1:
+        raise DamagedKeystoreError(f"{place} holds {len(found)} certificates, one belongs there")
+    return found[0]
+
+
+read_pem = read_certificate
 
 
 def read_certificates(pem: bytes, place: str) -> list[CertificateFacts]:
-    """Every certificate of a PEM file (a trust bundle during a CA roll-over)."""
+    """Reads a file of certificates and nothing else, such as a trust file during a CA roll-over.
+
+    Raises DamagedKeystoreError for no certificate, and for anything that is not the PEM of these certificates.
+    """
+    found = _read_all(pem)
+    if not found:
+        raise DamagedKeystoreError(f"{place} is not a usable certificate, or is damaged")
+    if b"".join(one.pem for one in found) != pem:
+        raise DamagedKeystoreError(f"{place} is not a usable certificate: {NOT_OUR_FORM}")
+    return list(found)
+
+
+@lru_cache(maxsize=2048)  # a launch asks for the same files before each of its processes
+def _read_all(pem: bytes) -> tuple[CertificateFacts, ...]:
+    """Every certificate of ``pem``; none where one of them cannot be read."""
     try:
-        return [read_der(block) for block in pem_blocks(pem)]
-    except der.DerError as error:
-        raise DamagedKeystoreError(f"{place} is not a usable certificate: {error}") from None
+        return tuple(_read_block(block) for block in _BLOCK.findall(pem))
+    except ValueError:
+        return ()
 
 
-def _read(data: bytes) -> CertificateFacts:
-    fields = der.parse(data).expect(der.SEQUENCE).children()[0].children()
-    _, serial, _, issuer, validity, subject, public_key, *rest = fields
-    names = [part for group in subject.children() for part in group.children()]
-    holder = next((part for part in rest if part.tag == _EXTENSIONS), None)
-    return CertificateFacts(
-        der=data,
-        serial=int.from_bytes(serial.content, "big"),
-        issuer=issuer.whole,
-        subject=subject.whole,
-        common_name=_common_name(names),
-        name_parts=len(names),
-        validity=_validity(validity.whole),
-        public_key=public_key.whole,
-        extensions=holder.content if holder is not None else b"",
-    )
-
-
-@lru_cache(maxsize=64)  # enclaves that were made together have the same
-def _validity(sequence: bytes) -> Validity:
-    not_before, not_after = der.parse(sequence).children()
-    return Validity(der.time_value(not_before), der.time_value(not_after))
-
-
-@lru_cache(maxsize=8)  # the CAs', which are compared with those of every enclave
-def _subject_key_id(extensions: bytes) -> bytes | None:
+def _read_block(block: bytes) -> CertificateFacts:
     try:
-        return der.parse(_by_oid(extensions)[_SUBJECT_KEY_ID]).content
-    except (KeyError, der.DerError):
-        return None
+        certificate = x509.load_pem_x509_certificate(block)
+    except TypeError as error:
+        raise ValueError(str(error)) from error
+    return read_der(certificate.public_bytes(Encoding.DER))
 
 
-def _by_oid(extensions: bytes) -> dict[bytes, bytes]:
-    """OID -> content of the extension's OCTET STRING. Unreadable extensions count as absent: the cautious reading, a
-    certificate that may do anything."""
-    try:
-        entries = [entry.children() for entry in der.parse(extensions).children()] if extensions else []
-        return {entry[0].whole: entry[-1].expect(der.OCTET_STRING).content for entry in entries if entry}
-    except der.DerError:
-        return {}
+def given_certificates(pem: bytes, place: str) -> list[CertificateFacts]:
+    """Reads the certificates of a file that somebody gave, such as a chain with remarks between the blocks.
 
-
-def _common_name(names: list[der.Element]) -> str | None:
-    values = [name.children() for name in names]
-    found = [value.content.decode("utf-8", "replace") for oid, value in values if oid.whole == _COMMON_NAME]
-    return found[0] if len(found) == 1 else None
-
-
-def _can_sign_mail(extensions: dict[bytes, bytes]) -> bool:
-    """OpenSSL's S/MIME signing purpose: EKU absent or emailProtection, KU absent or a signature bit."""
-    usages = extensions.get(_EXTENDED_KEY_USAGE)
-    if usages is not None:
-        allowed = {usage.whole for usage in der.parse(usages).children()}
-        if not allowed & {_EMAIL_PROTECTION, _ANY_USAGE}:
-            return False
-    bits = extensions.get(_KEY_USAGE)
-    # After the count of unused bits: digitalSignature and nonRepudiation are the two highest of the first byte.
-    return bits is None or bool(der.parse(bits).content[1:2] >= b"\x40")
+    It is never used as it stands: what is taken from it is written in the keystore's own form.
+    Raises DamagedKeystoreError for a file without any.
+    """
+    found = _read_all(pem)
+    if not found:
+        raise DamagedKeystoreError(f"{place} is not a usable certificate in PEM")
+    return list(found)

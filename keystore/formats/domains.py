@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from typing import NamedTuple
 
-from enclave_launch.boundary.light import NamedTuple
 from keystore.errors import InvalidInputError, printable
 
 LOWEST_ID = 0

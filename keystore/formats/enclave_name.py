@@ -6,9 +6,9 @@ tightened by what the DDS implementations can carry.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 
-from enclave_launch.boundary.light import late_pattern
 from keystore.errors import EnclaveTooDeep, InvalidEnclaveNameError, printable
 
 # RMW_TOPIC_MAX_NAME_LENGTH (247) minus two, where SROS2's namespace check stops; rcl itself allows 255.
@@ -16,8 +16,8 @@ MAX_LENGTH = 245
 # Cyclone DDS cuts subject names into at most 20 pieces, the CN's own first (access_control_utils.c).
 MAX_SEGMENTS = 19
 
-_SEGMENT = late_pattern(r"[A-Za-z_][A-Za-z0-9_]*\Z")
-_ENCLAVE = late_pattern(r"(?:/|(?:/[A-Za-z_][A-Za-z0-9_]*)+)\Z")
+_SEGMENT = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
+_ENCLAVE = re.compile(r"(?:/|(?:/[A-Za-z_][A-Za-z0-9_]*)+)\Z")
 
 
 def validate_enclave_name(name: str) -> str:

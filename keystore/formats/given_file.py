@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from enclave_launch.boundary.files import read_bytes
+from enclave_common.files import read_bytes
 from keystore.errors import InvalidInputError, printable
 
 MAX_BYTES = 200_000

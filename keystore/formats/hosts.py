@@ -29,10 +29,10 @@ from typing import NamedTuple, Optional
 from pydantic import Field, StrictBool, StrictStr
 
 from keystore.errors import InvalidInputError, printable
+from keystore.formats.bundle import refuse_host_name as refuse_host_name
 from keystore.formats.given_file import read_given
 from keystore.formats.strict_yaml import Strict, StrictDocument, parse_strict
 
-_HOST = re.compile(r"[A-Za-z0-9](?:[A-Za-z0-9._-]{0,61}[A-Za-z0-9])?\Z")
 _MEMORY = re.compile(r"[1-9][0-9]{0,6}[KMG]i\Z")
 _DEVICE = re.compile(r"/dev/[A-Za-z0-9._/-]+\Z")
 
@@ -141,15 +141,6 @@ def parse_hosts(text: bytes, where: str) -> Hosts:
         HostPatterns(name, tuple(one.enclaves), tuple(one.nodes)) for name, one in document.hosts.items()
     )
     return Hosts(hosts, tuple(_needs(one, where) for one in document.needs), where)
-
-
-def refuse_host_name(name: str, where: str) -> None:
-    """Raises InvalidInputError for what cannot name a file, a Compose service and a Kubernetes node."""
-    if not _HOST.match(name):
-        raise InvalidInputError(
-            f"{where}: {printable(name)} is not a host name: 1 to 63 of letters, digits, '.', '_' and '-', "
-            "a letter or digit first and last"
-        )
 
 
 def _needs(one: _Needs, where: str) -> NodeNeeds:

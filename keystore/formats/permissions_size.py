@@ -7,8 +7,8 @@ matches. Cyclone DDS 0.10.2 handles 140 kB.
 from __future__ import annotations
 
 from collections import Counter
+from typing import NamedTuple
 
-from enclave_launch.boundary.light import NamedTuple
 from keystore.formats.permissions_names import dds_topics, full_name
 from keystore.formats.policy import EnclavePolicy, Operation, Profile
 

@@ -7,8 +7,9 @@ sros2/policy/schemas/policy.xsd. Reading and writing the XML is ``keystore.forma
 from __future__ import annotations
 
 from collections.abc import Iterator
+from enum import Enum
+from typing import NamedTuple
 
-from enclave_launch.boundary.light import NamedTuple, TextEnum
 from keystore.errors import InvalidInputError
 from keystore.formats.permissions_patterns import has_wildcard
 
@@ -17,9 +18,11 @@ class PolicyError(InvalidInputError):
     """A policy, or a name in one, that must not become permissions. The text says what and where."""
 
 
-class Operation(TextEnum):
+class Operation(str, Enum):
     """What a rule is about; the value is the attribute of the policy XML, where ``call`` is said of actions alone.
     ``verb`` is what people are told: the same words for topics, services and actions everywhere."""
+
+    __str__ = str.__str__
 
     PUBLISH = "publish"
     SUBSCRIBE = "subscribe"
@@ -42,8 +45,10 @@ _VERBS = {
 }
 
 
-class Qualifier(TextEnum):
+class Qualifier(str, Enum):
     """Whether a rule of an SROS2 policy grants or refuses."""
+
+    __str__ = str.__str__
 
     ALLOW = "ALLOW"
     DENY = "DENY"

@@ -19,7 +19,7 @@ from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from enclave_launch.boundary.files import read_bytes
+from enclave_common.files import read_bytes
 from keystore.errors import InvalidEnclaveNameError, InvalidInputError, printable
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.permissions_names import full_name

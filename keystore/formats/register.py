@@ -15,7 +15,7 @@ import base64
 import json
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from datetime import datetime
+from datetime import datetime, timedelta
 from enum import Enum
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
@@ -23,10 +23,12 @@ from typing import Any, NamedTuple
 from keystore.errors import DamagedKeystoreError
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.role import Role
-from keystore.formats.validity import iso, parse_moment
+from keystore.formats.validity import iso, later, parse_moment
 
 _VERSION = 1
 _moment = lru_cache(maxsize=1024)(parse_moment)  # what was issued together has the same dates
+REVOKED_MARGIN = timedelta(days=400)
+"""How long a revoked certificate stays on the CRL after it has ended; longer than a clock may jump unasked."""
 UNKNOWN = ""
 """In place of an enclave, subject or key: of certificates that only a CRL of an earlier version tells of."""
 
@@ -53,6 +55,8 @@ class IssuedCertificate(NamedTuple):
     not_after: datetime
     replaced: bool = False
     revoked: datetime | None = None
+    lifetime: int | None = None
+    """In seconds, as it was granted, which a renewal keeps; None where an earlier version or another CA issued it."""
 
     @property
     def in_force(self) -> bool:
@@ -72,7 +76,7 @@ class SignedPermissions(NamedTuple):
 @dataclass(frozen=True)
 class Register:
     """``authorities``: role and DER certificate -> state. ``crl_published``: whether there is a CRL by the CA in use.
-    Each change gives a new register."""
+    ``written``: the machine's clock when it was written last. Each change gives a new register."""
 
     authorities: Mapping[tuple[Role, bytes], AuthorityState] = field(default_factory=dict)
     certificates: Mapping[int, IssuedCertificate] = field(default_factory=dict)
@@ -80,6 +84,7 @@ class Register:
     governance: bytes = b""
     crl_number: int = 0
     crl_published: bool = False
+    written: datetime | None = None
 
     @cached_property
     def _by_enclave(self) -> dict[str, list[IssuedCertificate]]:
@@ -169,9 +174,16 @@ class Register:
         return replace(self, crl_number=number, crl_published=True)
 
     def without_ended(self, now: datetime) -> Register:
-        """Nobody can use what has ended; what is in force stays, so that an enclave is still known."""
+        """Forgets what nobody can use any more; what is in force stays, so that an enclave is still known.
+
+        What was revoked stays longer: a clock that is wrong today must not take it off the CRL.
+        """
         certificates = {
-            serial: one for serial, one in self.certificates.items() if one.in_force or one.not_after > now
+            serial: one
+            for serial, one in self.certificates.items()
+            if one.in_force
+            or one.not_after > now
+            or (one.revoked and later(one.not_after, REVOKED_MARGIN) > now)
         }
         documents = tuple(
             one for one in self.documents if one.not_after > now or one is self.permissions(one.enclave)
@@ -186,6 +198,7 @@ def register_json(register: Register) -> bytes:
         "crl_number": register.crl_number,
         "crl_published": register.crl_published,
         "governance": register.governance.decode(),
+        "written": iso(register.written) if register.written is not None else None,
     }
     rows: dict[str, Iterable[list[Any]]] = {
         "authorities": (
@@ -212,7 +225,8 @@ def lines_json(head: Mapping[str, Any], rows: Mapping[str, Iterable[list[Any]]])
 def _certificate_row(one: IssuedCertificate) -> list[Any]:
     revoked = iso(one.revoked) if one.revoked is not None else None
     dates = (iso(one.not_before), iso(one.not_after))
-    return [f"{one.serial:x}", one.enclave, one.subject, one.key, one.issuer, *dates, one.replaced, revoked]
+    whose = [f"{one.serial:x}", one.enclave, one.subject, one.key, one.issuer]
+    return [*whose, *dates, one.replaced, revoked, one.lifetime]
 
 
 def parse_register(text: bytes, place: str) -> Register:
@@ -228,8 +242,9 @@ def parse_register(text: bytes, place: str) -> Register:
             content["governance"].encode(),
             int(content["crl_number"]),
             bool(content["crl_published"]),
+            _moment(content["written"]) if content.get("written") is not None else None,
         )
-    except (ValueError, KeyError, TypeError, AttributeError, IndexError, RecursionError):
+    except (ValueError, KeyError, TypeError, AttributeError, IndexError, OverflowError, RecursionError):
         raise DamagedKeystoreError(
             f"{place} is not a register that secure-keystore wrote; restore it from a backup"
         ) from None
@@ -241,7 +256,8 @@ def _authorities(rows: list[Any]) -> Iterator[tuple[tuple[Role, bytes], Authorit
 
 
 def _certificate(row: list[Any]) -> IssuedCertificate:
-    serial, enclave, subject, key, issuer, not_before, not_after, replaced, revoked = row
+    serial, enclave, subject, key, issuer, not_before, not_after, replaced, revoked, *more = row
+    lifetime = more[0] if more else None  # of earlier versions without
     return IssuedCertificate(
         int(serial, 16),
         validate_enclave_name(enclave) if enclave != UNKNOWN else UNKNOWN,
@@ -252,6 +268,7 @@ def _certificate(row: list[Any]) -> IssuedCertificate:
         _moment(not_after),
         bool(replaced),
         _moment(revoked) if revoked is not None else None,
+        int(lifetime) if lifetime is not None else None,
     )
 
 

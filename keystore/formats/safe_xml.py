@@ -9,8 +9,8 @@ from __future__ import annotations
 import re
 from functools import cache
 from importlib.resources import files
+from typing import TYPE_CHECKING
 
-from enclave_launch.boundary.light import TYPE_CHECKING
 from keystore.errors import InvalidInputError
 
 if TYPE_CHECKING:

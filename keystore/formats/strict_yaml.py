@@ -5,11 +5,12 @@ What the governance and the hosts file have in common.
 
 from __future__ import annotations
 
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import yaml
 from pydantic import BaseModel, StrictInt, ValidationError
 
+from enclave_common.yaml_reader import compose_yaml, construct
 from keystore.errors import InvalidInputError
 from keystore.formats.given_file import MAX_BYTES
 
@@ -33,7 +34,9 @@ def parse_strict(model: type[_Document], text: bytes, where: str) -> _Document:
     if len(text) > MAX_BYTES:
         raise InvalidInputError(f"{where}: larger than {MAX_BYTES} bytes")
     try:
-        content = yaml.load(text, _SafeLoader)
+        root = compose_yaml(text.decode("utf-8"))
+        _refuse_aliases_and_repeated_keys(root)
+        content = None if root is None else construct(root)
     except yaml.MarkedYAMLError as error:
         line = f":{error.problem_mark.line + 1}" if error.problem_mark else ""
         raise InvalidInputError(f"{where}{line}: {error.problem or 'not YAML'}") from None
@@ -57,23 +60,30 @@ def _others(model: type[Strict]) -> list[str]:
     return [name for name in model.__annotations__ if name != "version"]
 
 
-class _SafeLoader(yaml.SafeLoader):
-    """No aliases (nothing here needs them, bombs do) and no key twice."""
+def _refuse_aliases_and_repeated_keys(root: yaml.Node | None) -> None:
+    """Raise ``yaml.MarkedYAMLError``: nothing here needs aliases; of two values under one key only one would count."""
+    seen: set[int] = set()
+    pending = [] if root is None else [root]
+    for node in pending:
+        if id(node) in seen:
+            raise _refused(node, "aliases are not allowed here")
+        seen.add(id(node))
+        if isinstance(node, yaml.SequenceNode):
+            pending += node.value
+        elif isinstance(node, yaml.MappingNode):
+            _refuse_repeated_keys(node)
+            pending += [value for _, value in node.value]
 
-    def compose_node(self, parent: Any, index: Any) -> Any:
-        if self.check_event(yaml.AliasEvent):
-            event = self.peek_event()  # type: ignore[no-untyped-call]
-            raise yaml.composer.ComposerError(None, None, "aliases are not allowed here", event.start_mark)
-        return super().compose_node(parent, index)
 
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        seen = set()
-        for key, _ in node.value:
-            if not isinstance(key, yaml.ScalarNode):
-                mark = key.start_mark
-                raise yaml.constructor.ConstructorError(None, None, "a key must be a plain word", mark)
-            if key.value in seen:
-                mark = key.start_mark
-                raise yaml.constructor.ConstructorError(None, None, f"{key.value!r} is written twice", mark)
-            seen.add(key.value)
-        return super().construct_mapping(node, deep)
+def _refuse_repeated_keys(node: yaml.MappingNode) -> None:
+    seen: set[str] = set()
+    for key, _ in node.value:
+        if not isinstance(key, yaml.ScalarNode):
+            raise _refused(key, "a key must be a plain word")
+        if key.value in seen:
+            raise _refused(key, f"{key.value!r} is written twice")
+        seen.add(key.value)
+
+
+def _refused(node: yaml.Node, problem: str) -> yaml.MarkedYAMLError:
+    return yaml.MarkedYAMLError(problem=problem, problem_mark=node.start_mark)

@@ -8,16 +8,15 @@ those of everyone. Our common names contain none of these separators: each is on
 
 from __future__ import annotations
 
+import hashlib
 import re
 from collections.abc import Iterable, Mapping
 from enum import Enum
 
-from enclave_launch.boundary.light import late_pattern
-
 # X.520 ub-common-name; cryptography >= 43 enforces it.
 MAX_COMMON_NAME = 64
 _SEPARATORS = "[,/|]"
-_GENERATION = late_pattern(r"[1-9][0-9]{0,8}\Z")
+_GENERATION = re.compile(r"[1-9][0-9]{0,8}\Z")
 
 
 class SubjectScheme(str, Enum):
@@ -58,8 +57,6 @@ def names_enclave(cn: str | None, enclave: str) -> bool:
 
 
 def _short(enclave: str) -> str:
-    import hashlib  # loads libcrypto; only long names need it
-
     head = f"ros-{hashlib.sha256(enclave.encode()).hexdigest()[:40]}-"
     return head + enclave.replace("/", ".")[-(MAX_COMMON_NAME - len(head)) :].lstrip(".")
 
@@ -118,8 +115,6 @@ def guid_prefix(common_name: str) -> int:
     DDS-Security 9.3.3 makes them from a hash of it, so they are known before anything runs (measured on both
     implementations).
     """
-    import hashlib  # loads libcrypto; few launches need it
-
     digest = hashlib.sha256(_subject(common_name)).digest()
     return (int.from_bytes(digest[:6], "big") >> 1) | 1 << 47
 
@@ -130,10 +125,7 @@ def half_of(common_name: str) -> Half:
 
 
 def _subject(common_name: str) -> bytes:
-    """DER of a name with this common name alone, as certificates of a keystore have it."""
-    from keystore.formats import der  # as hashlib: few launches need it
+    """Returns the DER of a name with this common name alone, as certificates of a keystore have it."""
+    from cryptography import x509  # a dry run does without
 
-    attribute = der.encode(
-        der.SEQUENCE, der.object_identifier("2.5.4.3"), der.encode(der.UTF8_STRING, common_name.encode())
-    )
-    return der.encode(der.SEQUENCE, der.encode(der.SET, attribute))
+    return x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, common_name)]).public_bytes()

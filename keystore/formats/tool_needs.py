@@ -138,6 +138,11 @@ TABLE: tuple[Tool, ...] = (
 TOOLS = {tool.name: tool for tool in TABLE}
 
 
+def is_tool_enclave(enclave: str) -> bool:
+    """Returns whether an enclave is a tool's: short-lived, and renewed only by name."""
+    return enclave.startswith(f"{FOLDER}/")
+
+
 def tool_enclave_name(tool: Tool, targets: tuple[str, ...]) -> str:
     """Where the enclave is kept: ``/tools/echo/front/scan``; of several targets the first, and how many more."""
     rest = f"_and_{len(targets) - 1}_more" if len(targets) > 1 else ""

@@ -10,9 +10,8 @@ import base64
 import json
 from typing import Any
 
-from keystore.signing.authority import spki
 from keystore.signing.public_key import fingerprint
-from keystore.signing.signer import Signer
+from keystore.signing.signer import Signer, spki
 
 
 def envelope(payload: bytes, payload_type: str, signer: Signer) -> dict[str, Any]:

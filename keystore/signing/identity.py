@@ -6,7 +6,7 @@ Bytes in, bytes out; nothing is written here.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple, cast
+from typing import NamedTuple, cast
 
 from cryptography import x509
 from cryptography.exceptions import UnsupportedAlgorithm
@@ -15,20 +15,17 @@ from cryptography.hazmat.primitives import hashes, serialization
 from keystore.errors import DamagedKeystoreError
 from keystore.formats.certificate import CertificateFacts
 from keystore.formats.validity import Validity
-from keystore.signing.authority import (
-    Curve,
-    IdentityIssuer,
+from keystore.signing.authority import Curve, IdentityIssuer, new_key
+from keystore.signing.public_key import key_kind
+from keystore.signing.signer import (
+    FileSigner,
+    PublicKey,
+    Signer,
+    builder_key,
     key_pem,
-    new_key,
-    pem_certificate,
-    signing_key,
+    load_private_key,
     spki,
 )
-from keystore.signing.public_key import key_kind
-from keystore.signing.signer import FileSigner, Signer, load_private_key
-
-if TYPE_CHECKING:
-    from keystore.signing.signer import PublicKey
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +38,7 @@ class Identity:
     @property
     def cert(self) -> bytes:
         """The file ``cert.pem``."""
-        return pem_certificate(self.facts.der)
+        return self.facts.pem
 
 
 def new_identity(
@@ -75,7 +72,7 @@ def new_request(common_name: str, signer: Signer) -> bytes:
     """A PEM request for the key of ``signer``, signed by it."""
     subject = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, common_name)])
     builder = x509.CertificateSigningRequestBuilder().subject_name(subject)
-    made = builder.sign(signing_key(signer), hashes.SHA256())
+    made = builder.sign(builder_key(signer), hashes.SHA256())
     return made.public_bytes(serialization.Encoding.PEM)
 
 
@@ -85,7 +82,7 @@ def request_key(pem: bytes, place: str) -> RequestedKey:
         found = x509.load_pem_x509_csr(pem)
         if not found.is_signature_valid:
             raise DamagedKeystoreError(f"{place} is not signed by the key that it is for")
-        key = cast("PublicKey", found.public_key())  # any other kind is refused below
+        key = cast(PublicKey, found.public_key())  # any other kind is refused below
         names = found.subject.get_attributes_for_oid(x509.NameOID.COMMON_NAME)
         common_name = str(names[0].value) if len(names) == 1 else ""
         der = spki(key)

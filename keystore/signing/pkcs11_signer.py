@@ -1,6 +1,6 @@
 """A CA key in a PKCS#11 token (HSM, smart card, SoftHSM2), by the ``pkcs11:`` URI of RFC 7512.
 
-Optional: needs ``python-pkcs11`` (``pip install enclave-launch[pkcs11]``). The URI names token and
+Optional: needs ``python-pkcs11`` (``pip install python-pkcs11``). The URI names token and
 object; the module comes from ``module-path`` or ``PKCS11_MODULE_PATH``, the PIN from a ``Secret`` or
 ``pin-source``. A ``pin-value`` in a URI is refused: such a file would carry the secret in clear.
 """
@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 from urllib.parse import unquote
 
 from cryptography.hazmat.primitives.asymmetric import ec, rsa
@@ -19,9 +19,7 @@ from cryptography.hazmat.primitives.serialization import load_der_public_key
 
 from keystore.errors import InvalidInputError, SigningUnavailableError
 from keystore.signing.ca_access import Secret
-
-if TYPE_CHECKING:
-    from keystore.signing.signer import PublicKey
+from keystore.signing.signer import PublicKey
 
 MODULE_VARIABLE = "PKCS11_MODULE_PATH"
 
@@ -64,7 +62,7 @@ class Pkcs11Signer:
             import pkcs11.exceptions
         except ImportError:
             raise SigningUnavailableError(
-                "a key in a PKCS#11 token needs python-pkcs11: pip install 'enclave-launch[pkcs11]'"
+                "a key in a PKCS#11 token needs python-pkcs11: pip install python-pkcs11"
             ) from None
         try:
             key, public = _find(pkcs11, attributes, _module(attributes, environment), _pin(attributes, pin))

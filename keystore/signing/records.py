@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from datetime import timedelta
+
 from keystore.errors import DamagedKeystoreError
 from keystore.formats.certificate import CertificateFacts
 from keystore.formats.permissions_document import Grant, grant_for, rules_text
@@ -11,8 +13,10 @@ from keystore.formats.validity import parse_moment
 from keystore.signing.public_key import fingerprint
 
 
-def certificate_record(enclave: str, facts: CertificateFacts, issuer: CertificateFacts) -> IssuedCertificate:
-    """``issuer`` is the CA whose key signed it."""
+def certificate_record(
+    enclave: str, facts: CertificateFacts, issuer: CertificateFacts, lifetime: timedelta | None = None
+) -> IssuedCertificate:
+    """Returns what is kept of a certificate that ``issuer`` signed for ``lifetime``."""
     return IssuedCertificate(
         facts.serial,
         enclave,
@@ -20,6 +24,7 @@ def certificate_record(enclave: str, facts: CertificateFacts, issuer: Certificat
         fingerprint(facts.public_key),
         fingerprint(issuer.der),
         *facts.validity,
+        lifetime=int(lifetime.total_seconds()) if lifetime is not None else None,
     )
 
 

@@ -1,4 +1,4 @@
-"""A keystore held against what is wanted of it. Reads only, without ``cryptography``; ``reconciliation`` writes.
+"""A keystore held against what is wanted of it. Reads only; ``reconciliation`` writes.
 
 ``compare`` answers for a whole launch before it starts, ``differences`` for one enclave before each of its processes.
 """
@@ -14,6 +14,7 @@ from typing import NamedTuple
 from keystore.disk import layout
 from keystore.disk.authorities import refuse_foreign_authorities
 from keystore.disk.crl_file import crl_problem, crl_validity
+from keystore.disk.deployed import deployment_problem, refuse_changed_deployment
 from keystore.disk.register_file import needs_register, read_register
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.signed_documents import governance_domains, governance_stands
@@ -26,9 +27,16 @@ from keystore.formats.register import Register
 from keystore.formats.role import Role
 from keystore.formats.shares import Share
 from keystore.formats.validity import Validity, iso, later, utc_now
-from keystore.steps.enclave_state import OTHER_PERMISSIONS, EnclaveState, PermissionsSource, Reissue, inspect
+from keystore.steps.enclave_state import (
+    OTHER_PERMISSIONS,
+    EnclaveState,
+    PermissionsSource,
+    Reissue,
+    inspect,
+)
 from keystore.steps.options import EnclaveReport, ProvisionOptions, ProvisionReport
 from keystore.steps.sharing import EnclaveShare, kept_shares
+from keystore.steps.signing_here import beyond_and_missing
 
 
 class WantedEnclave(NamedTuple):
@@ -64,6 +72,7 @@ def compare(
         return None
     register = read_register(root)
     refuse_foreign_authorities(view, register)
+    refuse_changed_deployment(view, wanted)
     if not governance_stands(view, options.domains, register) or crl_problem(view, register, now):
         return None
     states = []
@@ -90,7 +99,7 @@ def differences(
 ) -> tuple[str, ...]:
     """Why an enclave is not (or no longer) what ``provision`` with the same options left; empty when it is.
 
-    Reads only, and cheaply: bytes, dates, modes and links, no signatures. Raises a KeystoreError for a
+    Reads only: bytes, dates, modes, links and signatures. Raises a KeystoreError for a
     keystore that cannot be read at all.
     """
     root = resolve_root(keystore)
@@ -106,7 +115,7 @@ def differences(
     reasons = [] if state.is_good else [*state.reasons]
     if not governance_stands(view, chosen.domains, register):
         reasons.append("the governance is not what it was")
-    if problem := crl_problem(view, register, now):
+    if problem := crl_problem(view, register, now) or deployment_problem(view, [policy.path]):
         reasons.append(problem)
     return tuple(reasons)
 
@@ -154,8 +163,6 @@ def asked_end(options: ProvisionOptions) -> datetime | None:
 
 def _with_shares_of_others(view: KeystoreView, state: EnclaveState, wanted: WantedEnclave) -> EnclaveState:
     """A bundle does not tell whose share is whose: permissions that hold all of ours are taken as a union."""
-    from keystore.steps.signing_here import beyond_and_missing  # parses: only where documents differ
-
     beyond, missing = beyond_and_missing(view, state, wanted)
     if missing or not beyond:
         return state

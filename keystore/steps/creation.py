@@ -13,14 +13,14 @@ from dataclasses import dataclass, field
 from datetime import timedelta
 from pathlib import Path
 
-from enclave_launch.boundary.dependencies import require
+from enclave_common.dependencies import require
 from keystore.disk import layout, safe_files, store
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.settings import KeystoreSettings
 from keystore.disk.store import Store
 from keystore.disk.view import KeystoreView
 from keystore.errors import DamagedKeystoreError, InvalidInputError, printable
-from keystore.formats.certificate import CertificateFacts, read_certificate
+from keystore.formats.certificate import CertificateFacts, given_certificates
 from keystore.formats.domains import Domains
 from keystore.formats.given_file import read_given
 from keystore.formats.governance import Governance, governance_document, parse_governance
@@ -32,7 +32,7 @@ from keystore.signing import authority
 from keystore.signing.authority import Authority, Curve, check_can_serve
 from keystore.signing.ca_access import Secret
 from keystore.signing.public_key import CYCLONE_KINDS, key_kind
-from keystore.signing.signer import Signer, open_signer
+from keystore.signing.signer import Signer, key_pem, open_signer
 from keystore.steps.governance import write_governance
 from keystore.steps.incoming_ca import install_incoming, put_incoming
 from keystore.steps.opening import ChangeOptions, opened_for_change
@@ -82,7 +82,7 @@ def create_keystore(keystore: Path | str, options: CreateOptions | None = None) 
 
     Raises NotAKeystoreError for a directory with other things in it, InvalidInputError for a CA that cannot serve.
     """
-    require("cryptography", "lxml")
+    require("cryptography", "asn1crypto", "lxml")
     chosen = options or CreateOptions()
     root = resolve_root(keystore)
     KeystoreView(root).refuse_foreign()
@@ -119,6 +119,10 @@ def complete(opened: Store, options: CreateOptions) -> CreateReport:
     if not view.is_complete:
         if _write_settings(opened, options):
             actions.append("settings written")
+            if _in_git_work_tree(opened.root):
+                with opened.batch() as batch:
+                    batch.file(layout.GITIGNORE, b"*\n")
+                actions.append("kept out of git by its .gitignore, since it holds keys")
         for directory in (layout.PUBLIC, layout.PRIVATE, layout.ENCLAVES):
             opened.ensure_directory(directory)
     for role in Role:
@@ -142,6 +146,10 @@ def _write_settings(opened: Store, options: CreateOptions) -> bool:
     return True
 
 
+def _in_git_work_tree(root: Path) -> bool:
+    return any((folder / ".git").exists() for folder in root.absolute().parents)
+
+
 def _add_ca(opened: Store, role: Role, options: CreateOptions) -> tuple[str, list[str]]:
     """Import or make the CA for ``role``; what was done and what to know of it, in words."""
     view = KeystoreView(opened.root)
@@ -151,7 +159,7 @@ def _add_ca(opened: Store, role: Role, options: CreateOptions) -> tuple[str, lis
         facts = _external_ca(role, options)
         with opened.batch() as batch:
             batch.record(opened.register.with_authority(role, facts.der, AuthorityState.IN_USE))
-            batch.file(layout.ca_cert(role), authority.pem_certificate(facts.der))
+            batch.file(layout.ca_cert(role), facts.pem)
         return "of somebody else imported; it signs what hosts request", []
     if given is not None and given.key is not None:
         made, key = _import_ca(role, options, given.key)
@@ -173,7 +181,7 @@ def _record_present_ca(opened: Store, role: Role, options: CreateOptions) -> Non
     view = KeystoreView(opened.root)
     if role in options.imported:
         place = options.imported[role].certificate
-        if read_certificate(read_given(place), printable(place)).der != view.ca(role).der:
+        if _given(place).der != view.ca(role).der:
             raise InvalidInputError(
                 f"the keystore has another {role.value} already; a CA is replaced with: "
                 "secure-keystore renew KEYSTORE --ca start"
@@ -196,7 +204,7 @@ def _refuse_foreign_enclaves(view: KeystoreView, role: Role) -> None:
 def new_ca(role: Role, options: CreateOptions) -> tuple[Authority, bytes]:
     """A fresh CA and its key file."""
     signer = authority.new_key(options.curve)
-    return _self_signed(role, options, signer), authority.key_pem(signer, _passphrase(options))
+    return _self_signed(role, options, signer), key_pem(signer, _passphrase(options))
 
 
 def _present_key_ca(view: KeystoreView, role: Role, options: CreateOptions) -> tuple[Authority, bytes] | None:
@@ -225,9 +233,14 @@ def _passphrase(options: CreateOptions) -> Secret | None:
 def _import_ca(role: Role, options: CreateOptions, key: Path) -> tuple[Authority, bytes]:
     place, reference = options.imported[role].certificate, read_given(key)
     signer = open_signer(reference, printable(key), options.access)
-    bound = authority.authority_of(read_given(place), signer, printable(place))
-    check_can_serve(bound.facts.der, role, options.now or utc_now(), printable(place))
+    bound = authority.authority_of(_given(place), signer, printable(place))
+    check_can_serve(bound.facts, role, options.now or utc_now(), printable(place))
     return bound, reference
+
+
+def _given(place: Path) -> CertificateFacts:
+    """The first certificate of a file that somebody gave."""
+    return given_certificates(read_given(place), printable(place))[0]
 
 
 def _shared_ca_warnings(role: Role, options: CreateOptions) -> list[str]:
@@ -245,8 +258,8 @@ def _external_ca(role: Role, options: CreateOptions) -> CertificateFacts:
     place = options.imported[role].certificate
     if role is not Role.IDENTITY:
         raise InvalidInputError("only the identity CA can be somebody else's: permissions are signed here")
-    facts = read_certificate(read_given(place), printable(place))
-    check_can_serve(facts.der, role, options.now or utc_now(), printable(place))
+    facts = _given(place)
+    check_can_serve(facts, role, options.now or utc_now(), printable(place))
     return facts
 
 

@@ -1,7 +1,7 @@
-"""One enclave on disk against what it should be: what is missing, stale or wrong, by cheap means. Reads only.
+"""One enclave on disk against what it should be: what is missing, stale or wrong. Reads only.
 
-Every launch asks this of every enclave: no ``cryptography``, no XML parser, some twenty system calls. It compares
-bytes, dates, modes and links; it does not check signatures, which DDS does at start and ``keystore.verify`` on request.
+Every launch asks this of every enclave: bytes, dates, modes, links and signatures, without an XML parser. Whatever is
+not in the form that we write counts as wrong: DDS implementations may read something else in it.
 """
 
 from __future__ import annotations
@@ -10,23 +10,22 @@ import os
 import shlex
 import stat
 from collections.abc import Callable
-from datetime import datetime
+from datetime import datetime, timedelta
 from enum import Enum
 from typing import NamedTuple
 
 from keystore.disk import layout, safe_files
 from keystore.disk.view import KeystoreView
 from keystore.errors import DamagedKeystoreError, SigningUnavailableError, UnsafeKeystoreError, printable
-from keystore.formats import certificate
-from keystore.formats.certificate import CertificateFacts
-from keystore.formats.der import DerError
+from keystore.formats.certificate import CertificateFacts, read_certificate
 from keystore.formats.register import Register
 from keystore.formats.role import Role
 from keystore.formats.subject import names_enclave, subject_name
-from keystore.formats.validity import Validity
+from keystore.formats.validity import DEFAULT_BACKDATE, Validity
 from keystore.signing import smime
-from keystore.signing.authority import spki
-from keystore.signing.public_key import fingerprint, key_matches
+from keystore.signing.identity import public_half, request_key
+from keystore.signing.public_key import fingerprint, is_our_form, issued_by, key_matches
+from keystore.signing.signer import spki
 
 PermissionsSource = Callable[[str, Validity], "bytes | None"]
 """(subject name, validity of the certificate) -> the document it should have; None: keep what it has."""
@@ -112,6 +111,19 @@ def inspect(
     return EnclaveState(name, reissue, facts, permissions, links, tuple(reasons), validity, incident)
 
 
+def granted_lifetime(view: KeystoreView, register: Register | None, enclave: str) -> timedelta | None:
+    """Returns the lifetime of the certificate issued last, as it was granted; None where it is not known."""
+    issued = register.of_enclave(enclave) if register is not None else []
+    if not issued:
+        return None
+    last = issued[-1]
+    if last.lifetime is not None:
+        return timedelta(seconds=last.lifetime)
+    if any(last.not_after == ca.validity.not_after for role in Role for ca in view.ca_bundle(role)):
+        return None  # cut to the life of its CA
+    return max(last.not_after - last.not_before - DEFAULT_BACKDATE, timedelta(hours=1))
+
+
 def _is_there(view: KeystoreView, directory: str) -> bool:
     """Whether the enclave's directory exists; raises UnsafeKeystoreError when it or one above is a link."""
     path = f"{view.root}/{layout.ENCLAVES}"
@@ -146,13 +158,19 @@ def _identity(enclave: _Enclave) -> _Found:
     )
     if request is not None:
         # The key is on its host; ``private/`` holds the request that somebody accepted, so it may be certified again.
-        problem = _certificate_problem(enclave, request, facts) if facts is not None else "no certificate"
+        public = request_key(request, f"the request of {enclave.name}").spki
+        matches = facts is not None and facts.public_key == public
+        problem = _certificate_problem(enclave, facts, matches) if cert is not None else "no certificate"
         return _Found(Reissue.CERTIFICATE if problem else Reissue.NOTHING, facts, problem)
     if key is None:
         return _Found(Reissue.KEY_PAIR, facts, "no private key" if cert is not None else NEW)
     if mode & 0o077:
         return _Found(Reissue.KEY_PAIR, facts, f"others could read its private key (mode {mode:04o})", True)
-    problem = _certificate_problem(enclave, key, facts) if cert is not None else "no certificate"
+    if not is_our_form(key):
+        why = "its private key is not in the form that is written here"
+        return _Found(Reissue.KEY_PAIR, facts, why, enclave.register is not None)
+    matches = facts is not None and key_matches(key, facts)
+    problem = _certificate_problem(enclave, facts, matches) if cert is not None else "no certificate"
     if problem is None:
         return _Found(Reissue.NOTHING, facts)
     if enclave.register is not None and not _key_is_ours(enclave, enclave.register, key):
@@ -176,23 +194,23 @@ def _key_mode(enclave: _Enclave) -> int:
 
 def _facts(cert: bytes | None) -> CertificateFacts | None:
     try:
-        return certificate.read_pem(cert) if cert is not None else None
-    except DerError:
+        return read_certificate(cert) if cert is not None else None
+    except DamagedKeystoreError:
         return None
 
 
-def _certificate_problem(enclave: _Enclave, key: bytes, facts: CertificateFacts | None) -> str | None:
+def _certificate_problem(enclave: _Enclave, facts: CertificateFacts | None, matches_key: bool) -> str | None:
     if facts is None:
         return "the certificate cannot be read"
     if not names_enclave(facts.common_name, enclave.name):
         return "the certificate names another subject"
-    if not facts.names_issuer(enclave.view.ca(Role.IDENTITY)):
+    if not issued_by(facts, enclave.view.ca(Role.IDENTITY)):
         return "the certificate is by another CA"
     if not facts.validity.covers(enclave.now):
         return "the certificate is expired or not yet valid"
     if facts.validity.not_after < enclave.due:
         return "the certificate expires soon"
-    if not key_matches(key, facts):
+    if not matches_key:
         return "the certificate belongs to another key"
     return _record_problem(enclave.register, enclave.name, facts.serial)
 
@@ -214,8 +232,6 @@ def _record_problem(register: Register | None, enclave: str, serial: int) -> str
 def _key_is_ours(enclave: _Enclave, register: Register, key_pem: bytes) -> bool:
     """Whether the key is that of the certificate in force, or of one by the present CA that is not revoked: only such
     a key is certified again. What an old CA issued says nothing: nobody revokes it."""
-    from keystore.signing.identity import public_half
-
     try:
         present = fingerprint(spki(public_half(key_pem, "the enclave's key")))
     except SigningUnavailableError:
@@ -235,8 +251,13 @@ def _permissions_problem(enclave: _Enclave, expected: bytes | None) -> str | Non
     try:
         present = smime.read(signed, f"{enclave.directory}/{layout.PERMISSIONS}")
     except DamagedKeystoreError:
-        return "the signed permissions cannot be read"
-    if not present.embeds(enclave.view.ca(Role.PERMISSIONS).der):
+        return "the signed permissions cannot be read: they are not in the form that is written here"
+    ca = enclave.view.ca(Role.PERMISSIONS)
+    try:
+        smime.check(present, [ca], enclave.directory)
+    except DamagedKeystoreError:
+        return "the permissions are signed by another CA"
+    if not present.embeds(ca.der):
         return "the permissions are signed by another CA"
     document = present.document
     if expected is not None and document != expected:

@@ -5,9 +5,8 @@ from __future__ import annotations
 from datetime import datetime, timedelta
 from functools import cached_property
 from itertools import count
-from typing import TYPE_CHECKING
 
-from enclave_launch.boundary.words import some_of
+from enclave_common.words import some_of
 from keystore.disk import layout, safe_files, store
 from keystore.disk.store import Batch, Content, Link, Store
 from keystore.disk.view import KeystoreView
@@ -32,11 +31,9 @@ from keystore.signing.identity import Identity, new_identity, public_half
 from keystore.signing.records import certificate_record, permissions_record
 from keystore.signing.smime import sign_document
 from keystore.steps.crl import can_revoke, revocable
-from keystore.steps.enclave_state import NEW, EnclaveState, PermissionsSource, Reissue
+from keystore.steps.enclave_state import NEW, EnclaveState, PermissionsSource, Reissue, granted_lifetime
+from keystore.steps.options import EnclaveReport, ProvisionOptions
 from keystore.steps.past_permissions import kept_permissions, what_is_taken_away
-
-if TYPE_CHECKING:
-    from keystore.steps.options import ProvisionOptions
 
 _DAY = timedelta(days=1)
 
@@ -75,14 +72,20 @@ class EnclaveWriter:
     def _can_revoke(self) -> bool:
         return self._options.revoke and can_revoke(self._view)
 
-    @cached_property
-    def _validity(self) -> Validity:
-        """Of new certificates; permissions take over what their certificate got."""
+    def _lifetime(self, enclave: str) -> timedelta:
+        """What is asked for, else what the enclave was granted, else the keystore's."""
+        options = self._options
+        if options.valid_until is not None:
+            return options.valid_until - self._now
+        if options.lifetime is not None:
+            return options.lifetime
+        return granted_lifetime(self._view, self._register, enclave) or self._view.settings.lifetime
+
+    def _validity(self, enclave: str) -> Validity:
+        """Of a new certificate; permissions take over what their certificate got."""
         self._view.refuse_ended(self._now, *Role)
         cas = [self._view.ca(role).validity for role in Role]
-        options = self._options
-        lifetime = self._view.settings.lifetime if options.lifetime is None else options.lifetime
-        asked = Validity.starting(self._now, lifetime, until=options.valid_until, backdate=options.backdate)
+        asked = Validity.starting(self._now, self._lifetime(enclave), backdate=self._options.backdate)
         return asked.within(cas[0]).within(cas[1])
 
     @property
@@ -106,9 +109,12 @@ class EnclaveWriter:
     def _present_name(self, enclave: str) -> str:
         return self._view.common_name(enclave) or common_name(enclave, self._scheme)
 
-    def write(self, batch: Batch, state: EnclaveState, permissions: PermissionsSource) -> tuple[str, ...]:
-        """Add the enclave's missing files; returns what was done. Order: key, certificate, links,
-        permissions, so that a process never finds permissions without an identity."""
+    def write(self, batch: Batch, state: EnclaveState, permissions: PermissionsSource) -> EnclaveReport:
+        """Adds the enclave's missing files; returns what was done.
+
+        Order: key, certificate, links, permissions, so that a process never finds permissions without an identity.
+        """
+        found = state.reasons
         entries: dict[str, Content | Link] = {}
         actions: list[str] = []
         if state.incident:
@@ -129,7 +135,7 @@ class EnclaveWriter:
             batch.directory(layout.enclave_directory(state.enclave), entries)
         if any(self._register.certificates[serial].enclave == state.enclave for serial in self._revoked):
             actions.append("old certificate revoked")
-        return tuple(actions)
+        return EnclaveReport(state.enclave, tuple(actions), found, facts.validity)
 
     def record(self, batch: Batch) -> None:
         """What was added to the batch: on record before anything of it is seen."""
@@ -186,7 +192,9 @@ class EnclaveWriter:
         if made.key is not None:
             entries[layout.KEY] = Content(made.key, store.PRIVATE_MODE)
         entries[layout.CERT] = Content(made.cert)
-        self._issued.append(certificate_record(state.enclave, made.facts, self._identity_ca.facts))
+        lifetime = self._lifetime(state.enclave)
+        record = certificate_record(state.enclave, made.facts, self._identity_ca.facts, lifetime)
+        self._issued.append(record)
         self._revoke_longer(state, made.facts.validity)
         return made.facts
 
@@ -200,13 +208,13 @@ class EnclaveWriter:
         if state.reissue is Reissue.KEY_PAIR:
             known = state.facts is not None or bool(self._register.of_enclave(state.enclave))
             actions.append("key and certificate" if known and state.reasons != (NEW,) else "created")
-            return new_identity(self._issuer, cn, self._validity, self._view.settings.curve)
+            return new_identity(self._issuer, cn, self._validity(state.enclave), self._view.settings.curve)
         directory = layout.enclave_directory(state.enclave)
         relative = layout.request(state.enclave) if made_on_host else f"{directory}/{layout.KEY}"
         key = safe_files.read_private(self._view.root, relative)
         actions.append("certificate")
         public = public_half(key, printable(self._view.root / relative))
-        return Identity(self._issuer.issue(cn, public, self._validity))
+        return Identity(self._issuer.issue(cn, public, self._validity(state.enclave)))
 
     def _subject(self, enclave: str, new_generation: bool) -> str:
         """The subject it has; another one for a new generation, or after a change of the scheme."""
@@ -255,7 +263,7 @@ class EnclaveWriter:
         document = source(subject, facts.validity) or kept_permissions(
             self._view, self._register, enclave, subject, facts.validity, self._options.rmw
         )
-        signed = sign_document(document, self._permissions_ca, self._now)
+        signed = sign_document(document, self._permissions_ca)
         self._signed.append(permissions_record(enclave, name, document))
         if len(signed) >= WARN_BYTES:
             self.warnings.append(

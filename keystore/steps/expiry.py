@@ -1,4 +1,4 @@
-"""What of a keystore ends when. Reads only, without ``cryptography``: a launch asks this every time."""
+"""What of a keystore ends when. Reads only: a launch asks this every time."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from keystore.disk import layout, safe_files
 from keystore.disk.crl_file import crl_validity
 from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import DamagedKeystoreError, InvalidInputError
-from keystore.formats import certificate, der
+from keystore.formats.certificate import read_certificate
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.role import Role
 from keystore.formats.validity import Validity, later, parse_moment, utc_now
@@ -106,10 +106,7 @@ def _enclave_expiries(view: KeystoreView, name: str) -> Iterator[Expiry]:
     directory = layout.enclave_directory(name)
     cert = safe_files.read_if_there(view.root, f"{directory}/{layout.CERT}")
     if cert is not None:
-        try:
-            yield _expiry("certificate", name, certificate.read_pem(cert).validity)
-        except der.DerError as error:
-            raise DamagedKeystoreError(f"{directory}/{layout.CERT}: {error}") from None
+        yield _expiry("certificate", name, read_certificate(cert, f"{directory}/{layout.CERT}").validity)
     signed = safe_files.read_if_there(view.root, f"{directory}/{layout.PERMISSIONS}")
     if signed is not None:
         yield _expiry("permissions", name, _permissions_validity(signed, f"{directory}/{layout.PERMISSIONS}"))
@@ -121,7 +118,7 @@ def _expiry(what: str, enclave: str | None, validity: Validity) -> Expiry:
 
 def _permissions_validity(signed: bytes, place: str) -> Validity:
     """Of the first grant, the only one that implementations use."""
-    found = dict(reversed(re.findall(_DATE, smime.read(signed, place).document)))
+    found = dict(reversed(re.findall(_DATE, smime.read_any(signed, place).document)))
     try:
         return Validity(parse_moment(found[b"before"].decode()), parse_moment(found[b"after"].decode()))
     except (KeyError, UnicodeDecodeError, InvalidInputError):

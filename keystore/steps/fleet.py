@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 from keystore.disk import layout, safe_files
 from keystore.disk.archive import read_bundle
+from keystore.disk.deployed import find_differences
 from keystore.disk.register_file import read_register
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.signed_documents import own_permissions_cas
@@ -143,7 +144,7 @@ def _judge(
     now: datetime,
     limit: datetime,
 ) -> HostStatus:
-    found = list(_ends(manifest, now, limit))
+    found = [*_ends(manifest, now, limit), *_changed(place)]
     if reference is not None:
         found += _against(manifest, reference)
     elif manifest.crl_number < newest_crl:
@@ -159,6 +160,19 @@ def _ends(manifest: Manifest, now: datetime, limit: datetime) -> Iterator[str]:
             yield f"{one.enclave} ends soon"
     if manifest.ends <= limit and not any(one.not_after <= limit for one in manifest.enclaves):
         yield "a CA or the CRL " + ("has ended" if manifest.ends < now else "ends soon")
+
+
+def _changed(place: Path) -> Iterator[str]:
+    """An imported keystore whose files are not those of its manifest, or a bundle file of which that is true."""
+    if place.is_file():
+        content = read_bundle(place)
+        manifest = smime.read(content[layout.BUNDLE], printable(place)).document
+        for name, digest in parse_manifest(manifest, printable(place)).files.items():
+            if name not in content or fingerprint(content[name]) != digest:
+                yield f"{name} is missing in the bundle, or is not the file that was signed"
+        return
+    for name, problem in find_differences(KeystoreView(resolve_root(place))):
+        yield f"{name} {problem}"
 
 
 def _against(manifest: Manifest, reference: Reference) -> Iterator[str]:

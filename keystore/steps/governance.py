@@ -38,7 +38,7 @@ def mirror_governance(opened: Store) -> bool:
 
 def write_governance(opened: Store, document: bytes, permissions_ca: Authority, now: datetime) -> None:
     """Record, sign and publish it."""
-    signed = sign_document(document, permissions_ca, now)
+    signed = sign_document(document, permissions_ca)
     with opened.batch() as batch:
         batch.record(replace(opened.register, governance=document))
         batch.file(layout.GOVERNANCE_XML, document)

@@ -20,7 +20,7 @@ from keystore.disk.store import Content, Store
 from keystore.disk.versions import write_new
 from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import InvalidInputError, StorageError, printable
-from keystore.formats.bundle import BundledEnclave, Manifest, manifest_json, parse_manifest
+from keystore.formats.bundle import BundledEnclave, Manifest, manifest_json, parse_manifest, pin
 from keystore.formats.certificate import read_certificate
 from keystore.formats.hosts import Hosts, refuse_host_name
 from keystore.formats.role import Role
@@ -120,7 +120,7 @@ def _export(
     if present is None or is_new:
         number = max(int(now.timestamp()), present[0].number + 1 if present is not None else 0)
         manifest = manifest._replace(number=number)
-        signed = sign_document(manifest_json(manifest), view.authority(Role.PERMISSIONS, options.access), now)
+        signed = sign_document(manifest_json(manifest), view.authority(Role.PERMISSIONS, options.access))
         with opened.batch() as batch:
             batch.file(layout.signed_bundle(host), signed, store.PRIVATE_MODE)
     else:
@@ -196,5 +196,5 @@ def _write(output: Path, host: str, content: bytes, root: Path) -> Path:
 
 
 def pinned(manifest: Manifest) -> tuple[str, ...]:
-    """The fingerprints that the first import wants to be told."""
-    return tuple(dict.fromkeys(one for role in Role for one in manifest.authorities[role]))
+    """Returns what the first import wants to be told: which CA may do what."""
+    return tuple(pin(role, one) for role in Role for one in manifest.authorities[role])

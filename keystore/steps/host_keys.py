@@ -18,7 +18,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
-from enclave_launch.boundary.dependencies import require
+from enclave_common.dependencies import require
 from keystore.disk import layout, lock, safe_files, store
 from keystore.disk.versions import Versions, write_new
 from keystore.errors import (
@@ -33,11 +33,11 @@ from keystore.formats.bundle import BundledEnclave
 from keystore.formats.certificate import read_certificate
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.subject import common_name
-from keystore.signing.authority import Curve, key_pem, new_key, spki
+from keystore.signing.authority import Curve, new_key
 from keystore.signing.ca_access import CaAccess
 from keystore.signing.identity import new_request, request_key
 from keystore.signing.public_key import fingerprint
-from keystore.signing.signer import FileSigner, Signer, load_private_key, open_signer
+from keystore.signing.signer import FileSigner, Signer, key_pem, load_private_key, open_signer, spki
 
 _BLOCK = re.compile(
     rb"^enclave: ([^\n]{1,300})\n(-----BEGIN CERTIFICATE REQUEST-----\n.*?\n-----END CERTIFICATE REQUEST-----\n)",

@@ -1,13 +1,14 @@
 """A bundle put in force on its host: everything is checked in memory and aside, then one rename changes all.
 
 Needs neither a network nor a CA key. Refused: what the pinned permissions CA did not sign, another host's bundle, an
-earlier one, one that is cut off or has a file more, less or changed, an earlier CRL, an enclave that was revoked, and
-what ``verify`` calls an error. Nothing is half-imported: a run that is killed leaves the keystore of before.
+earlier one, one that is cut off or has a file more, less or changed, an earlier CRL, an enclave that was revoked, a
+governance weaker than the default, and what ``verify`` calls an error. The same bundle again restores what was changed
+since. Nothing is half-imported: a run that is killed leaves the keystore of before.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from datetime import datetime
 from enum import Enum
@@ -16,22 +17,26 @@ from typing import NamedTuple
 
 from keystore.disk import layout, lock, safe_files, store
 from keystore.disk.archive import read_bundle
+from keystore.disk.deployed import differing_files
 from keystore.disk.store import Content, Link
 from keystore.disk.versions import Versions
+from keystore.disk.view import KeystoreView
 from keystore.errors import (
     DamagedKeystoreError,
     InvalidInputError,
     UnsafeKeystoreError,
     printable,
 )
-from keystore.formats.bundle import BundledEnclave, Manifest, parse_manifest
+from keystore.formats.bundle import BundledEnclave, Manifest, parse_manifest, pins_of
 from keystore.formats.certificate import read_certificates
+from keystore.formats.governance import parse_governance
 from keystore.formats.role import Role
 from keystore.formats.validity import utc_now
 from keystore.signing import smime
-from keystore.signing.public_key import fingerprint, fingerprints
+from keystore.signing.public_key import fingerprint
 from keystore.steps.host_keys import HostKey, find_key, forget_pending
 from keystore.verification import Severity, verify
+from keystore.verification.governance import weaknesses
 
 
 class Restart(str, Enum):
@@ -46,10 +51,14 @@ class Restart(str, Enum):
 @dataclass(frozen=True, slots=True)
 class ImportOptions:
     """``host``: which one this is; needed unless the bundle's name for it is taken from an earlier import.
-    ``authorities``: SHA-256 of the CAs to trust, for the first import and to pin others by hand."""
+
+    ``authorities``: which CA may do what, as ``identity=SHA256`` and ``permissions=SHA256``; for the first import, and
+    to pin others by hand. ``accept_weaker``: attributes of the governance that may be weaker than the default.
+    """
 
     host: str | None = None
     authorities: tuple[str, ...] = ()
+    accept_weaker: tuple[str, ...] = ()
     lock_timeout: float = lock.DEFAULT_TIMEOUT
     now: datetime | None = None
 
@@ -83,19 +92,24 @@ def import_bundle(
     versions = Versions(keystore)
     content = read_bundle(Path(bundle))
     with versions.opened(chosen.lock_timeout):
-        present = deployed_manifest(versions.current) if versions.current else None
+        present = _present(versions.current)
         found = _checked(content, printable(bundle), present, chosen)
-        if present is not None and found.manifest == present:
-            return ImportReport(
-                versions.root, present, (), (), Restart.NOBODY, ("this bundle is in force already",)
-            )
-        if present is not None:
+        differing: list[str] = []
+        if present is not None and versions.current is not None and found.manifest == present:
+            differing = [name for name, _ in differing_files(KeystoreView(versions.current), present)]
+            if not differing:
+                said = ("this bundle is in force already",)
+                return ImportReport(versions.root, present, (), (), Restart.NOBODY, said)
+        elif present is not None:
             _refuse_earlier(found, present)
-        return _put_in_force(versions, found, present, chosen.now or utc_now())
+        _refuse_weaker(found, present, chosen.accept_weaker)
+        return _put_in_force(versions, found, present, chosen.now or utc_now(), differing)
 
 
-def deployed_manifest(version: Path) -> Manifest:
-    """Of an imported keystore. Raises DamagedKeystoreError."""
+def _present(version: Path | None) -> Manifest | None:
+    """What is in force. Its signature was checked when it was imported; ``verify`` checks it again."""
+    if version is None:
+        return None
     place = printable(version / layout.BUNDLE)
     return parse_manifest(smime.read(safe_files.read(version, layout.BUNDLE), place).document, place)
 
@@ -119,25 +133,30 @@ def _checked(
     return found._replace(files={**found.files, layout.BUNDLE: signed})
 
 
-def _pins(present: Manifest | None, options: ImportOptions) -> frozenset[str]:
+def _pins(present: Manifest | None, options: ImportOptions) -> dict[Role, frozenset[str]]:
     """The CAs named by hand, else those of what is in force. Raises UnsafeKeystoreError without either."""
-    named = fingerprints(options.authorities)
-    if not named and present is None:
+    if options.authorities:
+        return pins_of(options.authorities)
+    if present is None:
         raise UnsafeKeystoreError(
-            "nothing is pinned on this host yet: give the fingerprints of both CAs with --require-ca; "
-            "secure-keystore export prints them, and they must come another way than the bundle"
+            "nothing is pinned on this host yet: say which CA may do what with --require-ca identity=SHA256 and "
+            "--require-ca permissions=SHA256; secure-keystore export prints them, and they must come another way than "
+            "the bundle"
         )
-    return named or frozenset(one for role in Role for one in (present.authorities[role] if present else ()))
+    return {role: frozenset(present.authorities[role]) for role in Role}
 
 
 def _check_signer(
-    document: smime.SignedDocument, content: Mapping[str, bytes], pins: frozenset[str], place: str
+    document: smime.SignedDocument,
+    content: Mapping[str, bytes],
+    pins: Mapping[Role, frozenset[str]],
+    place: str,
 ) -> None:
     name = layout.ca_cert(Role.PERMISSIONS)
     if name not in content:
         raise DamagedKeystoreError(f"{place} lacks {name}: it is cut off, or was changed; copy it again")
     authorities = read_certificates(content[name], f"{place}: {name}")
-    trusted = [ca for ca in authorities if fingerprint(ca.der) in pins]
+    trusted = [ca for ca in authorities if fingerprint(ca.der) in pins[Role.PERMISSIONS]]
     if not trusted:
         raise UnsafeKeystoreError(
             f"{place} is by another permissions CA than the one pinned here. If the CA was replaced and this host "
@@ -182,32 +201,54 @@ def _check_files(found: _Bundle) -> None:
 
 
 def _check_authorities(found: _Bundle, options: ImportOptions) -> None:
-    """The trust files hold the CAs that the manifest names; with pins by hand, only those."""
-    named = fingerprints(options.authorities)
+    """The trust files hold the CAs that the manifest names; with pins by hand, each only those of its role."""
+    pins = pins_of(options.authorities) if options.authorities else None
     for role in Role:
         name = layout.ca_cert(role)
         present = tuple(fingerprint(ca.der) for ca in read_certificates(found.files[name], name))
-        foreign = sorted(set(present) - named) if named else []
+        foreign = sorted(set(present) - pins[role]) if pins is not None else []
         if present != found.manifest.authorities[role] or foreign:
             what = foreign[0] if foreign else ", ".join(present)
-            raise UnsafeKeystoreError(f"{found.place}: {name} trusts a CA that is not pinned: {what}")
+            raise UnsafeKeystoreError(
+                f"{found.place}: {name} trusts a CA that is not pinned as {role.label}: {what}"
+            )
 
 
 def _refuse_earlier(found: _Bundle, present: Manifest) -> None:
+    """CRL numbers belong to their issuer: another identity CA in use begins a new series."""
     if found.manifest.number <= present.number:
         raise UnsafeKeystoreError(
             f"{found.place} is number {found.manifest.number}, but {present.number} is in force here: an earlier "
             "bundle may give back what was taken away or revoked since. Export again where the CA is"
         )
-    if found.manifest.crl_number < present.crl_number:
+    issuers = [one.authorities[Role.IDENTITY][:1] for one in (found.manifest, present)]
+    if issuers[0] == issuers[1] and found.manifest.crl_number < present.crl_number:
         raise UnsafeKeystoreError(
             f"{found.place} has an earlier CRL ({found.manifest.crl_number}) than this host ({present.crl_number})"
         )
 
 
+def _refuse_weaker(found: _Bundle, present: Manifest | None, accepted: Iterable[str]) -> None:
+    """Raises UnsafeKeystoreError for a governance weaker than the default that this host has not accepted yet."""
+    if (
+        present is not None
+        and present.files.get(layout.GOVERNANCE) == found.manifest.files[layout.GOVERNANCE]
+    ):
+        return
+    document = smime.read(found.files[layout.GOVERNANCE], layout.GOVERNANCE).document
+    for weakness in weaknesses(parse_governance(document, layout.GOVERNANCE)):
+        attribute = weakness.split()[0]
+        if attribute not in set(accepted):
+            raise UnsafeKeystoreError(
+                f"{found.place}: its governance is weaker than the default: {weakness}. Where that is meant: import "
+                f"with --accept-weaker {attribute}"
+            )
+
+
 def _put_in_force(
-    versions: Versions, found: _Bundle, present: Manifest | None, now: datetime
+    versions: Versions, found: _Bundle, present: Manifest | None, now: datetime, differing: Collection[str]
 ) -> ImportReport:
+    """``differing``: files that are not as the same bundle left them, and are restored."""
     keys = {one.enclave: find_key(versions, one) for one in found.manifest.enclaves if not one.has_key}
     staged = versions.stage(_entries(found, keys))
     try:
@@ -216,9 +257,21 @@ def _put_in_force(
     finally:
         versions.discard()
     forget_pending(versions, keys)
-    changed, removed = _differences(found.manifest, present)
-    restart = _restart(found.manifest, present, changed)
+    before = _without(present, differing)
+    changed, removed = _differences(found.manifest, before)
+    restart = _restart(found.manifest, before, changed)
+    notes += [f"restored: {name}" for name in differing]
     return ImportReport(versions.root, found.manifest, changed, removed, restart, tuple(notes))
+
+
+def _without(present: Manifest | None, differing: Collection[str]) -> Manifest | None:
+    """What was really in force: without the files that were not as they should be, and the enclaves they are of."""
+    if present is None:
+        return None
+    files = {name: digest for name, digest in present.files.items() if name not in differing}
+    directories = {name.rpartition("/")[0] for name in differing}
+    whole = tuple(one for one in present.enclaves if layout.enclave_directory(one.enclave) not in directories)
+    return present._replace(files=files, enclaves=whole)
 
 
 def _entries(found: _Bundle, keys: Mapping[str, HostKey]) -> dict[str, Content | Link]:

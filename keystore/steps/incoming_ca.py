@@ -9,7 +9,7 @@ from __future__ import annotations
 from keystore.disk import layout, safe_files, store
 from keystore.disk.store import Content, Store
 from keystore.errors import DamagedKeystoreError, printable
-from keystore.formats.certificate import read_certificate
+from keystore.formats.certificate import read_certificates
 from keystore.formats.register import AuthorityState
 from keystore.formats.role import Role
 from keystore.signing.signer import is_token_uri
@@ -21,7 +21,7 @@ def put_incoming(opened: Store, role: Role, cert: bytes, key: bytes) -> None:
     opened.ensure_directory(layout.PRIVATE)
     opened.ensure_directory(layout.INCOMING)
     name = layout.KEY_URI if is_token_uri(key) else layout.KEY
-    facts = read_certificate(cert, layout.INCOMING)
+    facts = read_certificates(cert, layout.INCOMING)[0]
     with opened.batch() as batch:
         batch.record(opened.register.with_authority(role, facts.der, AuthorityState.IN_USE))
         batch.directory(

@@ -12,8 +12,6 @@ from enum import Enum
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from cryptography import x509
-
 from keystore.disk import layout, safe_files
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.signed_documents import signed_governance
@@ -110,7 +108,7 @@ def _entry(use: str, name: str, facts: CertificateFacts, private_key: str) -> Ke
 
 
 def _signature(facts: CertificateFacts) -> str:
-    certificate = x509.load_der_x509_certificate(facts.der)
+    certificate = facts.certificate
     digest = certificate.signature_hash_algorithm
     return f"{_NAMES.get(certificate.signature_algorithm_oid.dotted_string, 'other')}, {digest.name if digest else '?'}"
 

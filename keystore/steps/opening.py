@@ -7,7 +7,7 @@ import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
-from datetime import datetime
+from datetime import datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,14 +18,12 @@ from keystore.disk.signed_documents import trusted_document
 from keystore.disk.store import Store
 from keystore.disk.view import KeystoreView
 from keystore.errors import DamagedKeystoreError, KeystoreError, printable
-from keystore.formats import certificate
-from keystore.formats.certificate import CertificateFacts, read_certificates
-from keystore.formats.der import DerError
+from keystore.formats.certificate import CertificateFacts, given_certificates, read_certificates
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.register import UNKNOWN, AuthorityState, IssuedCertificate, Register, SignedPermissions
 from keystore.formats.role import Role
 from keystore.formats.subject import common_name
-from keystore.formats.validity import parse_moment
+from keystore.formats.validity import iso, parse_moment
 from keystore.signing.ca_access import CaAccess
 from keystore.signing.public_key import fingerprint, issued_by
 from keystore.signing.records import certificate_record, permissions_record
@@ -43,19 +41,45 @@ class ChangeOptions:
     lock_timeout: float = lock.DEFAULT_TIMEOUT
     durable: bool = True
     now: datetime | None = None
+    accept_clock: bool = False
+    """Go on though the clock is far from the last time that the register knows."""
 
 
 @contextmanager
 def opened_for_change(
     root: Path, now: datetime, options: ChangeOptions | ProvisionOptions
 ) -> Iterator[Store]:
-    """As ``store.opened``; a complete keystore without a register gets one made from what stands in it."""
+    """As ``store.opened``; a complete keystore without a register gets one made from what stands in it.
+
+    Raises DamagedKeystoreError where the clock cannot be right, unless that is accepted or the caller gave the time.
+    """
     with store.opened(root, timeout=options.lock_timeout, durable=options.durable) as opened:
+        if options.now is None:
+            _check_clock(opened, now, accepted=options.accept_clock)
+            opened.clock = now
         if needs_register(KeystoreView(root)):
             take_over(opened, now)
         elif opened.has_register:
             _adopt_newer_crl(opened)
         yield opened
+
+
+_BACK, _AHEAD = timedelta(days=1), timedelta(days=366)
+
+
+def _check_clock(opened: Store, now: datetime, *, accepted: bool) -> None:
+    """With a wrong clock certificates end at the wrong time, and what was revoked could be forgotten."""
+    last = opened.register.written
+    if last is None or last - _BACK <= now <= last + _AHEAD:
+        return
+    if not accepted:
+        raise DamagedKeystoreError(
+            f"the clock says {iso(now)}, and the register was written at {iso(last)}: set the clock, or, if it is "
+            f"right, accept it with secure-keystore renew {printable(opened.root)} --accept-clock"
+        )
+    opened.clock = now
+    with opened.batch() as batch:
+        batch.record(opened.register)
 
 
 def _adopt_newer_crl(opened: Store) -> None:
@@ -146,10 +170,10 @@ def _issued(view: KeystoreView) -> Iterator[IssuedCertificate]:
     for enclave in view.enclaves():
         pem = view.enclave_file(enclave, layout.CERT)
         try:
-            facts = certificate.read_pem(pem or b"")
-            issuer = next((ca for ca in view.ca_bundle(Role.IDENTITY) if issued_by(facts, ca)), None)
-        except DerError:
+            facts = given_certificates(pem or b"", enclave)[0]
+        except DamagedKeystoreError:
             continue
+        issuer = next((ca for ca in view.ca_bundle(Role.IDENTITY) if issued_by(facts, ca)), None)
         if issuer is not None:
             yield certificate_record(enclave, facts, issuer)
 

@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 from datetime import datetime, timedelta
 from pathlib import Path
 from types import MappingProxyType
+from typing import TYPE_CHECKING, NamedTuple
 
-from enclave_launch.boundary.light import TYPE_CHECKING, NamedTuple
 from keystore.disk.lock import DEFAULT_TIMEOUT
 from keystore.disk.share_files import LaunchHold
 from keystore.formats.domains import Domains
@@ -18,6 +18,7 @@ from keystore.signing.ca_access import CaAccess
 if TYPE_CHECKING:
     from keystore.formats.subject import SubjectScheme
     from keystore.steps.creation import CreateOptions
+    from keystore.steps.signing_process import SigningProcess
 
 
 Progress = Callable[[int, int], None]
@@ -47,6 +48,7 @@ class ProvisionOptions(NamedTuple):
     durable: bool = True
     progress: Progress | None = None
     now: datetime | None = None
+    accept_clock: bool = False
     launch: LaunchHold | None = None
     """The launch whose share of the enclaves this is: shares of other launches stay, the enclaves get all of them
     together. None: the enclaves get exactly what is given, and no launch has a share."""
@@ -55,13 +57,15 @@ class ProvisionOptions(NamedTuple):
     types: Mapping[str, tuple[tuple[str, tuple[str, ...]], ...]] = MappingProxyType({})
     """By enclave, of those on Zenoh: the types of what the launch asks for (``zenoh.types.types_text``)."""
     enclave_domains: Mapping[str, Domains] = MappingProxyType({})
+    signing: SigningProcess | None = None
+    """Where signing is done by a process of its own; it has the ``access``, and everything that was asked for."""
     guid_halves: Mapping[str, Half] = MappingProxyType({})
     """Where the participants of enclaves without a certificate yet should sort; their subjects are chosen so."""
 
 
 class EnclaveReport(NamedTuple):
     """``actions``: ``created``, ``certificate``, ``permissions``, ``links``, ``mode``; or none. ``validity``: of
-    certificate and permissions, where they were found to be as wanted."""
+    certificate and permissions, where they were found to be as wanted or are new."""
 
     enclave: str
     actions: tuple[str, ...]
@@ -86,5 +90,5 @@ class ProvisionReport(NamedTuple):
 
     @property
     def validities(self) -> Mapping[str, Validity]:
-        """Of the enclaves that were found to be as wanted."""
+        """Of the enclaves that are as wanted."""
         return {report.enclave: report.validity for report in self.enclaves if report.validity is not None}

@@ -17,6 +17,7 @@ from keystore.formats.register import Register, SignedPermissions
 from keystore.formats.role import Role
 from keystore.formats.subject import names_enclave
 from keystore.formats.validity import Validity
+from keystore.signing.public_key import fingerprint
 from keystore.signing.records import rules_digest
 from keystore.steps.enclave_state import PermissionsSource
 
@@ -53,13 +54,12 @@ def kept_permissions(
 
     Raises DamagedKeystoreError for a document that is not the one signed last for this enclave.
     """
-    place = _place(enclave)
+    place, last = _place(enclave), register.permissions(enclave)
     if safe_files.read_if_there(view.root, place) is None:
         return _nothing(view, enclave, subject, validity, rmw)
     try:
-        document = trusted_document(view, place)
+        document = _document(view, enclave, last)
         mine = _grant(document, enclave)
-        last = register.permissions(enclave)
         if last is not None and (mine is None or rules_digest(mine) != last.rules):
             raise DamagedKeystoreError(
                 f"{printable(view.root / place)} is not what was signed last for {enclave}"
@@ -72,10 +72,21 @@ def kept_permissions(
         ) from None
 
 
+def _document(view: KeystoreView, enclave: str, last: SignedPermissions | None) -> bytes:
+    """Returns the document signed last, from ``permissions.xml`` where the signed file was damaged.
+
+    Raises DamagedKeystoreError where neither holds what the register has.
+    """
+    twin = view.enclave_file(enclave, layout.PERMISSIONS_XML)
+    if last is not None and twin is not None and fingerprint(twin) == last.document:
+        return twin
+    return trusted_document(view, _place(enclave))
+
+
 def _granted_last(view: KeystoreView, last: SignedPermissions) -> Grant | None:
     """The grant on disk, if it is the one recorded."""
     try:
-        grant = _grant(trusted_document(view, _place(last.enclave)), last.enclave)
+        grant = _grant(_document(view, last.enclave, last), last.enclave)
     except KeystoreError:
         return None
     return grant if grant is not None and rules_digest(grant) == last.rules else None

@@ -11,10 +11,12 @@ by the next one, because the comparison finds every missing step again.
 from __future__ import annotations
 
 import os
+import shlex
 from collections.abc import Iterable, Mapping
 from datetime import timedelta
 from pathlib import Path
 
+from enclave_common.words import counted, some_of
 from keystore.disk import layout, store
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.share_files import read_shares
@@ -33,7 +35,9 @@ from keystore.steps.comparison import (
 )
 from keystore.steps.enclave_state import PermissionsSource
 from keystore.steps.options import ProvisionOptions, ProvisionReport
-from keystore.steps.sharing import given_up, refuse_running
+from keystore.steps.reconciliation import reconcile
+from keystore.steps.sharing import given_up, left_over, refuse_running
+from keystore.steps.zenoh_configuration import follow
 from keystore.verification.before_launch import exposures
 
 
@@ -52,15 +56,29 @@ def provision(
         chosen.launch.take()
     else:
         refuse_running(root, (policy.path for policy in policies))
-    report = bring_about(
-        root, {policy.path: wanted_enclave(root, policy, chosen) for policy in policies}, chosen
-    )
+    if chosen.signing is not None:
+        report = chosen.signing.provision(policies, chosen)
+    else:
+        wanted = {policy.path: wanted_enclave(root, policy, chosen) for policy in policies}
+        report = bring_about(root, wanted, chosen)
     if chosen.launch is not None:
         chosen.launch.take()  # a new keystore had no place for it before
         chosen.launch.enclaves.update(policy.path for policy in policies)
+        gone = left_over(root, chosen.launch.owner, (policy.path for policy in policies))
+        report = report._replace(warnings=(*report.warnings, *_left_over(root, gone)))
     else:
         drop_share_files(root, [policy.path for policy in policies], chosen)
     return report
+
+
+def _left_over(root: Path, enclaves: list[str]) -> list[str]:
+    if not enclaves:
+        return []
+    return [
+        f"{counted(len(enclaves), 'enclave')} of this launch left over, with all that was granted: "
+        f"{some_of(enclaves, 8)}; to revoke and remove: secure-keystore remove {shlex.quote(str(root))} "
+        f"{' '.join(enclaves)}"
+    ]
 
 
 def drop_share_files(root: Path, enclaves: Iterable[str], options: ProvisionOptions) -> None:
@@ -87,7 +105,6 @@ def _zenoh(root: Path, options: ProvisionOptions) -> list[str]:
     """The router's rules follow from what was just changed."""
     if not os.path.lexists(f"{root}/{layout.ZENOH_ROUTER}"):
         return []
-    from keystore.steps.zenoh_configuration import follow
 
     return follow(root, options)
 
@@ -98,8 +115,6 @@ def bring_about(
     """Compare, and reconcile what differs. ``root`` is resolved, the names are valid and in order."""
     now = options.now or utc_now()
     if (report := compare(root, wanted, options, now)) is None:
-        from keystore.steps.reconciliation import reconcile  # brings cryptography: not on the warm path
-
         report = reconcile(root, wanted, options, now)
         report = report._replace(warnings=(*report.warnings, *_zenoh(root, options)))
     return report._replace(warnings=(*report.warnings, *exposures(KeystoreView(root))))

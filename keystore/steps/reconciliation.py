@@ -8,7 +8,7 @@ from dataclasses import replace
 from datetime import datetime, timedelta
 from pathlib import Path
 
-from enclave_launch.boundary.dependencies import require
+from enclave_common.dependencies import require
 from keystore.disk import store
 from keystore.disk.authorities import refuse_foreign_authorities
 from keystore.disk.signed_documents import governance_domains
@@ -37,7 +37,7 @@ def reconcile(
     root: Path, wanted: Mapping[str, WantedEnclave], options: ProvisionOptions, now: datetime
 ) -> ProvisionReport:
     """Complete the keystore, then every enclave that is not as wanted."""
-    require("cryptography", "lxml")
+    require("cryptography", "asn1crypto", "lxml")
     # An impossible validity is refused before a keystore is made for it.
     lifetime = DEFAULT_LIFETIME if options.lifetime is None else options.lifetime
     Validity.starting(now, lifetime, until=options.valid_until, backdate=options.backdate)
@@ -122,8 +122,7 @@ def _write_all(
         part = todo[start : start + _BATCH]
         with opened.batch() as batch:
             for position, state in enumerate(part, start + 1):
-                actions = writer.write(batch, state, wanted[state.enclave].permissions)
-                reports[state.enclave] = EnclaveReport(state.enclave, actions, state.reasons)
+                reports[state.enclave] = writer.write(batch, state, wanted[state.enclave].permissions)
                 if progress is not None:
                     progress(position, len(todo))
             writer.record(batch)

@@ -15,22 +15,22 @@ from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from pathlib import Path
 
+from enclave_common.words import counted, some_of
 from keystore.disk import layout, safe_files
-from keystore.disk.authorities import describe, foreign_authorities
+from keystore.disk.authorities import describe
 from keystore.disk.copies import refresh_copies
 from keystore.disk.register_file import read_register
 from keystore.disk.store import Store
 from keystore.disk.view import KeystoreView, keystore_at
 from keystore.disk.zenoh_files import has_router, zenoh_enclaves
-from keystore.formats import certificate
-from keystore.formats.certificate import CertificateFacts
-from keystore.formats.der import DerError
+from keystore.errors import DamagedKeystoreError, InvalidInputError, printable
+from keystore.formats.certificate import CertificateFacts, read_certificate, read_der
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.register import AuthorityState
 from keystore.formats.role import Role
 from keystore.formats.subject import SubjectScheme, scheme_of
-from keystore.formats.validity import utc_now
-from keystore.signing.authority import pem_certificate
+from keystore.formats.tool_needs import is_tool_enclave
+from keystore.formats.validity import iso, utc_now
 from keystore.steps import rollover
 from keystore.steps.comparison import WantedEnclave, with_domains
 from keystore.steps.crl import restore_crl
@@ -61,11 +61,16 @@ class RenewOptions:
 def renew(
     keystore: Path | str, enclaves: Iterable[str] | None = None, *, options: RenewOptions | None = None
 ) -> ProvisionReport:
-    """Renew these enclaves; without a list all that is due or exposed. Repeating does nothing more.
+    """Renews these enclaves; without a list all that is due or exposed, but no tool's. Repeating does nothing more.
 
-    Raises InvalidInputError for an enclave that is not there, SigningUnavailableError without the CA keys.
+    Each gets the lifetime that it was granted before, unless one is asked for. Raises InvalidInputError for an enclave
+    that is not there and for new keys of nobody, SigningUnavailableError without the CA keys.
     """
     chosen = options or RenewOptions()
+    if chosen.new_keys and enclaves is None and not chosen.everything:
+        raise InvalidInputError(
+            "new keys for whom? Name the enclaves (secure-keystore renew KEYSTORE /a /b --new-keys), or give --all"
+        )
     view = keystore_at(keystore)
     root = view.root
     provisioning = chosen.provisioning._replace(create=False)
@@ -79,7 +84,11 @@ def renew(
         if mirror_governance(opened):
             repaired.append("governance.xml made equal to the signed governance.p7s")
     view = KeystoreView(root)
-    wanted = {name: _wanted(view, name, named, chosen) for name in view.enclaves()}
+    wanted = {
+        name: _wanted(view, name, named, chosen)
+        for name in view.enclaves()
+        if name in (named or ()) or not is_tool_enclave(name)
+    }
     due = provisioning if named is not None else provisioning._replace(renew_within=chosen.within)
     report = bring_about(root, wanted, with_domains(root, due))
     if chosen.revoke_old:
@@ -88,7 +97,29 @@ def renew(
             count = revoke_replaced(opened, changed, provisioning.access, now)
         repaired.append(f"{count} replaced certificates revoked; deploy the new crl.pem to all enclaves")
         report = _with_names_of_their_own(root, report, due)
+    else:
+        report = report._replace(warnings=(*report.warnings, *_still_valid(root, report, now)))
     return report._replace(created=(*repaired, *report.created))
+
+
+def _still_valid(root: Path, report: ProvisionReport, now: datetime) -> list[str]:
+    """What was replaced can be used by whoever copied it, until it ends or is revoked."""
+    register = read_register(root)
+    renewed = [one.enclave for one in report.enclaves if one.actions]
+    earlier = [
+        one
+        for enclave in renewed
+        for one in (register.of_enclave(enclave) if register is not None else ())
+        if one.replaced and one.revoked is None and one.not_after > now
+    ]
+    if not earlier:
+        return []
+    names = list(dict.fromkeys(one.enclave for one in earlier))
+    return [
+        f"{counted(len(earlier), 'earlier certificate')} of {some_of(names, 3)} stay valid until "
+        f"{iso(max(one.not_after for one in earlier))}; if a key may have been copied, revoke them: secure-keystore "
+        f"renew {printable(root)} {' '.join(names[:3])}{' ...' if len(names) > 3 else ''} --new-keys --revoke-old"
+    ]
 
 
 def _with_names_of_their_own(
@@ -134,39 +165,56 @@ def _is_exposed(view: KeystoreView, name: str, options: RenewOptions) -> bool:
 def _facts(view: KeystoreView, name: str) -> CertificateFacts | None:
     pem = view.enclave_file(name, layout.CERT)
     try:
-        return certificate.read_pem(pem) if pem else None
-    except DerError:
+        return read_certificate(pem) if pem else None
+    except DamagedKeystoreError:
         return None
 
 
 def _repair_keystore(opened: Store, options: RenewOptions, now: datetime) -> list[str]:
     done = [f"made {name} private" for name in _close_modes(opened)]
-    done += _drop_foreign_authorities(opened)
+    done += _restore_trust_files(opened)
     if KeystoreView(opened.root).shares_one_ca:
         rollover.separate_permissions_ca(opened, options.provisioning, now, encrypt=options.encrypt_ca_keys)
         done.append("permissions CA separated from the identity CA; deploy all enclaves together")
     return done
 
 
-def _drop_foreign_authorities(opened: Store) -> list[str]:
-    """Trust files keep the CAs that the register knows, the one in use first."""
-    view = KeystoreView(opened.root)
-    foreign = foreign_authorities(view, opened.register if opened.has_register else None)
-    for role in sorted({role for role, _ in foreign}):
-        known = [
-            ca for (its, ca), state in opened.register.authorities.items()
-            if its is role and state is AuthorityState.IN_USE
-        ]  # fmt: skip
-        kept = [ca.der for ca in view.ca_bundle(role) if opened.register.trusts_authority(role, ca.der)]
-        bundle = dict.fromkeys((*known, *kept))
-        with opened.batch() as batch:
-            batch.file(layout.ca_cert(role), b"".join(map(pem_certificate, bundle)))
-    if foreign:
+def _restore_trust_files(opened: Store) -> list[str]:
+    """Writes each trust file again that is not exactly the CAs which the register knows, the one in use first."""
+    if not opened.has_register:
+        return []
+    done: list[str] = []
+    for role in Role:
+        trusted = _trusted(opened, role)
+        try:
+            found = KeystoreView(opened.root).ca_bundle(role)
+        except DamagedKeystoreError:
+            kept, said = (
+                trusted,
+                [f"{layout.ca_cert(role)} was not in the form that is written here; written again"],
+            )
+        else:
+            kept = [ca for ca in trusted if ca in (found_ca.der for found_ca in found)] or trusted[:1]
+            said = [
+                "CA that this keystore did not make, or has retired, removed from "
+                f"{layout.ca_cert(role)}: {describe(ca)}"
+                for ca in found
+                if ca.der not in trusted
+            ]
+        if said and kept:
+            with opened.batch() as batch:
+                batch.file(layout.ca_cert(role), b"".join(read_der(ca).pem for ca in kept))
+            done += said
+    if done:
         refresh_copies(opened)
-    return [
-        f"CA that this keystore did not make, or has retired, removed from {layout.ca_cert(role)}: {describe(ca)}"
-        for role, ca in foreign
-    ]
+    return done
+
+
+def _trusted(opened: Store, role: Role) -> list[bytes]:
+    """The CAs that may stand in the trust file (DER), the one in use first."""
+    known = {ca: state for (its, ca), state in opened.register.authorities.items() if its is role}
+    in_use = [ca for ca, state in known.items() if state is AuthorityState.IN_USE]
+    return in_use + [ca for ca in known if opened.register.trusts_authority(role, ca) and ca not in in_use]
 
 
 def _close_modes(opened: Store) -> list[str]:

@@ -14,12 +14,12 @@ from keystore.disk import layout
 from keystore.disk.store import PRIVATE_MODE, Batch, Content, Link, enclave_links
 from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import InvalidInputError, printable
-from keystore.formats.certificate import CertificateFacts, read_certificates
+from keystore.formats.certificate import CertificateFacts, given_certificates
 from keystore.formats.register import Register
 from keystore.formats.role import Role
 from keystore.formats.subject import common_name, names_enclave, subject_name
 from keystore.formats.validity import utc_now
-from keystore.signing.authority import Authority, pem_certificate
+from keystore.signing.authority import Authority
 from keystore.signing.identity import request_key
 from keystore.signing.public_key import fingerprint, issued_by
 from keystore.signing.records import certificate_record, permissions_record
@@ -84,14 +84,14 @@ def accept_certificates(
     with opened_for_change(root, now, chosen) as opened:
         view = KeystoreView(root)
         by_key = {
-            fingerprint(one.public_key): one for one in read_certificates(issued, "the issued certificates")
+            fingerprint(one.public_key): one for one in given_certificates(issued, "the issued certificates")
         }
         found = [(one, _fitting(view, opened.register, one, by_key.get(one.key), now)) for one in requests]
         signer = view.authority(Role.PERMISSIONS, chosen.access)
         register = opened.register
         with opened.batch() as batch:
             for one, facts in found:
-                register = _accept(batch, view, register, signer, one, facts, now)
+                register = _accept(batch, view, register, signer, one, facts)
             batch.record(register.without_ended(now))
         for one, _ in found:
             opened.remove(f"{layout.enclave_directory(one.enclave)}/{layout.KEY}")
@@ -127,15 +127,14 @@ def _accept(
     signer: Authority,
     one: Request,
     facts: CertificateFacts,
-    now: datetime,
 ) -> Register:
     """The enclave's files; its permissions again, for the dates of this certificate."""
     name = facts.common_name or ""
     document = kept_permissions(view, register, one.enclave, subject_name(name), facts.validity, None)
     entries: dict[str, Content | Link] = {
-        layout.CERT: Content(pem_certificate(facts.der)),
+        layout.CERT: Content(facts.pem),
         layout.PERMISSIONS_XML: Content(document),
-        layout.PERMISSIONS: Content(sign_document(document, signer, now)),
+        layout.PERMISSIONS: Content(sign_document(document, signer)),
         **enclave_links(one.enclave, crl=view.has_crl),
     }
     batch.file(layout.request(one.enclave), one.pem, PRIVATE_MODE)

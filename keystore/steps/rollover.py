@@ -29,13 +29,13 @@ from keystore.disk.signed_documents import governance_stands
 from keystore.disk.store import Content, Store
 from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import DamagedKeystoreError, InvalidInputError
-from keystore.formats.certificate import read_certificate, read_pem
-from keystore.formats.der import DerError
+from keystore.formats.certificate import read_certificate
 from keystore.formats.register import AuthorityState
 from keystore.formats.role import Role
+from keystore.formats.tool_needs import is_tool_enclave
 from keystore.formats.validity import utc_now
 from keystore.signing import smime
-from keystore.signing.authority import pem_certificate
+from keystore.signing.public_key import issued_by
 from keystore.steps.comparison import WantedEnclave, with_domains
 from keystore.steps.creation import CreateOptions, new_ca
 from keystore.steps.crl import drop_crl
@@ -78,12 +78,15 @@ def roll_over(
             _forget_installed(opened, role)
         if step is Step.FINISH:
             _refuse_to_strand(opened, roles)
+            _refuse_without_start(opened, roles)
         done = [_STEPS[step](opened, role, creation) for role in roles]
         refresh_copies(opened)
     if step is not Step.SWITCH:
         warnings = tuple(follow(root, chosen))
         return ProvisionReport(root, tuple(text for text in done if text), (), warnings)
-    wanted = {name: WantedEnclave(keep) for name in KeystoreView(root).enclaves()}
+    wanted = {
+        name: WantedEnclave(keep) for name in KeystoreView(root).enclaves() if not is_tool_enclave(name)
+    }
     report = bring_about(root, wanted, with_domains(root, chosen))
     return report._replace(created=(*(text for text in done if text), *report.created))
 
@@ -109,7 +112,7 @@ def _start(opened: Store, role: Role, creation: CreateOptions) -> str:
             batch.record(opened.register.with_authority(role, made.facts.der, AuthorityState.WAITING))
             batch.directory(_waiting(role), pair)
     new = safe_files.read(opened.root, f"{_waiting(role)}/{layout.CERT}")
-    return _trust(opened, role, pem_certificate(view.ca(role).der) + new)
+    return _trust(opened, role, view.ca(role).pem + new)
 
 
 def _trust(opened: Store, role: Role, bundle: bytes) -> str:
@@ -145,7 +148,7 @@ def _switch(opened: Store, role: Role, creation: CreateOptions) -> str:
 def retire(opened: Store, role: Role) -> bytes:
     """Keep the certificate in use among the retired, whose documents may be signed again; as PEM."""
     facts = KeystoreView(opened.root).ca(role)
-    pem = pem_certificate(facts.der)
+    pem = facts.pem
     opened.ensure_directory(layout.PRIVATE)
     opened.ensure_directory(layout.RETIRED)
     with opened.batch() as batch:
@@ -176,9 +179,19 @@ def _finish(opened: Store, role: Role, creation: CreateOptions) -> str:
         raise InvalidInputError(
             f"everything is still signed by the old {role.label}: first --ca switch, and deploy"
         )
-    said = _trust(opened, role, pem_certificate(KeystoreView(opened.root).ca(role).der))
+    said = _trust(opened, role, KeystoreView(opened.root).ca(role).pem)
     _retire_for_good(opened, role)
     return said
+
+
+def _refuse_without_start(opened: Store, roles: Collection[Role]) -> None:
+    """Raises InvalidInputError where no CA of these roles was ever replaced."""
+    states = {state for (role, _), state in opened.register.authorities.items() if role in roles}
+    if states <= {AuthorityState.IN_USE}:
+        raise InvalidInputError(
+            "no CA is being replaced: first secure-keystore renew KEYSTORE --ca start, deploy, --ca switch, deploy, "
+            "and then --ca finish"
+        )
 
 
 def _retire_for_good(opened: Store, role: Role) -> None:
@@ -192,7 +205,9 @@ def _retire_for_good(opened: Store, role: Role) -> None:
 def _refuse_to_strand(opened: Store, roles: Collection[Role]) -> None:
     """Raises InvalidInputError while anything in force hangs on an old CA: nobody would trust it any more."""
     view = KeystoreView(opened.root)
-    stranded = sorted({name for name in view.enclaves() if _hangs_on_old_ca(view, name, roles)})
+    stranded = [
+        name for name in view.enclaves() if not is_tool_enclave(name) and _hangs_on_old_ca(view, name, roles)
+    ]
     governance = Role.PERMISSIONS in roles and not governance_stands(view, None)
     if not stranded and not governance:
         return
@@ -212,8 +227,8 @@ def _hangs_on_old_ca(view: KeystoreView, enclave: str, roles: Collection[Role]) 
     """What cannot be read belongs to no CA; renew or verify tells of it."""
     pem = view.enclave_file(enclave, layout.CERT)
     signed = view.enclave_file(enclave, layout.PERMISSIONS)
-    with suppress(DerError, DamagedKeystoreError):
-        if Role.IDENTITY in roles and pem and not read_pem(pem).names_issuer(view.ca(Role.IDENTITY)):
+    with suppress(DamagedKeystoreError):
+        if Role.IDENTITY in roles and pem and not issued_by(read_certificate(pem), view.ca(Role.IDENTITY)):
             return True
         if Role.PERMISSIONS in roles and signed:
             return not smime.read(signed, layout.enclave_directory(enclave)).embeds(

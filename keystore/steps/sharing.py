@@ -173,6 +173,16 @@ def given_up(root: Path, owner: str) -> list[EnclaveShare]:
     return mine
 
 
+def left_over(root: Path, owner: str, enclaves: Iterable[str]) -> list[str]:
+    """Returns the enclaves in which ``owner`` still has a share, though it asks only for ``enclaves`` now."""
+    present = set(enclaves)
+    return [
+        name
+        for name in enclaves_with_shares(root)
+        if name not in present and any(share.owner == owner for share in read_shares(root, name))
+    ]
+
+
 def refuse_running(root: Path, enclaves: Iterable[str]) -> None:
     """Raises InvalidInputError when a running launch has a share of one of them: it would lose what it is using."""
     for enclave in enclaves:

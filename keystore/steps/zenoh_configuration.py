@@ -35,10 +35,11 @@ from keystore.formats.register import UNKNOWN, IssuedCertificate
 from keystore.formats.role import Role
 from keystore.formats.validity import DEFAULT_BACKDATE, Validity, later, utc_now
 from keystore.formats.zenoh.configuration import ROUTER_NAME, RouterAddress
-from keystore.signing.authority import IdentityIssuer, key_pem, new_key, pem_certificate
+from keystore.signing.authority import IdentityIssuer, new_key
 from keystore.signing.ca_access import CaAccess
 from keystore.signing.identity import public_half
 from keystore.signing.records import certificate_record
+from keystore.signing.signer import key_pem
 from keystore.steps.opening import opened_for_change
 from keystore.steps.options import ProvisionOptions
 
@@ -70,6 +71,8 @@ def write_zenoh(
     Raises InvalidInputError for an enclave that is not there, SigningUnavailableError without the CA key.
     """
     chosen = options or ProvisionOptions()
+    if chosen.signing is not None:
+        return chosen.signing.write_zenoh(enclaves, router, chosen)
     view = keystore_at(keystore)
     asked = set(enclaves)
     view.require_enclaves(asked)
@@ -193,4 +196,4 @@ def _issue(
     facts = IdentityIssuer(authority).issue(ROUTER_NAME, public, validity, address.hosts)
     files = {layout.ZENOH_ROUTER_KEY: key_pem(fresh)} if fresh is not None else {}
     record = certificate_record(UNKNOWN, facts, authority.facts)._replace(replaced=True)
-    return record, {**files, layout.ZENOH_ROUTER_CERT: pem_certificate(facts.der)}
+    return record, {**files, layout.ZENOH_ROUTER_CERT: facts.pem}

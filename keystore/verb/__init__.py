@@ -11,8 +11,9 @@ import argparse
 from collections.abc import Sequence
 from importlib import import_module
 
-from enclave_launch.boundary.command_line import (
+from enclave_common.command_line import (
     CommandParser,
+    add_absent_verb,
     add_verbosity,
     add_version,
     complete,
@@ -20,7 +21,7 @@ from enclave_launch.boundary.command_line import (
     guarded,
     parsers,
 )
-from enclave_launch.boundary.terminal import safe_output
+from enclave_common.terminal import safe_output
 from keystore.errors import KeystoreError
 from keystore.verb.common import add_table
 
@@ -50,9 +51,9 @@ def _offer(parser: argparse.ArgumentParser) -> None:
 
 
 def _enclaves(parsed_args: argparse.Namespace, **_: object) -> list[str]:
-    from keystore.steps.provisioning import list_enclaves
-
     try:
+        from keystore.steps.provisioning import list_enclaves  # cryptography
+
         return list_enclaves(parsed_args.keystore)
     except KeystoreError:
         return []
@@ -68,7 +69,11 @@ def build_parser() -> argparse.ArgumentParser:
     add_version(parser)
     verbs = parser.add_subparsers(title="verbs", metavar="VERB", required=True)
     for name in VERBS:
-        module = import_module(f"keystore.verb.{name.replace('-', '_')}")
+        try:
+            module = import_module(f"keystore.verb.{name.replace('-', '_')}")
+        except ModuleNotFoundError as error:
+            add_absent_verb(verbs, name, error)
+            continue
         summary = (module.__doc__ or "").strip()
         settings = getattr(module, "SETTINGS", {})
         verb = verbs.add_parser(name, help=summary.splitlines()[0], description=summary, **settings)

@@ -2,6 +2,6 @@
 
 import sys
 
-from keystore.verb import main
+from enclave_common.entry import secure_keystore
 
-sys.exit(main())
+sys.exit(secure_keystore())

@@ -10,17 +10,19 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from enclave_launch.boundary.command_line import FLAG, PATH, TEXT, Option, add_options, one_of
-from enclave_launch.boundary.terminal import ProgressBar, json_text, wanted
-from enclave_launch.boundary.words import counted
+from enclave_common.command_line import FLAG, PATH, TEXT, Option, add_options, one_of
+from enclave_common.terminal import ProgressBar, json_text, wanted
+from enclave_common.words import counted
 from keystore.disk.lock import DEFAULT_TIMEOUT
 from keystore.errors import InvalidInputError
-from keystore.formats.validity import DEFAULT_BACKDATE, parse_duration, parse_end, utc_now
+from keystore.formats.domains import Domains
+from keystore.formats.subject import SubjectScheme
+from keystore.formats.validity import DEFAULT_BACKDATE, iso, parse_duration, parse_end, utc_now
+from keystore.signing.ca_access import CaAccess, Secret
+from keystore.steps.options import ProvisionOptions
 
 if TYPE_CHECKING:
-    from keystore.formats.domains import Domains
-    from keystore.signing.ca_access import CaAccess
-    from keystore.steps.options import ProvisionOptions, ProvisionReport
+    from keystore.steps.options import ProvisionReport
 
 
 class SecretOptions(NamedTuple):
@@ -75,7 +77,15 @@ SIGNING: Table = (
     )),
 )  # fmt: skip
 """Read by ``access``."""
-CHANGE: Table = (*SIGNING, LOCK)
+CHANGE: Table = (
+    *SIGNING,
+    LOCK,
+    (
+        "--accept-clock",
+        FLAG,
+        "go on though the clock is far from the time at which the keystore was changed last",
+    ),
+)
 """Of each verb that signs and writes; read by ``change``."""
 PROVISIONING: Table = (
     *VALIDITY,
@@ -100,15 +110,11 @@ def add_table(parser: argparse.ArgumentParser, table: Table) -> None:
 
 def domains(arguments: argparse.Namespace) -> Domains | None:
     """What ``DOMAINS`` was given. Raises InvalidInputError."""
-    from keystore.formats.domains import Domains
-
     return Domains.parse(arguments.domain_id) if arguments.domain_id else None
 
 
 def access(arguments: argparse.Namespace) -> CaAccess:
     """How CA keys are opened, from the options of ``SIGNING``."""
-    from keystore.signing.ca_access import CaAccess, Secret
-
     given = vars(arguments)
     passphrase = Secret(given["passphrase_file"], given["passphrase_fd"], given["passphrase_env"])
     pin = Secret(file=given["pin_file"], variable=given["pin_env"])
@@ -117,7 +123,11 @@ def access(arguments: argparse.Namespace) -> CaAccess:
 
 def change(arguments: argparse.Namespace) -> dict[str, Any]:
     """How the keystore is opened, from the options of ``CHANGE``: for any change."""
-    return {"access": access(arguments), "lock_timeout": arguments.lock_timeout}
+    return {
+        "access": access(arguments),
+        "lock_timeout": arguments.lock_timeout,
+        "accept_clock": arguments.accept_clock,
+    }
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,9 +153,6 @@ def span(arguments: argparse.Namespace) -> Span:
 
 def provision_options(arguments: argparse.Namespace, **more: Any) -> ProvisionOptions:
     """What ``PROVISIONING`` was given."""
-    from keystore.formats.subject import SubjectScheme
-    from keystore.steps.options import ProvisionOptions
-
     validity = span(arguments)
     return ProvisionOptions(
         lifetime=validity.lifetime,
@@ -187,7 +194,8 @@ def print_report(report: ProvisionReport, arguments: argparse.Namespace) -> None
     print_lines(report.created)
     changed = [enclave for enclave in report.enclaves if enclave.actions]
     for enclave in changed:
-        print(f"{enclave.enclave}: {', '.join(enclave.actions)} ({'; '.join(enclave.reasons)})")
+        ends = f", valid until {iso(enclave.validity.not_after)}" if enclave.validity is not None else ""
+        print(f"{enclave.enclave}: {', '.join(enclave.actions)} ({'; '.join(enclave.reasons)}){ends}")
     unchanged = [enclave.enclave for enclave in report.enclaves if not enclave.actions]
     if arguments.verbose:
         print_lines(f"{path}: unchanged" for path in unchanged)

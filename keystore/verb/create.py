@@ -7,8 +7,14 @@ from __future__ import annotations
 
 import argparse
 
-from enclave_launch.boundary.command_line import PATH, TEXT, one_of
+from enclave_common.command_line import PATH, TEXT, one_of
+from keystore.formats.domains import Domains
+from keystore.formats.governance_yaml import load_governance_yaml
+from keystore.formats.role import Role
+from keystore.formats.subject import SubjectScheme
 from keystore.formats.validity import DEFAULT_LIFETIME, parse_end, utc_now
+from keystore.signing.authority import Curve
+from keystore.steps.creation import CreateOptions, ImportedCa, create_keystore
 from keystore.verb import common
 
 
@@ -39,13 +45,6 @@ OPTIONS: common.Table = (
 
 def run(arguments: argparse.Namespace) -> int:
     """Create or complete the keystore, and print what was made. Returns 0."""
-    from keystore.formats.domains import Domains
-    from keystore.formats.governance_yaml import load_governance_yaml
-    from keystore.formats.role import Role
-    from keystore.formats.subject import SubjectScheme
-    from keystore.signing.authority import Curve
-    from keystore.steps.creation import CreateOptions, ImportedCa, create_keystore
-
     validity = common.span(arguments)
     now = utc_now()
     lifetime = validity.lifetime

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import argparse
 
-from enclave_launch.boundary.command_line import FLAG
+from enclave_common.command_line import FLAG
+from keystore.steps.provisioning import create_enclaves
 from keystore.verb import common
 
 OPTIONS: common.Table = (
@@ -21,8 +22,6 @@ OPTIONS: common.Table = (
 
 def run(arguments: argparse.Namespace) -> int:
     """Create the enclaves, and print which are new. Returns 0."""
-    from keystore.steps.provisioning import create_enclaves
-
     options = common.provision_options(arguments, domains=common.domains(arguments))
     report = create_enclaves(
         arguments.keystore, arguments.enclaves, allow_all=arguments.allow_all, options=options

@@ -15,8 +15,9 @@ import sys
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
-from enclave_launch.boundary.command_line import PATH
+from enclave_common.command_line import PATH
 from keystore.errors import InvalidInputError, printable
+from keystore.steps.zenoh_denials import RouterLogExplainer
 from keystore.verb import common
 
 OPTIONS: common.Table = (
@@ -28,8 +29,6 @@ OPTIONS: common.Table = (
 
 def run(arguments: argparse.Namespace) -> int:
     """Tells each refusal once; returns 1 where there is one. Raises a ``KeystoreError`` for what cannot be read."""
-    from keystore.steps.zenoh_denials import RouterLogExplainer
-
     explainer, found = RouterLogExplainer(arguments.keystore), []
     for said in filter(None, map(explainer.read, _lines(arguments.log))):
         found.append(said)

@@ -11,8 +11,16 @@ import argparse
 import sys
 from pathlib import Path
 
-from enclave_launch.boundary.command_line import FLAG, PATH, TEXTS, one_of
+from enclave_common.command_line import FLAG, PATH, TEXTS, one_of
+from keystore.disk.safe_files import resolve_root
+from keystore.disk.view import KeystoreView
 from keystore.errors import InvalidInputError
+from keystore.formats.hosts import load_hosts
+from keystore.formats.role import Role
+from keystore.signing.public_key import fingerprint
+from keystore.steps.bundle import PublicFiles, export
+from keystore.steps.host_bundles import BundleOptions, enclaves_of_hosts, export_hosts, pinned
+from keystore.steps.provisioning import list_enclaves
 from keystore.verb import common
 
 OPTIONS: common.Table = (
@@ -33,7 +41,6 @@ def run(arguments: argparse.Namespace) -> int:
     """Write the bundles, print what they hold and how to pin their CAs. Returns 0."""
     if arguments.hosts or arguments.host:
         return _export_hosts(arguments)
-    from keystore.steps.bundle import PublicFiles, export
 
     if not arguments.enclave:
         raise InvalidInputError(
@@ -49,8 +56,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _export_hosts(arguments: argparse.Namespace) -> int:
-    from keystore.steps.host_bundles import BundleOptions, export_hosts, pinned
-
     options = BundleOptions(
         accept_exposures=arguments.accept_exposures,
         accept_shared=arguments.accept_shared_enclaves,
@@ -71,9 +76,6 @@ def _assigned(arguments: argparse.Namespace) -> dict[str, list[str]]:
         if len(arguments.host) != 1 or not arguments.enclave:
             raise InvalidInputError("without --hosts FILE give one --host NAME and its --enclave PATTERN")
         return {arguments.host[0]: arguments.enclave}
-    from keystore.formats.hosts import load_hosts
-    from keystore.steps.host_bundles import enclaves_of_hosts
-    from keystore.steps.provisioning import list_enclaves
 
     if arguments.enclave:
         raise InvalidInputError("--hosts FILE says which enclaves: leave --enclave out")
@@ -101,11 +103,6 @@ def _assigned(arguments: argparse.Namespace) -> dict[str, list[str]]:
 
 def _pinned(keystore: Path) -> str:
     """The command; a bundle has no register that could tell a foreign CA."""
-    from keystore.disk.safe_files import resolve_root
-    from keystore.disk.view import KeystoreView
-    from keystore.formats.role import Role
-    from keystore.signing.public_key import fingerprint
-
     view = KeystoreView(resolve_root(keystore))
     found = dict.fromkeys(fingerprint(ca.der) for role in Role for ca in view.ca_bundle(role))
     return " ".join(("secure-keystore verify BUNDLE", *(f"--require-ca {one}" for one in found)))

@@ -12,9 +12,10 @@ import argparse
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from enclave_launch.boundary.command_line import PATH
-from enclave_launch.boundary.terminal import printable
+from enclave_common.command_line import PATH
+from enclave_common.terminal import printable
 from keystore.formats.validity import iso, parse_duration
+from keystore.steps.fleet import fleet_status
 from keystore.verb import common
 from keystore.verb.status import ENDED, SOON
 
@@ -33,8 +34,6 @@ OPTIONS: common.Table = (
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the table. Returns 1 when a host is not as it should be."""
-    from keystore.steps.fleet import fleet_status
-
     report = fleet_status(
         arguments.places, keystore=arguments.keystore, within=parse_duration(arguments.within)
     )

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import argparse
 
-from enclave_launch.boundary.command_line import PATH
+from enclave_common.command_line import PATH
+from keystore.formats.governance_yaml import load_governance_yaml
+from keystore.steps.governance import GovernanceOptions, set_governance
 from keystore.verb import common
 
 OPTIONS: common.Table = (
@@ -19,9 +21,6 @@ OPTIONS: common.Table = (
 
 def run(arguments: argparse.Namespace) -> int:
     """Sign the governance if it differs, and print whether it did. Returns 0."""
-    from keystore.formats.governance_yaml import load_governance_yaml
-    from keystore.steps.governance import GovernanceOptions, set_governance
-
     governance = load_governance_yaml(arguments.file)
     options = GovernanceOptions(**common.change(arguments))
     changed = set_governance(arguments.keystore, governance, options=options)

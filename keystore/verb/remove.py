@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import argparse
 
-from enclave_launch.boundary.command_line import FLAG
+from enclave_common.command_line import FLAG
+from keystore.steps.removal import RemoveOptions, remove
 from keystore.verb import common
 
 OPTIONS: common.Table = (
@@ -21,8 +22,6 @@ OPTIONS: common.Table = (
 
 def run(arguments: argparse.Namespace) -> int:
     """Remove the enclaves, and print what was revoked. Returns 0."""
-    from keystore.steps.removal import RemoveOptions, remove
-
     options = RemoveOptions(revoke=not arguments.no_revoke, **common.change(arguments))
     report = remove(arguments.keystore, arguments.enclaves, options=options)
     if not arguments.quiet:

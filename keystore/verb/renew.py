@@ -11,9 +11,13 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from enclave_launch.boundary.command_line import FLAG
+from enclave_common.command_line import FLAG
 from keystore.errors import InvalidInputError
+from keystore.formats.role import Role
 from keystore.formats.validity import parse_duration, parse_end, utc_now
+from keystore.steps.creation import CreateOptions
+from keystore.steps.renewal import RenewOptions, renew
+from keystore.steps.rollover import Step, roll_over
 from keystore.verb import common
 
 if TYPE_CHECKING:
@@ -38,8 +42,6 @@ OPTIONS: common.Table = (
 
 def run(arguments: argparse.Namespace) -> int:
     """Renew, repair or replace, and print what was done. Returns 0."""
-    from keystore.steps.creation import CreateOptions
-
     now = utc_now()
     creation = CreateOptions(ca_lifetime=parse_end(arguments.ca_valid_for, now) - now)
     options = common.provision_options(arguments, creation=creation)
@@ -49,8 +51,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _renew(arguments: argparse.Namespace, options: ProvisionOptions) -> ProvisionReport:
-    from keystore.steps.renewal import RenewOptions, renew
-
     wanted = RenewOptions(
         within=parse_duration(arguments.within),
         everything=arguments.all,
@@ -63,9 +63,6 @@ def _renew(arguments: argparse.Namespace, options: ProvisionOptions) -> Provisio
 
 
 def _roll_over(arguments: argparse.Namespace, options: ProvisionOptions) -> ProvisionReport:
-    from keystore.formats.role import Role
-    from keystore.steps.rollover import Step, roll_over
-
     if arguments.enclaves:
         raise InvalidInputError("--ca concerns all enclaves; do not name any")
     roles = tuple(Role) if arguments.ca_role == "both" else (Role(f"{arguments.ca_role}_ca"),)

@@ -10,9 +10,10 @@ import argparse
 import sys
 from pathlib import Path
 
-from enclave_launch.boundary.command_line import PATH, TEXT
-from enclave_launch.boundary.new_file import write_bytes
+from enclave_common.command_line import PATH, TEXT
+from enclave_common.new_file import write_bytes
 from keystore.errors import StorageError
+from keystore.steps.host_keys import RequestOptions, request, requests_text
 from keystore.verb import common
 
 OPTIONS: common.Table = (
@@ -20,15 +21,14 @@ OPTIONS: common.Table = (
     ("enclaves ENCLAVE", {"nargs": "+"}, ""),
     ("-o --output FILE", PATH, "where the requests go (standard output)"),
     ("--token URI", TEXT, "pkcs11: URI of the enclave's key in a token (RFC 7512)"),
-    *common.CHANGE,
+    *common.SIGNING,
+    common.LOCK,
 )
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Make keys, print or write the requests for them. Returns 0."""
-    from keystore.steps.host_keys import RequestOptions, request, requests_text
-
-    options = RequestOptions(arguments.token, **common.change(arguments))
+    options = RequestOptions(arguments.token, common.access(arguments), arguments.lock_timeout)
     made = request(arguments.keystore, arguments.enclaves, options=options)
     text = requests_text(made)
     if arguments.output is None:

@@ -9,8 +9,11 @@ from __future__ import annotations
 
 import argparse
 
-from enclave_launch.boundary.command_line import TEXT
+from enclave_common.command_line import TEXT
 from keystore.errors import printable
+from keystore.steps.options import ProvisionOptions
+from keystore.steps.provisioning import drop_shares
+from keystore.steps.sharing import list_shares
 from keystore.verb import common
 
 OPTIONS: common.Table = (
@@ -23,10 +26,6 @@ OPTIONS: common.Table = (
 
 def run(arguments: argparse.Namespace) -> int:
     """Print which launch shares which enclave, or drop a launch. Returns 0."""
-    from keystore.steps.options import ProvisionOptions
-    from keystore.steps.provisioning import drop_shares
-    from keystore.steps.sharing import list_shares
-
     if arguments.drop is not None:
         options = ProvisionOptions(**common.change(arguments))
         common.print_report(drop_shares(arguments.keystore, arguments.drop, options=options), arguments)

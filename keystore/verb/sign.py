@@ -8,7 +8,10 @@ from __future__ import annotations
 
 import argparse
 
-from enclave_launch.boundary.command_line import PATH
+from enclave_common.command_line import PATH
+from keystore.formats.given_file import read_given
+from keystore.steps.host_keys import parse_requests
+from keystore.steps.request_signing import SigningOptions, accept_certificates, sign_requests
 from keystore.verb import common
 
 OPTIONS: common.Table = (
@@ -23,10 +26,6 @@ OPTIONS: common.Table = (
 
 def run(arguments: argparse.Namespace) -> int:
     """Certify the requests, and print for which keys. Returns 0."""
-    from keystore.formats.given_file import read_given
-    from keystore.steps.host_keys import parse_requests
-    from keystore.steps.request_signing import SigningOptions, accept_certificates, sign_requests
-
     requests = parse_requests(read_given(arguments.requests), str(arguments.requests))
     provisioning = common.provision_options(arguments)
     if arguments.issued is not None:

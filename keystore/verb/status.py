@@ -9,9 +9,10 @@ import argparse
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from enclave_launch.boundary.command_line import FLAG
-from enclave_launch.boundary.terminal import printable
+from enclave_common.command_line import FLAG
+from enclave_common.terminal import printable
 from keystore.formats.validity import iso, parse_duration
+from keystore.steps.expiry import status
 from keystore.verb import common
 
 if TYPE_CHECKING:
@@ -32,8 +33,6 @@ OPTIONS: common.Table = (
 
 def run(arguments: argparse.Namespace) -> int:
     """Print what ends when. Returns 3 where something ends soon, 4 where it has ended."""
-    from keystore.steps.expiry import status
-
     report = status(arguments.keystore)
     due = report.due(parse_duration(arguments.within))
     lines = _lines(report, report.expiries if arguments.all else due)

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 import argparse
 
-from enclave_launch.boundary.command_line import TEXT
+from enclave_common.command_line import TEXT
 from keystore.formats.tool_needs import TABLE
 from keystore.formats.validity import iso
+from keystore.steps.tool_enclaves import create_tool_enclave
 from keystore.verb import common
 
 SETTINGS = {
@@ -32,8 +33,6 @@ OPTIONS: common.Table = (
 
 def run(arguments: argparse.Namespace) -> int:
     """Make the enclave, and print how to use it. Returns 0."""
-    from keystore.steps.tool_enclaves import create_tool_enclave
-
     options = common.provision_options(arguments, domains=common.domains(arguments))
     tool, *targets = arguments.tool
     made = create_tool_enclave(

@@ -10,10 +10,12 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from typing import TYPE_CHECKING
 
-from enclave_launch.boundary.command_line import PATH, TEXTS
-from enclave_launch.boundary.words import counted
+from enclave_common.command_line import PATH, TEXTS
+from enclave_common.words import counted
 from keystore.errors import printable
+from keystore.formats.governance_yaml import governance_of
 from keystore.verb import common
+from keystore.verification import Requirements, verify
 
 if TYPE_CHECKING:
     from keystore.verification import VerifyReport
@@ -32,9 +34,6 @@ OPTIONS: common.Table = (
 
 def run(arguments: argparse.Namespace) -> int:
     """Print the findings. Returns 1 when one of them is an error."""
-    from keystore.formats.governance_yaml import governance_of
-    from keystore.verification import Requirements, verify
-
     required = Requirements(
         governance_of(arguments.require_governance) if arguments.require_governance else None,
         tuple(arguments.require_ca),

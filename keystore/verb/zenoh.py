@@ -10,7 +10,10 @@ from __future__ import annotations
 import argparse
 import shlex
 
-from enclave_launch.boundary.command_line import TEXT
+from enclave_common.command_line import TEXT
+from keystore.disk import layout
+from keystore.steps.options import ProvisionOptions
+from keystore.steps.zenoh_configuration import RESTART, matching_enclaves, write_zenoh
 from keystore.verb import common
 
 OPTIONS: common.Table = (
@@ -27,10 +30,6 @@ OPTIONS: common.Table = (
 
 def run(arguments: argparse.Namespace) -> int:
     """Write the files, and print which changed and how to use them. Returns 0."""
-    from keystore.disk import layout
-    from keystore.steps.options import ProvisionOptions
-    from keystore.steps.zenoh_configuration import RESTART, matching_enclaves, write_zenoh
-
     names = matching_enclaves(arguments.keystore, arguments.enclave)
     options = ProvisionOptions(**common.change(arguments))
     report = write_zenoh(arguments.keystore, names, router=arguments.router, options=options)

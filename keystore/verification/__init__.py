@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 from keystore.disk import layout
 from keystore.disk.crl_file import revoked_serials
+from keystore.disk.deployed import find_differences
 from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import KeystoreError, StorageError
 from keystore.formats.governance import Governance
@@ -82,12 +83,22 @@ def _findings(
         yield Finding(Severity.ERROR, "unreadable", layout.PUBLIC, str(error), repair.BACKUP)
         return
     yield from _check_settings(view)
+    yield from _check_deployment(view)
     try:
         revoked = frozenset(revoked_serials(view))
     except KeystoreError:
         revoked = frozenset()  # the CRL itself was reported above
     yield from check_enclaves(view, register, revoked, now)
     yield from check_zenoh(view, now)
+
+
+def _check_deployment(view: KeystoreView) -> Iterator[Finding]:
+    """An imported keystore is what its signed manifest says, or was changed since."""
+    fix = repair.run(
+        view.root, "import", "HOST.bundle", note="the bundle in force, or a newer one: restores it"
+    )
+    for place, problem in find_differences(view):
+        yield Finding(Severity.ERROR, "bundle-differs", place, problem, fix)
 
 
 def _check_settings(view: KeystoreView) -> Iterator[Finding]:

@@ -21,7 +21,6 @@ from keystore.signing.authority import check_can_serve
 from keystore.signing.ca_access import CaAccess
 from keystore.signing.public_key import CYCLONE_KINDS, issued_by, key_kind
 from keystore.verification import repair
-from keystore.verification.contents import mime_problem
 from keystore.verification.finding import Finding, Severity
 from keystore.verification.governance import check_strength
 
@@ -63,7 +62,7 @@ def _check_certificate(
 ) -> Iterator[Finding]:
     place = layout.ca_cert(role)
     try:
-        check_can_serve(facts.der, role, now, place)
+        check_can_serve(facts, role, now, place)
     except KeystoreError as error:
         fix = repair.run(view.root, "renew", "--ca", "start", note="deploy; then --ca switch and --ca finish")
         yield Finding(Severity.ERROR, "ca-unfit", place, str(error), fix)
@@ -111,8 +110,6 @@ def _check_governance(
     except KeystoreError as error:
         yield Finding(Severity.ERROR, "governance", place, str(error), again)
         return
-    if problem := mime_problem(p7s):
-        yield Finding(Severity.ERROR, "governance", place, problem, again)
     if not signed.embeds(view.ca(Role.PERMISSIONS).der):
         yield Finding(
             Severity.ERROR, "embedded-differs", place,

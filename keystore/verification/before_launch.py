@@ -1,7 +1,6 @@
 """The cheap part of ``verify``, before each secured launch: what works and exposes the keystore all the same.
 
-Files are looked at, not opened, and no signature is checked: neither ``cryptography`` nor lxml is imported while the
-governance is the default one.
+No XML parser is imported while the governance is the default one.
 """
 
 from __future__ import annotations

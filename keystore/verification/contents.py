@@ -7,14 +7,18 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
-from enclave_launch.boundary.files import read_bytes
+from enclave_common.files import read_bytes
 from keystore.disk import layout
+from keystore.disk.crl_file import is_crl
+from keystore.errors import DamagedKeystoreError
+from keystore.formats.certificate import read_certificate, read_certificates
 from keystore.formats.role import Role
+from keystore.signing import smime
+from keystore.signing.public_key import is_our_form
 from keystore.verification import repair
 from keystore.verification.finding import Finding, Severity
 
 _MAX_BYTES = 64_000_000
-_BEGIN = re.compile(rb"-----BEGIN ([A-Z0-9 ]+)-----")
 _BASE64_RUN = re.compile(rb"[A-Za-z0-9+/=\r\n]{80,}")
 _DER_KEYS = (
     b"\x02\x01\x00\x30\x13\x06\x07\x2a\x86\x48\xce\x3d\x02\x01",  # PKCS#8 (RFC 5958), elliptic curve
@@ -26,8 +30,8 @@ _DER_KEYS = (
     b"\x06\x0b\x2a\x86\x48\x86\xf7\x0d\x01\x0c\x0a\x01",  # PKCS#12 key bags (RFC 7292)
 )
 
-_CERTIFICATE, _CRL, _KEY = b"CERTIFICATE", b"X509 CRL", b"PRIVATE KEY"
-_ONE_BLOCK = {layout.CERT: _CERTIFICATE, layout.ENCLAVE_CRL: _CRL, layout.KEY: _KEY}
+_KEY = b"PRIVATE KEY"
+_ONE_BLOCK = frozenset({layout.CERT, layout.ENCLAVE_CRL})
 _TRUST_ANCHORS = frozenset(f"{role.value}.cert.pem" for role in Role) | {"ca.cert.pem"}
 
 
@@ -39,7 +43,7 @@ def holds_private_key(data: bytes) -> bool:
 
 
 def check_content(root: Path, relative: str) -> Iterator[Finding]:
-    """One file that belongs to the keystore: nothing in it but what its name says."""
+    """Finds what a file of the keystore holds beside what its name says; DDS implementations may read that instead."""
     try:
         data = read_bytes(root / relative, _MAX_BYTES)
     except OSError:
@@ -52,42 +56,33 @@ def check_content(root: Path, relative: str) -> Iterator[Finding]:
             "holds a private key, which goes wherever this file goes; the key counts as exposed",
             _new_key(root, relative),
         )  # fmt: skip
-    yield from _check_blocks(root, relative, _KEY if is_key else _ONE_BLOCK.get(name), data)
-
-
-def mime_problem(p7s: bytes) -> str | None:
-    """Why OpenSSL, and so both DDS implementations, would not find the two parts of a signed document."""
-    import email
-
-    message = email.message_from_bytes(p7s)
-    if message.get_content_type() != "multipart/signed" or not message.is_multipart():
-        return "its first line does not say multipart/signed"
-    parts = [part.get_content_type() for part in message.walk()][1:]
-    if len(parts) != 2 or parts[1] not in _SIGNATURE_TYPES:
-        return "it has not two parts, a text and its signature"
-    return None
-
-
-_SIGNATURE_TYPES = ("application/x-pkcs7-signature", "application/pkcs7-signature")
-
-
-def _check_blocks(root: Path, relative: str, wanted: bytes | None, data: bytes) -> Iterator[Finding]:
-    labels = [label for label in _BEGIN.findall(data) if label != b"EC PARAMETERS"]
-    if wanted is None:
-        wanted = _CERTIFICATE if relative.rpartition("/")[2] in _TRUST_ANCHORS else None
-        strange = [label for label in labels if wanted is not None and label != wanted]
-        several = False
-    else:
-        strange = [label for label in labels if not label.endswith(wanted)]
-        several = len(labels) > 1
-    if strange or several:
-        found = ", ".join(label.decode().lower() for label in labels)
+    blocks = data.count(b"-----BEGIN ")
+    several = blocks > 1 and (is_key or name in _ONE_BLOCK)
+    if several or not _is_our_form(name, data):
+        fix = _new_key(root, relative) if is_key or several else _written_again(root, relative)
+        message = f"holds {blocks} PEM blocks" if several else "is not as secure-keystore writes it"
         yield Finding(
-            Severity.ERROR, "several-blocks", relative,
-            f"holds {found}; one {(wanted or b'').decode().lower()} belongs there, and implementations differ in "
-            "which block they read",
-            _new_key(root, relative),
+            Severity.ERROR, "several-blocks" if blocks > 1 else "other-form", relative,
+            f"{message}: DDS implementations may read something else in it than was signed", fix,
         )  # fmt: skip
+
+
+def _is_our_form(name: str, data: bytes) -> bool:
+    """Returns whether a file that DDS implementations read is byte for byte as it is written here."""
+    try:
+        if name == layout.KEY:
+            return is_our_form(data)
+        if name == layout.CERT:
+            read_certificate(data)
+        elif name in _TRUST_ANCHORS:
+            read_certificates(data, name)
+        elif name == layout.ENCLAVE_CRL:
+            return is_crl(data)
+        elif name.endswith(".p7s"):
+            smime.read(data, name)
+    except DamagedKeystoreError:
+        return False
+    return True
 
 
 def _decoded(data: bytes) -> Iterator[bytes]:
@@ -104,3 +99,10 @@ def _new_key(root: Path, relative: str) -> str:
         return repair.BACKUP
     enclave = relative.removeprefix(layout.ENCLAVES).rpartition("/")[0] or "/"
     return repair.run(root, "renew", enclave, "--new-keys", "--revoke-old")
+
+
+def _written_again(root: Path, relative: str) -> str:
+    if not relative.startswith(layout.ENCLAVES + "/") or relative == layout.GOVERNANCE:
+        return repair.run(root, "renew", note="writes it again")
+    enclave = relative.removeprefix(layout.ENCLAVES).rpartition("/")[0] or "/"
+    return repair.run(root, "renew", enclave)

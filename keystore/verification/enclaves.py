@@ -7,21 +7,20 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import datetime
-from typing import TYPE_CHECKING, Any
+
+from cryptography import x509
 
 from keystore.disk import layout, safe_files
 from keystore.disk.signed_documents import signed_governance
 from keystore.disk.view import KeystoreView
 from keystore.errors import (
+    DamagedKeystoreError,
     InvalidInputError,
     KeystoreError,
-    SigningUnavailableError,
     UnsafeKeystoreError,
     printable,
 )
-from keystore.formats import certificate
-from keystore.formats.certificate import CertificateFacts
-from keystore.formats.der import DerError
+from keystore.formats.certificate import NOT_OUR_FORM, CertificateFacts, read_certificate
 from keystore.formats.domains import Domains
 from keystore.formats.governance import parse_governance
 from keystore.formats.permissions_document import Grant, parse_permissions
@@ -39,17 +38,11 @@ from keystore.formats.subject import (
 )
 from keystore.formats.validity import LATEST, Validity, iso, parse_moment
 from keystore.signing import smime
-from keystore.signing.authority import spki
-from keystore.signing.public_key import CYCLONE_KINDS, issued_by, key_kind, key_matches, signature_is_valid
-from keystore.signing.signer import FileSigner, load_private_key
+from keystore.signing.public_key import CYCLONE_KINDS, is_our_form, issued_by, key_kind, key_matches
 from keystore.verification import repair
-from keystore.verification.contents import mime_problem
 from keystore.verification.finding import Finding, Severity
 from keystore.verification.governance import check_domains
 from keystore.verification.issued import check_certificate_issued, check_permissions_issued
-
-if TYPE_CHECKING:
-    from cryptography import x509
 
 _WILDCARD = re.compile(r"[*?\[]")
 _BROKEN_HASHES = frozenset({"md5", "sha1"})
@@ -161,9 +154,9 @@ class _EnclaveCheck:
         if pem is None:
             return
         try:
-            self.facts = certificate.read_pem(pem)
-        except DerError as error:
-            yield self.error("certificate", layout.CERT, f"not a usable certificate: {error}")
+            self.facts = read_certificate(pem, layout.CERT)
+        except DamagedKeystoreError as error:
+            yield self.error("certificate", layout.CERT, str(error))
             return
         yield from self._chain(self.facts)
         yield from self._subject(self.facts)
@@ -171,9 +164,11 @@ class _EnclaveCheck:
         if self.facts.serial not in self._revoked:
             yield from check_certificate_issued(self._view, self._register, self._enclave, self.facts)
         key = self._read(layout.KEY)
-        if key is not None and not _loads(key):
+        if key is not None and not is_our_form(key):
             fix = repair.run(self._view.root, "renew", self._enclave, "--new-keys")
-            yield self._finding(Severity.ERROR, "key", layout.KEY, "not a usable private key", fix)
+            yield self._finding(
+                Severity.ERROR, "key", layout.KEY, f"not a usable private key: {NOT_OUR_FORM}", fix
+            )
         elif key is not None and not key_matches(key, self.facts):
             text = "does not belong to cert.pem; Cyclone DDS starts but never talks"
             yield self.error("key-mismatch", layout.KEY, text)
@@ -210,24 +205,16 @@ class _EnclaveCheck:
     def _profile(self, facts: CertificateFacts) -> Iterator[Finding]:
         """Basic constraints, key usage and signature (RFC 5280 sections 4.2.1.3, 4.2.1.9): what the certificate allows
         beyond identifying one enclave."""
-        from cryptography import x509
-
-        try:
-            certificate = x509.load_der_x509_certificate(facts.der)
-            extensions = certificate.extensions
-            algorithm = certificate.signature_hash_algorithm
-        except Exception:  # the parser's own errors, which differ between releases: to us it is one thing
-            yield self.leaf(Severity.ERROR, "certificate", "its extensions cannot be read")
-            return
+        algorithm = facts.certificate.signature_hash_algorithm
         if algorithm is None or algorithm.name in _BROKEN_HASHES:
             text = f"signed with {'no hash' if algorithm is None else algorithm.name}, which can be forged"
             yield self.leaf(Severity.EXPOSURE, "weak-signature", text)
-        constraints = _extension(extensions, x509.BasicConstraints)
+        constraints = facts.extension(x509.BasicConstraints)
         if constraints is not None and constraints.ca:
             text = "a CA certificate: its key can certify enclaves of its own"
             yield self.leaf(Severity.ERROR, "leaf-is-ca", text)
-        yield from self._key_usage(_extension(extensions, x509.KeyUsage))
-        if _extension(extensions, x509.ExtendedKeyUsage) is None:
+        yield from self._key_usage(facts.extension(x509.KeyUsage))
+        if facts.extension(x509.ExtendedKeyUsage) is None:
             text = "nothing says that its key may not sign documents: where it is certified by a permissions CA, it can"
             yield self.leaf(Severity.WARNING, "no-extended-key-usage", text)
 
@@ -272,8 +259,6 @@ class _EnclaveCheck:
         except KeystoreError as error:
             yield self._distrusted("permissions", str(error))
             return
-        if problem := mime_problem(p7s):
-            yield self._distrusted("permissions", problem)
         if not signed.embeds(self._view.ca(Role.PERMISSIONS).der):
             yield self.error(
                 "embedded-differs", layout.PERMISSIONS,
@@ -341,22 +326,3 @@ class _EnclaveCheck:
         elif validity.not_after != facts.validity.not_after or parse_moment(grant.not_after) > LATEST:
             text = "not valid as long as the certificate"
             yield self._finding(Severity.WARNING, "validity-differs", layout.PERMISSIONS, text, self._renew())
-
-
-def _extension(extensions: x509.Extensions, kind: type) -> Any:
-    from cryptography import x509
-
-    try:
-        return extensions.get_extension_for_class(kind).value
-    except x509.ExtensionNotFound:
-        return None
-
-
-def _loads(key_pem: bytes) -> bool:
-    """``key_matches`` looks at the public half in the file; only a signature shows that the private half fits it."""
-    probe = b"do both halves fit"
-    try:
-        signer = FileSigner(load_private_key(key_pem, None, layout.KEY))
-        return signature_is_valid(spki(signer.public_key()), signer.sign(probe), probe)
-    except (SigningUnavailableError, ValueError):
-        return False

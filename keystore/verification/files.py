@@ -11,7 +11,7 @@ import stat
 from collections.abc import Iterator
 from pathlib import Path
 
-from enclave_launch.boundary.files import read_bytes
+from enclave_common.files import read_bytes
 from keystore.disk import layout, safe_files
 from keystore.errors import InvalidEnclaveNameError, printable
 from keystore.formats.enclave_name import check_distinct, validate_enclave_name
@@ -22,7 +22,7 @@ from keystore.verification.finding import Finding, Severity
 
 _TOP = frozenset({layout.PUBLIC, layout.PRIVATE, layout.ENCLAVES, layout.ZENOH})
 _KNOWN = frozenset({
-    layout.LOCK, layout.SETTINGS, layout.CRL, layout.GOVERNANCE_XML, layout.GOVERNANCE,
+    layout.LOCK, layout.GITIGNORE, layout.SETTINGS, layout.CRL, layout.GOVERNANCE_XML, layout.GOVERNANCE,
     layout.SHARED_CA_CERT, layout.SHARED_CA_KEY, layout.SUPERSEDED, layout.REGISTER, layout.CRL_UNLINKED,
     layout.ZENOH_ROUTER, layout.ZENOH_ROUTER_CERT, layout.ZENOH_ROUTER_KEY,
     layout.BUNDLE,

@@ -7,11 +7,13 @@ today. Where there is no register (a bundle, a host) only fingerprints can be sh
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
+from contextlib import suppress
 from datetime import datetime
 
 from keystore.disk import layout
 from keystore.disk.authorities import describe, foreign_authorities
 from keystore.disk.crl_file import crl_problem
+from keystore.disk.deployed import deployed_manifest
 from keystore.disk.register_file import needs_register, read_register
 from keystore.disk.view import KeystoreView
 from keystore.errors import KeystoreError
@@ -40,15 +42,16 @@ def load_register(view: KeystoreView) -> tuple[Register | None, list[Finding]]:
 def check_anchors(
     view: KeystoreView, register: Register | None, required: Collection[str]
 ) -> Iterator[Finding]:
-    """``required``: SHA-256 fingerprints of the CA certificates to trust, any CA when empty."""
+    """``required``: SHA-256 of the CA certificates to trust, for one role (``identity=``) or both; any when empty."""
     for role, ca in foreign_authorities(view, register):
         yield Finding(
             Severity.ERROR, "foreign-ca", layout.ca_cert(role),
             f"holds a CA that this keystore did not make, or has retired: {describe(ca)}; whoever has its key can make "
             "enclaves that Fast DDS lets in", repair.run(view.root, "renew", note="once it is known who put it there"),
         )  # fmt: skip
-    wanted = fingerprints(required)
     for role in Role:
+        prefix = role.value.removesuffix("_ca") + "="
+        wanted = fingerprints(one.removeprefix(prefix) for one in required)
         bundle = view.ca_bundle(role)
         for ca in bundle:
             if wanted and fingerprint(ca.der) not in wanted:
@@ -56,12 +59,19 @@ def check_anchors(
                     Severity.ERROR, "ca-not-required", layout.ca_cert(role),
                     f"trusts a CA that --require-ca does not name: {describe(ca)}", repair.BACKUP,
                 )  # fmt: skip
-        if register is None and len(bundle) > 1 and not wanted:
+        if register is None and len(bundle) > 1 and not wanted and not _is_imported(view):
             yield Finding(
                 Severity.EXPOSURE, "several-cas", layout.ca_cert(role),
                 f"trusts {len(bundle)} CAs: {'; '.join(map(describe, bundle))}; without a register nobody can say "
                 "whether a roll-over is under way", "verify --require-ca SHA256 for each CA that is meant",
             )  # fmt: skip
+
+
+def _is_imported(view: KeystoreView) -> bool:
+    """Whether a signed manifest names the CAs; that they are these is checked with its other files."""
+    with suppress(KeystoreError):
+        return deployed_manifest(view) is not None
+    return False
 
 
 def check_published(view: KeystoreView, register: Register | None, now: datetime) -> Iterator[Finding]:

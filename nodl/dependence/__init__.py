@@ -10,8 +10,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
+from typing import NamedTuple
 
-from enclave_launch.boundary.light import NamedTuple
 from nodl.node_interface import EndpointKind
 
 

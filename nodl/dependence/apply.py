@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from typing import NamedTuple, Protocol
 
-from enclave_launch.boundary.light import NamedTuple, Protocol
 from nodl.dependence import (
     Configuration,
     Dependence,
@@ -20,6 +20,7 @@ from nodl.dependence import (
     Transport,
     Variation,
 )
+from nodl.dependence.configuration import read_configuration
 from nodl.dependence.scope import Filled, Scope
 from nodl.name_template import NameTemplate
 from nodl.names import join
@@ -220,7 +221,6 @@ class _Application:
     def _configured(self, configuration: Configuration, scope: Scope, by: NodeInterface) -> None:
         if not scope.holds(configuration.when):
             return
-        from nodl.dependence.configuration import read_configuration
 
         file = scope.fill(configuration.file).text
         found = read_configuration(configuration.kind, file or "", self._situation, by.source)

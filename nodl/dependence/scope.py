@@ -16,8 +16,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
 
-from enclave_launch.boundary.light import NamedTuple
 from nodl.builtin_interfaces import DISTROS
 from nodl.dependence import Situation, Test, When
 from nodl.name_template import NameTemplate, Part, UnknownPart

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from enclave_launch.boundary.xml_tree import XmlElement
-from nodl.document import ManifestNode
+from enclave_common.xml_tree import XmlElement
 from nodl.errors import (
     InvalidElementError,
     InvalidNodeChildError,
@@ -26,7 +25,7 @@ from nodl.names import (
     validate_node_name,
     validate_written_name,
 )
-from nodl.node_interface import Endpoint, EndpointKind, NodeInterface
+from nodl.node_interface import Endpoint, EndpointKind, ManifestNode, NodeInterface
 from nodl.source_ref import SourceRef
 from nodl.xml_text import parse_xml
 
@@ -41,6 +40,9 @@ _ROLES: dict[str, dict[str, tuple[EndpointKind, ...]]] = {
         (EndpointKind.ACTION_SERVER, EndpointKind.ACTION_CLIENT),
     )
 }
+_XSI = "{http://www.w3.org/2001/XMLSchema-instance}"
+# What any schema allows.
+_ALLOWED_ANYWHERE = (f"{_XSI}schemaLocation", f"{_XSI}noNamespaceSchemaLocation")
 
 
 def parse_v1(text: bytes, file: str, package: str | None = None) -> tuple[ManifestNode, ...]:
@@ -74,6 +76,7 @@ def _node(element: XmlElement, file: str, package: str | None) -> ManifestNode:
     for child in element:
         if child.tag == "parameter":
             _expect(child, "parameter", ("name", "type"), file)
+            _expect_no_elements(child, file)
             parameters[child.get("name", "")] = child.get("type", "")
         elif child.tag in _ROLES:
             endpoints.update(dict.fromkeys(_endpoints(child, file, own_prefix)))
@@ -114,6 +117,7 @@ def _endpoints(element: XmlElement, file: str, own_prefix: str) -> list[Endpoint
     """``/node_name/x`` is v1's habit of writing the private name ``~/x``, and is taken as that."""
     tag = element.tag
     _expect(element, tag, ("name", "type", "role"), file)
+    _expect_no_elements(element, file)
     name, role = element.get("name", ""), element.get("role", "")
     if role not in _ROLES[tag]:
         raise InvalidNoDLDocumentError.at(
@@ -146,11 +150,18 @@ def _expect(element: XmlElement, tag: str, attributes: tuple[str, ...], file: st
         if name not in element.attrib:
             raise InvalidNoDLDocumentError.at(_at(element, file), f"<{tag}> needs the attribute {name}")
     for attribute in element.attrib:
-        if attribute not in attributes:
+        if attribute not in attributes and attribute not in _ALLOWED_ANYWHERE:
             raise InvalidNoDLDocumentError.at(_at(element, file), f"<{tag}> has no attribute {attribute!s}")
     if element.text:  # the schema knows none; some there is mostly a tag that lost its bracket
         why = f"<{element.tag}> holds the text {shown(element.text[:40])}, which has no meaning"
         raise InvalidNoDLDocumentError.at(_at(element, file), why)
+
+
+def _expect_no_elements(element: XmlElement, file: str) -> None:
+    for child in element:
+        raise InvalidNoDLDocumentError.at(
+            _at(child, file), f"<{child.tag}> is not allowed in <{element.tag}>, which holds no elements"
+        )
 
 
 def _at(element: XmlElement, file: str) -> SourceRef:

@@ -17,7 +17,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from nodl.document import ManifestNode
 from nodl.document.v2_include import Included, follow_includes
 from nodl.document.v2_learnt import LearntName, learnt_from, learnt_names, logger_services
 from nodl.document.v2_schema import check_document
@@ -25,7 +24,7 @@ from nodl.document.v2_section import CATEGORIES, dependence_of, section_of
 from nodl.errors import InvalidElementError, InvalidNoDLDocumentError
 from nodl.name_template import NameTemplate
 from nodl.names import InvalidNameError, validate_namespace, validate_node_name, validate_written_name
-from nodl.node_interface import ClientLibrary, Endpoint, EndpointKind, NodeInterface
+from nodl.node_interface import ClientLibrary, Endpoint, EndpointKind, ManifestNode, NodeInterface
 from nodl.source_ref import SourceRef
 from nodl.yaml_text import YamlList, YamlMap, YamlScalar, parse_yaml
 
@@ -57,6 +56,7 @@ def parse_root(
         depends=dependence_of(root),
         runs=learnt.runs,
         incomplete=learnt.incomplete,
+        parameters_complete=_fields(root).get("all_parameters") is True,
     )
     included = tuple(document.file for document in documents[1:])
     explicit = not {"executable", "plugin"}.isdisjoint(_fields(root))

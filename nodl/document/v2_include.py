@@ -10,17 +10,17 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
-from enclave_launch.boundary.files import read_bytes
-from enclave_launch.boundary.light import NamedTuple
+from enclave_common.files import read_bytes
 from nodl.ament_index import INDEX_FOLDER, find_resource
-from nodl.document import RESOURCE_TYPE, resource_key
 from nodl.document.v2_schema import check_document
 from nodl.errors import IncludeError
 from nodl.names import shown
 from nodl.source_ref import SourceRef
 from nodl.yaml_text import MAX_BYTES, YamlList, YamlMap, YamlScalar, parse_yaml
 
+RESOURCE_TYPE = "nodl"  # of v2 documents in the ament index
 MAX_DEPTH = 32
 COMMON = Path(__file__).parent / "common"
 """Documents that packages of ROS bring, for machines without them: the installed ones come first."""
@@ -122,3 +122,8 @@ def _read(path: Path, source: SourceRef) -> bytes:
         return read_bytes(path, MAX_BYTES)
     except OSError as error:
         raise IncludeError.at(source, f"cannot read {path}: {error.strerror}") from None
+
+
+def resource_key(package: str, name: str) -> str:
+    """Name in the ament index of the v2 document ``nodl://package/name``."""
+    return f"{package}__{name}"

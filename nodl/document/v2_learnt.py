@@ -16,9 +16,9 @@ for the reader: plans show them.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import NamedTuple
 
-from enclave_launch.boundary.light import NamedTuple
-from enclave_launch.boundary.words import counted
+from enclave_common.words import counted
 from nodl.builtin_interfaces import LOGGER_SERVICES
 from nodl.document.v2_section import section_of
 from nodl.errors import InvalidElementError

@@ -118,6 +118,7 @@ SECTION = map_of(
         "classes": _TEXTS,
         "own_node": boolean,
         "random_name": boolean,
+        "all_parameters": boolean,
         "tf_listener": either(map_of(_CONDITION), boolean),
         "node_name": text_of(),
         "options": map_of(others=_TEXTS),

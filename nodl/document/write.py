@@ -9,14 +9,13 @@ import json
 import re
 from collections.abc import Iterable, Sequence
 from html import escape
+from typing import NamedTuple
 
-from enclave_launch.boundary.light import NamedTuple
-from nodl.document import ManifestNode
 from nodl.document.v2_schema import NAME_PATTERN, PARAMETER_TYPES, TYPE_PATTERN
 from nodl.document.v2_section import CATEGORIES, IDENTITY_KEY
 from nodl.errors import InvalidNoDLDocumentError
 from nodl.names import shown
-from nodl.node_interface import ClientLibrary, Endpoint, NodeInterface
+from nodl.node_interface import ClientLibrary, Endpoint, ManifestNode, NodeInterface
 
 _UNKNOWN_QOS = "{history: SYSTEM_DEFAULT, reliability: SYSTEM_DEFAULT}"
 _PLAIN_SCALAR = re.compile(r"[A-Za-z/][A-Za-z0-9_/.:]*[A-Za-z0-9_]\Z|~/[A-Za-z0-9_/]+\Z")

@@ -20,6 +20,13 @@ from nodl.graph.quality import INFINITE, Quality
 from nodl.graph.udp_ports import UdpPorts
 from nodl.graph.wire_names import DISCOVERY_TOPIC
 
+RANGE_VARIABLES = (
+    "ROS_AUTOMATIC_DISCOVERY_RANGE",
+    "ROS_LOCALHOST_ONLY",
+    "ROS_STATIC_PEERS",
+    "CYCLONEDDS_URI",
+)
+"""Variables that say where participants are looked for."""
 _MOST_AT_ONCE = 4096
 _MOST_PARTICIPANTS = 119  # of one domain on one host: what its ports have room for (DDSI-RTPS 9.6.1)
 _LOOPBACK = '<NetworkInterface name="lo"/>'

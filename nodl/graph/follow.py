@@ -11,14 +11,10 @@ import select
 import sys
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from nodl.errors import NoDLError
 from nodl.graph.json_form import graph_document
-from nodl.graph.observing import SOURCES, Where, observer
-
-if TYPE_CHECKING:
-    from nodl.graph.observing import Observer
+from nodl.graph.observing import SOURCES, Observer, Where, observer
 
 _BETWEEN = 1.0  # seconds between two lines at least; looks come oftener
 _LOOK = 0.2

@@ -127,6 +127,11 @@ class GraphProcess(NamedTuple):
     announced: bool = False
 
     @property
+    def visible(self) -> bool:
+        """Return True if the observer discovered any endpoint of it, or its list of nodes."""
+        return self.announced or self.listed or bool(self.nodes)
+
+    @property
     def interfaces(self) -> Iterator[SeenInterface]:
         for node in self.nodes:
             yield from node.interfaces

@@ -9,7 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
-from enclave_launch.boundary.environment import environment_with
+from enclave_common.environment import environment_with
 from nodl.graph.cyclone import CycloneObserver, ObserverError
 from nodl.graph.model import Graph
 from nodl.graph.rclpy_graph import RclpyObserver

@@ -14,6 +14,7 @@ from nodl.remap import RemapRules, valid_rules
 from nodl.ros_arguments import PARAMETER, REMAP, flags
 
 _IN_PREFIX = re.compile(r"(?:.*/)?lib/([^/]+)/([^/]+)\Z")  # an executable of an ament package
+_GENERATED_FILE = re.compile(r"<params:\d+>")
 _UNSPECIFIED = "<node_name_unspecified>"
 _NO_NAMESPACE = "<node_namespace_unspecified>"
 
@@ -75,9 +76,22 @@ def start_for(fqn: str, command: Sequence[str], starts: Iterable[StartedNode]) -
 
 
 def _within(planned: tuple[str, ...], running: Sequence[str]) -> bool:
-    """A running command line has an interpreter before the planned words and what ``--secure`` adds behind them."""
+    """Return True if ``running`` is ``planned``, with an interpreter before it and what ``--secure`` adds behind it.
+
+    A parameter file that launch generates has another path at each start; a plan writes ``<params:N>`` for it.
+    """
     size = len(planned)
-    return any(tuple(running[i : i + size]) == planned for i in range(min(4, len(running) - size + 1)))
+    return any(
+        all(
+            word == there or _is_generated(word, there)
+            for word, there in zip(planned, running[i:], strict=False)
+        )
+        for i in range(min(4, len(running) - size + 1))
+    )
+
+
+def _is_generated(planned: str, running: str) -> bool:
+    return _GENERATED_FILE.fullmatch(planned) is not None and running.startswith("/")
 
 
 def _of_process(fields: Mapping[str, Any]) -> StartedNode:

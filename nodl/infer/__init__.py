@@ -7,8 +7,7 @@ at what launch starts as ``lib/<package>/<executable>``. What could not be found
 from __future__ import annotations
 
 from importlib import import_module
-
-from enclave_launch.boundary.light import TYPE_CHECKING
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from nodl.infer.executable import InferredExecutable, infer_executable

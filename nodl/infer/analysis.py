@@ -6,13 +6,15 @@ import ast
 import functools
 import gc
 import itertools
+import os
 import re
 import sys
+import traceback
 from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 
-from nodl.infer.callbacks import call_from_outside, completed, expect_methods, settle, settle_meanwhile
+from nodl.infer.callbacks import call_from_outside, expect_methods, settle, settle_meanwhile
 from nodl.infer.interpreter.define import linearized
 from nodl.infer.interpreter.frames import Arguments, Frame
 from nodl.infer.interpreter.imports import execute_module
@@ -79,8 +81,7 @@ def _followed(program: Program, main: SourceModule, body: Callable[[Run], None])
 
 
 def _start(run: Run, main: SourceModule, functions: tuple[str, ...]) -> None:
-    completed(run, lambda: execute_module(run, main, "__main__"))
-    module = run.modules["__main__"]
+    module = execute_module(run, main, "__main__")
     for name in functions or ("main",):
         for atom in module.cells.get(name, ()):
             if isinstance(atom, FunctionValue) and (functions or atom.node not in run.called):
@@ -89,8 +90,7 @@ def _start(run: Run, main: SourceModule, functions: tuple[str, ...]) -> None:
 
 
 def _start_function(run: Run, module: SourceModule, path: list[str]) -> None:
-    completed(run, lambda: execute_module(run, module, module.name))
-    imported = run.modules[module.name]
+    imported = execute_module(run, module, module.name)
     value = imported.cells.get(path[0], ())
     frame = Frame(imported, {}, None, 0)
     for step in path[1:]:
@@ -171,12 +171,26 @@ def _guarded(run: Run, body: Callable[[], None]) -> None:
         why = f"the analysis was given up: {error}{_busiest(run)}; any interface beside those listed is possible"
         run.findings.gap(SourceRef(run.main.path), why)
     except RecursionError:
+        run.gave_up = True
         run.findings.gap(SourceRef(run.main.path), "the analysis was given up: nested too deep")
+    except Exception as error:
+        run.gave_up = True
+        run.findings.gap(SourceRef(run.main.path), failure(error))
     finally:
         sys.setrecursionlimit(limit)
     for instance, source in run.handed.items():
         if instance.node is not None and instance.node.created:
             instance.node.gaps.setdefault((source, "the node is handed to code that is not analysed"))
+
+
+def failure(error: Exception) -> str:
+    """Says that the analysis of a program failed, where in our code, and what to do."""
+    frames = traceback.extract_tb(error.__traceback__)
+    place = f"{os.path.basename(frames[-1].filename)}:{frames[-1].lineno}" if frames else "an unknown place"
+    return (
+        f"the analysis failed ({type(error).__name__} at {place}); any interface is possible: "
+        "give the node a manifest, and please report this line with the program"
+    )
 
 
 def _busiest(run: Run) -> str:

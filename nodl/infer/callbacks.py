@@ -10,10 +10,9 @@ from collections.abc import Callable, Iterable
 
 from nodl.infer.interpreter.define import methods_in, program_classes
 from nodl.infer.interpreter.frames import Arguments, Call, Frame
-from nodl.infer.interpreter.raising import Raised
 from nodl.infer.interpreter.run import Run
 from nodl.infer.state import WhatWasRead
-from nodl.infer.values import ClassValue, Instance, ModuleValue, unknown
+from nodl.infer.values import ClassValue, GeneratorValue, Instance, ModuleValue, unknown
 from nodl.source_ref import SourceRef
 
 MAX_ROUNDS = 12
@@ -25,8 +24,6 @@ def settle(run: Run, at_end: bool = True) -> None:
     run.repeated += 1
     outermost = run.settle is not _no_settling
     run.settle = _no_settling
-    # What a callback raises ends it, or the call that waits: one risk of a ``try``.
-    tries, run.tries = run.tries, 0
     expected: set[object] = set()
     for turn in range(MAX_ROUNDS):
         _expect_escaped(run, expected)
@@ -41,8 +38,6 @@ def settle(run: Run, at_end: bool = True) -> None:
     else:
         run.findings.gap(SourceRef(run.main.path), "the callbacks do not settle; names may be missing")
     run.repeated -= 1
-    run.tries = tries
-    run.risks += 1
     run.settle = settle_meanwhile if outermost else _no_settling
 
 
@@ -114,29 +109,14 @@ def _called_from_outside(run: Run, callback: object, arity: int | None) -> Calla
 
     def call() -> bool:
         made = call_from_outside(run, module, callback, args)
-        if isinstance(callback, ClassValue):
-            run.escape_value(made)
+        is_made = isinstance(callback, ClassValue | GeneratorValue)
+        run.escape_value(tuple(atom for atom in made if is_made or isinstance(atom, GeneratorValue)))
         return True
 
     return call
 
 
 def call_from_outside(run: Run, module: ModuleValue, atom: object, args: Arguments) -> tuple[object, ...]:
-    """Call ``atom`` as nobody in the program does; what it gives, nothing where an exception ends it."""
+    """Call ``atom`` as nobody in the program does; returns what it gives."""
     frame = Frame(module, {}, None, run.state.depth)
-    results: list[tuple[object, ...]] = []
-    completed(run, lambda: results.append(run.call_atom(atom, Call(args, module.source.tree, frame))))
-    return results[0] if results else ()
-
-
-def completed(run: Run, body: Callable[[], object]) -> None:
-    """Run ``body`` to its end, or to the exception that ends the program there; what it registered stays."""
-    state = run.state
-    before = len(run.stack), run.context, state.depth, run.unrolled
-    try:
-        body()
-    except Raised:
-        size, run.context, state.depth, run.unrolled = before
-        del run.stack[size:]
-        run.tries = 0
-        run.try_forks = 0
+    return run.call_atom(atom, Call(args, module.source.tree, frame))

@@ -8,9 +8,9 @@ runs nothing.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING, NamedTuple
 
-from enclave_launch.boundary.files import check_regular
-from enclave_launch.boundary.light import TYPE_CHECKING, NamedTuple
+from enclave_common.files import check_regular
 from nodl.ament_index import ExecutableNotInstalledError, PackageNotFoundError, executable_path
 from nodl.node_interface import NodeInterface
 

@@ -6,7 +6,8 @@ Everything here only grows, in whatever order branches and loops are analysed; `
 
 from __future__ import annotations
 
-from enclave_launch.boundary.light import NamedTuple
+from typing import NamedTuple
+
 from nodl.infer.values import BOTTOM, FieldCells, Unknown, Value, join
 from nodl.node_interface import EndpointKind, QosPolicies
 from nodl.source_ref import SourceRef
@@ -77,7 +78,6 @@ class Findings:
     def __init__(self) -> None:
         self.nodes: dict[NodeRecord, None] = {}
         self.gaps: dict[tuple[SourceRef, str], None] = {}
-        self.files: dict[str, None] = {}  # data that was read, on which all of this depends
         self.by_path = False  # of several runs, one for each outcome of undecided tests
         self.homeless: NodeRecord | None = None
         self.global_arguments: Value = BOTTOM  # a list handed to rclpy.init(args=...)

@@ -1,19 +1,16 @@
 """Answers about Python programs, kept by content between runs: an analysis is a function of what it asked of the disk.
 
 An answer holds while our own code, the interpreter and everything that the analysis asked are as they were: the
-content of each file, the names in each folder where it looked for modules, where packages are installed. Reads and
-writes files.
+content of each file, the names in each folder where it looked for modules. Reads and writes files.
 """
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
 from functools import cached_property, lru_cache
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any
-from nodl.ament_index import PackageNotFoundError, package_prefix
 from nodl.infer.cpp.cache.codec import keep_variant, variants
 from nodl.infer.cpp.cache.folder import CacheFolder, digest, digest_of
 
@@ -24,17 +21,9 @@ VARIANTS = 4
 """Answers to one question, after different edits, of which the newest are kept."""
 
 
-def installed_in(package: str, prefixes: Sequence[str]) -> str:
-    """The prefix of a package; the empty string where it is not installed."""
-    try:
-        return package_prefix(package, prefixes)
-    except (PackageNotFoundError, ValueError):
-        return ""
-
-
 _OWN_SOURCES = (
-    "*.py", "dependence/*.py", "infer/*.py", "infer/interpreter/*.py", "infer/models/*.py", "infer/cpp/*.py",
-    "infer/cpp/cache/*.py",
+    "*.py", "dependence/*.py", "document/*.py", "infer/*.py", "infer/interpreter/*.py", "infer/models/*.py",
+    "infer/cpp/*.py", "infer/cpp/cache/*.py",
 )  # fmt: skip
 
 
@@ -60,7 +49,7 @@ class KeptAnswer:
 
     @cached_property
     def _key(self) -> str:
-        return digest("python", _analyser(), self._program.prefixes, self._program.roots, self._question)
+        return digest("python", _analyser(), self._program.roots, self._question)
 
     def find(self) -> Any:
         """What was kept; ``None``: nothing, or the disk would answer otherwise now."""

@@ -1,9 +1,10 @@
-"""What is called or read through something else: bound methods, partial functions, properties, ``vars(x)``."""
+"""What is called or read through something else: bound methods, partial functions, properties."""
 
 from __future__ import annotations
 
-from enclave_launch.boundary.light import NamedTuple
-from nodl.infer.values import BOTTOM, ClassValue, FunctionValue, HeapObject, Value
+from typing import NamedTuple
+
+from nodl.infer.values import BOTTOM, ClassValue, FunctionValue, Value
 
 
 class BoundMethod(NamedTuple):
@@ -36,14 +37,6 @@ class Partial(NamedTuple):
     keywords: tuple[tuple[str, Value], ...]
 
 
-class Getter(NamedTuple):
-    """``operator.methodcaller``, ``attrgetter`` and ``itemgetter`` with what they were given."""
-
-    kind: str
-    positional: tuple[Value, ...]
-    keywords: tuple[tuple[str, Value], ...]
-
-
 class SuperProxy(NamedTuple):
     """``super()`` inside a method of ``owner`` for object ``receiver``."""
 
@@ -71,23 +64,3 @@ class ClassMethod(NamedTuple):
 
     function: Value
     static: bool
-
-
-class PartialMethod(NamedTuple):
-    """``functools.partialmethod``: bound like a function, with arguments of its own."""
-
-    partial: Partial
-
-
-class Variables(NamedTuple):
-    """The dictionary of an object's or a module's variables: ``vars(x)``, ``x.__dict__``, ``globals()``."""
-
-    owner: HeapObject
-
-    def named(self) -> dict[str, Value]:
-        """What is certainly or perhaps set, by name."""
-        return {
-            name: value
-            for name, value in self.owner.cells.items()
-            if isinstance(name, str) and not name.startswith("[")
-        }

@@ -9,12 +9,13 @@ import ast
 import re
 from functools import lru_cache
 from pathlib import Path
+from typing import NamedTuple
 
-from enclave_launch.boundary.files import text_or_nothing
-from enclave_launch.boundary.light import NamedTuple
+from enclave_common.files import text_or_nothing
 
 _ENTRY = re.compile(r"\s*([\w.\-]+)\s*=\s*([\w.]+)\s*:\s*([\w.]+)\s*\Z")
 _NAME = re.compile(r"<name>\s*([^<\s]+)\s*</name>")
+_DEPENDS = re.compile(r"<(?:exec_|run_|build_)?depend(?:\s[^>]*)?>\s*([^<\s]+)\s*</")
 _PROGRAMS = re.compile(r"install\s*\(\s*PROGRAMS(.*?)DESTINATION", re.S | re.I)
 
 
@@ -33,6 +34,7 @@ class Package(NamedTuple):
     folder: str
     entry_points: tuple[EntryPoint, ...] = ()
     installed_programs: frozenset[str] = frozenset()
+    dependencies: frozenset[str] = frozenset()
 
     def entry_points_of(self, module: str) -> list[EntryPoint]:
         return [entry for entry in self.entry_points if entry.module == module]
@@ -52,11 +54,13 @@ def find_package(file: str) -> Package | None:
 def read_package(folder: str) -> Package:
     """What the files in ``folder`` tell; the folder's name stands in where package.xml gives none."""
     base = Path(folder)
-    match = _NAME.search(text_or_nothing(base / "package.xml"))
+    manifest = text_or_nothing(base / "package.xml")
+    match = _NAME.search(manifest)
     name = match[1] if match else base.name
     texts = (*_literal_texts(base / "setup.py"), *text_or_nothing(base / "setup.cfg").splitlines())
     entries = tuple(EntryPoint(*match.groups()) for match in map(_ENTRY.match, texts) if match)
-    return Package(name, folder, entries, _cmake_programs(base / "CMakeLists.txt"))
+    dependencies = frozenset(_DEPENDS.findall(manifest))
+    return Package(name, folder, entries, _cmake_programs(base / "CMakeLists.txt"), dependencies)
 
 
 def _literal_texts(path: Path) -> list[str]:

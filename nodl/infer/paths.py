@@ -1,39 +1,37 @@
-"""Programs with a few undecided tests, followed once per outcome: what belongs together stays together.
+"""Programs that test parameters, followed once per outcome: what only one outcome makes is kept for launch to decide.
 
-The joined run knows ``left`` or ``right`` and ``one`` or ``two``; only a run per outcome knows that ``left`` goes with
-``one``. Where a test asks for the value of a parameter, what only one outcome makes is kept under that condition, for
-launch to decide. More tests than ``MAX_FORKS`` in a row leave the joined run as it is.
+More tests than ``MAX_FORKS`` in a row leave the joined run as it is, which grants what any outcome makes.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from typing import NamedTuple
 
-from enclave_launch.boundary.light import NamedTuple
 from nodl.infer.findings import Findings, FoundEndpoint, NodeRecord
-from nodl.infer.interpreter.conditions import OPPOSITE
+from nodl.infer.interpreter.conditions import OPPOSITE, Condition
 from nodl.infer.interpreter.run import Run
 from nodl.infer.text import Input, Piece, Text, make_text, pieces_of
 
-MAX_FORKS = 4  # undecided tests of which each outcome is followed by itself
+MAX_FORKS = 4  # tests of which each outcome is followed by itself
 MAX_STEPS = 40_000  # of all paths together; a larger program is not followed path by path
 Guards = frozenset[tuple[str, str, tuple[str, ...]]]
 Follow = Callable[["Decisions"], Run]
 
 
 class TooManyPaths(Exception):
-    """The program has more undecided tests in a row than are followed one by one."""
+    """The program has more such tests in a row than are followed one by one."""
 
 
 class Decisions:
-    """Outcomes of the undecided tests on one path through the program, in their order."""
+    """Outcomes of the tests on one path through the program, in their order."""
 
     def __init__(self, outcomes: list[bool]) -> None:
         self.outcomes = outcomes
-        self.conditions: list[object] = []  # what the test asks of a parameter, or None
+        self.conditions: list[Condition] = []
         self.taken = 0
 
-    def next(self, condition: object) -> bool:
+    def next(self, condition: Condition) -> bool:
         """The outcome of the next test. Raises ``TooManyPaths``."""
         if self.taken == MAX_FORKS:
             raise TooManyPaths
@@ -54,11 +52,7 @@ class Path(NamedTuple):
 
 def refine(run: Run, follow: Follow) -> None:
     """Replace the findings of the joined ``run`` by those of its single paths, where that can tell more."""
-    if (
-        not run.undecided
-        or 2 * run.steps > MAX_STEPS
-        or not ((run.conditional and run.state.stakes) or _has_alternatives(run.findings))
-    ):
+    if not run.conditional or 2 * run.steps > MAX_STEPS:
         return
     try:
         paths = list(_paths(follow))
@@ -67,21 +61,6 @@ def refine(run: Run, follow: Follow) -> None:
     if len(paths) < 2 or any(path.run.gave_up for path in paths):
         return
     run.findings = _merged(paths)
-
-
-def _has_alternatives(findings: Findings) -> bool:
-    """Some place makes endpoints (or nodes) under more than one name, or of more than one type."""
-    for record in findings.nodes:
-        places: set[object] = set()
-        for endpoint in record.endpoints:
-            place = endpoint.kind, endpoint.source
-            if place in places:
-                return True
-            places.add(place)
-        whole = record.names, record.namespaces, record.arguments, record.use_global_arguments
-        if any(len(value) > 1 for value in whole):
-            return True
-    return len(findings.global_arguments) > 1
 
 
 def _paths(follow: Follow) -> Iterator[Path]:
@@ -122,7 +101,6 @@ def _merged(paths: list[Path]) -> Findings:
             record.endpoints = made
             merged.add_node(record)
         merged.gaps.update(path.run.findings.gaps)
-        merged.files.update(path.run.findings.files)
         merged.global_arguments = path.run.findings.global_arguments
     return merged
 
@@ -138,9 +116,8 @@ def _identity(record: NodeRecord, endpoint: FoundEndpoint) -> object:
 def _guards(decisions: Decisions) -> Guards:
     guards = []
     for outcome, condition in zip(decisions.outcomes, decisions.conditions, strict=False):
-        if isinstance(condition, tuple):
-            asked, edit, given = condition
-            guards.append((asked.name, edit if outcome else OPPOSITE[edit], given))
+        asked, edit, given = condition
+        guards.append((asked.name, edit if outcome else OPPOSITE[edit], given))
     return frozenset(guards)
 
 

@@ -12,11 +12,10 @@ import functools
 import os
 import re
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 
-from enclave_launch.boundary.files import read_bytes
+from enclave_common.files import read_bytes
 from nodl.infer.cpp.cache.folder import digest, digest_of
-from nodl.infer.kept import installed_in
 from nodl.infer.source_text import mangle, source_text
 
 MAX_SOURCE_BYTES = 1_000_000
@@ -75,8 +74,7 @@ class SourceModule:
 class Program:
     """Finds and parses modules below ``roots``; one object serves many runs."""
 
-    def __init__(self, roots: Iterable[str] = (), prefixes: Sequence[str] = ()):
-        self.prefixes = tuple(prefixes)  # where packages are installed, with the data that programs ask for
+    def __init__(self, roots: Iterable[str] = ()):
         self.roots = list(dict.fromkeys(os.path.abspath(root) for root in roots))
         # What was asked of the disk, with a digest of what it said.
         self.asked: dict[tuple[str, str], str] = {}
@@ -100,16 +98,13 @@ class Program:
         return module
 
     def ask(self, kind: str, what: str) -> str:
-        """A digest of a ``file``'s content or a ``folder``'s names, or where a ``package`` is installed; remembered.
+        """A digest of a ``file``'s content or a ``folder``'s names; remembered.
 
         To be asked before a file is read: what changes in between is then found to have changed.
         """
         said = self.asked.get((kind, what))
         if said is None:
-            if kind == "folder":
-                said = digest(sorted(self._listing(what)))
-            else:
-                said = digest_of(what) if kind == "file" else installed_in(what, self.prefixes)
+            said = digest_of(what) if kind == "file" else digest(sorted(self._listing(what)))
             self.asked[kind, what] = said
         return said
 

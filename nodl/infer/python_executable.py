@@ -14,7 +14,7 @@ import re
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from enclave_launch.boundary.files import read_text
+from enclave_common.files import read_text
 from nodl.infer.kept import KeptAnswer
 from nodl.infer.program import Program
 from nodl.infer.start import LaunchKey
@@ -67,7 +67,7 @@ class _Finder:
     def __init__(self, prefixes: Sequence[str]):
         self._sites = [site for prefix in prefixes for site in _sites_of(prefix)]
         folders = (folder for site in self._sites for folder in (site, *_linked_folders(site)))
-        self.program = Program(folders, prefixes)
+        self.program = Program(folders)
 
     def target(self, path: str, package: str, executable: str) -> ProgramTarget:
         text = read_text(path, errors="replace")

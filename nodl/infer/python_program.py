@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from nodl.infer.analysis import start, start_function, without_collector
-from nodl.infer.coverage import unsettled_places
+from nodl.infer.analysis import failure, start, start_function, without_collector
 from nodl.infer.interpreter.run import Run
+from nodl.infer.net import unsettled_places
 from nodl.infer.program import Program
 from nodl.infer.python_executable import ProgramTarget
 from nodl.infer.results import interfaces_of
@@ -17,11 +17,14 @@ def infer_program(
     program: Program, target: ProgramTarget, path: str, origin: LaunchKey
 ) -> tuple[tuple[NodeInterface, ...], str]:
     """The nodes that the program behind ``path`` creates, with its gaps; without any, why none was found."""
-    with without_collector():
-        run = _run(program, target, path)
-        interfaces = interfaces_of(run.findings, origin)
-        for gap in unsettled_places(run):
-            run.findings.gap(gap.source, gap.why)
+    try:
+        with without_collector():
+            run = _run(program, target, path)
+            interfaces = interfaces_of(run.findings, origin)
+            for gap in unsettled_places(run):
+                run.findings.gap(gap.source, gap.why)
+    except Exception as error:  # a mistake of ours in one program must not end the plan of all
+        return (), f"{path}: {failure(error)}"
     if interfaces:
         return _with_gaps(interfaces, run), ""
     reasons = "; ".join(f"{source}: {why}" for source, why in run.findings.gaps)

@@ -46,8 +46,7 @@ def _united(interfaces: list[NodeInterface]) -> list[NodeInterface]:
 
 def _interfaces_of_node(record: NodeRecord, findings: Findings, origin: LaunchKey) -> list[NodeInterface]:
     rules, gaps = _rules(record, findings)
-    note = f"the program reads {', '.join(findings.files)}" if findings.files else ""
-    endpoints = tuple(dict.fromkeys(e for found in record.endpoints for e in _endpoints(found, note)))
+    endpoints = tuple(dict.fromkeys(e for found in record.endpoints for e in _endpoints(found)))
     gaps.extend(Gap(source, why) for source, why in record.gaps)
     names: list[str | None] = [*_plain_texts(record.names)] or [None]
     if not record.created:
@@ -59,6 +58,8 @@ def _interfaces_of_node(record: NodeRecord, findings: Findings, origin: LaunchKe
         gaps.append(Gap(record.source, f"the namespace {made}{_made_of(record.namespaces)}"))
     if record.created and names != [None] and not all(isinstance(atom, str) for atom in record.names):
         gaps.append(Gap(record.source, f"the name {made}{_made_of(record.names)}"))
+    if len(names) > 1 and len(_namespaces(record)) > 1:
+        gaps.append(Gap(record.source, "which name of this node goes with which namespace is not known"))
     return [
         NodeInterface(
             package=origin.package,
@@ -107,9 +108,9 @@ def _plain_texts(value: Value) -> list[str]:
 # --- endpoints ----------------------------------------------------------------------------------------------
 
 
-def _endpoints(found: FoundEndpoint, note: str) -> list[Endpoint]:
+def _endpoints(found: FoundEndpoint) -> list[Endpoint]:
     return [
-        Endpoint(found.kind, each, found.type, found.source, certainty_of(each), note=note, qos=found.qos)
+        Endpoint(found.kind, each, found.type, found.source, certainty_of(each), qos=found.qos)
         for each in templates(found.name)
     ]
 

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-
-from enclave_launch.boundary.light import NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 
 class LaunchKey(NamedTuple):

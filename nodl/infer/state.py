@@ -66,7 +66,6 @@ class ProgramState:
         self.period = 0  # a callback, or what runs between two of them
         self.learned = 0  # containers opened to foreign code, which no branch takes back
         self.opened = 0  # those of them that are older than the running callback
-        self.pulled = 0  # how often an iterator was advanced, which no branch takes back either
         self.reads = WhatWasRead(self)
         self.work = 0  # trail entries looked at
         self.depth = 0  # how many branches or loops surround the current point
@@ -120,9 +119,6 @@ class ProgramState:
 
     def mark(self) -> int:
         return len(self._trail)
-
-    def unchanged_since(self, mark: int) -> bool:
-        return len(self._trail) == mark
 
     def branches(self, alternatives: Sequence[Alternative]) -> bool:
         """Run each alternative from the present state and join what they leave. False: none falls through."""

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 from pathlib import Path
+from typing import NamedTuple, TypeVar
 
-from enclave_launch.boundary.light import NamedTuple
-from nodl.infer.analysis import analyse_rest, start, without_collector
-from nodl.infer.coverage import may_make_interfaces, unsettled_places
+from nodl.infer.analysis import analyse_rest, failure, start, without_collector
 from nodl.infer.interpreter.run import Run
+from nodl.infer.net import may_make_interfaces, unsettled_places
 from nodl.infer.packages import EntryPoint, Package, find_package
 from nodl.infer.program import Program
 from nodl.infer.results import interfaces_of
@@ -18,6 +19,7 @@ from nodl.infer.start import LaunchKey
 from nodl.node_interface import Gap, NodeInterface
 from nodl.source_ref import SourceRef
 
+Found = TypeVar("Found")
 CPP_SUFFIXES = (".cpp", ".cc", ".cxx", ".hpp", ".hh", ".hxx", ".h")
 _SKIPPED_FOLDERS = frozenset(
     {"build", "install", "log", "node_modules", "venv", "site-packages", "__pycache__"}
@@ -33,32 +35,47 @@ class InferredSystem(NamedTuple):
     files: tuple[str, ...]
 
 
-def infer_paths(paths: Iterable[str | Path], prefixes: Sequence[str] = ()) -> InferredSystem:
+def infer_paths(paths: Iterable[str | Path]) -> InferredSystem:
     """All nodes that the Python and C++ files in ``paths`` (files, or folders with everything below) may create.
 
-    ``prefixes``: where the packages are installed whose data the programs read.
     Raises ``FileNotFoundError`` for a path that does not exist. A file that cannot be parsed is a gap.
     """
     found = list(dict.fromkeys(file for path in paths for file in _source_files(Path(path))))
     files = [file for file in found if file.endswith(".py") or not file.endswith(CPP_SUFFIXES)]
-    program = Program(prefixes=prefixes)
+    program = Program()
     for file in files:
         program.add_root(program.top_folder(file))
+    failed: list[Gap] = []
     with without_collector():
-        runs = [(run, origin) for file in files for run, origin in _runs(program, file)]
+        runs: list[tuple[Run, LaunchKey]] = []
+        for file in files:
+            runs.extend(_attempted(partial(_runs, program, file), file, failed))
         called = {node for run, _ in runs for node in run.called}
         instantiated = {node for run, _ in runs for node in run.instantiated}
         for run, _ in runs:
             analyse_rest(run, called, instantiated)
-        everywhere = {node for run, _ in runs for node in run.called}
+        everywhere = {node for run, _ in runs for node in run.entries}
         instantiated.update(node for run, _ in runs for node in run.instantiated)
-        unsettled = [gap for run, _ in runs for gap in unsettled_places(run, everywhere, instantiated)]
-        nodes = [node for run, origin in runs for node in interfaces_of(run.findings, origin)]
-    gaps = [Gap(source, why) for run, _ in runs for source, why in run.findings.gaps]
+        unsettled: list[Gap] = []
+        nodes: list[NodeInterface] = []
+        for run, origin in runs:
+            nodes.extend(_attempted(partial(interfaces_of, run.findings, origin), run.main.path, failed))
+            settle = partial(unsettled_places, run, everywhere, instantiated)
+            unsettled.extend(_attempted(settle, run.main.path, failed))
+    gaps = [*failed, *(Gap(source, why) for run, _ in runs for source, why in run.findings.gaps)]
     cpp_nodes, cpp_gaps = _cpp([file for file in found if file not in files])
     # One may be found through several files of a program.
     distinct = tuple(dict.fromkeys([*nodes, *cpp_nodes]))
     return InferredSystem(distinct, (*dict.fromkeys([*gaps, *unsettled]), *cpp_gaps), tuple(found))
+
+
+def _attempted(analyse: Callable[[], Iterable[Found]], file: str, failed: list[Gap]) -> list[Found]:
+    """What ``analyse`` finds in a program; nothing, and a gap in ``failed``, where we fail at it."""
+    try:
+        return list(analyse())
+    except Exception as error:
+        failed.append(Gap(SourceRef(file), failure(error)))
+        return []
 
 
 def _cpp(files: list[str]) -> tuple[list[NodeInterface], list[Gap]]:

@@ -8,8 +8,8 @@ common prefix and suffix around a hole; a text that is only a hole says no more 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
-from enclave_launch.boundary.light import NamedTuple
 from nodl.name_template import EDITS, Edit
 
 MAX_PARTS = 24
@@ -98,6 +98,9 @@ def text_of(pieces: Iterable[Piece]) -> TextAtom:
         if not (type(piece) is Hole and type(last) is Hole):
             merged.append(piece)
             last = piece
+    for index, piece in enumerate(merged):
+        if type(piece) is Input and _is_one_of_several(piece) and piece in merged[:index]:
+            merged[index] = Hole("which parts go together")
     if not merged:
         return ""
     if len(merged) == 1 and isinstance(merged[0], str):
@@ -105,6 +108,11 @@ def text_of(pieces: Iterable[Piece]) -> TextAtom:
     if len(merged) > MAX_PARTS:
         merged = [merged[0], Hole("a very long text"), merged[-1]]
     return make_text(tuple(merged))
+
+
+def _is_one_of_several(piece: Input) -> bool:
+    """Whether it stands for several texts: an element of a list, a part of a text that is split, a number."""
+    return piece.item == "each" or any(method in ("split", "range", "key") for method, _ in piece.edits)
 
 
 def pieces_of(text: TextAtom) -> tuple[Piece, ...]:
@@ -119,7 +127,11 @@ def concatenate(left: TextAtom, right: TextAtom) -> TextAtom:
     if not left or not right:
         return left or right
     head, tail = pieces_of(left), pieces_of(right)
-    melts = len(head) + len(tail) > MAX_PARTS or type(head[-1]) is type(tail[0])
+    melts = (
+        any(type(piece) is Input and piece in head for piece in tail)
+        or len(head) + len(tail) > MAX_PARTS
+        or type(head[-1]) is type(tail[0])
+    )
     if melts or _is_long(left) or _is_long(right):
         return text_of((*head, *tail))
     return make_text((*head, *tail))
@@ -130,7 +142,16 @@ def _is_long(text: TextAtom) -> bool:
 
 
 def concatenations(operands: Sequence[Sequence[TextAtom]]) -> list[TextAtom]:
-    """All texts made of one alternative of each operand; a pattern when there are too many."""
+    """All texts made of one alternative of each operand.
+
+    Where two have alternatives, nobody knows which of them go together: but for the first these become a pattern.
+    """
+    several = [index for index, alternatives in enumerate(operands) if len(alternatives) > 1]
+    if len(several) > 1:
+        operands = [
+            [common_text(each, "which texts go together")] if index in several[1:] else each
+            for index, each in enumerate(operands)
+        ]
     if all(len(alternatives) == 1 for alternatives in operands):
         return [text_of(piece for texts in operands for piece in pieces_of(texts[0]))]
     results: list[TextAtom] = [""]

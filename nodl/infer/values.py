@@ -9,10 +9,9 @@ Heap objects keep their contents in ``cells``; only ``state.State`` writes there
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, TypeAlias
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
-from enclave_launch.boundary.light import NamedTuple
 from nodl.infer.text import Text, common_text
 
 if TYPE_CHECKING:
@@ -245,29 +244,10 @@ class FunctionValue:
         self.shared = False  # it stands for several, made at the same place
 
 
-class NativeObject:
-    """A real object of Python's library: a match, a path, an iterator.
-
-    One that changes (``forks``: how many undecided branches were around when it was made) is ``lost`` once it is used
-    where branches may be undone. ``sources`` went into it; ``fallback`` gives what it may yield after all.
-    """
-
-    __slots__ = ("fallback", "forks", "given", "lost", "object", "place", "sources")
-
-    def __init__(self, found: object, forks: int, sources: tuple[Value, ...] = ()):
-        self.object = found
-        self.forks = forks
-        self.lost = False
-        self.sources = sources
-        self.fallback: Callable[[], Value] | None = None
-        self.given: Cells = {}  # of a generator of the program: its arguments, and the call that made it
-        self.place: object = None
-
-
 class ClassValue(HeapObject):
     """An analysed class, whose cells hold what its body and later assignments set."""
 
-    __slots__ = ("bases", "fields", "hooked", "linear", "module", "name", "node")
+    __slots__ = ("bases", "fields", "linear", "module", "name", "node")
 
     def __init__(self, node: ast.ClassDef, name: str, module: ModuleValue, bases: Value):
         super().__init__()
@@ -277,7 +257,6 @@ class ClassValue(HeapObject):
         self.bases = bases
         self.linear: tuple[object, ...] | None = None  # method resolution order, made on first use
         self.fields: list[tuple[str, Value | None]] | None = None  # of a dataclass
-        self.hooked = True  # it, or one of its bases, may define what reading or setting an attribute does
 
 
 class Instance(HeapObject):
@@ -292,9 +271,21 @@ class Instance(HeapObject):
         self.node: NodeRecord | None = None
 
 
+class GeneratorValue(HeapObject):
+    """A call of a generator of the program: its cells are the arguments, its body runs when it is iterated over."""
+
+    __slots__ = ("function", "node")
+
+    def __init__(self, function: FunctionValue, node: ast.AST):
+        super().__init__()
+        self.function = function
+        self.node = node  # the call
+
+
 # Equal only to themselves, or strings: ``in`` then says the same as comparing one by one, and faster.
 _COMPARED_IN_C = frozenset({
-    str, Text, External, Instance, Sequence, Dictionary, FunctionValue, ClassValue, ModuleValue, NativeObject,
+    str, Text, External, Instance, Sequence, Dictionary, FunctionValue, ClassValue, ModuleValue,
+    GeneratorValue,
 })  # fmt: skip
 
 

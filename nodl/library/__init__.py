@@ -8,14 +8,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import NamedTuple
 
-from enclave_launch.boundary.light import TYPE_CHECKING, NamedTuple
 from nodl.errors import NoDLError
+from nodl.library.document import LibraryDocument, read_library_document
 from nodl.library.index import IndexEntry, read_index, scanned
 from nodl.node_interface import NodeInterface
-
-if TYPE_CHECKING:
-    from nodl.library.document import LibraryDocument
 
 SHIPPED = os.path.join(os.path.dirname(os.path.abspath(__file__)), "documents")
 
@@ -113,8 +111,6 @@ class Library:
 
     def _document(self, folder: str, file: str) -> LibraryDocument:
         if (folder, file) not in self._documents:
-            from nodl.library.document import read_library_document  # with the reader of NoDL documents
-
             self._documents[folder, file] = read_library_document(folder, file)
         return self._documents[folder, file]
 

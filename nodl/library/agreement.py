@@ -9,10 +9,9 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
-if TYPE_CHECKING:
-    from nodl.library.check import LibraryVerdict
+from nodl.library.check import LibraryVerdict
 
 FILE = "agreement.json"
 

@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 import os
+from typing import Any, NamedTuple
 
-from enclave_launch.boundary.light import Any, NamedTuple
 from nodl.document import read_root
 from nodl.document.v2 import parse_root
 from nodl.document.v2_section import plain, section_of
-from nodl.library.index import stem_of
 from nodl.node_interface import NodeInterface
+
+SUFFIX = ".nodl.yaml"
+
+
+def stem_of(file: str) -> str:
+    """``PACKAGE/NAME`` of a file of a library: ``PACKAGE/NAME.nodl.yaml``, or ``PACKAGE__NAME.nodl.yaml``."""
+    name = file.removesuffix(SUFFIX)
+    return name if "/" in name else name.replace("__", "/", 1)
 
 
 class Evidence(NamedTuple):

@@ -6,17 +6,15 @@ The index of the library that ships with us is ``index.json`` beside the documen
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Iterator
+from typing import NamedTuple
 
-from enclave_launch.boundary.light import TYPE_CHECKING, NamedTuple
 from nodl.errors import NoDLError
-
-if TYPE_CHECKING:
-    from nodl.library.document import LibraryDocument
+from nodl.library.document import SUFFIX, LibraryDocument, read_library_document, stem_of
 
 INDEX = "index.json"
-SUFFIX = ".nodl.yaml"
 
 
 class IndexEntry(NamedTuple):
@@ -37,17 +35,9 @@ class IndexEntry(NamedTuple):
         return stem_of(self.file)
 
 
-def stem_of(file: str) -> str:
-    """``PACKAGE/NAME`` of a file of a library: ``PACKAGE/NAME.nodl.yaml``, or ``PACKAGE__NAME.nodl.yaml``."""
-    name = file.removesuffix(SUFFIX)
-    return name if "/" in name else name.replace("__", "/", 1)
-
-
 def read_index(folder: str) -> tuple[IndexEntry, ...]:
     """What the index file of a library folder lists. Raises ``OSError``, ``ValueError`` for JSON that does
     not parse."""
-    import json
-
     with open(os.path.join(folder, INDEX), encoding="utf-8") as stream:
         listed = json.load(stream)
     return tuple(
@@ -65,8 +55,6 @@ def read_index(folder: str) -> tuple[IndexEntry, ...]:
 def scanned(folder: str) -> tuple[IndexEntry, ...]:
     """The entries of all documents below ``folder``. Raises ``InvalidNoDLError`` for a broken one, ``NoDLError`` for
     one that would never be found."""
-    from nodl.library.document import read_library_document  # most lookups end at the index
-
     found = {file: read_library_document(folder, file) for file in _files(folder)}
     for file, document in found.items():
         if "/" not in document.stem and not document.recorded:  # a program without a package can be recorded
@@ -76,8 +64,6 @@ def scanned(folder: str) -> tuple[IndexEntry, ...]:
 
 def index_text(folder: str) -> str:
     """What the index of ``folder`` must say."""
-    import json
-
     fields = ("programs", "classes", "versions", "transport")
     entries = {
         entry.file: {name: getattr(entry, name) for name in fields if getattr(entry, name)}

@@ -11,6 +11,9 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+import yaml
+
+from enclave_common.yaml_reader import load_yaml
 from nodl.document.v2_schema import NAME_PATTERN
 from nodl.document.v2_section import CATEGORIES, IDENTITY_KEY
 from nodl.node_interface import ClientLibrary
@@ -30,9 +33,7 @@ OBSERVED_HEAD = (
 def manifest_text(node: LearntNode, before: str = "", head: str = _HEAD) -> str:
     """The document of ``node``; ``before`` is the text that stands there, ``head`` says where it is from. Raises
     ``yaml.YAMLError`` for a text that is not YAML."""
-    import yaml
-
-    old = yaml.safe_load(before) if before.strip() else None
+    old = load_yaml(before) if before.strip() else None
     document = _united(_document(node), old if isinstance(old, dict) else {})
     dumper = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
     notes = "".join(f"# {_line(text)}\n" for text in (*node.incomplete, *node.notes))

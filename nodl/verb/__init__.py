@@ -12,17 +12,18 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from enclave_launch.boundary.command_line import (
+from enclave_common.command_line import (
     TEXTS,
     CommandParser,
     Option,
+    add_absent_verb,
     add_options,
     add_verbosity,
     add_version,
     complete,
     guarded,
 )
-from enclave_launch.boundary.terminal import printable, safe_output
+from enclave_common.terminal import printable, safe_output
 from nodl.errors import NoDLError
 
 VERBS = ("check_record", "convert", "infer", "library", "observe", "show", "validate")
@@ -64,7 +65,12 @@ def build_parser() -> argparse.ArgumentParser:
     add_version(parser)
     verbs = parser.add_subparsers(dest="verb", title="verbs", required=True, metavar="VERB")
     for name in VERBS:
-        import_module(f"nodl.verb.{name}").add_parser(verbs)
+        try:
+            verb = import_module(f"nodl.verb.{name}")
+        except ModuleNotFoundError as error:
+            add_absent_verb(verbs, name.replace("_", "-"), error)
+            continue
+        verb.add_parser(verbs)
     add_verbosity(parser)
     return parser
 

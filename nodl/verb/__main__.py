@@ -2,6 +2,6 @@
 
 import sys
 
-from nodl.verb import main
+from enclave_common.entry import secure_nodl
 
-sys.exit(main())
+sys.exit(secure_nodl())

@@ -8,21 +8,22 @@ import sys
 from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
-from enclave_launch.boundary.command_line import PATH, PATHS, Option, one_of
+from enclave_common.command_line import PATH, PATHS, Option, one_of
 from nodl.ament_index import search_prefixes
 from nodl.dependence import Situation
+from nodl.dependence.apply import applied, own_name
+from nodl.infer.cpp.reach import SourcesInReach
+from nodl.infer.executable import infer_executable
 from nodl.library import Library, LibraryDocuments
 from nodl.lookup import ManifestLookup
 from nodl.names import split_fqn
+from nodl.node_interface import NodeInterface
+from nodl.record.asked import AskedNode, all_asked
+from nodl.record.assembly import read_record
+from nodl.record.checking import Comparison, compare
 from nodl.verb import PREFIX, add_verb
-
-if TYPE_CHECKING:
-    from nodl.infer.cpp.reach import SourcesInReach
-    from nodl.node_interface import NodeInterface
-    from nodl.record.asked import AskedNode
-    from nodl.record.checking import Comparison
 
 _MOST_NODES = 32  # of one program: descriptions may refer to each other
 JUDGED = ("manifest", "inference", "library")
@@ -80,9 +81,6 @@ def _files(paths: Iterable[Path]) -> list[Path]:
 
 
 def _recorded(files: Iterable[Path]) -> tuple[list[AskedNode], list[str]]:
-    from nodl.record.asked import all_asked
-    from nodl.record.assembly import read_record
-
     nodes: list[AskedNode] = []
     complaints: list[str] = []
     for file in files:
@@ -105,8 +103,6 @@ class _Known(NamedTuple):
 
 
 def _judge(node: AskedNode, known: _Known, judges: Iterable[str]) -> Iterable[Judgement]:
-    from nodl.record.checking import compare
-
     for judge in judges:
         interfaces, why = _SAYS[judge](node, known)
         described = _at_this_start(node, interfaces)
@@ -119,8 +115,6 @@ def _described(node: AskedNode, known: _Known) -> tuple[Sequence[NodeInterface],
 
 
 def _inferred(node: AskedNode, known: _Known) -> tuple[Sequence[NodeInterface], str]:
-    from nodl.infer.executable import infer_executable
-
     inferred = infer_executable(
         node.package,
         node.executable or None,
@@ -150,8 +144,6 @@ class _RecordedStart(NamedTuple):
 
 @lru_cache(maxsize=4)
 def _sources(prefixes: tuple[str, ...], folders: tuple[str, ...]) -> SourcesInReach:
-    from nodl.infer.cpp.reach import SourcesInReach
-
     return SourcesInReach(prefixes, folders)
 
 
@@ -163,8 +155,6 @@ def _of_library(node: AskedNode, known: _Known) -> tuple[Sequence[NodeInterface]
 def _at_this_start(node: AskedNode, interfaces: Iterable[NodeInterface]) -> list[NodeInterface]:
     """Descriptions that depend on parameters and words, as they are with those that the launch gave; with the further
     nodes that they bring."""
-    from nodl.dependence.apply import applied, own_name
-
     namespace, name = split_fqn(node.fqn)
     situation = Situation(node.distro, name, namespace, node.parameters, node.arguments)
     documents = LibraryDocuments(Library(), node.distro)

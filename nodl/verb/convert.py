@@ -8,11 +8,12 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from enclave_launch.boundary.command_line import PATH, Option
+from enclave_common.command_line import PATH, Option
 from nodl.ament_index import search_prefixes
-from nodl.document import ManifestNode, read_document
+from nodl.document import read_document
 from nodl.document.write import Written, v1_xml, v2_yaml
 from nodl.errors import NoDLError
+from nodl.node_interface import ManifestNode
 from nodl.verb import PREFIX, add_verb
 
 OPTIONS: tuple[Option, ...] = (

@@ -7,21 +7,22 @@ import os
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from enclave_launch.boundary.command_line import FLAG, PATH, Option
-from enclave_launch.boundary.terminal import printable
-from enclave_launch.boundary.words import counted
+from enclave_common.command_line import FLAG, PATH, Option
+from enclave_common.terminal import printable
+from enclave_common.words import counted
 from nodl.ament_index import PackageNotFoundError, executables, package_prefix, search_prefixes
+from nodl.infer.executable import infer_executable
+from nodl.infer.report import written
+from nodl.infer.report.comparison import lacking, to_text
+from nodl.infer.report.expanded import ExpandedSystem, expand
+from nodl.infer.report.nodl_report import to_v1
+from nodl.infer.report.v2_report import open_questions, to_v2
+from nodl.infer.system import InferredSystem, infer_paths
 from nodl.lookup import ManifestLookup
-from nodl.node_interface import Gap
+from nodl.node_interface import Gap, NodeInterface
 from nodl.source_ref import SourceRef
 from nodl.verb import PREFIX, add_verb, encodable, write_documents
-
-if TYPE_CHECKING:
-    from nodl.infer.report.expanded import ExpandedSystem
-    from nodl.infer.system import InferredSystem
-    from nodl.node_interface import NodeInterface
 
 OPTIONS: tuple[Option, ...] = (
     ("subjects PACKAGE|PATH", {"nargs": "+"}, "an installed package, or files and folders"),
@@ -51,7 +52,6 @@ def run(args: argparse.Namespace) -> int:
         return 2
     if args.compare:
         return _compare(system, search_prefixes(args.prefix))
-    from nodl.infer.report.expanded import expand
 
     expanded = expand(system)
     chosen = args.format or ("v2" if args.output else "text")
@@ -84,8 +84,6 @@ def _tell_guesses(system: InferredSystem) -> None:
 
 def _compare(system: InferredSystem, prefixes: Sequence[str]) -> int:
     """Each program of ``system`` beside its manifest. 1: a manifest lacks something, or none was found."""
-    from nodl.infer.report.comparison import lacking, to_text
-
     lookup = ManifestLookup(prefixes)
     programs: dict[tuple[str, str | None, str | None], list[NodeInterface]] = {}
     for node in system.nodes:
@@ -108,8 +106,6 @@ def _compare(system: InferredSystem, prefixes: Sequence[str]) -> int:
 def _documents(
     chosen: str, system: InferredSystem, expanded: ExpandedSystem, args: argparse.Namespace
 ) -> dict[str, str]:
-    from nodl.infer.report import written
-
     if chosen == "json":
         return {"inferred.json": written.to_json(expanded, built_in=args.builtin)}
     if chosen == "policy":
@@ -118,16 +114,12 @@ def _documents(
         text = written.to_text(expanded, built_in=args.builtin)
         here = os.path.join(os.getcwd(), "")
         return {"inferred.txt": text.replace(here, "")}  # as a person would name the files
-    from nodl.infer.report.nodl_report import to_v1
-    from nodl.infer.report.v2_report import to_v2
 
     return to_v1(system) if chosen == "v1" else to_v2(_writable(system, args.with_gaps))
 
 
 def _writable(system: InferredSystem, with_gaps: bool) -> list[NodeInterface]:
     """The nodes that documents are written of; those with open questions only when that is asked for."""
-    from nodl.infer.report.v2_report import open_questions
-
     kept = []
     for node in system.nodes:
         questions = open_questions(node)
@@ -142,10 +134,8 @@ def _writable(system: InferredSystem, with_gaps: bool) -> list[NodeInterface]:
 
 def _infer(subjects: list[str], prefixes: Sequence[str]) -> InferredSystem:
     """Paths together, so that they find each other's modules; packages by their executables."""
-    from nodl.infer.system import InferredSystem, infer_paths
-
     paths = [subject for subject in subjects if os.path.exists(subject)]
-    found = [infer_paths(paths, prefixes)] if paths else []
+    found = [infer_paths(paths)] if paths else []
     found.extend(_infer_package(subject, prefixes) for subject in subjects if subject not in paths)
     return InferredSystem(
         tuple(node for each in found for node in each.nodes),
@@ -155,9 +145,6 @@ def _infer(subjects: list[str], prefixes: Sequence[str]) -> InferredSystem:
 
 
 def _infer_package(package: str, prefixes: Sequence[str]) -> InferredSystem:
-    from nodl.infer.executable import infer_executable
-    from nodl.infer.system import InferredSystem
-
     try:
         folder = Path(package_prefix(package, prefixes), "lib", package)
     except ValueError:

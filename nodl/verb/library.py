@@ -6,10 +6,12 @@ import argparse
 import sys
 from collections.abc import Iterable, Iterator
 
-from enclave_launch.boundary.command_line import FLAG, TEXT, TEXTS, Option
-from enclave_launch.boundary.terminal import printable
+from enclave_common.command_line import FLAG, TEXT, TEXTS, Option
+from enclave_common.terminal import printable
 from nodl.ament_index import package_version, search_prefixes
 from nodl.library import SHIPPED, Hit, Library
+from nodl.library.agreement import keep_agreements, read_agreements
+from nodl.library.contents import contents_text
 from nodl.library.document import LibraryDocument
 from nodl.library.index import write_index
 from nodl.verb import PREFIX, add_verb
@@ -106,7 +108,7 @@ def _evidence(document: LibraryDocument) -> Iterable[str]:
 
 
 def _check(arguments: argparse.Namespace) -> int:
-    from nodl.library.check import check
+    from nodl.library.check import check  # an add-on: inference
 
     verdicts = check(Library(arguments.library), arguments.sources)
     for verdict in verdicts:
@@ -115,17 +117,12 @@ def _check(arguments: argparse.Namespace) -> int:
         print(f"no package of the library is in {arguments.sources}", file=sys.stderr)
         return 1
     if arguments.keep:
-        from nodl.library.agreement import keep_agreements
-
         compared = (verdict for verdict in verdicts if not verdict.of_other_version)
         keep_agreements(SHIPPED, compared, (each.stem for each in Library().documents()))
     return 1 if any(verdict.is_wrong for verdict in verdicts) else 0
 
 
 def _table(arguments: argparse.Namespace) -> int:
-    from nodl.library.agreement import read_agreements
-    from nodl.library.contents import contents_text
-
     print(contents_text(Library().documents(), read_agreements(SHIPPED)), end="")
     return 0
 

@@ -15,19 +15,26 @@ import socket
 import subprocess
 import sys
 from collections.abc import Sequence
+from datetime import datetime, timezone
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from enclave_launch.boundary.command_line import FLAG, PATH, TEXT, Option, add_options, one_of
-from enclave_launch.boundary.environment import domain_id
-from enclave_launch.boundary.terminal import json_text, printable
+from enclave_common.command_line import FLAG, PATH, TEXT, Option, add_options, one_of
+from enclave_common.environment import domain_id
+from enclave_common.terminal import json_text, printable
+from enclave_common.words import counted
 from nodl.errors import NoDLError
+from nodl.graph.json_form import graph_document
+from nodl.graph.model import Graph
+from nodl.graph.observation import Observed, command_lines, observed_text, read_observed
+from nodl.graph.observing import Quiet, Where, look_until, observer
+from nodl.graph.policy import observed_policy
+from nodl.graph.sources import learn_observed
+from nodl.graph.starts import StartedNode, starts_of_plan
+from nodl.graph.text import graph_text
+from nodl.record.lines import RecordedRun
+from nodl.record.manifest import OBSERVED_HEAD, manifest_file_name, manifest_text
 from nodl.verb import add_verb, write_documents
-
-if TYPE_CHECKING:
-    from nodl.graph.model import Graph
-    from nodl.graph.observation import Observed
-    from nodl.graph.starts import StartedNode
 
 _HIGHEST_DOMAIN = 232  # beyond, there are no ports (DDS-RTPS 9.6.1)
 _SECONDS = re.compile(r"([0-9]+(?:\.[0-9]+)?)(s|m|h)?\Z")
@@ -95,8 +102,6 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 def run(arguments: argparse.Namespace) -> int:
     """Print what was seen. Returns 1 when nothing was, 2 for wrong usage."""
-    from nodl.graph.observation import observed_text, read_observed
-
     if arguments.merge_only and not arguments.runs:
         print("secure-nodl observe: --merge-only needs observations to merge", file=sys.stderr)
         return 2
@@ -119,11 +124,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _observe(arguments: argparse.Namespace, starts: tuple[StartedNode, ...]) -> Observed:
-    from datetime import datetime, timezone
-
-    from nodl.graph.observation import Observed, command_lines
-    from nodl.graph.observing import Quiet, Where, look_until, observer
-    from nodl.record.lines import RecordedRun
 
     directory = _enclave_directory(arguments)
     where = Where(_domain_id(arguments), arguments.source, directory)
@@ -149,10 +149,6 @@ def _observe(arguments: argparse.Namespace, starts: tuple[StartedNode, ...]) -> 
 
 
 def _documents(chosen: str, runs: Sequence[Observed], folder: Path | None) -> dict[str, str]:
-    from nodl.graph.json_form import graph_document
-    from nodl.graph.policy import observed_policy
-    from nodl.graph.text import graph_text
-
     if chosen == "v2":
         return _manifests(runs, folder)
     if chosen == "policy":
@@ -164,9 +160,6 @@ def _documents(chosen: str, runs: Sequence[Observed], folder: Path | None) -> di
 
 
 def _manifests(runs: Sequence[Observed], folder: Path | None) -> dict[str, str]:
-    from nodl.graph.sources import learn_observed
-    from nodl.record.manifest import OBSERVED_HEAD, manifest_file_name, manifest_text
-
     found = learn_observed(runs)
     documents: dict[str, str] = {}
     for node in found.learnt.nodes:
@@ -186,8 +179,6 @@ def _manifests(runs: Sequence[Observed], folder: Path | None) -> dict[str, str]:
 
 def _starts(words: Sequence[str]) -> tuple[StartedNode, ...]:
     """Raises ``NoDLError`` for what is not a plan, and with what the dry run says of a launch file."""
-    from nodl.graph.starts import starts_of_plan
-
     if not words:
         return ()
     try:
@@ -234,9 +225,11 @@ def _nothing_seen(runs: Sequence[Observed]) -> str:
     others = sum(len(each.graph.processes) for each in runs)
     if others:
         return (
-            f"{others} participants were, but not what they have: is the system secured? Then give --keystore and "
-            "--enclave, of an enclave of the same keystore"
+            f"{counted(others, 'participant')} discovered, but nothing of what they have: set "
+            "ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST if they use the loopback interface only; if the system is "
+            "secured, give --keystore and --enclave, of an enclave of the same keystore"
         )
     return (
-        "is it the right domain (--domain-id), and does discovery reach it (ROS_AUTOMATIC_DISCOVERY_RANGE)?"
+        "if nodes run in this domain (--domain-id), set ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST if they use the "
+        "loopback interface only (as the demo does), else ROS_STATIC_PEERS or CYCLONEDDS_URI as they have it"
     )

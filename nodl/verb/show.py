@@ -7,8 +7,8 @@ import os
 import sys
 from collections.abc import Iterable, Iterator
 
-from enclave_launch.boundary.command_line import TEXT, Option, one_of
-from enclave_launch.boundary.terminal import json_text, printable
+from enclave_common.command_line import TEXT, Option, one_of
+from enclave_common.terminal import json_text, printable
 from nodl.ament_index import search_prefixes
 from nodl.document import read_document
 from nodl.lookup import ManifestLookup

@@ -6,8 +6,8 @@ import argparse
 import sys
 from pathlib import Path
 
-from enclave_launch.boundary.command_line import Option
-from enclave_launch.boundary.terminal import printable
+from enclave_common.command_line import Option
+from enclave_common.terminal import printable
 from nodl.ament_index import search_prefixes
 from nodl.document import V1_SUFFIX, read_document
 from nodl.errors import NoDLError

@@ -79,7 +79,7 @@ def test_check_leaves_plan_sarif_and_report(repository: Path) -> None:
     assert json.loads(Path(ran.outputs["plan"]).read_text())["version"] == 1
     assert json.loads(Path(ran.outputs["sarif"]).read_text())["version"] == "2.1.0"
     assert "<!DOCTYPE html>" in Path(ran.outputs["report"]).read_text()
-    assert "[enclave-shared]" in ran.summary and set(ran.outputs) == {"plan", "sarif", "report"}
+    assert "1 enclave-shared" in ran.summary and set(ran.outputs) == {"plan", "sarif", "report"}
     assert set(ran.outputs) | {"rights-grew"} == set(ACTION["outputs"])
 
 

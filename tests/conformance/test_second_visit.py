@@ -12,9 +12,9 @@ from pathlib import Path
 import pytest
 
 from enclave_launch.evaluation.evaluate import EvaluationError, evaluate, parse_arguments
-from enclave_launch.host.outcomes import Outcomes
 from enclave_launch.host.plan_host import PlanHost
 from enclave_launch.host.protocol import HostOptions
+from enclave_launch.host.user_code_results import RecordedResults
 from enclave_launch.process import Evaluation
 
 from . import case_files
@@ -37,8 +37,8 @@ def prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-def visited(main: Path, case: Case, outcomes: Outcomes) -> tuple[Evaluation, str]:
-    host = PlanHost(HostOptions("rolling", anonymous_seed=1), outcomes=outcomes)
+def visited(main: Path, case: Case, user_code_results: RecordedResults) -> tuple[Evaluation, str]:
+    host = PlanHost(HostOptions("rolling", anonymous_seed=1), user_code_results=user_code_results)
     try:
         return evaluate(main, parse_arguments(case.arguments), host=host), ""
     except EvaluationError as error:
@@ -55,11 +55,11 @@ def test_a_second_visit_gives_the_same(
     for name, value in variables.items():
         monkeypatch.setenv(name, value)
     monkeypatch.chdir(tmp_path)
-    outcomes = Outcomes()
+    user_code_results = RecordedResults()
     before = dict(os.environ)
-    first = visited(main, case, outcomes)
-    assert outcomes.rewind()
-    second = visited(main, case, outcomes)
+    first = visited(main, case, user_code_results)
+    assert user_code_results.rewind()
+    second = visited(main, case, user_code_results)
     assert second[1] == first[1]
     assert second[0].processes == first[0].processes
     assert second[0].components == first[0].components

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.deployment.kit import TALK, export, launch_file, provisioned
+from enclave_launch.verb.secure_plan import main
+from tests.deployment.kit import DEMO_WS, TALK, export, launch_file, provisioned
 
 ENGINES = ("systemd", "compose", "kubernetes")
 
@@ -110,7 +111,7 @@ def test_an_enclave_that_is_not_provisioned_is_not_exported(
     ks = provisioned(launch, tmp_path / "ks")
     launch.write_text(TALK.replace('name="ear"', 'name="other"'))
     assert export("systemd", launch, ks, tmp_path / "out") == 1
-    assert "enclave /other is not complete" in capsys.readouterr().err
+    assert "has no enclave /other; it has /ear, /front/speaker" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -142,3 +143,14 @@ def test_processes_on_zenoh_are_refused_since_nothing_would_lead_them_to_a_route
     assert export(engine, launch, ks, tmp_path / "out", "--accept-unexpressed") == 1
     assert "on Zenoh (rmw_zenoh_cpp): without a router" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+def test_a_keystore_of_another_enclave_scope_is_named_as_that(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    launch = launch_file(tmp_path)
+    keystore = provisioned(launch, tmp_path / "ks")  # an enclave for each node
+    words = ("--format", "systemd", "--keystore", str(keystore), "-o", str(tmp_path / "out"))
+    assert main(["export", *words, "--prefix", str(DEMO_WS), "--enclave-scope", "launch", str(launch)]) == 1
+    told = capsys.readouterr().err
+    assert "has no enclave /; it has /ear, /front/speaker" in told and "--enclave-scope" in told

@@ -251,18 +251,54 @@ def test_two_ends_whose_quality_does_not_meet_are_found_and_those_that_meet_are_
     assert len(told(Quality(ownership="EXCLUSIVE"), Quality())) == 1
 
 
-def test_what_is_accepted_and_what_shows_nothing_is_no_alarm() -> None:
+def test_what_is_accepted_is_no_finding_and_a_participant_without_endpoints_of_its_own_is_a_note() -> None:
     made = Made()
     running(TALKER, made)
     guid = made.participant(90)
     made.listed(guid, made.node(guid, "/_ros2cli_7", *topic("/chatter", writes=False)))
-    made.participant(91)
+    observer = made.participant(91)
+    made.node(observer, "", "reader ros_discovery_info rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_")
     assert {each.kind for each in found(TALKER, made.graph())} == {
         Kind.UNPLANNED_NODE,
         Kind.UNPLANNED_PROCESS,
     }
-    (observer,) = found(TALKER, made.graph(), accepted=("/_ros2cli*",))
-    assert (observer.kind, observer.level) == (Kind.UNPLANNED_PROCESS, Level.NOTE)
+    (note,) = found(TALKER, made.graph(), accepted=("/_ros2cli*",))
+    assert (note.kind, note.level) == (Kind.UNPLANNED_PROCESS, Level.NOTE)
+
+
+def test_an_unknown_participant_of_which_nothing_is_seen_is_an_alarm() -> None:
+    made = Made()
+    running(TALKER, made)
+    made.participant(91)
+    (finding,) = found(TALKER, made.graph())
+    assert (finding.kind, finding.level) == (Kind.UNPLANNED_PROCESS, Level.ALARM)
+    assert "sees none of its endpoints" in finding.text
+
+
+def test_what_the_observer_cannot_see_is_neither_missing_nor_as_planned() -> None:
+    made = Made()
+    (empty,) = found(TALKER, made.graph())
+    assert (empty.kind, empty.level) == (Kind.OUT_OF_SIGHT, Level.CANNOT_TELL)
+    assert "no participant was discovered" in empty.text
+    assert "ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST" in empty.remedy
+    made.participant(1)
+    findings = found(TALKER, made.graph())
+    assert [each.level for each in findings if each.kind is Kind.OUT_OF_SIGHT] == [Level.CANNOT_TELL]
+    assert Kind.MISSING_NODE not in {each.kind for each in findings}
+
+
+def test_an_observer_without_an_enclave_cannot_tell_about_a_secured_system() -> None:
+    made = Made()
+    made.participant(1, prefix=f"{HASH:012x}")
+    (finding,) = found(TALKER, made.graph(), security=SECURITY._replace(authenticated=False))
+    assert finding.kind is Kind.OUT_OF_SIGHT and "--enclave" in finding.remedy
+
+
+def test_an_observer_that_is_not_trusted_cannot_tell() -> None:
+    made = Made()
+    made.participant(1, prefix=f"{HASH:012x}")
+    (finding,) = found(TALKER, made.graph(), security=SECURITY)
+    assert finding.kind is Kind.OUT_OF_SIGHT and "not trusted" in finding.remedy
 
 
 def test_a_planned_node_in_a_process_that_the_launch_did_not_start_is_found() -> None:
@@ -385,3 +421,17 @@ def test_without_an_enclave_of_its_own_the_observer_judges_participants_only() -
     assert {each.kind for each in findings} >= {Kind.NOT_SECURED}
     assert Kind.MISSING_NODE not in {each.kind for each in findings}
     assert Kind.NOT_AUTHENTICATED not in {each.kind for each in findings}
+
+
+def test_an_enclave_that_is_made_while_somebody_watches_is_not_of_another_ca() -> None:
+    made = Made()
+    secured(made, 1, "/talker")
+    made.participant(9, prefix=f"{HASH + 7:012x}")
+    before = [each.kind for each in found(TALKER, made.graph(), security=SECURITY)]
+    assert Kind.OTHER_CA in before
+    expected, graph = expected_in([TALKER], 0), made.graph()
+    now = {**SECURITY.enclaves, HASH + 7: "/tools/observe"}
+    after = compare(expected, graph, Circumstances(SECURITY), lambda: now)
+    assert Kind.OTHER_CA not in {each.kind for each in after}
+    still = compare(expected, graph, Circumstances(SECURITY), lambda: {**SECURITY.enclaves})
+    assert Kind.OTHER_CA in {each.kind for each in still}

@@ -10,9 +10,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from enclave_launch.description.events.dispatch import HandlerTable, chain
 from enclave_launch.description.events.event import Event
 from enclave_launch.description.events.handlers import EventHandler
+from enclave_launch.description.events.queue import HandlerTable
+from enclave_launch.description.visit import chain
 from enclave_launch.host.environment import Environment, environment_untouched
 from enclave_launch.host.plan_host import VirtualLoop
 from enclave_launch.ros_rules.distro import Distro, Feature, Since, choose_release, release_of

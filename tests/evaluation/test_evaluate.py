@@ -73,15 +73,48 @@ def test_cyclic_includes_are_an_error(
         evaluate(folder / "a.launch.xml")
 
 
-def test_a_recursive_include_that_ends_is_fine(files: Callable[..., Path]) -> None:
+@pytest.mark.parametrize("path", ["$(dirname)", "$(env D)"])
+def test_a_recursive_include_that_ends_is_fine(
+    files: Callable[..., Path], monkeypatch: pytest.MonkeyPatch, path: str
+) -> None:
+    """The argument scan of launch can perform ``$(env D)``, and ``$(dirname)`` not."""
     folder = files(
-        a__launch__xml="""
+        a__launch__xml=f"""
             <arg name="n" default="3"/><executable cmd="$(var n)"/>
-            <include file="$(dirname)/a.launch.xml" if="$(eval '$(var n) > 0')">
+            <include file="{path}/a.launch.xml" if="$(eval '$(var n) > 0')">
               <arg name="n" value="$(eval '$(var n) - 1')"/></include>
         """
     )
+    monkeypatch.setenv("D", str(folder))
     assert [process.cmd[0] for process in evaluate(folder / "a.launch.xml").processes] == ["3", "2", "1", "0"]
+
+
+def test_a_description_in_memory_is_no_missing_file(launch_py: Any) -> None:
+    """Its location is a name only; beside it, a file that is missing is left out."""
+    found = launch_py(
+        """
+        from launch import LaunchDescriptionSource
+        inner = LaunchDescription([ExecuteProcess(cmd=["inner"])])
+        entities = [
+            IncludeLaunchDescription(LaunchDescriptionSource(inner)),
+            IncludeLaunchDescription("/missing/p/launch/p.launch.xml"),
+        ]
+        """,
+        allow_missing_packages=True,
+    )
+    assert [process.cmd for process in found.processes] == [("inner",)]
+    assert [str(warning.code) for warning in found.warnings] == ["include-left-out"]
+
+
+@pytest.mark.parametrize("simulated", [True, False])
+def test_a_timer_on_simulated_time_is_reported(launch_py: Any, simulated: bool) -> None:
+    found = launch_py(f"""
+        from launch_ros.actions import ROSTimer, SetUseSimTime
+        entities = [ROSTimer(period=2.0, actions=[ExecuteProcess(cmd=["later"])])]
+        entities += [SetUseSimTime(True)] if {simulated} else []
+    """)
+    assert [process.cmd for process in found.processes] == [("later",)]
+    assert [str(warning.code) for warning in found.warnings] == ["ros-timer-on-wall-time"] * simulated
 
 
 def test_our_own_process_is_left_as_it_was(launch_py: Any) -> None:

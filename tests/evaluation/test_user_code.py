@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from enclave_launch.host.moment import looked_at
+from enclave_launch.host.observed_state import observing
 from enclave_launch.host.user_code import only_acts
 
 _SEEN: list[int] = []
@@ -88,9 +88,9 @@ IGNORES: dict[str, Deed] = {
 
 
 def moment_of(deed: Deed, path: Path) -> Any:
-    with looked_at(None) as looks:
+    with observing(None) as looks:
         deed(path)
-    return looks.moment(None)
+    return looks.state(None)
 
 
 @pytest.mark.parametrize("there", [True, False], ids=["changed", "new"])
@@ -101,10 +101,10 @@ def test_a_moment_ends_with_what_was_looked_at(tmp_path: Path, deed: Deed, there
     if there:
         path.write_text("before")
     moment = moment_of(deed, path)
-    assert moment.holds(None)
+    assert moment.is_unchanged(None)
     path.unlink(missing_ok=True)
     path.write_text("something else")
-    assert not moment.holds(None)
+    assert not moment.is_unchanged(None)
 
 
 @pytest.mark.parametrize("deed", IGNORES.values(), ids=IGNORES)
@@ -113,13 +113,13 @@ def test_a_moment_goes_on_when_something_else_changes(tmp_path: Path, deed: Deed
     path.parent.mkdir()
     moment = moment_of(deed, path)
     path.write_text("new")
-    assert moment.holds(None)
+    assert moment.is_unchanged(None)
 
 
 def test_the_environment_counts(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     moment = moment_of(IGNORES["nothing"], tmp_path)
     monkeypatch.setenv("OF_THIS_MOMENT", "1")
-    assert not moment.holds(None)
+    assert not moment.is_unchanged(None)
 
 
 def _binds(path: Path) -> None:
@@ -157,7 +157,7 @@ def test_what_looked_at_something_that_changes_unseen_holds_for_no_other_moment(
 
 @pytest.mark.parametrize("deed", LEAVES_ONE.values(), ids=LEAVES_ONE)
 def test_what_can_be_looked_at_again_holds(deed: Deed, tmp_path: Path) -> None:
-    assert moment_of(deed, tmp_path / "path").holds(None)
+    assert moment_of(deed, tmp_path / "path").is_unchanged(None)
 
 
 def test_what_was_put_in_the_place_of_os_functions_is_gone_afterwards(tmp_path: Path) -> None:

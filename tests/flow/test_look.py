@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from enclave_launch.boundary.terminal import ProgressLine
+from enclave_common.terminal import ProgressLine
 from enclave_launch.diagnostics import Code, Diagnostic
 from enclave_launch.flow import resolve
 from enclave_launch.options import ResolveOptions

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -10,6 +12,8 @@ import pytest
 
 from enclave_launch import __version__
 
+DEMO_WS = Path(__file__).parents[2] / "fixtures/demo_ws"
+TALKER = ("--prefix", str(DEMO_WS), "demo_nodes", "talker_listener.launch.xml")
 COMMANDS = {
     "secure-launch": "enclave_launch",
     "secure-plan": "enclave_launch.verb.secure_plan",
@@ -135,3 +139,40 @@ def test_an_executable_that_is_guessed_from_a_node_name_is_told(tmp_path: Path) 
     made = run("secure-nodl", "infer", str(source), "-o", str(tmp_path / "out"))
     assert "which executable runs node chatterbox is not known" in made.stderr
     assert run("secure-nodl", "infer", "-q", str(source), "-o", str(tmp_path / "out")).stderr == ""
+
+
+WRITES = {
+    "secure-launch": ("--dry-run", "--format", "json", *TALKER),
+    "secure-plan": ("show", *TALKER),
+    "secure-nodl": ("library", "list"),
+}
+
+
+@pytest.mark.parametrize("command", WRITES)
+def test_a_full_disk_behind_the_output_is_one_line_and_a_failure(command: str) -> None:
+    words = [sys.executable, "-m", COMMANDS[command], *WRITES[command]]
+    with Path("/dev/full").open("w") as full:
+        ran = subprocess.run(words, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert ran.returncode == 1
+    assert "the output cannot be written: No space left on device" in ran.stderr
+    assert "Traceback" not in ran.stderr
+
+
+@pytest.mark.parametrize("command", WRITES)
+def test_a_closed_output_is_no_traceback(command: str) -> None:
+    words = shlex.join([sys.executable, "-m", COMMANDS[command], *WRITES[command]])
+    ran = subprocess.run(["/bin/sh", "-c", f"{words} >&-"], stderr=subprocess.PIPE, text=True, check=False)
+    assert (ran.returncode, ran.stderr) == (0, "")
+
+
+def test_ctrl_c_during_the_imports_is_one_line(tmp_path: Path) -> None:
+    (tmp_path / "yaml.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGINT)\n")
+    path = os.pathsep.join([str(tmp_path), str(Path(__file__).parents[2])])
+    ran = subprocess.run(
+        [sys.executable, "-m", "enclave_launch", "--help"],
+        env={**os.environ, "PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (ran.returncode, ran.stderr) == (130, "secure-launch: interrupted\n")

@@ -240,3 +240,38 @@ def test_a_plain_launch_asks_nobody_what_its_nodes_say(secure_launch: SecureLaun
     run = secure_launch(file)
     assert run.returncode == 0
     assert "process has finished cleanly" in run.stdout and "warning" not in run.stderr
+
+
+@pytest.mark.parametrize(("scope", "shared"), [((), True), (("--enclave-scope", "node"), False)])
+def test_a_secured_start_says_what_processes_gain_by_sharing_an_enclave(
+    scope: tuple[str, ...],
+    shared: bool,
+    secure_launch: SecureLaunch,
+    write: Callable[..., Path],
+    tmp_path: Path,
+) -> None:
+    file = write('<node pkg="demo_nodes" exec="talker"/><node pkg="demo_nodes" exec="listener"/>')
+    file.write_text(file.read_text().replace("</launch>", '<shutdown reason="enough"/></launch>'))
+    run = secure_launch("--secure", "--keystore", tmp_path / "ks", *scope, file)
+    gains = "/listener may also publish /chatter; /talker may also subscribe /chatter"
+    assert (f"enclave / is shared by 2 processes: {gains}" in run.stderr) is shared, run.stderr
+
+
+def test_provisioning_alone_makes_what_a_start_would_make_and_starts_nothing(
+    secure_launch: SecureLaunch, write: Callable[..., Path], tmp_path: Path
+) -> None:
+    file = write('<node pkg="demo_nodes" exec="talker"/><executable cmd="touch started"/>')
+    run = secure_launch("--secure", "--provision-only", "--keystore", tmp_path / "ks", file, cwd=tmp_path)
+    assert run.returncode == 0, run.stderr
+    assert (tmp_path / "ks/enclaves/permissions.p7s").is_file()
+    assert not (tmp_path / "started").exists() and "process started" not in run.stdout + run.stderr
+
+
+@pytest.mark.parametrize("words", [("--provision-only",), ("--secure", "--provision-only", "--dry-run")])
+def test_provisioning_alone_needs_secure_and_nothing_that_looks(
+    words: tuple[str, ...], secure_launch: SecureLaunch, write: Callable[..., Path], tmp_path: Path
+) -> None:
+    file = write('<node pkg="demo_nodes" exec="talker"/>')
+    run = secure_launch(*words, *(("--keystore", tmp_path / "ks") if "--secure" in words else ()), file)
+    assert run.returncode == 2 and "--provision-only" in run.stderr
+    assert not (tmp_path / "ks").exists()

@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 from enclave_launch.description.entity import Action
-from enclave_launch.description.markup.entity import Entity
+from enclave_launch.description.markup.entity import Entity, Parser
 from enclave_launch.description.markup.expose import action_parse_methods, expose_action, instantiate_action
-from enclave_launch.description.markup.parser import Parser
+from enclave_launch.description.markup.parser import Parser as FrontEnd
 from enclave_launch.description.markup.xml import Parser as XmlParser
 from enclave_launch.frontend.error_location import location_of
 
@@ -121,5 +121,5 @@ def test_two_methods_for_one_name_are_refused() -> None:
 
 
 def test_loading_all_extensions_registers_every_element() -> None:
-    Parser.load_launch_extensions()
+    FrontEnd.load_launch_extensions()
     assert {"arg", "group", "include", "node", "node_container", "timer"} <= set(action_parse_methods)

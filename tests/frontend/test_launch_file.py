@@ -4,19 +4,11 @@ from __future__ import annotations
 
 import io
 import os
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from enclave_launch.frontend import launch_file
-
-
-@pytest.fixture(autouse=True)
-def nothing_kept() -> Iterator[None]:
-    launch_file.forget()
-    yield
-    launch_file.forget()
 
 
 def test_an_unchanged_file_is_the_same_object(tmp_path: Path) -> None:
@@ -85,13 +77,3 @@ def test_a_huge_file_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     path.write_text("<launch/><!-- -->")
     with pytest.raises(launch_file.LaunchFileTooLarge, match="more than 10 characters"):
         launch_file.read(path)
-
-
-def test_what_is_kept_is_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(launch_file, "_MAX_KEPT_CHARACTERS", 100)
-    paths = [tmp_path / f"{i}.xml" for i in range(20)]
-    for path in paths:
-        path.write_text("<launch/>" + " " * 11)
-    kept = [launch_file.read(path) for path in paths]
-    assert launch_file.read(paths[-1]) is kept[-1]
-    assert launch_file.read(paths[0]) is not kept[0]

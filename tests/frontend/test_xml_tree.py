@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from enclave_launch.boundary.xml_tree import MAX_NESTING, RefusedXml, XmlElement
+from enclave_common.xml_tree import MAX_NESTING, RefusedXml, XmlElement
 from enclave_launch.frontend.xml_tree import MAX_ENTITY_LENGTH, parse_launch_xml
 
 

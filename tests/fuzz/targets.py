@@ -10,18 +10,16 @@ from typing import NamedTuple
 
 import yaml
 
-from enclave_launch.boundary.shell_words import split_words
-from enclave_launch.boundary.xml_tree import RefusedXml
+from enclave_common.shell_words import split_words
+from enclave_common.xml_tree import RefusedXml
+from enclave_common.yaml_reader import load_yaml
 from enclave_launch.frontend.substitution_grammar import TemplateSyntaxError, parse_template, print_template
 from enclave_launch.frontend.xml_tree import parse_launch_xml as parse_launch_xml
-from enclave_launch.frontend.yaml_scalar import load as load_scalar
-from enclave_launch.frontend.yaml_tree import parse_yaml as parse_launch_yaml
 from enclave_launch.ros_rules.parameter_file import RefusedParameters, sections_of_text
 from enclave_launch.ros_rules.ros_arguments import parse_ros_arguments
 from keystore.disk.archive import archive_bytes, read_archive
 from keystore.disk.store import Content
 from keystore.errors import KeystoreError
-from keystore.formats import der
 from keystore.formats.bundle import parse_manifest
 from keystore.formats.certificate import read_certificates
 from keystore.formats.domains import Domains
@@ -36,7 +34,7 @@ from keystore.formats.shares import parse_shares
 from keystore.formats.validity import parse_duration, parse_moment
 from keystore.signing import smime
 from keystore.steps.host_keys import parse_requests, request, requests_text
-from keystore.verification.contents import holds_private_key, mime_problem
+from keystore.verification.contents import holds_private_key
 from nodl.document.v1 import parse_v1
 from nodl.document.v2 import parse_v2
 from nodl.errors import InvalidNoDLError
@@ -188,9 +186,9 @@ def targets() -> dict[str, Target]:
             read("launch/talker_listener.launch.xml", "launch/services_actions.launch.xml"),
             XML,
         ),
-        "launch-yaml": Target(text(parse_launch_yaml), (yaml.YAMLError, ValueError), LAUNCH_YAML, YAML),
+        "launch-yaml": Target(text(load_yaml), (yaml.YAMLError, ValueError), LAUNCH_YAML, YAML),
         "value": Target(
-            text(load_scalar),
+            text(load_yaml),
             (yaml.YAMLError, ValueError, RecursionError),
             (b"[1, 2]", b"1.5", b"{a: b}", b"yes"),
             YAML,
@@ -269,7 +267,7 @@ def targets() -> dict[str, Target]:
             lambda data: parse_permissions(data, "a.xml"), refused, (made["permissions.xml"],), XML
         ),
         "signed-document": Target(
-            lambda data: (mime_problem(data), smime.read(data, "a.p7s")),
+            lambda data: smime.read_any(data, "a.p7s").embeds(b""),
             refused,
             (made["permissions.p7s"],),
             words("------", "\r\n", "Content-Type: text/plain", "base64", "boundary="),
@@ -280,10 +278,10 @@ def targets() -> dict[str, Target]:
             (made["cert.pem"], made["cert.pem"] * 2),
             words("-----BEGIN CERTIFICATE-----", "-----END CERTIFICATE-----"),
         ),
-        "der": Target(
-            der.parse,
-            (der.DerError,),
-            (b"\x30\x03\x02\x01\x01",),
+        "pkcs7": Target(
+            lambda data: smime.SignedDocument(b"", data).embeds(b""),
+            (),
+            (smime.read(made["permissions.p7s"], "a.p7s").pkcs7, b"\x30\x03\x02\x01\x01"),
             (b"\x30\x80", b"\x30\x84\xff\xff\xff\xff", b"\x02\x01\x00"),
         ),
         "key-search": Target(

@@ -65,7 +65,8 @@ def test_where_nothing_runs_the_status_and_the_message_say_so(
     cyclone: Implementation, domain_id: int
 ) -> None:
     ran = observe(domain_id, "--for", "1s", status=1)
-    assert "no node was seen; is it the right domain" in ran.stderr
+    assert "no node was seen; if nodes run in this domain" in ran.stderr
+    assert "ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST" in ran.stderr
 
 
 @pytest.mark.parametrize(

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from types import MappingProxyType
 
+import pytest
+
 from nodl.graph.observation import Observed
 from nodl.graph.sources import learn_observed
-from nodl.graph.starts import StartedNode, start_of_command, starts_of_plan
+from nodl.graph.starts import StartedNode, start_for, start_of_command, starts_of_plan
 from nodl.node_interface import EndpointKind as Kind
 from nodl.record.learning import LearntEndpoint, LearntNode
 from nodl.record.lines import RecordedRun
@@ -160,3 +162,18 @@ def test_a_launch_file_tells_how_a_node_was_started_also_where_it_gives_no_name(
     run = Observed(RecordedRun("a"), made.graph(), starts=starts_of_plan(plan))
     found = {node.program: node.entries[0].name for node in learn_observed([run]).learnt.nodes}
     assert found == {"demo/talker": "chatter", "demo/demo::Listener": "chatter"}
+
+
+@pytest.mark.parametrize(
+    ("running", "found"),
+    [
+        (("python3", "/ws/lib/demo/one", "--ros-args", "--params-file", "/tmp/launch_params_x1"), True),
+        (("python3", "/ws/lib/demo/one", "--ros-args", "--params-file", "relative"), False),
+        (("python3", "/ws/lib/demo/two", "--ros-args", "--params-file", "/tmp/launch_params_x1"), False),
+        (("python3", "/ws/lib/demo/one", "--ros-args"), False),
+    ],
+)
+def test_a_parameter_file_that_launch_generates_has_any_path(running: tuple[str, ...], found: bool) -> None:
+    planned = ("/ws/lib/demo/one", "--ros-args", "--params-file", "<params:1>")
+    start = StartedNode("demo", "one", fqn="/one", command=planned)
+    assert bool(start_for("/one", running, [start])) is found

@@ -131,6 +131,15 @@ HOSTILE: dict[str, tuple[Callable[[Path], str], str]] = {
         lambda folder: '<!DOCTYPE launch [<!ENTITY a SYSTEM "/dev/zero">]><launch>&a;</launch>',
         "external",
     ),
+    "a megabyte in one argument": (executable("x" * 1_000_000), "a word of a command line has more than"),
+    "a megabyte in quotes": (
+        executable("'" + "x" * 1_000_000 + "'"),
+        "a word of a command line has more than",
+    ),
+    "a megabyte for a shell": (
+        lambda folder: f'<launch><executable cmd="true {"x" * 1_000_000}" shell="true"/></launch>',
+        "a word of a command line has more than",
+    ),
     "elements in elements": (lambda folder: "<group>" * 100_000, "nested more than"),
     "an alias bomb in a component's parameter file": (
         lambda folder: component(folder, f"{bomb(9)}\n/**:\n  ros__parameters:\n    b: 1\n"),
@@ -143,12 +152,7 @@ HARMLESS: dict[str, Callable[[Path], str]] = {
         '<launch><node pkg="demo_nodes" exec="talker" name="t">'
         f'<param name="p" value="{alias_bomb_in_one_line()}"/></node></launch>'
     ),
-    "a megabyte in one argument": executable("x" * 1_000_000),
-    "a megabyte in quotes": executable("'" + "x" * 1_000_000 + "'"),
     "a hundred thousand words": executable("x " * 100_000),
-    "a megabyte for a shell": lambda folder: (
-        f'<launch><executable cmd="true {"x" * 1_000_000}" shell="true"/></launch>'
-    ),
     "a megabyte of dollars": lambda folder: f'<launch><let name="a" value="{"$" * 1_000_000}"/></launch>',
     "a megabyte of backslashes": lambda folder: (
         f'<launch><let name="a" value="{chr(92) * 1_000_000}"/></launch>'

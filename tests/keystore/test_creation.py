@@ -18,7 +18,7 @@ from keystore.formats.validity import Validity
 from keystore.signing import authority
 from keystore.signing.authority import Authority, Curve
 from keystore.signing.ca_access import CaAccess, Secret
-from keystore.signing.signer import FileSigner
+from keystore.signing.signer import FileSigner, key_pem
 from keystore.steps.creation import CreateOptions, ImportedCa, create_keystore
 from keystore.steps.provisioning import provision
 from keystore.verification import verify
@@ -88,7 +88,7 @@ def made_ca(role: Role, directory: Path, **kind: object) -> tuple[Authority, Imp
     made = authority.self_signed_ca(role, f"imported {role.value}", signer, validity)
     cert, key = directory / f"{role.value}.crt", directory / f"{role.value}.key"
     cert.write_bytes(made.pem())
-    key.write_bytes(authority.key_pem(signer))
+    key.write_bytes(key_pem(signer))
     return made, ImportedCa(cert, key)
 
 

@@ -10,17 +10,20 @@ from collections.abc import Callable
 from datetime import timedelta
 from pathlib import Path
 
+import asn1crypto.x509
 import pytest
+from asn1crypto import cms
 
 from keystore.disk import layout
 from keystore.disk.view import KeystoreView
-from keystore.formats.certificate import read_pem
+from keystore.formats.certificate import read_der, read_pem
 from keystore.formats.domains import Domains
 from keystore.formats.governance import DomainRule, Governance, Protection
 from keystore.formats.role import Role
 from keystore.formats.subject import SubjectScheme
 from keystore.formats.validity import Validity, utc_now
-from keystore.signing.authority import Authority, Curve, IdentityIssuer, pem_certificate
+from keystore.signing import smime
+from keystore.signing.authority import Authority, Curve, IdentityIssuer
 from keystore.signing.ca_access import CaAccess
 from keystore.signing.identity import public_half
 from keystore.signing.public_key import fingerprint
@@ -132,8 +135,8 @@ def test_a_ca_that_is_not_valid_now(root: Path) -> None:
 
 def test_a_ca_whose_own_signature_is_wrong(root: Path) -> None:
     place = root / layout.ca_cert(Role.IDENTITY)
-    facts = read_pem(place.read_bytes())
-    place.write_bytes(pem_certificate(facts.der[:-1] + bytes((facts.der[-1] ^ 1,))))
+    der = read_pem(place.read_bytes()).der
+    place.write_bytes(read_der(der[:-1] + bytes((der[-1] ^ 1,))).pem)
     (one,) = found(root, "ca-signature")
     assert one.severity is Severity.ERROR and one.place == layout.ca_cert(Role.IDENTITY)
 
@@ -142,15 +145,21 @@ def authority(root: Path, role: Role) -> Authority:
     return KeystoreView(root).authority(role, CaAccess())
 
 
+class PromisingAuthority(Authority):
+    """A CA that does not know when it ends."""
+
+    validity = Validity.starting(utc_now(), 200 * YEAR)
+
+
 def issued(root: Path, **changes: object) -> None:
     """Another certificate for the key of /a, by our own CA, which promises longer than it lives itself."""
     ca = authority(root, Role.IDENTITY)
     if "validity" in changes:
-        ca = Authority(ca.facts._replace(validity=changes["validity"]), ca.signer)  # type: ignore[arg-type]
+        ca = PromisingAuthority(ca.facts, ca.signer)
     public = public_half((root / "enclaves/a/key.pem").read_bytes(), "key")
     validity = Validity.starting(utc_now(), 100 * YEAR if "validity" in changes else YEAR)
     made = IdentityIssuer(ca).issue("ros.a", public, validity, changes.get("hosts", ()))  # type: ignore[arg-type]
-    (root / "enclaves/a/cert.pem").write_bytes(pem_certificate(made.der))
+    (root / "enclaves/a/cert.pem").write_bytes(made.pem)
 
 
 def test_a_certificate_that_outlives_its_ca(root: Path) -> None:
@@ -193,14 +202,18 @@ def test_a_certificate_signed_with_a_broken_hash(root: Path, tmp_path: Path) -> 
 
 def with_another_certificate(document: bytes, root: Path) -> bytes:
     ca, other = authority(root, Role.PERMISSIONS), authority(root, Role.IDENTITY)
-    return sign_document(document, Authority(ca.facts._replace(der=other.facts.der), ca.signer), utc_now())
+    signed = sign_document(document, ca)
+    message = cms.ContentInfo.load(smime.read(signed, "x").pkcs7)
+    carried = asn1crypto.x509.Certificate.load(other.facts.der)
+    message["content"]["certificates"] = cms.CertificateSet([cms.CertificateChoices("certificate", carried)])
+    return smime._framed(smime._content(document), message.dump(force=True))
 
 
 def with_a_grant_for_others(document: bytes, root: Path) -> bytes:
     _, grant, tail = document.partition(b"<grant")
     grant += tail.partition(b"</grant>\n")[0] + b"</grant>\n"
     both = document.replace(b"</permissions>", grant.replace(b"CN=ros.a<", b"CN=ros.z<") + b"</permissions>")
-    return sign_document(both, authority(root, Role.PERMISSIONS), utc_now())
+    return sign_document(both, authority(root, Role.PERMISSIONS))
 
 
 @pytest.mark.parametrize(
@@ -214,7 +227,7 @@ def test_signed_permissions_with_more_in_them_than_belongs_there(
     root: Path, code: str, severity: Severity, forged: Callable[[bytes, Path], bytes]
 ) -> None:
     document = (root / "enclaves/a/permissions.xml").read_bytes()
-    plain = sign_document(document, authority(root, Role.PERMISSIONS), utc_now())
+    plain = sign_document(document, authority(root, Role.PERMISSIONS))
     (root / "enclaves/a/permissions.p7s").write_bytes(plain)
     assert verify(root).findings == ()
     (root / "enclaves/a/permissions.p7s").write_bytes(forged(document, root))

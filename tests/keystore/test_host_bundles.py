@@ -171,8 +171,12 @@ def test_the_first_import_needs_pins_and_holds_to_them(ca: Path, tmp_path: Path)
     with pytest.raises(UnsafeKeystoreError, match="nothing is pinned on this host yet"):
         import_bundle(tmp_path / "ks", bundle.path, options=ImportOptions(host="base"))
     with pytest.raises(UnsafeKeystoreError, match="trusts a CA that is not pinned"):
-        only = (bundle.manifest.authorities[Role.PERMISSIONS][0],)
+        digest = bundle.manifest.authorities[Role.PERMISSIONS][0]
+        only = (f"permissions={digest}", f"identity={digest}")
         import_bundle(tmp_path / "ks", bundle.path, options=ImportOptions("base", only))
+    for unclear in ((digest,), (f"permissions={digest}",), (f"root={digest}",)):
+        with pytest.raises(InvalidInputError, match="identity=SHA256"):
+            import_bundle(tmp_path / "ks", bundle.path, options=ImportOptions("base", unclear))
     with pytest.raises(InvalidInputError, match="which host is this"):
         import_bundle(tmp_path / "ks", bundle.path, options=ImportOptions(None, pinned(bundle.manifest)))
     assert not os.path.lexists(tmp_path / "ks")
@@ -210,7 +214,7 @@ CHANGES: Mapping[str, tuple[Callable[[dict[str, bytes]], object], str]] = {
     "no manifest": (lambda files: files.pop(layout.BUNDLE), "has no bundle.p7s"),
     "another manifest": (
         lambda files: files.update({layout.BUNDLE: files[layout.BUNDLE].replace(b'"base"', b'"arm"')}),
-        "changed after signing",
+        "not in the form",
     ),
     "governance as manifest": (
         lambda files: files.update({layout.BUNDLE: files[layout.GOVERNANCE]}),
@@ -248,7 +252,7 @@ def test_an_archive_with_links_or_a_file_twice_is_refused(ca: Path, host: Path, 
             strange.type, strange.linkname = kind, "/etc/shadow"
             archive.addfile(strange)
         (tmp_path / "strange").write_bytes(buffer.getvalue())
-        refused(host, tmp_path / "strange", DamagedKeystoreError, "not a file of its own")
+        refused(host, tmp_path / "strange", DamagedKeystoreError, "not a plain file of its own")
 
 
 def test_a_keystore_that_was_not_imported_is_never_replaced(ca: Path, tmp_path: Path) -> None:

@@ -258,6 +258,11 @@ HOSTILE: dict[str, tuple[str, Change]] = {
     "key in bare base64 as a note": ("stray-key", new("enclaves/a/note", bare_base64)),
     "CA key in an enclave": ("stray-key", new("enclaves/a/ca.key.pem", of(CA_KEY))),
     "CA key as an editor's backup": ("stray-key", new("private/identity_ca.key.pem~", of(CA_KEY))),
+    # another form than ours, in which DDS implementations may read something else
+    "text before a certificate": (
+        "other-form",
+        lambda root: (root / CERT).write_bytes(b"for robot 1\n" + (root / CERT).read_bytes()),
+    ),
     # more, or something else, than one block
     "two certificates": ("several-blocks", append(CERT, of("enclaves/b/cert.pem"))),
     "the CA behind the certificate": ("several-blocks", append(CERT, of(ANCHOR))),
@@ -357,9 +362,6 @@ GIVEN_AWAY = [
 ]
 
 HARMLESS: dict[str, Change] = {
-    "text before a certificate": lambda root: (root / CERT).write_bytes(
-        b"for robot 1\n" + (root / CERT).read_bytes()
-    ),
     "modes closed further": lambda root: (root / CERT).chmod(0o400),
     "an empty note": lambda root: (root / "README").write_text("who to call"),
     "times touched": lambda root: os.utime(root / KEY, (0, 0)),

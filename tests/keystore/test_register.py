@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from dataclasses import replace
 from datetime import timedelta
 from pathlib import Path
 
@@ -459,7 +460,8 @@ class TestTakingOver:
         report = provision(self.earlier(root), [policy("/a"), policy("/b")], options=options())
         assert actions(report) == {}
         assert report.created == ("register of what was issued made from what stands here: 2 certificates",)
-        assert register(root) == before
+        bare = {serial: one._replace(lifetime=None) for serial, one in before.certificates.items()}
+        assert replace(register(root), written=before.written) == replace(before, certificates=bare)
 
     def test_revocations_and_replaced_certificates_are_kept(self, tmp_path: Path) -> None:
         root = filled(tmp_path / "ks", ["/a", "/b", "/c"])

@@ -81,7 +81,8 @@ def test_an_sros2_keystore_is_extended_in_place(sros2: Path) -> None:
     ]
     after = contents(sros2)
     assert {name for name in after if before.get(name) != after[name]} == {
-        "private/register.json", *(f"enclaves/new/{name}" for name in layout.ENCLAVE_FILES - {"crl.pem"})
+        "private/register.json", "enclaves/governance.p7s",
+        *(f"enclaves/new/{name}" for name in layout.ENCLAVE_FILES - {"crl.pem"}),
     }  # fmt: skip
     directory = sros2 / "enclaves/new"
     openssl("verify", "-CAfile", directory / "identity_ca.cert.pem", directory / "cert.pem")
@@ -134,7 +135,7 @@ def test_what_provisioning_saw_need_not_be_read_again(tmp_path: Path) -> None:
     (root / "enclaves/a/cert.pem").unlink()
     assert expires_soon(root, 30 * DAY, enclaves=known, known=known, now=NOW) == soon
     assert not expires_soon(root, 10 * DAY, enclaves=known, known=known, now=NOW)
-    assert provision(root, [policy("/a")], options=options(now=NOW)).validities == {}, "just made, not found"
+    assert provision(root, [policy("/a")], options=options(now=NOW)).validities == {"/a": known["/a"]}
 
 
 def test_named_enclaves_are_renewed_in_any_case(tmp_path: Path) -> None:

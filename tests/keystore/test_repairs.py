@@ -125,7 +125,7 @@ PLANTED: dict[str, tuple[str, Plant]] = {
     "certificate garbled": ("certificate", write("enclaves/a/cert.pem")),
     "key garbled": ("key", write("enclaves/a/key.pem")),
     "private half garbled": ("key", private_half),
-    "certificate of no known curve": ("wrong-ca", der_changed("enclaves/a/cert.pem", CURVE, b"\0" * len(CURVE))),
+    "certificate of no known curve": ("certificate", der_changed("enclaves/a/cert.pem", CURVE, b"\0" * len(CURVE))),
     "signature with stray characters": ("permissions", stray_characters),
     "permissions garbled": ("permissions", write("enclaves/a/permissions.p7s")),
     "permissions.xml garbled": ("twin-differs", write("enclaves/a/permissions.xml")),

@@ -141,7 +141,7 @@ def test_a_reader_that_leaves_is_no_traceback(root: Path) -> None:
 
 
 def test_the_progress_bar_is_for_terminals_that_wait(monkeypatch: pytest.MonkeyPatch) -> None:
-    from enclave_launch.boundary.terminal import ProgressBar
+    from enclave_common.terminal import ProgressBar
 
     parent, child = pty.openpty()
     with os.fdopen(child, "w") as terminal:

@@ -27,7 +27,7 @@ Damage = Callable[[Path], object]
 
 def sign(root: Path, document: bytes) -> bytes:
     ca = KeystoreView(root).authority(Role.PERMISSIONS, CaAccess())
-    return smime.sign_document(document, ca, NOW)
+    return smime.sign_document(document, ca)
 
 
 def resign(root: Path, old: bytes, new: bytes) -> None:

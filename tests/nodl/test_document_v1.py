@@ -10,9 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nodl import errors
-from nodl.document import ManifestNode
 from nodl.document.v1 import parse_v1
-from nodl.node_interface import NodeInterface
+from nodl.node_interface import ManifestNode, NodeInterface
 
 
 def parse(text: str) -> tuple[ManifestNode, ...]:
@@ -75,6 +74,12 @@ NODE_NAMES = {"/talker": ("/", "talker"), "/ns/talker": ("/ns", "talker"), "ns/t
 def test_node_names_with_a_namespace(written: str) -> None:
     interface = one('<parameter name="p" type="int"/>', name=written)
     assert (interface.namespace, interface.name) == NODE_NAMES[written]
+
+
+def test_a_document_may_name_its_schema() -> None:
+    schema = 'xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" xsi:noNamespaceSchemaLocation="v1.xsd"'
+    (node,) = parse(f'<interface version="1" {schema}>{NODE}</interface>')
+    assert node.interface.name == "n"
 
 
 def test_names_below_the_nodes_own_name_are_private() -> None:
@@ -158,6 +163,17 @@ BROKEN = {
 for _label, _element, _error in (
     ("an unknown element", "<topics/>", errors.InvalidNodeChildError),
     ("an unknown attribute", TOPIC.replace("/>", ' qos="x"/>'), errors.InvalidNoDLDocumentError),
+    ("an element in a topic", TOPIC.replace("/>", "><qos/></topic>"), errors.InvalidNoDLDocumentError),
+    (
+        "a topic in a service",
+        f'<service name="a" type="T" role="both">{TOPIC}</service>',
+        errors.InvalidNoDLDocumentError,
+    ),
+    (
+        "a topic in a parameter",
+        f'<parameter name="a" type="T">{TOPIC}</parameter>',
+        errors.InvalidNoDLDocumentError,
+    ),
     ("an unknown role", TOPIC.replace("publisher", "server"), errors.InvalidNoDLDocumentError),
     ("no role", '<service name="a" type="T"/>', errors.InvalidNoDLDocumentError),
     ("an empty name", TOPIC.replace('"a"', '""'), errors.InvalidElementError),

@@ -12,9 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from nodl import errors
-from nodl.document import ManifestNode, read_document
+from nodl.document import read_document
 from nodl.document.v2 import parse_v2
-from nodl.node_interface import ClientLibrary
+from nodl.node_interface import ClientLibrary, ManifestNode
 
 QOS = "{history: KEEP_LAST, depth: 10, reliability: RELIABLE}"
 
@@ -197,12 +197,12 @@ def test_an_alias_bomb_is_stopped_early() -> None:
     """Unfolded, it would have nine to the twelfth elements."""
     lines = ["a0: &a0 [x, x, x, x, x, x, x, x, x]"]
     lines += [f"a{i}: &a{i} [{', '.join([f'*a{i - 1}'] * 9)}]" for i in range(1, 12)]
-    with pytest.raises(errors.InvalidYAMLError, match="unfolds too far"):
+    with pytest.raises(errors.InvalidYAMLError, match="aliases stand for more than"):
         parse("\n".join(lines))
 
 
 def test_an_alias_to_its_own_list_is_stopped() -> None:
-    with pytest.raises(errors.InvalidYAMLError, match="unfolds too far"):
+    with pytest.raises(errors.InvalidYAMLError, match="a value contains itself: line 1"):
         parse("description: &a [*a]")
 
 

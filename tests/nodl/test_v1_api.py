@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import inspect
 import io
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -154,13 +152,3 @@ def test_errors_made_by_their_v1_constructors() -> None:
     with pytest.raises(etree.XMLSyntaxError) as caught:
         etree.fromstring("<a>")
     assert "not well-formed" in str(errors.InvalidXMLError(caught.value))
-
-
-def test_importing_nodl_loads_nothing_else() -> None:
-    code = (
-        "import sys, nodl; print([m for m in sys.modules if m.startswith('nodl.') or m in ('lxml', 'yaml')])"
-    )
-    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert run.stdout.strip() == "[]"
-    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
-        _ = nodl.nothing

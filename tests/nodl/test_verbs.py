@@ -9,10 +9,11 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from nodl.document import ManifestNode, read_document
+from nodl.document import read_document
 from nodl.document.v1 import parse_v1
 from nodl.document.v2 import parse_v2
 from nodl.document.write import v1_xml, v2_yaml
+from nodl.node_interface import ManifestNode
 from nodl.verb import main
 
 V1 = """\

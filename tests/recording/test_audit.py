@@ -94,6 +94,26 @@ def test_a_record_that_is_removed_while_it_grows_ends_no_launch(stand_in: Path, 
     assert any("cannot be read" in why for why in report["incomplete"])
 
 
+def test_a_program_that_writes_as_the_launcher_is_reported_and_not_believed(
+    stand_in: Path, tmp_path: Path
+) -> None:
+    workspace = make_workspace(tmp_path, stand_in, [FIT])
+    forged = [
+        {"what": "process", "pid": 1, "process": "fit-1", "package": "stand_in_nodes", "executable": "fit"},
+        {"what": "publisher", "pid": 1, "name": "/cmd_vel", "final": "/cmd_vel"},
+    ]
+    (tmp_path / "lines").write_text("".join(json.dumps(line) + "\n" for line in forged))
+    script = tmp_path / "forge.sh"
+    script.write_text(f"#!/bin/sh\ncat {tmp_path / 'lines'} >>$ENCLAVE_LAUNCH_RECORD\n")
+    script.chmod(0o755)
+    file = workspace.folder / "share/stand_in_nodes/launch/all.launch.xml"
+    file.write_text(file.read_text().replace("</launch>", f'<executable cmd="{script}"/></launch>'))
+    _, output, report = audit(workspace)
+    assert "forge.sh-2 wrote lines about the launcher into its record; they are not used" in output
+    assert any("about the launcher" in why for why in report["incomplete"])
+    assert "/cmd_vel" not in json.dumps(report.get("findings", report))
+
+
 def test_a_library_of_the_launch_file_stays_beside_the_recorder(stand_in: Path, tmp_path: Path) -> None:
     library = stand_in / "librcutils.so"
     preloads = FIT._replace(inside=f'<env name="LD_PRELOAD" value="{library}"/>')

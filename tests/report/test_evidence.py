@@ -256,3 +256,15 @@ def test_no_conformity_is_claimed(evidence: Path) -> None:
     text = (evidence / "README.md").read_text()
     assert DISCLAIMER in text
     assert "conforms" not in text and "compliant" not in text and "certified" not in text
+
+
+@pytest.mark.parametrize("option", ["--passphrase-env", "--pin-env"])
+def test_a_secret_is_for_a_saved_plan_since_code_of_a_launch_file_could_read_it(
+    option: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    given = ("-o", str(tmp_path / "out"), "--sign-key", "key.pem", option, "SECRET")
+    assert main(["evidence", *WORDS, *given]) == 2
+    assert "go with a saved plan" in capsys.readouterr().err
+    (tmp_path / "plan.json").write_text("{}")
+    assert main(["evidence", str(tmp_path / "plan.json"), *given]) == 2
+    assert "go with a saved plan" not in capsys.readouterr().err, "refused for what it holds"

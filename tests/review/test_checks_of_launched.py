@@ -16,7 +16,7 @@ from enclave_launch.review.document import Told
 
 MANIFEST = """\
 nodl_version: 2
-codegen: {{enclave_launch: {{package: demo, executable: {name}}}}}
+codegen: {{enclave_launch: {{package: demo, executable: {name}, all_parameters: {all_parameters}}}}}
 {parameters}publishers:
   - {{name: {publishes}, type: std_msgs/msg/String, qos: {{history: KEEP_LAST, depth: 1, {offers}}}}}
 subscriptions:
@@ -37,7 +37,13 @@ def check(tmp_path: Path) -> Check:
     (tmp_path / "ws" / "share" / "demo").mkdir()
 
     def run(
-        launch: str, *, offers: str = RELIABLE, asks: str = RELIABLE, parameters: str = "", **given: str
+        launch: str,
+        *,
+        offers: str = RELIABLE,
+        asks: str = RELIABLE,
+        parameters: str = "",
+        all_parameters: str = "false",
+        **given: str,
     ) -> list[Told]:
         manifests = []
         for name, publishes, subscribes in (("one", "x", "y"), ("two", "y", "x")):
@@ -52,6 +58,7 @@ def check(tmp_path: Path) -> Check:
                 offers=offers,
                 asks=asks,
                 parameters=parameters,
+                all_parameters=all_parameters,
             )
             file.write_text(text)
             manifests.append(file)
@@ -145,8 +152,13 @@ def test_a_rule_of_a_program_that_nobody_describes_may_be_of_use(check: Check, t
 def test_a_parameter_that_the_node_does_not_declare(check: Check, parameter: str, known: bool) -> None:
     node = f'<node pkg="demo" exec="one" name="one"><param name="{parameter}" value="1"/></node>'
     declared = "parameters: {speed: {type: int}}\n"
-    assert ("parameter-unknown" in codes(check(node, parameters=declared))) is not known
-    assert "parameter-unknown" not in codes(check(node)), "a manifest without parameters says nothing of them"
+    assert (
+        "parameter-unknown" in codes(check(node, parameters=declared, all_parameters="true"))
+    ) is not known
+    some = codes(check(node, parameters=declared))
+    assert "parameter-unknown" not in some, (
+        "a manifest that does not say that it lists all says nothing of others"
+    )
 
 
 def test_an_argument_that_no_file_looks_at(check: Check) -> None:
@@ -169,3 +181,8 @@ def test_an_argument_that_no_file_looks_at(check: Check) -> None:
 def test_a_parameter_that_looks_like_a_secret(check: Check, name: str, is_secret: bool) -> None:
     node = f'<node pkg="demo" exec="one" name="one"><param name="{name}" value="hunter2"/></node>'
     assert ("secret-in-parameters" in codes(check(node))) is is_secret
+
+
+def test_a_remap_of_tf_is_a_convention_and_any_other_dead_rule_is_reported(check: Check) -> None:
+    assert "remap-dead" not in codes(check(f'<group><set_remap from="/tf" to="tf"/>{ONE}</group>'))
+    assert "remap-dead" in codes(check(f'<group><set_remap from="/tg" to="tg"/>{ONE}</group>'))

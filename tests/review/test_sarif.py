@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from jsonschema import Draft4Validator
 
-from enclave_launch.boundary.terminal import json_text
+from enclave_common.terminal import json_text
 from enclave_launch.report.sarif import sarif_document
 from enclave_launch.review.checks import RULES, check_plan
 from enclave_launch.review.document import Told

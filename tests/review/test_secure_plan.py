@@ -51,6 +51,19 @@ def test_a_saved_plan_and_the_launch_file_show_the_same(run: Run, saved: Path) -
     assert run("show", *REMAP)[1] == shown
 
 
+@pytest.mark.parametrize("part", ["processes", "nodes"])
+@pytest.mark.parametrize("verb", ["show", "check", "suggest", "report", "hosts"])
+def test_a_saved_plan_whose_parts_do_not_fit_is_one_clear_error(
+    verb: str, part: str, run: Run, saved: Path
+) -> None:
+    document = json.loads(saved.read_text())
+    document[part][0]["enclave"] = "/other"
+    saved.write_text(json.dumps(document))
+    status, _, told = run(verb, saved)
+    assert status == 2
+    assert "does not fit together" in told and "is in enclave /other" in told
+
+
 def test_diff_tells_by_its_exit_status_whether_rights_grew(run: Run, saved: Path) -> None:
     assert run("diff", saved, saved)[:2] == (0, "no enclave, node, permission or flow differs\n")
     status, text, _ = run("diff", saved, *PLAIN)

@@ -13,19 +13,18 @@ import pytest
 import zenoh
 
 from keystore import ProvisionOptions, RemoveOptions, RenewOptions, apply_policy, remove, renew
+from keystore.disk.view import KeystoreView
 from keystore.formats.role import Role
 from keystore.formats.validity import Validity, utc_now
 from keystore.signing.authority import (
     Authority,
     Curve,
     IdentityIssuer,
-    authority_of,
-    key_pem,
     new_key,
-    pem_certificate,
     self_signed_ca,
 )
-from keystore.signing.signer import FileSigner, load_private_key
+from keystore.signing.ca_access import CaAccess
+from keystore.signing.signer import key_pem
 from tests.zenoh import kit
 from tests.zenoh.conftest import Grants, System, keystore_of, policy_of
 from tests.zenoh.kit import Heard, opens, passes, topic
@@ -41,10 +40,7 @@ def tls(text: str, **changes: object) -> str:
 
 
 def own_ca(keystore: Path) -> Authority:
-    key = FileSigner(
-        load_private_key((keystore / "private/identity_ca.key.pem").read_bytes(), None, "the CA")
-    )
-    return authority_of((keystore / "public/identity_ca.cert.pem").read_bytes(), key, "the CA")
+    return KeystoreView(keystore).authority(Role.IDENTITY, CaAccess())
 
 
 def identity(
@@ -55,7 +51,7 @@ def identity(
     span = validity or Validity.starting(utc_now(), LIFE)
     folder.mkdir(exist_ok=True)
     cert, key = folder / "cert.pem", folder / "key.pem"
-    cert.write_bytes(pem_certificate(IdentityIssuer(ca).issue(name, signer.public_key(), span, hosts).der))
+    cert.write_bytes(IdentityIssuer(ca).issue(name, signer.public_key(), span, hosts).pem)
     key.write_bytes(key_pem(signer))
     return {
         "connect_certificate": str(cert), "connect_private_key": str(key),

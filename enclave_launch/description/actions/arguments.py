@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any
+
 from enclave_launch.description import read_only
-from enclave_launch.description.entity import Action
+from enclave_launch.description.entity import Action, ScanRole
 from enclave_launch.description.markup.entity import Entity
 from enclave_launch.description.markup.expose import expose_action
 from enclave_launch.description.substitution import (
@@ -17,7 +18,7 @@ from enclave_launch.ros_rules.distro import Feature
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch_context import LaunchContext
-    from enclave_launch.description.markup.parser import Parser
+    from enclave_launch.description.markup.entity import Parser
 
 
 @expose_action("arg")
@@ -28,6 +29,7 @@ class DeclareLaunchArgument(Action):
     Raises ``RuntimeError`` for empty choices, and for a default of plain text that is not among them.
     """
 
+    scan_role = ScanRole.ARGUMENT
     name: str = ""
     default_value: list[Substitution] | None = None
     description: str = ""

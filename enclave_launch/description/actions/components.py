@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any
+
 from enclave_launch.description import read_only
 from enclave_launch.description.actions.nodes import Node, parse_remaps
 from enclave_launch.description.entity import Action
-from enclave_launch.description.markup.entity import Entity
-from enclave_launch.description.markup.parser import Parser
+from enclave_launch.description.markup.entity import Entity, Parser
 from enclave_launch.description.node_names import RemapRules, SomeRemapRules, normalize_remap_rules
 from enclave_launch.description.parameters.normalize import normalize_parameters
 from enclave_launch.description.substitution import (
@@ -133,7 +133,7 @@ class ComposableLifecycleNode(ComposableNode):
 
 
 def parse_lifecycle_components(entity: Entity, parser: Parser) -> list[ComposableNode]:
-    """The ``composable_lifecycle_node`` children; where the distribution has none, they stay unread."""
+    """Parse the ``composable_lifecycle_node`` children; a distribution without them leaves them unread."""
     if not current_release().has(Feature.LIFECYCLE_TAGS):
         return []
     children = entity.get_attr("composable_lifecycle_node", data_type=list[Entity], optional=True)

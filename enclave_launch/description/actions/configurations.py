@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any
-from enclave_launch.description.entity import Action
+from enclave_launch.description.entity import Action, ScanRole
 from enclave_launch.description.markup.entity import Entity
 from enclave_launch.description.markup.expose import expose_action
 from enclave_launch.description.substitution import normalize_to_list_of_substitutions, perform_substitutions
@@ -13,7 +13,7 @@ from enclave_launch.description.templates import TemplateAction, template
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch_context import LaunchContext
-    from enclave_launch.description.markup.parser import Parser
+    from enclave_launch.description.markup.entity import Parser
     from enclave_launch.description.substitution import SomeSubstitutionsType
 
 
@@ -55,6 +55,8 @@ class PopLaunchConfigurations(Action):
 @expose_action("reset")
 class ResetLaunchConfigurations(Action):
     """Remove every launch configuration but those given, whose values still see the old ones."""
+
+    scan_role = ScanRole.RESET
 
     def __init__(
         self,

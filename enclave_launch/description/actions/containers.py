@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from enclave_launch.boundary.files import as_path
-from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.actions.components import (
     ComposableLifecycleNode,
     ComposableNode,
     parse_lifecycle_components,
 )
+from enclave_launch.description.actions.lifecycle import autostart_transition
 from enclave_launch.description.actions.nodes import Node
 from enclave_launch.description.argument_types import ensure_argument_type
 from enclave_launch.description.entity import Action, LaunchDescriptionEntity
 from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.description.location import location_of
-from enclave_launch.description.markup.entity import Entity
+from enclave_launch.description.markup.entity import Entity, Parser
 from enclave_launch.description.markup.expose import expose_action
-from enclave_launch.description.markup.parser import Parser
 from enclave_launch.description.node_names import performed_remaps, placed, warn_about_repeats
 from enclave_launch.description.parameters.descriptions import ParameterFile
 from enclave_launch.description.parameters.evaluate import evaluate_parameters
@@ -80,7 +80,7 @@ class ComposableNodeContainer(Node):
 
 
 def parse_components(entity: Entity, parser: Parser, *, optional: bool) -> list[ComposableNode] | None:
-    """The ``composable_node`` children, of newer distributions also ``composable_lifecycle_node``."""
+    """Parse the ``composable_node`` children, of newer distributions also ``composable_lifecycle_node``."""
     lifecycle = parse_lifecycle_components(entity, parser)
     children = entity.get_attr(
         "composable_node",
@@ -212,7 +212,7 @@ def _global_parameters(context: LaunchContext) -> Iterator[Any]:
         if isinstance(item, tuple):
             yield normalize_parameter_dict({item[0]: item[1]})
             continue
-        path = as_path(item).resolve()
+        path = Path(item).resolve()
         if not path.is_file() and not context.host.allow_missing_packages:
             raise AssertionError(f"the file of set_parameters_from_file does not exist: {path}")
         yield ParameterFile(path)
@@ -221,7 +221,7 @@ def _global_parameters(context: LaunchContext) -> Iterator[Any]:
 def _values(
     context: LaunchContext, name: str, namespace: str | None, parameters: Parameters
 ) -> dict[str, ParameterValue]:
-    """What the load request carries; of repeats the node takes the last."""
+    """Return the values of a load request; of repeats the node takes the last."""
     evaluated = evaluate_parameters(context, parameters)
     return {
         item.name: tuple(item.value) if isinstance(item.value, list) else item.value  # type: ignore[misc]
@@ -232,6 +232,4 @@ def _values(
 def _autostart(description: ComposableNode, component: ResolvedComponent) -> list[LaunchDescriptionEntity]:
     if not isinstance(description, ComposableLifecycleNode) or not description.node_autostart:
         return []
-    from enclave_launch.description.actions.lifecycle import autostart_transition
-
     return [autostart_transition(component.fqn)]

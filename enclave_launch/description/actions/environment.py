@@ -5,13 +5,12 @@ and pop their scope.
 from __future__ import annotations
 
 import os
+from typing import Any
 
-from enclave_launch.boundary.light import Any
 from enclave_launch.description.entity import Action
 from enclave_launch.description.launch_context import LaunchContext
-from enclave_launch.description.markup.entity import Entity
+from enclave_launch.description.markup.entity import Entity, Parser
 from enclave_launch.description.markup.expose import expose_action
-from enclave_launch.description.markup.parser import Parser
 from enclave_launch.description.substitution import (
     Substitution,
     perform_substitutions,
@@ -118,6 +117,6 @@ class SetROSLogDir(TemplateAction):
 
 
 def _default_log_directory(environment: Any) -> str:
-    """What ``rcl_logging_get_logging_directory`` answers while ``ROS_LOG_DIR`` is unset."""
+    """Return what ``rcl_logging_get_logging_directory`` returns while ``ROS_LOG_DIR`` is unset."""
     home = environment.get("ROS_HOME") or os.path.join(os.path.expanduser("~"), ".ros")
     return os.path.join(os.path.expanduser(home), "log")

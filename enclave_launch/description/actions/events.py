@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.entity import Action, LaunchDescriptionEntity, normalize_to_list_of_entities
 from enclave_launch.description.events.event import Event, ProcessExited
 from enclave_launch.description.events.event import Shutdown as ShutdownEvent
+from enclave_launch.description.logging import get_logger
 from enclave_launch.description.markup.expose import expose_action
 from enclave_launch.description.templates import TemplateAction, kept
 
 if TYPE_CHECKING:
     from enclave_launch.description.events.handlers import BaseEventHandler
     from enclave_launch.description.launch_context import LaunchContext
-    from enclave_launch.description.markup.entity import Entity
-    from enclave_launch.description.markup.parser import Parser
+    from enclave_launch.description.markup.entity import Entity, Parser
 
 
 class EmitEvent(TemplateAction):
@@ -72,8 +72,6 @@ class Shutdown(EmitEvent):
     def execute(self, context: LaunchContext) -> None:
         event = context.get_locals_as_dict().get("event")
         if isinstance(event, ProcessExited):
-            from enclave_launch.description.logging import get_logger
-
             name = event.process_name
             get_logger("launch").info(f"process[{name}] was required: shutting down launched system")
         super().execute(context)

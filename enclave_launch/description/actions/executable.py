@@ -5,9 +5,9 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING
 
-from enclave_launch.boundary import shell_words
-from enclave_launch.boundary.light import TYPE_CHECKING
+from enclave_common import shell_words
 from enclave_launch.description import read_only
 from enclave_launch.description.substitution import normalize_to_list_of_substitutions, perform_substitutions
 from enclave_launch.description.substitutions.variables import LaunchConfiguration
@@ -71,7 +71,7 @@ class Executable:
 
     @property
     def cmd(self) -> list[list[Substitution]]:
-        """The command, shared: derived descriptions append to it."""
+        """Return the command, shared: derived descriptions append to it."""
         return self.__cmd
 
     def prepare(self, context: LaunchContext, action: Action) -> None:
@@ -96,7 +96,7 @@ class Executable:
         return re.match(pattern, os.path.basename(cmd[0])) is not None
 
     def __environment(self, context: LaunchContext) -> dict[str, str]:
-        """Each variable sees the environment of the context, not the ones added before it."""
+        """Perform the variables; each sees the environment of the context, not the ones added before it."""
         if self.__env is None:
             base = context.process_environment.snapshot()
         else:

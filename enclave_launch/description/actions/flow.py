@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import collections.abc
+import inspect
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from copy import deepcopy
+from typing import TYPE_CHECKING, Any
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any
+from enclave_common.yaml_reader import load_yaml
 from enclave_launch.description.actions.configurations import (
     PopLaunchConfigurations,
     PushLaunchConfigurations,
@@ -23,14 +25,13 @@ from enclave_launch.description.markup.expose import expose_action
 from enclave_launch.description.substitution import SomeSubstitutionsType, perform_substitutions
 from enclave_launch.description.substitutions.variables import local_name
 from enclave_launch.description.templates import TemplateAction, kept, template
-from enclave_launch.frontend import yaml_scalar
 from enclave_launch.host.user_code import called_for_entities
 from enclave_launch.ros_rules.distro import Feature
 
 if TYPE_CHECKING:
     from enclave_launch.description.events.event import Event
     from enclave_launch.description.launch_context import LaunchContext
-    from enclave_launch.description.markup.parser import Parser
+    from enclave_launch.description.markup.entity import Parser
 
 
 class OpaqueFunction(Action):
@@ -76,8 +77,6 @@ class OpaqueCoroutine(Action):
         **left_over_kwargs: Any,
     ) -> None:
         super().__init__(**left_over_kwargs)
-        import inspect  # and with it a third of what Python's own modules cost a launch file
-
         if not inspect.iscoroutinefunction(coroutine):
             raise TypeError(
                 f"OpaqueCoroutine expected a coroutine function for 'coroutine', got '{type(coroutine)}'"
@@ -190,7 +189,7 @@ class ForEach(TemplateAction):
         text = perform_substitutions(context, self.input_values)
         entities: list[LaunchDescriptionEntity] = []
         for item in filter(None, text.strip().split(self.SEPARATOR)):
-            values = yaml_scalar.load(item.strip())
+            values = load_yaml(item.strip())
             if values is not None:
                 context.count_unfolded(_size_of(self.function))
                 entities.extend(self._round(context, values) or ())
@@ -248,7 +247,7 @@ def _count(entity: Entity) -> int:
 
 
 def _size_of(function: Body) -> int:
-    """Of a function in Python only the call itself is known."""
+    """Count the entities of a body; of a function in Python only the call itself is known."""
     return getattr(function, "elements", 1)
 
 

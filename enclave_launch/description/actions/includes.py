@@ -6,52 +6,57 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.actions.configurations import SetLaunchConfiguration
-from enclave_launch.description.entity import Action, LaunchDescriptionEntity
-from enclave_launch.description.launch_context import LaunchContext
+from enclave_launch.description.actions.flow import OpaqueFunction
+from enclave_launch.description.argument_scan import check_required_arguments
+from enclave_launch.description.entity import Action, LaunchDescriptionEntity, ScanRole
+from enclave_launch.description.launch_context import LaunchContext, OpenFile
 from enclave_launch.description.markup.entity import Entity
 from enclave_launch.description.markup.expose import expose_action
 from enclave_launch.description.sources import AnyLaunchDescriptionSource, LaunchDescriptionSource
 from enclave_launch.description.substitution import normalize_to_list_of_substitutions, perform_substitutions
 from enclave_launch.diagnostics.evaluation import include_left_out
-from enclave_launch.host.base_host import CyclicIncludeError
 from enclave_launch.host.current import current_release
 from enclave_launch.ros_rules.distro import Feature
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch_description import LaunchDescription
-    from enclave_launch.description.markup.parser import Parser
+    from enclave_launch.description.markup.entity import Parser
     from enclave_launch.description.substitution import SomeSubstitutionsType
 
 
-MAX_DEPTH = 200
+MAX_DEPTH = 450
 """Nested includes; upstream runs out of stack at about this depth."""
 
-OpenFile = tuple[str, dict[str, Any], dict[str, str]]
-"""A file that is being visited, with the launch configurations and the environment in which it was entered."""
+
+class CyclicIncludeError(RuntimeError):
+    """A launch file that includes itself, directly or through others, without end."""
 
 
 def left_out(include: IncludeLaunchDescription, context: LaunchContext) -> bool:
-    """Whether ``include`` names a file that may be missing and is: of a package that is not installed or not built.
-    That gives a warning."""
-    location = include.launch_description_source.expand(context)
-    if os.path.exists(location) or not context.host.allow_missing_packages:
+    """Return True, and warn, if ``include`` names a file that is missing and may be.
+
+    A description in memory has no file: its location is only a name.
+    """
+    source = include.launch_description_source
+    location = source.expand(context)
+    if not context.host.allow_missing_packages or not source.is_file or os.path.exists(location):
         return False
     context.host.warn(include_left_out(location))
     return True
 
 
 def prepare_include(include: IncludeLaunchDescription, context: LaunchContext) -> LaunchDescription:
-    """The description to visit: whatever a Python file returned. Raises ``CyclicIncludeError``."""
+    """Return the description to visit: whatever a Python file returned. Raises ``CyclicIncludeError``."""
     source = include.launch_description_source
     _check_cycle(source.expand(context), context)
     return source.get_launch_description(context)
 
 
 def _check_cycle(location: str, context: LaunchContext) -> None:
-    """The same file entered again in the same state will be entered for ever."""
+    """Raise ``CyclicIncludeError`` if a file is entered again in the same state, or too deep."""
     path = os.path.abspath(location)
     state = (path, context.launch_configurations, context.process_environment.snapshot())
     repeated = state in context.open_files
@@ -65,7 +70,7 @@ def _check_cycle(location: str, context: LaunchContext) -> None:
 
 
 def opened(include: IncludeLaunchDescription, context: LaunchContext) -> tuple[OpenFile, ...]:
-    """The files open below ``include``."""
+    """Return the files open below ``include``."""
     path = os.path.abspath(include.launch_description_source.location)
     return (*context.open_files, (path, *include.entered_with))
 
@@ -80,6 +85,8 @@ class IncludeLaunchDescription(Action):
 
     This opens no scope: whatever the included file sets stays set.
     """
+
+    scan_role = ScanRole.INCLUDE
 
     def __init__(
         self,
@@ -127,7 +134,7 @@ class IncludeLaunchDescription(Action):
         return [] if description is None else [description]
 
     def argument_names_without_context(self) -> list[str] | None:
-        """The names of the arguments given, ``None`` when one needs a context."""
+        """Return the names of the arguments given; None if one needs a context."""
         context = LaunchContext()
         try:
             return self.__argument_names(context)
@@ -148,21 +155,17 @@ class IncludeLaunchDescription(Action):
         description = prepare_include(self, context)
         before = {name: context.get_locals_as_dict().get(name) for name in _FILE_LOCALS}
         self.__set_file_locals(context)
-        from enclave_launch.description.argument_scan import check_required_arguments
-
         check_required_arguments(description, self.__argument_names(context))
         arguments = [SetLaunchConfiguration(name, value) for name, value in self.__launch_arguments]
         for argument in arguments:  # an error in one stands where the include stands
             argument.source_location = self.source_location
         if context.host.release.has(Feature.SCOPED_FILE_LOCALS) and None not in before.values():
-            from enclave_launch.description.actions.flow import OpaqueFunction
-
             leave = OpaqueFunction(function=lambda context: context.extend_locals(before))
             return [*arguments, description, leave]
         return [*arguments, description]
 
     def __set_file_locals(self, context: LaunchContext) -> None:
-        """A description made in a script has no file: both locals are its location then."""
+        """Set the locals of the current file; a description made in a script has its location in both."""
         path = os.path.abspath(self.__source.location)
         exists = os.path.exists(path)
         context.extend_locals(

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
+from typing import Any, ClassVar
 
-from enclave_launch.boundary.light import Any, ClassVar
 from enclave_launch.description import read_only
 from enclave_launch.description.actions.events import EmitEvent, RegisterEventHandler
 from enclave_launch.description.actions.flow import OpaqueFunction
@@ -17,9 +17,8 @@ from enclave_launch.description.events.lifecycle import ChangeState, StateTransi
 from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.description.lifecycle_msgs import State, Transition, TransitionEvent
 from enclave_launch.description.location import location_of
-from enclave_launch.description.markup.entity import Entity
+from enclave_launch.description.markup.entity import Entity, Parser
 from enclave_launch.description.markup.expose import expose_action
-from enclave_launch.description.markup.parser import Parser
 from enclave_launch.description.node_names import matches_node_name
 from enclave_launch.description.substitution import (
     SomeSubstitutionsType,
@@ -158,7 +157,7 @@ class OnStateTransition(EventHandler):
         return all(asked in (None, value) for asked, value in zip(self.__asked, told, strict=True))
 
     def foresee(self, started: Sequence[Any]) -> Event | None:
-        """The first transition of a started lifecycle node that this handler would answer."""
+        """Return the first transition of a started lifecycle node that this handler would answer."""
         nodes = [action for action in started if isinstance(action, LifecycleNode)]
         if self.__target_lifecycle_node is not None:
             nodes = [self.__target_lifecycle_node] if self.__target_lifecycle_node in nodes else []
@@ -270,7 +269,7 @@ class LifecycleTransition(Action):
 
 
 def autostart_transition(full_name: str) -> LifecycleTransition:
-    """What ``autostart`` does: configure, then activate."""
+    """Return the handler of ``autostart``: configure, then activate."""
     return LifecycleTransition(
         lifecycle_node_names=[full_name],
         transition_ids=[Transition.TRANSITION_CONFIGURE, Transition.TRANSITION_ACTIVATE],

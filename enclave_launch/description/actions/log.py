@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any
+import logging
+from typing import TYPE_CHECKING, Any
+
 from enclave_launch.description.entity import Action
 from enclave_launch.description.logging import get_logger
 from enclave_launch.description.markup.expose import expose_action
@@ -14,8 +16,7 @@ from enclave_launch.ros_rules.distro import Feature
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch_context import LaunchContext
-    from enclave_launch.description.markup.entity import Entity
-    from enclave_launch.description.markup.parser import Parser
+    from enclave_launch.description.markup.entity import Entity, Parser
     from enclave_launch.description.substitution import SomeSubstitutionsType
 
 
@@ -27,12 +28,10 @@ class LogInfo(TemplateAction):
     msg = template(attribute="message", keyword_only=True)
 
     def log_level(self, context: LaunchContext) -> str:
-        """The name of the level, upper case."""
+        """Return the name of the level, upper case."""
         return self.level_name
 
     def execute(self, context: LaunchContext) -> None:
-        import logging
-
         level = logging.getLevelName(self.log_level(context))
         get_logger("launch.user").log(level, "%s", perform_substitutions(context, self.msg))
 

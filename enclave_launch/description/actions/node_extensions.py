@@ -6,11 +6,10 @@ import os
 import sys
 import warnings
 from functools import lru_cache
-
-from enclave_launch.boundary.light import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from enclave_launch.description.actions.nodes import Node
+    from enclave_launch.description.entity import Action
     from enclave_launch.description.launch_context import LaunchContext
 
 
@@ -55,7 +54,7 @@ class NodeActionExtension:
         satisfies_version(self.EXTENSION_POINT_VERSION, "^0.1")
 
     def prepare_for_execute(
-        self, context: LaunchContext, ros_specific_arguments: dict[str, Any], node_action: Node
+        self, context: LaunchContext, ros_specific_arguments: dict[str, Any], node_action: Action
     ) -> tuple[list[Any], dict[str, Any]]:
         """Words to append to the command line, and the (changed) local ROS arguments."""
         return [], ros_specific_arguments
@@ -63,13 +62,13 @@ class NodeActionExtension:
 
 @lru_cache(maxsize=1)
 def installed_extensions() -> tuple[NodeActionExtension, ...]:
-    """One instance of each. One that cannot be loaded is a warning, as upstream.
+    """Return one instance of each extension; warn about one that cannot be loaded, as upstream does.
 
     Extensions extend an installed launch_ros; without one the look-up (50 ms) is spared.
     """
     if not any(os.path.isdir(os.path.join(folder, "launch_ros")) for folder in sys.path):
         return ()
-    import importlib.metadata
+    import importlib.metadata  # only where ROS is installed: it takes long to load
 
     found = importlib.metadata.entry_points(group=_GROUP)
     loaded = [_instantiate(entry) for entry in found if not entry.value.startswith(_REPLACED)]

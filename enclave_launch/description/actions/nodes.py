@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING, Any
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description import read_only
 from enclave_launch.description.actions.node_extensions import NodeActionExtension, installed_extensions
 from enclave_launch.description.actions.processes import ExecuteProcess
 from enclave_launch.description.argument_types import ensure_argument_type
-from enclave_launch.description.markup.entity import Entity, get_data_type_from_identifier
+from enclave_launch.description.markup.entity import Entity, Parser, get_data_type_from_identifier
 from enclave_launch.description.markup.expose import expose_action
-from enclave_launch.description.markup.parser import Parser
 from enclave_launch.description.node_names import (
     PlacedRule,
     SomeRemapRules,
@@ -110,7 +109,7 @@ class Node(ExecuteProcess):
 
     @staticmethod
     def parse_nested_parameters(params: list[Entity], parser: Parser) -> list[Any]:
-        """The ``param`` children of an element, in the shape of ``parameters=``."""
+        """Parse the ``param`` children of an element, in the shape of ``parameters=``."""
         return [_parse_parameter(param, parser) for param in params]
 
     @classmethod
@@ -224,7 +223,7 @@ class Node(ExecuteProcess):
         )
 
     def __placed_remaps(self, process: ResolvedProcess) -> Iterator[RemapRule]:
-        """The rules of the launch file, each with its place in the file and on the command line."""
+        """Return the rules of the launch file, each with its place in the file and on the command line."""
         first = len(process.prefix) + self.__first_remap + 1  # "-r" stands before each
         for number, rule in enumerate(self.__expanded_remapping_rules or ()):
             yield placed(rule, process.location, first + 2 * number)
@@ -262,7 +261,7 @@ def parse_remaps(remaps: list[Entity], parser: Parser) -> list[PlacedRule]:
 
 
 def _parse_parameter(param: Entity, parser: Parser) -> Any:
-    """One ``param``: a file, or a dict of one name. Raises ``RuntimeError``, ``ValueError`` as upstream."""
+    """Parse one ``param``: a file, or a dict of one name. Raises ``RuntimeError``, ``ValueError`` as upstream."""
     given = param.given
     if "from" not in given and "allow_substs" not in given and "name" in given:
         return _parse_named_parameters([param], parser)

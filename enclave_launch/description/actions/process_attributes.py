@@ -1,17 +1,17 @@
-"""The attributes of ``executable`` and ``node`` elements: how each is read, and since which release. Pure."""
+"""The attributes of ``executable`` and ``node`` elements: how each is read, and since which release."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache
+from typing import TYPE_CHECKING, Any
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.actions.events import Shutdown
 from enclave_launch.description.markup.entity import Entity
 from enclave_launch.ros_rules.distro import Feature, Release
 
 if TYPE_CHECKING:
-    from enclave_launch.description.markup.parser import Parser
+    from enclave_launch.description.markup.entity import Parser
 
 
 def _text(entity: Entity, parser: Parser, name: str) -> Any:
@@ -101,7 +101,7 @@ _ENVIRONMENT: _Attribute = ("env", "additional_env", _environment)
 
 @lru_cache(maxsize=8)
 def attributes_of(release: Release) -> tuple[_Attribute, ...]:
-    """The optional attributes of a process element, in the order in which upstream reads them."""
+    """Parse the optional attributes of a process element, in the order in which upstream reads them."""
     return (
         *_ATTRIBUTES,
         *(_EXIT_AND_TTY if release.has(Feature.EXIT_AND_TTY_ATTRIBUTES) else ()),

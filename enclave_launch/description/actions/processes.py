@@ -1,4 +1,4 @@
-"""``executable``: the actions that start a process and let handlers react to it.
+"""``executable``: the actions that start a process, and the handlers of its start, its output and its exit.
 
 Preparing performs all substitutions; starting is the host's business (``Host.start_process``): a dry run records, the
 runtime spawns, pipes output and emits the process events.
@@ -7,14 +7,22 @@ runtime spawns, pipes output and emits the process events.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
-from enclave_launch.boundary import shell_words
-from enclave_launch.boundary.light import TYPE_CHECKING, Any
+from enclave_common import shell_words
 from enclave_launch.description import read_only
 from enclave_launch.description.actions.executable import Executable
 from enclave_launch.description.actions.process_attributes import attributes_of
 from enclave_launch.description.entity import Action, LaunchDescriptionEntity, SomeEntitiesType
+from enclave_launch.description.events.event import (
+    Event,
+    ProcessExited,
+    ProcessIO,
+    ProcessStarted,
+    process_event_arguments,
+)
+from enclave_launch.description.events.handlers import OnActionEventBase
 from enclave_launch.description.location import location_of
 from enclave_launch.description.markup.entity import Entity
 from enclave_launch.description.markup.expose import expose_action
@@ -35,11 +43,12 @@ from enclave_launch.ros_rules.output import Routes, output_routes
 from enclave_launch.ros_rules.ros_arguments import RosArguments, parse_ros_arguments, words_after_program
 
 if TYPE_CHECKING:
-    from enclave_launch.description.events.event import ProcessExited
+    from enclave_launch.description.events.handlers import ActionMatcher, OnEvent
     from enclave_launch.description.launch_context import LaunchContext
-    from enclave_launch.description.markup.parser import Parser
+    from enclave_launch.description.markup.entity import Parser
 
     OnExit = SomeEntitiesType | Callable[[ProcessExited, LaunchContext], SomeEntitiesType | None]
+    OnText = Callable[[ProcessIO], SomeEntitiesType | None] | None
 
 
 _SIGTERM_TIMEOUT = LaunchConfiguration("sigterm_timeout", default=5)
@@ -126,7 +135,7 @@ class ExecuteLocal(Action):
 
     @property
     def respawn(self) -> Any:
-        """A bool once prepared, before that what was given."""
+        """Return a bool once prepared, before that what was given."""
         return self.__respawn
 
     @property
@@ -139,7 +148,7 @@ class ExecuteLocal(Action):
         return self.final_return_code
 
     def get_stdout(self) -> str:
-        """What the process wrote so far. Raises ``RuntimeError`` without ``cached_output``."""
+        """Return what the process wrote so far. Raises ``RuntimeError`` without ``cached_output``."""
         return self.__captured(0, "stdout")
 
     def get_stderr(self) -> str:
@@ -191,17 +200,15 @@ class ExecuteLocal(Action):
         return None
 
     def __routes(self, context: LaunchContext) -> Routes:
-        """Where its output goes. Raises ``ValueError`` for what launch does not know."""
+        """Return where its output goes. Raises ``ValueError`` for what launch does not know."""
         output: Any = self.__output
         return output_routes(output if isinstance(output, dict) else perform_substitutions(context, output))
 
     def __register_on_exit(self, context: LaunchContext, on_exit: OnExit) -> None:
-        from enclave_launch.description.events.process_handlers import OnProcessExit
-
         context.register_event_handler(OnProcessExit(target_action=self, on_exit=on_exit))
 
     def resolve(self, context: LaunchContext) -> ResolvedProcess:
-        """The prepared process as a value. Subclasses replace what they know better of their node."""
+        """Return the prepared process as a value. Subclasses replace what they know better of their node."""
         description = self.__process_description
         name, cmd = description.final_name or "", tuple(description.final_cmd or ())
         return ResolvedProcess(
@@ -231,7 +238,7 @@ class ExecuteLocal(Action):
         )
 
     def ros_arguments(self) -> RosArguments:
-        """What rcl would find on the prepared command line."""
+        """Parse the ROS arguments of the prepared command line, as rcl does."""
         description = self.__process_description
         words = words_after_program(
             description.final_cmd or (), len(description.final_prefix), shell=self.__shell is True
@@ -239,7 +246,7 @@ class ExecuteLocal(Action):
         return parse_ros_arguments(words)
 
     def enclave_request(self, context: LaunchContext) -> EnclaveRequest:
-        """What the launch file says about the enclave, without the user's own ROS arguments."""
+        """Return what the launch file says about the enclave, without the user's own ROS arguments."""
         attribute = None if self.__enclave is None else perform_substitutions(context, self.__enclave)
         return EnclaveRequest(attribute, enclave_scope(context.launch_configurations))
 
@@ -252,7 +259,7 @@ class ExecuteLocal(Action):
 
 
 def first_word(cmd: tuple[str, ...]) -> str:
-    """The program of a command that is all one string when run by a shell."""
+    """Return the program of a command, which is all one string when run by a shell."""
     words = cmd[0].split() if cmd else []
     return words[0] if words else ""
 
@@ -269,7 +276,7 @@ def _respawn(respawn: bool | SomeSubstitutionsType) -> Any:
 
 
 def _final_or_given(name: str) -> Any:
-    """A property of the process: what is final once it is prepared, before that what was given."""
+    """Build a property of the process: the final value once it is prepared, before that the given one."""
 
     def get(process: ExecuteLocal) -> Any:
         description = process.process_description
@@ -358,3 +365,69 @@ def split_words(template: Iterable[Substitution]) -> list[SomeSubstitutionsType]
     if word:
         words.append(word)
     return words
+
+
+class OnProcessStart(OnActionEventBase):
+    """When a process has started. The target must be an ``ExecuteProcess``, or a node."""
+
+    def __init__(self, *, target_action: ActionMatcher = None, on_start: OnEvent, **kwargs: Any) -> None:
+        super().__init__(
+            action_matcher=target_action,
+            on_event=on_start,
+            target_event_cls=ProcessStarted,
+            target_action_cls=ExecuteProcess,
+            **kwargs,
+        )
+
+
+class OnProcessExit(OnActionEventBase):
+    """When a process has exited, also each time before it is respawned."""
+
+    def __init__(self, *, target_action: ActionMatcher = None, on_exit: OnEvent, **kwargs: Any) -> None:
+        super().__init__(
+            action_matcher=target_action,
+            on_event=on_exit,
+            target_event_cls=ProcessExited,
+            target_action_cls=ExecuteLocal,
+            **kwargs,
+        )
+
+    def foresee(self, started: Sequence[Any]) -> Event | None:
+        action = self.first_accepted(started)
+        return None if action is None else ProcessExited(returncode=0, **process_event_arguments(action))
+
+
+class OnProcessIO(OnActionEventBase):
+    """When a process writes, or is written to: one callback ``(event)`` for each stream."""
+
+    def __init__(
+        self,
+        *,
+        target_action: ActionMatcher = None,
+        on_stdin: OnText = None,
+        on_stdout: OnText = None,
+        on_stderr: OnText = None,
+        **kwargs: Any,
+    ) -> None:
+        def handle(event: ProcessIO, _: LaunchContext) -> SomeEntitiesType | None:
+            if event.from_stdout and on_stdout is not None:
+                return on_stdout(event)
+            if event.from_stderr and on_stderr is not None:
+                return on_stderr(event)
+            if event.from_stdin and on_stdin is not None:
+                return on_stdin(event)
+            return None
+
+        # Whose code this runs: a dry run does not call the user's.
+        handle.__module__ = getattr(on_stdout or on_stderr or on_stdin, "__module__", __name__)
+        super().__init__(
+            action_matcher=target_action,
+            on_event=handle,
+            target_event_cls=ProcessIO,
+            target_action_cls=ExecuteLocal,
+            **kwargs,
+        )
+
+    def foresee(self, started: Sequence[Any]) -> Event | None:
+        action = self.first_accepted(started)
+        return None if action is None else ProcessIO(text=b"", fd=1, **process_event_arguments(action))

@@ -4,13 +4,13 @@
 
 from __future__ import annotations
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any
+
 from enclave_launch.description.entity import Action
 from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.description.location import location_of
-from enclave_launch.description.markup.entity import Entity
+from enclave_launch.description.markup.entity import Entity, Parser
 from enclave_launch.description.markup.expose import expose_action
-from enclave_launch.description.markup.parser import Parser
 from enclave_launch.description.node_names import PlacedRule
 from enclave_launch.description.parameters.evaluate import evaluate_parameter_dict
 from enclave_launch.description.parameters.normalize import normalize_parameter_dict
@@ -151,9 +151,12 @@ class SetUseSimTime(TemplateAction):
         """
         value = self.value
         if context.host.release.has(Feature.SIM_TIME_IN_FRONTENDS):
-            perform_typed_substitution(context, normalize_typed_substitution(value, bool), bool)
+            context.simulated_time = perform_typed_substitution(
+                context, normalize_typed_substitution(value, bool), bool
+            )
             return
         if not isinstance(value, bool):
             raise ValueError(f"Type 'Type.BOOL' and value '{value}' do not agree")
         if not value:
             raise RuntimeError("Failed to set use_sim_time parameter")
+        context.simulated_time = True

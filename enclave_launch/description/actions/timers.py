@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import collections.abc
 from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description import read_only
 from enclave_launch.description.actions.flow import OpaqueFunction
 from enclave_launch.description.argument_types import ensure_argument_type
@@ -15,12 +15,12 @@ from enclave_launch.description.events.handlers import BaseEventHandler
 from enclave_launch.description.markup.expose import expose_action
 from enclave_launch.description.substitution import SomeSubstitutionsType, SomeSubstitutionsType_types_tuple
 from enclave_launch.description.typed_values import normalize_typed_substitution, perform_typed_substitution
+from enclave_launch.diagnostics.evaluation import ros_timer_on_wall_time
 from enclave_launch.ros_rules.distro import Feature
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch_context import LaunchContext
-    from enclave_launch.description.markup.entity import Entity
-    from enclave_launch.description.markup.parser import Parser
+    from enclave_launch.description.markup.entity import Entity, Parser
 
 
 _PERIOD_TYPES = (*SomeSubstitutionsType_types_tuple, float)
@@ -119,7 +119,7 @@ class TimerAction(Action):
             self._completed_future.set_result(None)
 
     def handle(self, context: LaunchContext) -> SomeEntitiesType | None:
-        """What the timer event gives; called while it is handled."""
+        """Return the entities of the timer event; called while it is handled."""
         context.extend_locals(self.__locals)
         if self.__configurations is None and self.__environment is None:
             return self.__actions
@@ -162,7 +162,8 @@ class _OnTimerEvent(BaseEventHandler):
     def handle(self, event: Event, context: LaunchContext) -> SomeEntitiesType | None:
         super().handle(event, context)
         assert isinstance(event, TimerEvent)
-        return event.timer_action.handle(context)
+        timer: TimerAction = event.timer_action
+        return timer.handle(context)
 
 
 class _CancelOnShutdown(BaseEventHandler):
@@ -202,6 +203,12 @@ class ROSTimer(TimerAction):
         ensure_argument_type(period, (*SomeSubstitutionsType_types_tuple, float), "period", "ROSTimer")
         super().__init__(period=period, actions=actions, **kwargs)
         normalize_typed_substitution(period, float)  # a text is taken by TimerAction only
+
+    def _schedule(self, context: LaunchContext, seconds: float, mark: str | None) -> None:
+        """Wait on wall time. Whether launch's clock is simulated is known once the visit in progress has ended."""
+        if context.simulated_time:
+            context.host.warn(ros_timer_on_wall_time(seconds, self.source_location))
+        super()._schedule(context, seconds, mark)
 
 
 RosTimer = ROSTimer  # the older name, the only one in humble

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import signal as signals
 from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description import read_only
 from enclave_launch.description.argument_types import ensure_argument_type
 
 if TYPE_CHECKING:
     import signal as signals
 
-    from enclave_launch.description.actions.processes import ExecuteLocal
-    from enclave_launch.description.actions.timers import TimerAction
-    from enclave_launch.description.entity import Action
-    from enclave_launch.description.launch_description import LaunchDescription
+
+# Types of higher floors: the actions and descriptions that events are about know their events.
+Action = Any
+ExecuteLocal = Any
+LaunchDescription = Any
+TimerAction = Any
 
 
 class Event:
@@ -23,7 +26,7 @@ class Event:
     name = "launch.Event"
 
     def subject(self) -> str:
-        """Whom it is about, for the marks of a dry run (``OnProcessExit talker-1``); empty when nobody."""
+        """Return whom it is about, for the marks of a dry run (``OnProcessExit talker-1``); empty if nobody."""
         return ""
 
 
@@ -87,12 +90,12 @@ class TimerEvent(Event):
 
 
 def matches_action(target_action: Action) -> Callable[[Action], bool]:
-    """Is it exactly this action?"""
+    """Return a matcher of exactly this action."""
     return lambda action: action == target_action
 
 
 def event_named(name: str) -> Callable[[Event], bool]:
-    """A matcher of the events with this name."""
+    """Return a matcher of the events with this name."""
     return lambda event: event.name == name
 
 
@@ -236,7 +239,7 @@ def _matches(test: Callable[[dict[str, Any]], bool]) -> Matcher:
 
 
 def matches_pid(pid: int) -> Matcher:
-    """The process with this id."""
+    """Return a matcher of the process with this id."""
     return _matches(lambda details: bool(details["pid"] == pid))
 
 
@@ -265,8 +268,6 @@ class SignalProcess(ProcessTargetedEvent):
         self, *, signal_number: str | signals.Signals, process_matcher: Callable[[ExecuteLocal], bool]
     ) -> None:
         super().__init__(process_matcher=process_matcher)
-        import signal as signals  # has a thousand names to convert, which few launches need
-
         ensure_argument_type(signal_number, (str, signals.Signals), "signal_number", "SignalProcess")
         self.__signal = signal_number
 
@@ -280,12 +281,12 @@ class SignalProcess(ProcessTargetedEvent):
 
 
 def process_event_arguments(action: Any) -> dict[str, Any]:
-    """The constructor arguments of an event about a process that was prepared."""
+    """Return the constructor arguments of an event about a process that was prepared."""
     return {"pid": 0, **(action.process_details or {})}
 
 
 def suppose_process_event(matches: Callable[[Event], bool], started: Sequence[Any]) -> Event | None:
-    """The first of exit and output, of the started processes in order, that ``matches``; ``None``: none does.
+    """Return the first exit or output, of the started processes in order, that ``matches``; None if none does.
 
     ``matches`` is foreign code that may expect another kind of event; what it raises means no.
     """

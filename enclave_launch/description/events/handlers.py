@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import collections.abc
 from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING, Any, TypeAlias
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any, TypeAlias
 from enclave_launch.description import read_only
 from enclave_launch.description.entity import Action, LaunchDescriptionEntity, SomeEntitiesType
 from enclave_launch.description.events.event import (
@@ -52,7 +52,7 @@ class BaseEventHandler:
         return self.__matcher(event)
 
     def describe(self) -> tuple[str, list[Any]]:
-        """A line of text, and the entities that are known without an event."""
+        """Return a line of text, and the entities that are known without an event."""
         return (
             f"{type(self).__name__}(matcher='{self.matcher_description}', "
             f"handler='{self.handler_description}', handle_once={self.__handle_once})",
@@ -67,14 +67,14 @@ class BaseEventHandler:
         return None
 
     def foresee(self, started: Sequence[Any]) -> Event | None:
-        """An event, not certain to happen, that this handler would answer; ``None``: none can be made up.
+        """Return an event, not certain to happen, that this handler would answer; None if none can be supposed.
 
         For the dry run. ``started`` are the process actions that were started so far, in order.
         """
         return None
 
     def computes(self) -> bool:
-        """Does a callback compute the entities, so that nothing is known before the event?"""
+        """Return True if a callback computes the entities, so that nothing is known before the event."""
         return False
 
 
@@ -105,7 +105,7 @@ class EventHandler(BaseEventHandler):
         return self.__entities
 
     def foresee(self, started: Sequence[Any]) -> Event | None:
-        """The exit, or the first output, of a started process that the matcher takes."""
+        """Return the exit, or the first output, of a started process that the matcher takes."""
         if type(self).matches is not BaseEventHandler.matches or self.event_class is not None:
             return None
 
@@ -152,7 +152,7 @@ class OnActionEventBase(BaseEventHandler):
         return self.accepts(event.action)  # type: ignore[attr-defined]
 
     def accepts(self, action: Action) -> bool:
-        """Is ``action`` one whose events are handled?"""
+        """Return True if the events of ``action`` are handled."""
         if callable(self.__action_matcher):
             return bool(self.__action_matcher(action))
         return self.__action_matcher is None or action is self.__action_matcher
@@ -182,7 +182,7 @@ class OnActionEventBase(BaseEventHandler):
         return f"event == {event_name} and {self.__target_action_cls.__name__}(event.action)"
 
     def first_accepted(self, started: Sequence[Any]) -> Any:
-        """The first of the started processes that this handler is about, ``None`` without one."""
+        """Return the first of the started processes that this handler is about; None without one."""
         return next((action for action in started if self.accepts(action)), None)
 
 
@@ -238,7 +238,8 @@ class OnIncludeLaunchDescription(BaseEventHandler):
     def handle(self, event: Event, context: LaunchContext) -> SomeEntitiesType | None:
         super().handle(event, context)
         assert isinstance(event, IncludeLaunchDescription)
-        return event.launch_description
+        description: SomeEntitiesType = event.launch_description
+        return description
 
     @property
     def handler_description(self) -> str:

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from typing import Any, ClassVar
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any, ClassVar
 from enclave_launch.description import node_names, read_only
 from enclave_launch.description.events.event import Event
 from enclave_launch.description.lifecycle_msgs import State, Transition
-
-if TYPE_CHECKING:
-    from enclave_launch.description.actions.lifecycle import LifecycleNode
 
 
 def _constants(message: type, prefix: str) -> dict[int, str]:
@@ -55,16 +52,16 @@ class StateTransition(Event):
     name = "launch_ros.events.lifecycle.StateTransition"
     msg: Any = None
 
-    def __init__(self, *, action: LifecycleNode, msg: Any):
+    def __init__(self, *, action: Any, msg: Any):
         super().__init__()
         self.__action = action
         self.__msg = msg
 
     def subject(self) -> str:
-        return self.__action.node_name
+        return str(self.__action.node_name)
 
     @property
-    def action(self) -> LifecycleNode:
+    def action(self) -> Any:
         return self.__action
 
     @property
@@ -85,6 +82,6 @@ class StateTransition(Event):
 
 
 def matches_node_name(node_name: str) -> Callable[[Any], bool]:
-    """The place where it was before it moved to ``launch_ros.events``; warns."""
+    """Forward to ``launch_ros.events``, where it is now, and warn."""
     warnings.warn("'matches_node_name' is in 'launch_ros.events' now, not in 'lifecycle'", stacklevel=2)
     return node_names.matches_node_name(node_name)

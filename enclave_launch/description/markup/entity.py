@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any, TypeVar, overload
+from typing import TYPE_CHECKING, Any, List, Protocol, TypeVar, overload  # noqa: UP035  (upstream names typing.List)
 
 if TYPE_CHECKING:
     from collections.abc import Container
@@ -36,7 +36,7 @@ class Entity:
 
     @property
     def children(self) -> list[Entity]:
-        """All child elements, in order; asking for them counts as having read them."""
+        """Return all child elements, in order; asking for them counts as having read them."""
         raise NotImplementedError()
 
     @property
@@ -88,13 +88,22 @@ class Entity:
         raise NotImplementedError()
 
 
+class Parser(Protocol):
+    """What elements ask of the front end that reads them; ``markup.parser.Parser`` is one."""
+
+    def parse_action(self, entity: Entity) -> Any: ...
+    def parse_substitution(self, value: str) -> Any: ...
+    def parse_if_substitutions(self, value: Any) -> Any: ...
+    def escape_characters(self, value: str) -> str: ...
+
+
 # Types that front ends can be asked for (API of ``launch.frontend.type_utils``).
 
 _SCALARS = {"str": str, "bool": bool, "float": float, "int": int}
 
 
 def check_is_list_entity(data_type: Any) -> bool:
-    """Whether ``data_type`` is a list type whose items are entities."""
+    """Return True if ``data_type`` is a list type whose items are entities."""
     items = getattr(data_type, "__args__", None)
     if not items or getattr(data_type, "__origin__", None) is not list:
         return False
@@ -109,7 +118,5 @@ def get_data_type_from_identifier(type_identifier: str) -> Any:
     if scalar is None:
         raise ValueError(f"Got invalid type identifier '{type_identifier}'")
     if type_identifier.startswith("list_of_"):
-        from typing import List  # noqa: UP035  (upstream names typing.List)
-
         return List[scalar]  # type: ignore[valid-type]  # noqa: UP006
     return scalar

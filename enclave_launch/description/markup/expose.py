@@ -10,8 +10,8 @@ from __future__ import annotations
 import functools
 from collections.abc import Callable, Iterable
 from types import FunctionType, MethodType
+from typing import TYPE_CHECKING, Any, TypeVar
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any, TypeVar
 from enclave_launch.description.markup.tags import registrations_of
 from enclave_launch.frontend import error_location
 from enclave_launch.host.current import current_release
@@ -19,8 +19,7 @@ from enclave_launch.ros_rules.distro import Since
 
 if TYPE_CHECKING:
     from enclave_launch.description.entity import Action
-    from enclave_launch.description.markup.entity import Entity
-    from enclave_launch.description.markup.parser import Parser
+    from enclave_launch.description.markup.entity import Entity, Parser
     from enclave_launch.description.substitution import SomeSubstitutionsType, Substitution
 
 
@@ -71,7 +70,7 @@ def instantiate_substitution(
 
 
 def is_ours(name: str) -> bool:
-    """Whether substitution ``name`` is one of this package's, or unknown: not foreign code."""
+    """Return True if substitution ``name`` is one of this package's, or unknown: not foreign code."""
     method = _lookup("substitution", name)
     return method is None or method.__module__.startswith(_OUR_PACKAGE)
 
@@ -93,7 +92,7 @@ def expose_substitution(name: str, *, feature: Since | None = None) -> Callable[
 
 
 def _lookup(kind: str, name: str) -> ParseMethod | None:
-    """The registered parse method, imported if need be; ``None`` if the release in force has none."""
+    """Return the registered parse method, imported if need be; None if the release in force has none."""
     gate = _GATES[kind].get(name)
     if gate is not None and not current_release().has(gate):
         return None
@@ -135,7 +134,7 @@ def forget(module: str) -> None:
 
 
 def _registered(method: Any) -> Any:
-    """What was exposed, without what ``_checking_leftovers`` and others have put around it."""
+    """Return what was exposed, without the wrappers of ``_checking_leftovers`` and others."""
     while hasattr(method, "__wrapped__"):
         method = method.__wrapped__
     return method

@@ -7,8 +7,8 @@ own substitutions never change once built, so what a text gave is kept and its o
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import TYPE_CHECKING, Any
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.markup import expose
 from enclave_launch.description.substitution import Substitution, TextSubstitution
 from enclave_launch.frontend.substitution_grammar import (
@@ -84,7 +84,7 @@ def _parse_if(value: Any) -> Any:
 
 @lru_cache(maxsize=16384)
 def _parse_shared(string_value: str) -> tuple[Substitution, ...] | None:
-    """The substitutions of a text; ``None`` if a foreign class takes part, whose objects may have a state."""
+    """Return the substitutions of a text; None if a foreign class takes part, whose objects may have a state."""
     template = parse_template(string_value)
     if not all(expose.is_ours(name) for name in called_names(template)):
         return None

@@ -6,8 +6,10 @@ import itertools
 import os
 import warnings
 from collections.abc import Sequence
+from importlib import import_module
+from typing import TYPE_CHECKING, Any, TextIO
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any, TextIO
+from enclave_launch.description.launch_description import LaunchDescription
 from enclave_launch.description.markup import expose, parse_substitution, tags
 from enclave_launch.description.markup.entity import Entity
 from enclave_launch.frontend import launch_file
@@ -15,9 +17,14 @@ from enclave_launch.frontend.error_location import mark
 
 if TYPE_CHECKING:
     from enclave_launch.description.entity import Action
-    from enclave_launch.description.launch_description import LaunchDescription
     from enclave_launch.description.substitution import Substitution
 
+
+# In the order in which they are tried. Their modules build on this one and are imported when first needed.
+_FRONT_ENDS = {
+    "xml": "enclave_launch.description.markup.xml",
+    "yaml": "enclave_launch.description.markup.yaml",
+}
 
 FilePath = str | bytes | os.PathLike[str]
 
@@ -68,10 +75,8 @@ class Parser:
     def load_parser_implementations(cls) -> None:
         """Find the front ends: ours, in the order in which they are tried."""
         if cls.frontend_parsers is None:
-            from enclave_launch.description.markup.xml import Parser as XmlParser
-            from enclave_launch.description.markup.yaml import Parser as YamlParser
-
-            Parser.frontend_parsers = {"xml": XmlParser, "yaml": YamlParser}
+            modules = {name: import_module(module) for name, module in _FRONT_ENDS.items()}
+            Parser.frontend_parsers = {name: module.Parser for name, module in modules.items()}
 
     def parse_action(self, entity: Entity) -> Action:
         """Build the action that ``entity`` describes."""
@@ -91,8 +96,6 @@ class Parser:
 
     def parse_description(self, entity: Entity) -> LaunchDescription:
         """Root element -> ``LaunchDescription``; ``RuntimeError`` unless it is ``launch``."""
-        from enclave_launch.description.launch_description import LaunchDescription
-
         try:
             if entity.type_name != "launch":
                 raise RuntimeError("Expected 'launch' as root tag")
@@ -136,17 +139,17 @@ class Parser:
 
     @classmethod
     def may_parse(cls, filename: str) -> bool:
-        """Whether the name ends like this front end's files."""
+        """Return True if the name ends like this front end's files."""
         return any(filename.endswith("." + extension) for extension in cls.get_file_extensions())
 
     @classmethod
     def is_filename_valid(cls, filename: str) -> bool:
-        """Whether the name ends like the files of any front end."""
+        """Return True if the name ends like the files of any front end."""
         return any(parser.may_parse(filename) for parser in cls._implementations().values())
 
     @classmethod
     def get_parsers_from_filename(cls, filename: str) -> list[type[Parser]]:
-        """The front ends whose files are named like this, in order."""
+        """Return the front ends whose files are named like this, in order."""
         return [parser for parser in cls._implementations().values() if parser.may_parse(filename)]
 
     @classmethod

@@ -120,7 +120,7 @@ def _load_entry_points() -> None:
     if _entry_points_loaded:
         return
     _entry_points_loaded = True
-    import importlib.metadata
+    import importlib.metadata  # only for an element that is not ours: it takes long to load
 
     for entry_point in importlib.metadata.entry_points(group=EXTENSION_GROUP):
         if entry_point.name in OUR_EXTENSIONS:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
+
 from enclave_launch.description.markup.entity import Entity as BaseEntity
 from enclave_launch.description.markup.entity import check_is_list_entity
 from enclave_launch.description.markup.parser import FilePath
@@ -16,7 +17,7 @@ from enclave_launch.source_location import SourceLocation
 if TYPE_CHECKING:
     from collections.abc import Container
 
-    from enclave_launch.boundary.xml_tree import XmlElement
+    from enclave_common.xml_tree import XmlElement
 
 
 _VALUE_TYPES = frozenset({str, int, float, bool, None})  # certainly no lists of entities
@@ -57,7 +58,7 @@ class Entity(BaseEntity):
         return {*element.attrib, *[child.tag for child in element.children]}
 
     def find_text(self, text: str) -> SourceLocation | None:
-        """The first place at or below this element where an attribute has exactly this text."""
+        """Return the first place at or below this element where an attribute has exactly this text."""
         if text in self._element.attrib.values():
             return self.source_location
         places = (Entity(child, file=self._file).find_text(text) for child in self._element)

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Container, Mapping
+from typing import Any, TextIO
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any, TextIO
+from enclave_common.yaml_reader import load_yaml_with_lines
 from enclave_launch.description.markup.entity import Entity as BaseEntity
 from enclave_launch.description.markup.entity import check_is_list_entity
 from enclave_launch.description.markup.parser import FilePath
@@ -13,10 +14,6 @@ from enclave_launch.description.typed_values import is_instance_of
 from enclave_launch.frontend import launch_file
 from enclave_launch.frontend.error_location import mark_at
 from enclave_launch.source_location import SourceLocation
-
-if TYPE_CHECKING:
-    from enclave_launch.frontend.yaml_tree import YamlDocument
-
 
 _NO_LINES: Mapping[int, int] = {}
 
@@ -91,7 +88,7 @@ class Entity(BaseEntity):
         return self._element if isinstance(self._element, dict) else super().given
 
     def find_text(self, text: str) -> SourceLocation | None:
-        """The place of the innermost mapping or list that holds exactly this text."""
+        """Return the place of the innermost mapping or list that holds exactly this text."""
         line = _line_of_text(self._element, text, self._lines, self._line)
         return None if line is None else SourceLocation(self._file, line, str(self._type_name or ""))
 
@@ -159,7 +156,7 @@ class Parser(BaseParser):
     @classmethod
     def load_source(cls, source: launch_file.LaunchFile) -> tuple[Entity, Parser]:
         try:
-            document = source.parsed_by(_parse_yaml)
+            document = source.parsed_by(load_yaml_with_lines)
             tree = document.root
             if tree is None:
                 raise TypeError("the file is empty, expected the key 'launch'")
@@ -176,12 +173,6 @@ class Parser(BaseParser):
     @classmethod
     def get_file_extensions(cls) -> set[str]:
         return {"launch.yaml", "launch.yml", "yaml", "yml", "launch"}
-
-
-def _parse_yaml(text: str) -> YamlDocument:
-    from enclave_launch.frontend.yaml_tree import parse_yaml  # loads PyYAML, which XML does not need
-
-    return parse_yaml(text)
 
 
 def _line_of(error: Exception) -> int:

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Union, cast
 
-from enclave_launch.boundary.files import as_path, read_text
-from enclave_launch.boundary.light import TYPE_CHECKING, Any, cast
-from enclave_launch.boundary.plain_yaml import known_parts
+import yaml
+
+from enclave_common.files import read_text
 from enclave_launch.description.argument_types import ensure_argument_type
 from enclave_launch.description.markup.parse_substitution import parse_substitution
 from enclave_launch.description.parameters import yaml_text
@@ -18,13 +21,16 @@ from enclave_launch.description.substitution import (
     perform_substitutions,
 )
 from enclave_launch.description.typed_values import normalize_typed_substitution, perform_typed_substitution
+from enclave_launch.ros_rules.parameter_file import MAX_BYTES
 
 if TYPE_CHECKING:
-    from pathlib import Path
-
     from enclave_launch.description.launch_context import LaunchContext
-    from enclave_launch.description.parameters.types import EvaluatedParameterValue
     from enclave_launch.description.substitution import Substitution
+
+
+EvaluatedParameterValue = Union[  # noqa: UP007  (evaluated at run time, as upstream's)
+    str, int, float, bool, Sequence[str], Sequence[int], Sequence[float], Sequence[bool], bytes
+]
 
 
 class ParameterValue:
@@ -47,7 +53,7 @@ class ParameterValue:
         return f"launch_ros.description.ParameterValue(value={self.value}, value_type={self.value_type})"
 
     def evaluate(self, context: LaunchContext) -> EvaluatedParameterValue:
-        """The typed value; the first one is kept. Raises ``ValueError`` where coercion fails."""
+        """Return the typed value, evaluated once. Raises ``ValueError`` if coercion fails."""
         evaluated = perform_typed_substitution(context, self.value, self.__value_type)
         self.__evaluated = cast("EvaluatedParameterValue", evaluated)
         return self.__evaluated
@@ -109,11 +115,11 @@ class ParameterFile:
         else:
             self.__param_file = param_file
         self.__allow_substs = bool(allow_substs)
-        self.__evaluated: str | None = None
+        self.__evaluated: Path | None = None
 
     @property
     def param_file(self) -> list[Substitution] | os.PathLike[str]:
-        return self.__param_file if self.__evaluated is None else as_path(self.__evaluated)
+        return self.__param_file if self.__evaluated is None else self.__evaluated
 
     @property
     def allow_substs(self) -> bool:
@@ -126,18 +132,16 @@ class ParameterFile:
         )
 
     def evaluate(self, context: LaunchContext) -> Path:
-        """The path to pass on: the file itself, or a generated copy with the substitutions performed.
+        """Return the path to pass on: the file itself, or a generated copy with the substitutions performed.
 
         Raises ``FileNotFoundError`` for a missing file that is to be substituted, ``SubstitutionFailure``
         when it is not YAML afterwards.
         """
-        return as_path(self.path_text(context))
-
-    def path_text(self, context: LaunchContext) -> str:
-        """As ``evaluate``, as text."""
         if self.__evaluated is None:
             given = self.__param_file
-            path = _path_text(perform_substitutions(context, given) if isinstance(given, list) else given)
+            path = Path(
+                perform_substitutions(context, given) if isinstance(given, list) else os.fsdecode(given)
+            )
             self.__evaluated = _substituted(context, path) if self.__allow_substs else path
         return self.__evaluated
 
@@ -146,22 +150,13 @@ class ParameterFile:
         self.__evaluated = None
 
 
-def _path_text(path: str | os.PathLike[str]) -> str:
-    """``str(Path(path))``; nearly every path stays as it is written, for which nobody needs ``pathlib``."""
-    if isinstance(path, str) and path and "." not in (parts := path.split("/")) and "" not in parts[1:]:
-        return path
-    return str(as_path(path))
-
-
-def _substituted(context: LaunchContext, path: str) -> str:
-    import yaml
-
-    if context.host.allow_missing_packages and not os.path.isfile(path):
-        return path  # told where it is used
-    text = perform_substitutions(context, parse_substitution(read_text(path)))
+def _substituted(context: LaunchContext, path: Path) -> Path:
+    if context.host.allow_missing_packages and not path.is_file():
+        return path  # reported where it is used
+    template = parse_substitution(read_text(path, MAX_BYTES))
+    text = perform_substitutions(context, template, MAX_BYTES)
     try:
-        if known_parts(text) is None:
-            yaml_text.load_shared(text)
+        yaml_text.load_parameter_file(text)
     except yaml.YAMLError:
         raise SubstitutionFailure("The substituted parameter file is not a valid yaml file") from None
-    return str(context.host.write_parameter_file(text))
+    return Path(context.host.write_parameter_file(text))

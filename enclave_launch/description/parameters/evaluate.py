@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from enclave_launch.boundary.files import as_path
-from enclave_launch.boundary.light import TYPE_CHECKING, Any
+import yaml
+
+from enclave_common.yaml_reader import load_yaml
 from enclave_launch.description.argument_types import ensure_argument_type
 from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.description.parameters import yaml_text
@@ -26,23 +29,16 @@ _SCALARS = (bool, int, float, str)
 
 
 def evaluate_parameters(context: LaunchContext, parameters: Parameters) -> EvaluatedParameters:
-    """Files as paths, dicts with their values, ``Parameter`` descriptions unchanged, in the given order."""
-    evaluated = evaluated_parameters(context, parameters)
-    return tuple(as_path(item) if isinstance(item, str) else item for item in evaluated)
-
-
-def evaluated_parameters(context: LaunchContext, parameters: Parameters) -> list[Any]:
-    """As ``evaluate_parameters``, files as the text of their paths."""
-    evaluated: list[Any] = []
+    """Return files as paths, dicts with their values, ``Parameter`` descriptions unchanged, in the given order."""
+    evaluated: list[Path | Parameter | dict[str, EvaluatedParameterValue]] = []
     for item in parameters:
         if isinstance(item, ParameterFile):
-            ours = type(item).evaluate is ParameterFile.evaluate
-            evaluated.append(item.path_text(context) if ours else str(item.evaluate(context)))
+            evaluated.append(item.evaluate(context))
         elif isinstance(item, Parameter):
             evaluated.append(item)
         elif isinstance(item, Mapping):
             evaluated.append(evaluate_parameter_dict(context, item))
-    return evaluated
+    return tuple(evaluated)
 
 
 def evaluate_parameter_dict(
@@ -77,14 +73,12 @@ def _evaluate_value(context: LaunchContext, name: str, value: Any) -> Any:
 
 
 def _read(context: LaunchContext, name: str, substitutions: tuple[Substitution, ...]) -> Any:
-    """The joined text of the substitutions as YAML; empty text stays text."""
-    import yaml
-
+    """Read the joined text of the substitutions as YAML; empty text stays text."""
     if len(substitutions) == 1 and isinstance(substitutions[0], yaml_text.YamlConstant):
         return substitutions[0].value
     text = perform_substitutions(context, list(substitutions))
     try:
-        return yaml_text.load(text) if text else ""
+        return load_yaml(text) if text else ""
     except yaml.YAMLError:
         raise TypeError(
             f"Unable to parse the value of parameter {name} as yaml. {_WRAP_IT_AS_TEXT}"
@@ -94,7 +88,7 @@ def _read(context: LaunchContext, name: str, substitutions: tuple[Substitution, 
 def _read_item(context: LaunchContext, item: Sequence[Substitution]) -> Any:
     if len(item) == 1 and isinstance(item[0], yaml_text.YamlConstant):
         return item[0].value
-    return yaml_text.load(perform_substitutions(context, list(item)))
+    return load_yaml(perform_substitutions(context, list(item)))
 
 
 def _checked(name: str, value: Any) -> Any:

@@ -11,8 +11,8 @@ A normalized file is a ``ParameterFile``; a normalized dict maps tuples of subst
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.argument_types import ensure_argument_type
 from enclave_launch.description.parameters.descriptions import Parameter, ParameterFile, ParameterValue
 from enclave_launch.description.parameters.yaml_text import YamlConstant

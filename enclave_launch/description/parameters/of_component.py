@@ -10,9 +10,9 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from enclave_launch.boundary.files import read_text
-from enclave_launch.boundary.light import TYPE_CHECKING, Any, NamedTuple
+from enclave_common.files import read_text
 from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.description.parameters import yaml_text
 from enclave_launch.description.parameters.evaluate import evaluate_parameter_dict
@@ -20,6 +20,7 @@ from enclave_launch.description.parameters.normalize import normalize_parameter_
 from enclave_launch.diagnostics.evaluation import parameter_file_missing
 from enclave_launch.host.current import current_release
 from enclave_launch.ros_rules.distro import Feature
+from enclave_launch.ros_rules.parameter_file import MAX_BYTES
 from enclave_launch.ros_rules.rcl_parameters import section_applies
 
 if TYPE_CHECKING:
@@ -73,11 +74,11 @@ def _read(context: LaunchContext, path: os.PathLike[str]) -> Any:
     if generated is None and context.host.allow_missing_packages and not os.path.isfile(path):
         context.host.warn(parameter_file_missing(str(path)))
         return {}
-    return yaml_text.load_shared(read_text(path) if generated is None else generated)
+    return yaml_text.load_parameter_file(read_text(path, MAX_BYTES) if generated is None else generated)
 
 
 def _applicable(document: Any, section: str) -> tuple[Mapping[str, Any], bool]:
-    """What of a parameter file applies to this node, and whether the file has sections at all."""
+    """Return what of a parameter file applies to this node, and whether the file has sections at all."""
     sections = dict(_sections(document, ()))
     if not sections:
         return document, False
@@ -94,7 +95,7 @@ def _matching_patterns(sections: Mapping[str, Any], section: str) -> list[str]:
 
 
 def _sections(mapping: Mapping[str, Any], path: tuple[str, ...]) -> Iterator[tuple[str, Any]]:
-    """Each ``ros__parameters`` with the keys above it; what follows in the same mapping is not read."""
+    """Yield each ``ros__parameters`` with the keys above it; what follows in the same mapping is not read."""
     for key, value in mapping.items():
         if key == "ros__parameters":
             yield "/".join(path), value

@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import partial
+from typing import TYPE_CHECKING, Any
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description.parameters import yaml_text
 from enclave_launch.description.parameters.descriptions import Parameter
-from enclave_launch.description.parameters.evaluate import evaluated_parameters
+from enclave_launch.description.parameters.evaluate import evaluate_parameters
 from enclave_launch.diagnostics.evaluation import parameter_file_missing
 from enclave_launch.ros_rules.distro import Feature
 from enclave_launch.ros_rules.parameter_value import ParameterValue
@@ -37,7 +37,7 @@ class NodeParameters:
     def write(self, context: LaunchContext, section: str) -> list[str]:
         """Words to append to the command line. ``section`` is the node's full name, or ``/**``."""
         words = [word for pair in _global_words(context) for word in pair]
-        for item in evaluated_parameters(context, self.__own):
+        for item in evaluate_parameters(context, self.__own):
             words += self.__own_words(context, section, item)
         return words
 
@@ -45,12 +45,12 @@ class NodeParameters:
         if isinstance(item, Parameter):
             name, value = item.evaluate(context)
             return ("-p", f"{name}:={yaml_text.dump(value)}")
-        if isinstance(item, str):
-            return self.__file_words(context, item)
+        if isinstance(item, os.PathLike):
+            return self.__file_words(context, os.fspath(item))
         return ("--params-file", self.__write_file(context, section, item))
 
     def __file_words(self, context: LaunchContext, path: str) -> Sequence[str]:
-        """A file of the user's, or one that was made from such a file by substitutions."""
+        """Return the words for a file of the user's, or for one made from it by substitutions."""
         text = context.host.parameter_file(path)
         if text is not None:
             self.__written[path] = partial(parameters_of_text, text, path)
@@ -73,7 +73,7 @@ class NodeParameters:
         sources: Sequence[ParameterFileArgument | ParameterRule],
         directory: str | None,
     ) -> ResolvedParameters:
-        """What the node sees after rcl has merged everything on its command line."""
+        """Return what the node sees after rcl has merged everything on its command line."""
         written = self.__written
         return resolve_parameters(
             name_tokens, sources, lambda path: written[path]() if path in written else None, directory

@@ -6,6 +6,9 @@ import pathlib
 from collections.abc import Mapping, Sequence
 from typing import Any, Union
 
+from enclave_launch.description.parameters.descriptions import (
+    EvaluatedParameterValue as EvaluatedParameterValue,
+)
 from enclave_launch.description.parameters.descriptions import Parameter as ParameterDescription
 from enclave_launch.description.parameters.descriptions import ParameterFile
 from enclave_launch.description.parameters.descriptions import ParameterValue as ParameterValueDescription
@@ -37,5 +40,4 @@ ParameterValue = Union[
 ParametersDict = dict[ParameterName, ParameterValue]
 Parameters = Sequence[Union[ParameterFile, ParametersDict, ParameterDescription]]
 
-EvaluatedParameterValue = Union[_Scalar, _Several]
 EvaluatedParameters = Sequence[Union[pathlib.Path, ParameterDescription, dict[str, EvaluatedParameterValue]]]

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import suppress
 from functools import lru_cache
+from typing import Any
 
-from enclave_launch.boundary.light import Any
-from enclave_launch.boundary.plain_yaml import LONGEST_KEY, WIDTH, NeedsPyYAML, block_text, scalar_text
+import yaml
+
+from enclave_common.yaml_reader import load_yaml
 from enclave_launch.description.substitution import TextSubstitution
-from enclave_launch.frontend import yaml_scalar
+from enclave_launch.frontend import libyaml
+from enclave_launch.ros_rules.parameter_file import MAX_BYTES
 
 
 class YamlConstant(TextSubstitution):
@@ -27,55 +29,46 @@ class YamlConstant(TextSubstitution):
         return self.text
 
 
-def load(text: str) -> Any:
-    """YAML 1.1 as ``yaml.safe_load`` reads it. Raises ``yaml.YAMLError``, ``ValueError``."""
-    if "\n" not in text:
-        return yaml_scalar.load(text)
-    from enclave_launch.frontend.yaml_tree import values_of_yaml
+@lru_cache(maxsize=16)
+def load_parameter_file(text: str) -> Any:
+    """Load as ``yaml.safe_load``, once for all nodes with the same file; do not modify the values.
 
-    return values_of_yaml(text)
-
-
-@lru_cache(maxsize=256)
-def load_shared(text: str) -> Any:
-    """As ``load``, read once for all who read the same text; do not modify the values."""
-    return load(text)
+    Raises ``yaml.YAMLError``, ``ValueError``.
+    """
+    return load_yaml(text, MAX_BYTES)
 
 
 def dump(value: Any) -> str:
-    """YAML as PyYAML writes it by default, Python tags included; block style, sorted keys."""
-    import yaml
+    """Write YAML as PyYAML does by default, Python tags included; block style, sorted keys."""
+    return str(libyaml.dump(value, default_flow_style=False))
 
-    return str(yaml.dump(value, default_flow_style=False))
+
+class _QuotedText(str):
+    """A text that is written in quotes."""
+
+
+class _QuotingDumper(yaml.Dumper):
+    """Writes ``_QuotedText`` in quotes."""
+
+
+_QuotingDumper.add_representer(
+    _QuotedText, lambda dumper, text: dumper.represent_scalar("tag:yaml.org,2002:str", str(text), style="'")
+)
 
 
 def quoted_parameter_file(section: str, parameters: Mapping[str, Any]) -> str:
-    """As ``parameter_file``, but every text value is in quotes, so that rcl cannot take it for a number."""
-    import yaml
+    """Write a parameter file with every text value in quotes, so that rcl cannot take it for a number."""
+    values = {name: _quoted(value) for name, value in parameters.items()}
+    document = {section: {"ros__parameters": values}}
+    return str(yaml.dump(document, Dumper=_QuotingDumper, default_flow_style=False))
 
-    class Dumper(yaml.Dumper):
-        pass
 
-    class Quoted(str):
-        pass
-
-    def quoted(value: Any) -> Any:
-        if isinstance(value, (list, tuple)):
-            return type(value)(quoted(item) for item in value)
-        return Quoted(value) if isinstance(value, str) else value
-
-    Dumper.add_representer(
-        Quoted, lambda dumper, text: dumper.represent_scalar("tag:yaml.org,2002:str", str(text), style="'")
-    )
-    values = {name: quoted(value) for name, value in parameters.items()}
-    return str(yaml.dump({section: {"ros__parameters": values}}, Dumper=Dumper, default_flow_style=False))
+def _quoted(value: Any) -> Any:
+    if isinstance(value, (list, tuple)):
+        return type(value)(_quoted(item) for item in value)
+    return _QuotedText(value) if isinstance(value, str) else value
 
 
 def parameter_file(section: str, parameters: Mapping[str, Any]) -> str:
-    """The parameter file launch writes for one dict: ``section`` is a node's full name or ``/**``."""
-    with suppress(NeedsPyYAML):  # for lists, and what does not fit into a line
-        lines = [f"    {scalar_text(name)}: {scalar_text(parameters[name])}\n" for name in sorted(parameters)]
-        if lines and all(parameters) and len(max(lines, key=len)) <= WIDTH and len(section) <= LONGEST_KEY:
-            return f"{scalar_text(section)}:\n  ros__parameters:\n{''.join(lines)}"
-    values = {section: {"ros__parameters": dict(parameters)}}
-    return block_text(values) or dump(values)
+    """Write the parameter file that launch writes for one dict: ``section`` is a node's full name or ``/**``."""
+    return dump({section: {"ros__parameters": dict(parameters)}})

@@ -5,10 +5,10 @@ from __future__ import annotations
 import importlib
 import math
 from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
-from enclave_launch.boundary import shell_words
-from enclave_launch.boundary.files import read_text
-from enclave_launch.boundary.light import TYPE_CHECKING, Any
+from enclave_common import shell_words
+from enclave_common.files import read_text
 from enclave_launch.description.markup.expose import expose_substitution
 from enclave_launch.description.substitution import (
     MAX_TEXT,
@@ -126,10 +126,10 @@ class PythonExpression(Substitution):
             names = dict(math.__dict__)
         # A launch file may compute anything here: that is the substitution's purpose.
         expression = perform_substitutions(context, self.__expression)
-        outcomes = context.host.outcomes
-        if outcomes is None:
+        results = context.host.user_code_results
+        if results is None:
             return str(eval(expression, {}, names))
-        return outcomes.call(
+        return results.call(
             ("eval", expression),
             lambda: str(eval(expression, {}, names)),
             at_event=context.on_event is not None,
@@ -137,7 +137,7 @@ class PythonExpression(Substitution):
 
 
 def _literal_names(modules: Any) -> list[str]:
-    """The comma-separated names; only literal text counts."""
+    """Return the comma-separated names; only literal text counts."""
     parts = list(modules)
     if not parts:
         return []

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description import ament_index as packages
 from enclave_launch.description.launch_context import LaunchContext
+from enclave_launch.description.logging import launch_config
 from enclave_launch.description.markup.expose import expose_substitution
 from enclave_launch.description.substitution import (
     SomeSubstitutionsType,
@@ -80,8 +82,6 @@ class PathSubstitution(PathOperator, Substitution):
 
     def __init__(self, path: object) -> None:
         self.__path = path
-        from pathlib import Path  # slow to import, and here only when somebody has one
-
         text = str(path) if isinstance(path, Path) else path
         self.__parts = normalize_to_list_of_substitutions(text)  # type: ignore[arg-type]
 
@@ -139,7 +139,7 @@ class LaunchLogDir(TemplateSubstitution):
         return "LaunchLogDir()"
 
     def perform(self, context: LaunchContext) -> str:
-        return context.host.log_directory()
+        return context.host.log_directory() or launch_config.log_dir
 
 
 class FindPackage(PathOperator, TemplateSubstitution):

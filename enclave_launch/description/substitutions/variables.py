@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import collections.abc
 from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any
 from enclave_launch.description import read_only
 from enclave_launch.description.argument_types import ensure_argument_type
 from enclave_launch.description.markup.expose import expose_substitution
@@ -134,7 +134,7 @@ class LocalSubstitution(Substitution):
 
 
 def local_name(name: str) -> str:
-    """The local that carries the value of loop variable ``name``."""
+    """Return the name of the local that carries the value of loop variable ``name``."""
     return f"ForEachVar__{name}"
 
 

@@ -10,8 +10,8 @@ import hashlib
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
+from enclave_common.terminal import json_text
 from enclave_launch import __version__
-from enclave_launch.boundary.terminal import json_text
 from enclave_launch.report.contents import ReportContents
 from enclave_launch.report.evidence import matrix
 from enclave_launch.report.evidence.requirements import DISCLAIMER, PARTS

@@ -7,7 +7,7 @@ import io
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
-from enclave_launch.boundary.terminal import printable
+from enclave_common.terminal import printable
 from enclave_launch.report.graph import EnclaveGraph, evidence_text
 
 

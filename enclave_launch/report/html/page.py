@@ -10,9 +10,9 @@ import re
 from pathlib import Path
 from typing import Any
 
+from enclave_common.terminal import json_text, printable
+from enclave_common.words import counted
 from enclave_launch import __version__
-from enclave_launch.boundary.terminal import json_text, printable
-from enclave_launch.boundary.words import counted
 from enclave_launch.report.contents import ReportContents
 from enclave_launch.report.graph import OUTWARD, ChannelUse, EnclaveGraph, evidence_text
 from enclave_launch.report.html import tables

@@ -8,8 +8,8 @@ from __future__ import annotations
 import html
 from collections.abc import Iterable, Iterator
 
-from enclave_launch.boundary.terminal import printable
-from enclave_launch.boundary.words import counted
+from enclave_common.terminal import printable
+from enclave_common.words import counted
 from enclave_launch.report.contents import Influence, ReportContents
 from enclave_launch.report.graph import ChannelUse, EnclaveGraph, evidence_text
 from enclave_launch.report.review_text import step_text

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from enclave_launch.boundary.words import some_of
+from enclave_common.words import some_of
 from enclave_launch.review.checks.rules import finding
 from enclave_launch.review.document import GrantedName, PlanDocument, Told
 from enclave_launch.review.similarity import splits

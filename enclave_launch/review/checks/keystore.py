@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
-from enclave_launch.boundary.words import some_of
+from enclave_common.words import some_of
 from enclave_launch.review.checks.rules import finding
 from enclave_launch.review.document import GrantedName, PlanDocument, Told
 from enclave_launch.review.signed import as_signed

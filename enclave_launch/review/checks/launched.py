@@ -18,6 +18,8 @@ _SECRET = re.compile(
     r"|(api|access|private|secret)[._-]?key)$",
     re.IGNORECASE,
 )
+_BY_CONVENTION = ("/tf", "/tf_static")
+"""Names that launch files remap for every node of a namespace, whether it has a transform listener or not."""
 _CAMEL = re.compile(r"(?<=[a-z0-9])(?=[A-Z])")
 _OF_EVERY_NODE = re.compile(
     r"use_sim_time$|start_type_description_service$|qos_overrides\.|.*/qos_overrides\."
@@ -34,6 +36,8 @@ def remaps(plan: PlanDocument, document: Document) -> Iterator[Told]:
     for item in launched(document):
         for source, target in item["remaps"]:
             rule = (source, target)
+            if source in _BY_CONVENTION:
+                continue
             if f"{source}:={target}" in used.get(_key(item), ()) or _key(item) in unknown or source == target:
                 alive.add(rule)
             dead.setdefault(rule, item)

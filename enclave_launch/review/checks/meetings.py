@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from itertools import combinations, product
 from typing import Any, NamedTuple
 
-from enclave_launch.boundary.words import some_of
+from enclave_common.words import some_of
 from enclave_launch.review.checks.rules import finding
 from enclave_launch.review.document import KIND_OF, GrantedName, Operation, PlanDocument, Told
 from keystore.formats.permissions_patterns import can_meet, has_wildcard

@@ -6,16 +6,17 @@ import argparse
 from collections.abc import Sequence
 from importlib import import_module
 
-from enclave_launch.boundary.command_line import (
+from enclave_common.command_line import (
     CommandParser,
     Option,
+    add_absent_verb,
     add_options,
     add_verbosity,
     add_version,
     complete,
     guarded,
 )
-from enclave_launch.boundary.terminal import safe_output
+from enclave_common.terminal import safe_output
 from enclave_launch.errors import EnclaveLaunchError
 from enclave_launch.verb.completion import offer_launches
 from enclave_launch.verb.options import EVALUATION, POLICY
@@ -40,7 +41,11 @@ def build_parser() -> argparse.ArgumentParser:
     add_version(parser)
     verbs = parser.add_subparsers(metavar="VERB", required=True)
     for name in VERBS:
-        verb = import_module(f"enclave_launch.verb.secure_plan.{name}")
+        try:
+            verb = import_module(f"enclave_launch.verb.secure_plan.{name}")
+        except ModuleNotFoundError as error:
+            add_absent_verb(verbs, name, error, "verb")
+            continue
         head = verb.__doc__ or ""
         below = verbs.add_parser(name, help=head.partition("\n")[0], description=head, formatter_class=raw)
         add_options(below, getattr(verb, "WORDS", PLAN))

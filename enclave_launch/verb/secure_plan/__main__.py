@@ -2,6 +2,6 @@
 
 import sys
 
-from enclave_launch.verb.secure_plan import main
+from enclave_common.entry import secure_plan
 
-sys.exit(main())
+sys.exit(secure_plan())

@@ -11,17 +11,16 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from typing import TYPE_CHECKING
 
+from enclave_common.command_line import FLAG, PATH, one_of
+from enclave_common.terminal import json_text
 from enclave_launch import __version__
-from enclave_launch.boundary.command_line import FLAG, PATH, one_of
-from enclave_launch.boundary.terminal import json_text
+from enclave_launch.report.review_text import findings_document, findings_text
+from enclave_launch.report.sarif import sarif_document
+from enclave_launch.review.checks import MEANINGS
+from enclave_launch.review.document import Told
 from enclave_launch.verb.secure_plan.judging import EXPECT, WITHIN, judged
 from enclave_launch.verb.secure_plan.plans import read_plan
-
-if TYPE_CHECKING:
-    from enclave_launch.review.document import Told
-
 
 OPTIONS = {
     "": (
@@ -37,19 +36,14 @@ OPTIONS = {
 def run(options: argparse.Namespace) -> int:
     """Print the findings. Returns 1 for an error that nobody accepted (``--strict``: for any finding)."""
     found = judged(read_plan(options.words, options), options.expect, options.keystore, options.within)
-    sys.stdout.write(_text(found, options.format))
+    sys.stdout.write(_text(found, options.format, options.verbose))
     open_ones = [told for told, accepted in found if accepted is None]
     return 1 if any(options.strict or told.severity == "error" for told in open_ones) else 0
 
 
-def _text(found: list[tuple[Told, str | None]], form: str) -> str:
-    from enclave_launch.report.review_text import findings_document, findings_text
-
+def _text(found: list[tuple[Told, str | None]], form: str, verbose: bool) -> str:
     if form == "sarif":
-        from enclave_launch.report.sarif import sarif_document
-        from enclave_launch.review.checks import MEANINGS
-
         return json_text(sarif_document(found, MEANINGS, __version__, os.getcwd()), indent=2) + "\n"
     if form == "json":
         return json_text(findings_document(found), indent=2) + "\n"
-    return findings_text(found)
+    return findings_text(found, verbose=verbose)

@@ -17,20 +17,19 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from typing import TYPE_CHECKING
+from collections.abc import Iterator, Mapping
 
-from enclave_launch.boundary.command_line import TEXT, Option, one_of
-from enclave_launch.boundary.terminal import json_text
+from enclave_common.command_line import TEXT, Option, one_of
+from enclave_common.terminal import json_text
 from enclave_launch.errors import keystore_errors
-from enclave_launch.verb.secure_plan import plans
+from enclave_launch.report.changes import changes_document, changes_markdown, changes_text
+from enclave_launch.review.changes import FileChange, changes
+from enclave_launch.review.document import GrantedName, PlanDocument, plan_from_document
+from enclave_launch.review.signed import keystore_as_plan, plan_as_signed
+from enclave_launch.verb.secure_plan import plans, revisions
+from enclave_launch.verb.secure_plan.keystores import enforced_grants, signed_grants
 from enclave_launch.verb.secure_plan.plans import read_plan
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator, Mapping
-
-    from enclave_launch.review.changes import FileChange
-    from enclave_launch.review.document import GrantedName, PlanDocument
-
+from keystore.steps.inventory import files_changed
 
 WORDS: tuple[Option, ...] = (
     ("before BEFORE", TEXT, "PLAN.json | PATH | REVISION: | REVISION:PATH | KEYSTORE"),
@@ -41,9 +40,6 @@ OPTIONS = {"": (("--format", one_of("text", "json", "markdown"), ""),)}
 
 def run(options: argparse.Namespace) -> int:
     """Print the difference. Returns 1 when rights grew."""
-    from enclave_launch.report.changes import changes_document, changes_markdown, changes_text
-    from enclave_launch.review.changes import changes
-
     changed = changes(*_both(options))._replace(files=_files(options))
     if options.format == "json":
         sys.stdout.write(json_text(changes_document(changed), indent=2) + "\n")
@@ -53,9 +49,6 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _both(options: argparse.Namespace) -> tuple[PlanDocument, PlanDocument]:
-    from enclave_launch.review.document import plan_from_document
-    from enclave_launch.verb.secure_plan import revisions
-
     if _two_keystores(options):
         return _keystore(options.before), _keystore(options.words[0])
     after = plan_from_document(read_plan(options.words, options))
@@ -68,8 +61,6 @@ def _both(options: argparse.Namespace) -> tuple[PlanDocument, PlanDocument]:
 
 def _keystore_and(plan: PlanDocument, keystore: str) -> tuple[PlanDocument, PlanDocument]:
     """Enclaves of other launches in the keystore are none of this plan's business."""
-    from enclave_launch.review.signed import keystore_as_plan, plan_as_signed
-
     before, wanted = _keystore(keystore), plan_as_signed(plan)
     signed = {path: grants for path, grants in before.enclaves.items() if path in plan.enclaves}
     if plan.on_zenoh:
@@ -81,8 +72,6 @@ def _enforced(
     signed: Mapping[str, frozenset[GrantedName]], wanted: PlanDocument, keystore: str
 ) -> Iterator[tuple[str, frozenset[GrantedName]]]:
     """Of enclaves on Zenoh: what is signed and what the router's file says have to be as planned, both."""
-    from enclave_launch.verb.secure_plan.keystores import enforced_grants
-
     enforced = enforced_grants(keystore)
     for path in wanted.on_zenoh & signed.keys():
         one, other = signed[path], enforced.get(path, frozenset())
@@ -94,9 +83,6 @@ def _two_keystores(options: argparse.Namespace) -> bool:
 
 
 def _keystore(keystore: str) -> PlanDocument:
-    from enclave_launch.review.document import PlanDocument
-    from enclave_launch.verb.secure_plan.keystores import enforced_grants, signed_grants
-
     return PlanDocument(signed_grants(keystore), (), (), frozenset(enforced_grants(keystore)))
 
 
@@ -104,8 +90,6 @@ def _files(options: argparse.Namespace) -> tuple[FileChange, ...]:
     """Of two keystores: the files for Zenoh, which hold more than names (types, domains, protections)."""
     if not _two_keystores(options):
         return ()
-    from enclave_launch.review.changes import FileChange
-    from keystore.steps.inventory import files_changed
 
     with keystore_errors():
         found = files_changed(options.before, options.words[0])

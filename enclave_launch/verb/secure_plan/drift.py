@@ -1,9 +1,10 @@
 """Hold a running system against the plan: what runs and is not planned, what is planned and does not run.
 
 Looks at the DDS domain, with Cyclone DDS's Python binding or rclpy. A secured system needs --keystore and --enclave
-(secure-keystore tool-enclave KEYSTORE --for observe makes one). docs/running-systems.md says what is told.
+(secure-keystore tool-enclave KEYSTORE --for observe makes one). docs/running-systems.md lists the findings.
 
-exit status: 0 as planned, 1 alarms, 2 wrong usage, 3 the domain cannot be observed
+exit status: 0 as planned, 1 alarms, 2 wrong usage, 3 the domain cannot be observed, 4 cannot tell: what the plan
+starts is out of the observer's sight
 """
 
 from __future__ import annotations
@@ -12,24 +13,29 @@ import argparse
 import os
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from enclave_common.command_line import PATH, PATHS, TEXT, TEXTS, one_of
+from enclave_common.environment import environment_with
+from enclave_common.terminal import json_text, message
 from enclave_launch.admission.variables import domain_of
-from enclave_launch.boundary.command_line import PATH, PATHS, TEXT, TEXTS, one_of
-from enclave_launch.boundary.terminal import json_text, message
+from enclave_launch.drift.compare import Circumstances, Security, compare
+from enclave_launch.drift.expected import Expected, expected_in, out_of_sight
+from enclave_launch.drift.finding import DriftFinding, FindingCertainty, Level, drift_document, drift_text
 from enclave_launch.errors import EnclaveLaunchError, UsageError, translated
 from enclave_launch.verb.secure_plan.plans import FORM, read_plan, read_saved
 from keystore.errors import KeystoreError
+from keystore.steps.tool_enclaves import enclaves_by_guid
+from nodl.errors import NoDLError
+from nodl.graph.cyclone import RANGE_VARIABLES
+from nodl.graph.model import Graph
+from nodl.graph.observation import read_observed
+from nodl.graph.observing import Observer, Quiet, Where, look_until, observer
 
-if TYPE_CHECKING:
-    from enclave_launch.drift.compare import Security
-    from enclave_launch.drift.expected import Expected
-    from enclave_launch.drift.finding import DriftFinding
-    from nodl.graph.model import Graph
-    from nodl.graph.observing import Observer, Where
-
+CANNOT_TELL = 4
+"""Exit status."""
 _BETWEEN = 0.5  # seconds between two comparisons while something may still come
 
 
@@ -59,11 +65,7 @@ OPTIONS = {
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print how the domain differs from the plan. Returns 1 for an alarm."""
-    from enclave_launch.drift.compare import Circumstances, compare
-    from enclave_launch.drift.expected import expected_in, out_of_sight
-    from enclave_launch.drift.finding import Level, drift_document, drift_text
-
+    """Print how the domain differs from the plan. Returns 1 for an alarm, 4 if the observer does not see enough."""
     documents = [read_plan(options.words, options), *map(read_saved, options.also_planned)]
     if zenoh := out_of_sight(documents):
         raise UsageError(f"drift: only DDS is observed, and {', '.join(zenoh)} of the plan on Zenoh")
@@ -73,14 +75,17 @@ def run(options: argparse.Namespace) -> int:
 
     def findings(graph: Graph, forged: tuple[str, ...] = ()) -> list[DriftFinding]:
         circumstances = Circumstances(security, tuple(options.accept), forged=forged)
-        return compare(expected, graph, circumstances)
+        return compare(expected, graph, circumstances, _enclaves_now(options))
 
     graph, found = _looked(options, domain, findings)
     if options.format == "json":
         sys.stdout.write(json_text(drift_document(found, graph), indent=2) + "\n")
     else:
         sys.stdout.write(message(drift_text(found, graph)).replace("\n    ", "\n"))
-    return 1 if any(each.level is Level.ALARM for each in found) else 0
+    levels = {each.level for each in found}
+    if Level.ALARM in levels:
+        return 1
+    return CANNOT_TELL if Level.CANNOT_TELL in levels else 0
 
 
 Findings = Callable[..., "list[DriftFinding]"]
@@ -88,36 +93,50 @@ Findings = Callable[..., "list[DriftFinding]"]
 
 def _looked(options: argparse.Namespace, domain: int, findings: Findings) -> tuple[Graph, list[DriftFinding]]:
     """Raises ``CannotObserve``."""
-    from nodl.errors import NoDLError
-    from nodl.graph.observing import Where, observer
-
     try:
         if options.graph is not None:
-            from nodl.graph.observation import read_observed
-
             graph = read_observed(options.graph).graph
             return graph, findings(graph)
         where = Where(domain, options.observer, _enclave_directory(options))
-        with observer(where, os.environ) as up:
-            return _settled(options, where, up, findings)
+        return _observed(options, where, findings)
     except (NoDLError, OSError) as error:
         raise CannotObserve(str(error)) from error
 
 
+def _observed(
+    options: argparse.Namespace, where: Where, findings: Findings
+) -> tuple[Graph, list[DriftFinding]]:
+    """Look where the environment says; if the plan is out of sight there, once more on the loopback interface."""
+    with observer(where, os.environ) as up:
+        graph, found = _settled(options, up, findings)
+    if _in_sight(found) or any(os.environ.get(name) for name in RANGE_VARIABLES):
+        return graph, found
+    local = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST"}
+    with environment_with(local), observer(where, os.environ) as up:
+        graph_there, found_there = _settled(options, up, findings)
+    if not _in_sight(found_there):
+        return graph, found
+    print(
+        "secure-plan drift: observed on the loopback interface, where the planned nodes talk", file=sys.stderr
+    )
+    return graph_there, found_there
+
+
+def _in_sight(found: Sequence[DriftFinding]) -> bool:
+    return all(each.level is not Level.CANNOT_TELL for each in found)
+
+
 def _settled(
-    options: argparse.Namespace, where: Where, up: Observer, findings: Findings
+    options: argparse.Namespace, up: Observer, findings: Findings
 ) -> tuple[Graph, list[DriftFinding]]:
     """Once nothing changes any more and nothing is missing; what is missing has until the end of ``--for``."""
-    from enclave_launch.drift.finding import FindingCertainty, Level
-    from nodl.graph.observing import Quiet, look_until
-
     end = time.monotonic() + options.longest
     while True:
         look_until(up, Quiet(up, options.settle, max(options.longest, options.settle)))
         graph = up.graph()
         found = findings(graph, up.forged)
         waits = any(
-            each.certainty is not FindingCertainty.FACT and each.level is Level.ALARM for each in found
+            each.certainty is not FindingCertainty.FACT and each.level is not Level.NOTE for each in found
         )
         if not waits or time.monotonic() >= end:
             return graph, found
@@ -137,16 +156,24 @@ def _domain(options: argparse.Namespace, document: Any) -> int:
 
 
 def _security(options: argparse.Namespace) -> Security | None:
-    from enclave_launch.drift.compare import Security
-
     if options.keystore is None:
         if options.enclave is not None:
             raise UsageError("drift: --enclave needs --keystore, the keystore that it is in")
         return None
-    from keystore.steps.tool_enclaves import enclaves_by_guid
 
     with translated(KeystoreError, UsageError, f"--keystore {options.keystore}: "):
         return Security(enclaves_by_guid(options.keystore), authenticated=options.enclave is not None)
+
+
+def _enclaves_now(options: argparse.Namespace) -> Callable[[], Mapping[int, str]] | None:
+    if options.keystore is None:
+        return None
+
+    def read() -> Mapping[int, str]:
+        with translated(KeystoreError, UsageError, f"--keystore {options.keystore}: "):
+            return enclaves_by_guid(options.keystore)
+
+    return read
 
 
 def _enclave_directory(options: argparse.Namespace) -> Path | None:

@@ -10,23 +10,31 @@ A key file may hold the pkcs11: URI of a token, as those of a keystore. Exit sta
 from __future__ import annotations
 
 import argparse
+import hashlib
 import json
 import os
 from collections.abc import Mapping
 from datetime import datetime, timezone
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from enclave_launch.boundary.command_line import PATH, TEXT
-from enclave_launch.boundary.files import read_bytes
+from enclave_common.command_line import PATH, TEXT
+from enclave_common.files import read_bytes
+from enclave_common.new_file import write_bytes
 from enclave_launch.errors import UsageError, keystore_errors, translated
+from enclave_launch.report.contents import report_contents
+from enclave_launch.report.evidence.documents import PAYLOAD_TYPE, Examined, evidence_files, statement
+from enclave_launch.review.checks import MEANINGS
 from enclave_launch.verb.secure_plan.judging import EXPECT, WITHIN, judged
 from enclave_launch.verb.secure_plan.keystores import endings
-from enclave_launch.verb.secure_plan.plans import read_plan
+from enclave_launch.verb.secure_plan.plans import is_saved_plan, read_plan
 from keystore.errors import InvalidInputError
-
-if TYPE_CHECKING:
-    from enclave_launch.report.evidence.documents import Examined
+from keystore.formats.validity import iso, parse_moment, utc_now
+from keystore.signing.ca_access import CaAccess, Secret
+from keystore.signing.dsse import envelope, envelope_text
+from keystore.signing.signer import open_signer
+from keystore.steps.inventory import governance_facts, inventory
+from keystore.verification import verify
 
 SIGNED = "statement.dsse.json"
 
@@ -47,9 +55,15 @@ OPTIONS = {
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write the files. Returns 1 when the checks find an error that nobody accepted."""
-    from enclave_launch.report.evidence.documents import evidence_files, statement
+    """Write the files. Returns 1 if the checks find an error that nobody accepted.
 
+    Raises ``UsageError`` for a secret beside a launch file, whose code could read it.
+    """
+    if (options.passphrase_env or options.pin_env) and not is_saved_plan(options.words):
+        raise UsageError(
+            "evidence: --passphrase-env and --pin-env go with a saved plan (PLAN.json of secure-launch --dry-run "
+            "--format json): the code of a launch file could read them"
+        )
     folder = _new_folder(options.output)
     examined = _examine(options)
     files = evidence_files(examined)
@@ -72,11 +86,6 @@ def _new_folder(folder: Path) -> Path:
 
 
 def _examine(options: argparse.Namespace) -> Examined:
-    from enclave_launch.report.contents import report_contents
-    from enclave_launch.report.evidence.documents import Examined
-    from enclave_launch.review.checks import MEANINGS
-    from keystore.formats.validity import iso
-
     now, keystore = _moment(options.at), options.keystore
     document = read_plan(options.words, options)
     components = _bill_of_materials(options.sbom) if options.sbom is not None else None
@@ -92,8 +101,6 @@ def _examine(options: argparse.Namespace) -> Examined:
 
 def _moment(text: str | None) -> datetime:
     """``--at``, else ``SOURCE_DATE_EPOCH`` (reproducible-builds.org), else now."""
-    from keystore.formats.validity import parse_moment, utc_now
-
     epoch = os.environ.get("SOURCE_DATE_EPOCH", "")
     try:
         if text is not None:
@@ -106,16 +113,11 @@ def _moment(text: str | None) -> datetime:
 
 
 def _keys(keystore: Path) -> list[dict[str, Any]]:
-    from keystore.steps.inventory import inventory
-
     with keystore_errors():
         return [entry._asdict() for entry in inventory(keystore)]
 
 
 def _defaults(keystore: Path, now: datetime) -> dict[str, Any]:
-    from keystore.steps.inventory import governance_facts
-    from keystore.verification import verify
-
     with keystore_errors():
         facts = governance_facts(keystore)
         report = verify(keystore, now=now)
@@ -135,8 +137,6 @@ def _defaults(keystore: Path, now: datetime) -> dict[str, Any]:
 
 def _bill_of_materials(file: Path) -> dict[str, Any]:
     """Its BOM-Link (CycloneDX specification, "BOM-Link") and hash. Raises ``UsageError`` for anything else."""
-    import hashlib
-
     with translated(OSError, UsageError, f"--sbom {file}: "):
         data = read_bytes(file)
     with translated(ValueError, UsageError, f"--sbom {file} is not JSON: "):
@@ -154,11 +154,6 @@ def _bill_of_materials(file: Path) -> dict[str, Any]:
 
 
 def _signed(said: bytes, options: argparse.Namespace) -> dict[str, bytes]:
-    from enclave_launch.report.evidence.documents import PAYLOAD_TYPE
-    from keystore.signing.ca_access import CaAccess, Secret
-    from keystore.signing.dsse import envelope, envelope_text
-    from keystore.signing.signer import open_signer
-
     def secret(variable: str | None) -> Secret | None:
         return Secret(variable=variable) if variable else None
 
@@ -171,8 +166,6 @@ def _signed(said: bytes, options: argparse.Namespace) -> dict[str, bytes]:
 
 
 def _write(folder: Path, files: Mapping[str, bytes]) -> None:
-    from enclave_launch.boundary.new_file import write_bytes
-
     with translated(OSError, UsageError, f"{folder}: "):
         folder.mkdir(parents=True, exist_ok=True)
         for name, data in files.items():

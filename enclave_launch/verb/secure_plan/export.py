@@ -15,20 +15,32 @@ import argparse
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from enclave_common.command_line import FLAG, PATH, TEXT, TEXTS
+from enclave_common.terminal import message, printable
 from enclave_launch.admission.middleware import ZENOH
-from enclave_launch.boundary.command_line import FLAG, PATH, TEXT, TEXTS
-from enclave_launch.boundary.terminal import message, printable
+from enclave_launch.deployment.compose import compose_files
+from enclave_launch.deployment.deployment import Deployment, File
+from enclave_launch.deployment.folder import write_folder
+from enclave_launch.deployment.kubernetes import kubernetes_files
+from enclave_launch.deployment.material import read_material
+from enclave_launch.deployment.placement import ONLY_HOST, Placement, in_restart_order, place
+from enclave_launch.deployment.processes import DeployedProcess, deployed_processes, label
+from enclave_launch.deployment.semantics import (
+    Engine,
+    Unexpressed,
+    differences,
+    ends_launch,
+    unexpressed,
+    unexpressed_needs,
+)
+from enclave_launch.deployment.systemd import systemd_files
 from enclave_launch.errors import ManifestError, UsageError
+from enclave_launch.review.document import plan_from_document
+from enclave_launch.review.information_flow import flow_graph
 from enclave_launch.verb.secure_plan.hosts import HOSTS, hosts_of
 from enclave_launch.verb.secure_plan.plans import read_plan
-
-if TYPE_CHECKING:
-    from enclave_launch.deployment.deployment import Deployment, File
-    from enclave_launch.deployment.placement import Placement
-    from enclave_launch.deployment.processes import DeployedProcess
-    from enclave_launch.deployment.semantics import Engine, Unexpressed
 
 ENGINES = ("systemd", "compose", "kubernetes")
 
@@ -56,11 +68,6 @@ OPTIONS = {
 
 def run(options: argparse.Namespace) -> int:
     """Write the files. Returns 0."""
-    from enclave_launch.deployment.folder import write_folder
-    from enclave_launch.deployment.placement import ONLY_HOST, place
-    from enclave_launch.deployment.processes import deployed_processes
-    from enclave_launch.deployment.semantics import Engine, unexpressed, unexpressed_needs
-
     _check(options)
     document = read_plan(options.words, options)
     engine = Engine(options.format)
@@ -136,14 +143,6 @@ def _deployment(
     lost: tuple[Unexpressed, ...],
     options: argparse.Namespace,
 ) -> Deployment:
-    from enclave_launch.deployment.deployment import Deployment
-    from enclave_launch.deployment.material import read_material
-    from enclave_launch.deployment.placement import in_restart_order
-    from enclave_launch.deployment.processes import label
-    from enclave_launch.deployment.semantics import Engine, differences, ends_launch
-    from enclave_launch.review.document import plan_from_document
-    from enclave_launch.review.information_flow import flow_graph
-
     graph = flow_graph(plan_from_document(document))
     notes = differences(document, Engine(options.format))
     file = Path([word for word in options.words if ":=" not in word][-1])
@@ -167,14 +166,9 @@ def _deployment(
 def _files(deployment: Deployment, options: argparse.Namespace) -> dict[str, File]:
     keystore = options.host_keystore
     if options.format == "systemd":
-        from enclave_launch.deployment.systemd import systemd_files
-
         parameters = f"/etc/ros/{deployment.name}/parameters"
         return systemd_files(deployment, keystore=keystore, parameters=parameters, setup=tuple(options.setup))
     if options.format == "compose":
-        from enclave_launch.deployment.compose import compose_files
-
         return compose_files(deployment, image=options.image, user=options.user, keystore=keystore)
-    from enclave_launch.deployment.kubernetes import kubernetes_files
 
     return kubernetes_files(deployment, image=options.image)

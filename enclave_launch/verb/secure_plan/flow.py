@@ -12,8 +12,11 @@ from __future__ import annotations
 import argparse
 import sys
 
-from enclave_launch.boundary.command_line import FLAG
+from enclave_common.command_line import FLAG
 from enclave_launch.errors import UsageError
+from enclave_launch.report.review_text import paths_text, reach_text
+from enclave_launch.review.document import plan_from_document
+from enclave_launch.review.information_flow import flow_graph, shortest_paths
 from enclave_launch.verb.secure_plan.plans import read_plan
 
 OPTIONS = {
@@ -27,10 +30,6 @@ OPTIONS = {
 
 def run(options: argparse.Namespace) -> int:
     """Print who can influence whom. Returns 0."""
-    from enclave_launch.report.review_text import paths_text, reach_text
-    from enclave_launch.review.document import plan_from_document
-    from enclave_launch.review.information_flow import flow_graph, shortest_paths
-
     if (options.influence_from is None) is not (options.influence_to is None):
         raise UsageError("flow: give both --from and --to, or neither")
     plan = plan_from_document(read_plan(options.words, options))

@@ -11,17 +11,18 @@ from __future__ import annotations
 import argparse
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from enclave_launch.boundary.command_line import PATH, Option
-from enclave_launch.boundary.terminal import json_text
+from enclave_common.command_line import PATH, Option
+from enclave_common.terminal import json_text
+from enclave_launch.deployment.placement import place
+from enclave_launch.deployment.processes import deployed_processes
 from enclave_launch.errors import UsageError, translated
+from enclave_launch.report.hosts import enclaves_yaml, hosts_document, hosts_text
+from enclave_launch.review.document import plan_from_document
+from enclave_launch.review.information_flow import flow_graph
 from enclave_launch.verb.secure_plan.plans import FORM, read_plan
 from keystore.errors import InvalidInputError
-
-if TYPE_CHECKING:
-    from keystore.formats.hosts import Hosts
-
+from keystore.formats.hosts import Hosts, load_hosts
 
 HOSTS: Option = ("--hosts FILE", PATH, "which nodes or enclaves belong to which host")
 OPTIONS = {
@@ -36,12 +37,6 @@ OPTIONS = {
 
 def run(options: argparse.Namespace) -> int:
     """Print who runs where. Returns 1 when a process has no host, or an enclave several."""
-    from enclave_launch.deployment.placement import place
-    from enclave_launch.deployment.processes import deployed_processes
-    from enclave_launch.report.hosts import enclaves_yaml, hosts_document, hosts_text
-    from enclave_launch.review.document import plan_from_document
-    from enclave_launch.review.information_flow import flow_graph
-
     document = read_plan(options.words, options)
     placement = place(deployed_processes(document), hosts_of(options.hosts))
     graph = flow_graph(plan_from_document(document))
@@ -57,8 +52,6 @@ def run(options: argparse.Namespace) -> int:
 
 def hosts_of(file: Path | None) -> Hosts:
     """Raises ``UsageError`` for a file that is not understood."""
-    from keystore.formats.hosts import Hosts, load_hosts
-
     if file is None:
         return Hosts()
     with translated(InvalidInputError, UsageError):

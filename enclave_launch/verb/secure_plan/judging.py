@@ -4,12 +4,20 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
+from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-from enclave_launch.boundary.command_line import PATH, Option
-from enclave_launch.boundary.files import read_text
+import yaml
+
+from enclave_common.command_line import PATH, Option
+from enclave_common.files import read_text
+from enclave_common.yaml_reader import load_yaml
 from enclave_launch.errors import UsageError, translated
+from enclave_launch.review.checks import check_plan
+from enclave_launch.review.checks.keystore import against_keystore, against_router
+from enclave_launch.review.document import Told, plan_from_document
+from enclave_launch.review.expectations import Expectations, read_expectations, rule_findings
 from enclave_launch.verb.secure_plan.keystores import (
     DEFAULT_MARGIN,
     endings,
@@ -17,12 +25,6 @@ from enclave_launch.verb.secure_plan.keystores import (
     signed_grants,
     zenoh_findings,
 )
-
-if TYPE_CHECKING:
-    from datetime import datetime
-
-    from enclave_launch.review.document import Told
-    from enclave_launch.review.expectations import Expectations
 
 EXPECTATIONS = "enclaves.review.yaml"
 EXPECT: Option = ("--expect FILE", PATH, f"default: {EXPECTATIONS}, if it exists")
@@ -41,9 +43,6 @@ def judged(
 
     Raises ``UsageError`` for rules that are missing or not understood, ``ProvisionError`` for the keystore.
     """
-    from enclave_launch.review.checks import check_plan
-    from enclave_launch.review.expectations import rule_findings
-
     expected = expectations(expect)
     findings = [*check_plan(document), *rule_findings(document, expected.never)]
     if keystore is not None:
@@ -54,9 +53,6 @@ def judged(
 def _of_keystore(
     document: Mapping[str, Any], keystore: Path | str, within: str, now: datetime | None
 ) -> list[Told]:
-    from enclave_launch.review.checks.keystore import against_keystore, against_router
-    from enclave_launch.review.document import plan_from_document
-
     plan = plan_from_document(document)
     found = against_keystore(plan, signed_grants(keystore), endings(keystore, within, now))
     if plan.on_zenoh:
@@ -66,13 +62,10 @@ def _of_keystore(
 
 def expectations(file: Path | None) -> Expectations:
     """Raises ``UsageError`` for a file that was named and is missing, and for content that is not understood."""
-    import yaml
-
-    from enclave_launch.review.expectations import Expectations, read_expectations
 
     if file is None:
         if not os.path.exists(EXPECTATIONS):
             return Expectations()
         file = Path(EXPECTATIONS)
     with translated(OSError, UsageError, f"{file}: "), translated(yaml.YAMLError, UsageError, f"{file}: "):
-        return read_expectations(yaml.safe_load(read_text(file)) or {}, str(file))
+        return read_expectations(load_yaml(read_text(file)) or {}, str(file))

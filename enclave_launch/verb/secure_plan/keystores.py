@@ -3,44 +3,36 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from enclave_launch.errors import keystore_errors
-
-if TYPE_CHECKING:
-    from datetime import datetime
-
-    from enclave_launch.review.checks.keystore import Ending
-    from enclave_launch.review.document import GrantedName
-    from keystore.verification.finding import Finding
+from enclave_launch.review.checks.keystore import Ending
+from enclave_launch.review.document import GrantedName
+from enclave_launch.review.signed import grants_of_rules
+from keystore.formats.validity import iso, parse_duration, utc_now
+from keystore.steps.expiry import status
+from keystore.steps.inventory import enforced, granted
+from keystore.verification.finding import Finding
+from keystore.verification.zenoh import check_zenoh_files
 
 DEFAULT_MARGIN = "30d"
 
 
 def signed_grants(keystore: Path | str) -> Mapping[str, frozenset[GrantedName]]:
     """Enclave -> what its signed permissions allow."""
-    from enclave_launch.review.signed import grants_of_rules
-    from keystore.steps.inventory import granted
-
     with keystore_errors():
         return {enclave: grants_of_rules(found.allowed) for enclave, found in granted(keystore).items()}
 
 
 def enforced_grants(keystore: Path | str) -> Mapping[str, frozenset[GrantedName]]:
     """Enclave -> what the configuration of the keystore's Zenoh router allows; empty without one."""
-    from enclave_launch.review.signed import grants_of_rules
-    from keystore.steps.inventory import enforced
-
     with keystore_errors():
         return {enclave: grants_of_rules(rules) for enclave, rules in enforced(keystore).items()}
 
 
 def zenoh_findings(keystore: Path | str, now: datetime | None = None) -> tuple[Finding, ...]:
     """What ``secure-keystore verify`` finds in the files for Zenoh."""
-    from keystore.formats.validity import utc_now
-    from keystore.verification.zenoh import check_zenoh_files
-
     with keystore_errors():
         return check_zenoh_files(keystore, now or utc_now())
 
@@ -49,10 +41,6 @@ def endings(
     keystore: Path | str, within: str | None = None, now: datetime | None = None
 ) -> tuple[Ending, ...]:
     """All that ends, or what ends ``within`` a time such as ``30d``; the earliest first."""
-    from enclave_launch.review.checks.keystore import Ending
-    from keystore.formats.validity import iso, parse_duration
-    from keystore.steps.expiry import status
-
     with keystore_errors():
         report = status(keystore, now=now)
         chosen = report.expiries if within is None else report.due(parse_duration(within))

@@ -16,8 +16,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from enclave_launch.boundary.command_line import PATH, one_of
+from enclave_common.command_line import PATH, one_of
+from enclave_common.new_file import write_text
 from enclave_launch.errors import UsageError, translated
+from enclave_launch.report.contents import report_contents
+from enclave_launch.report.diagrams import dot, mermaid
+from enclave_launch.report.graph import plan_graph
+from enclave_launch.report.html.page import html_report
+from enclave_launch.report.markdown import markdown_report
 from enclave_launch.verb.secure_plan.judging import EXPECT, judged
 from enclave_launch.verb.secure_plan.keystores import endings
 from enclave_launch.verb.secure_plan.plans import read_plan
@@ -34,8 +40,6 @@ OPTIONS = {
 
 def run(options: argparse.Namespace) -> int:
     """Print or write the report. Returns 0."""
-    from enclave_launch.boundary.new_file import write_text
-
     document = read_plan(options.words, options)
     title = " ".join(options.words)
     text = report_text(document, options.format, title, keystore=options.keystore, expect=options.expect)
@@ -57,21 +61,13 @@ def report_text(
 ) -> str:
     """``document``: the dry run's JSON. Raises ``UsageError`` for rules, and a ``ProvisionError`` for a keystore, that
     cannot be read."""
-    from enclave_launch.report.graph import plan_graph
-
     if form in ("dot", "mermaid"):
-        from enclave_launch.report import diagrams
-
-        return (diagrams.dot if form == "dot" else diagrams.mermaid)(plan_graph(document))
-    from enclave_launch.report.contents import report_contents
+        return (dot if form == "dot" else mermaid)(plan_graph(document))
 
     ends = endings(keystore) if keystore is not None else None
     found = judged(document, expect, keystore)
     contents = report_contents(document, found, title=title, root=os.getcwd(), endings=ends)
     if form == "markdown":
-        from enclave_launch.report.markdown import markdown_report
-
         return markdown_report(contents)
-    from enclave_launch.report.html.page import html_report
 
     return html_report(contents)

@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from enclave_launch.boundary.environment import environment_with
+from enclave_common.environment import environment_with
 from enclave_launch.errors import UsageError
 from enclave_launch.verb.secure_plan.plans import plan_of, read_saved
 from enclave_launch.verb.target import find_target

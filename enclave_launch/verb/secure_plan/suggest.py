@@ -5,6 +5,9 @@ from __future__ import annotations
 import argparse
 import sys
 
+from enclave_launch.report.review_text import suggestions_text
+from enclave_launch.review.document import plan_from_document
+from enclave_launch.review.similarity import merges, splits
 from enclave_launch.verb.secure_plan.plans import read_plan
 
 OPTIONS = {
@@ -20,10 +23,6 @@ OPTIONS = {
 
 def run(options: argparse.Namespace) -> int:
     """Print which enclaves could be merged or split. Returns 0."""
-    from enclave_launch.report.review_text import suggestions_text
-    from enclave_launch.review.document import plan_from_document
-    from enclave_launch.review.similarity import merges, splits
-
     plan = plan_from_document(read_plan(options.words, options))
     sys.stdout.write(suggestions_text(merges(plan, least_similarity=options.similarity), splits(plan)))
     return 0

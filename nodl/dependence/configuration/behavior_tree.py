@@ -9,9 +9,9 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from enclave_launch.boundary.files import read_bytes
-from enclave_launch.boundary.xml_tree import XmlElement
-from nodl.dependence.configuration import Configured, collected, endpoint_named
+from enclave_common.files import read_bytes
+from enclave_common.xml_tree import XmlElement
+from nodl.dependence.configuration.configured import Configured, collected, endpoint_named
 from nodl.errors import InvalidXMLError
 from nodl.names import shown
 from nodl.node_interface import Endpoint, EndpointKind, Gap

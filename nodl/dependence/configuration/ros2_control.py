@@ -6,7 +6,7 @@ small letters, ``/`` as ``_``.
 
 from __future__ import annotations
 
-from nodl.dependence.configuration import Configured
+from nodl.dependence.configuration.configured import Configured
 from nodl.errors import InvalidXMLError
 from nodl.node_interface import Gap
 from nodl.source_ref import SourceRef

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 
-from nodl.dependence.configuration import Configured, collected, endpoint_named
+from nodl.dependence.configuration.configured import Configured, collected, endpoint_named
 from nodl.names import shown
 from nodl.node_interface import Endpoint, EndpointKind, Gap
 from nodl.source_ref import SourceRef

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from nodl.dependence.configuration import Configured, endpoint_named
+from nodl.dependence.configuration.configured import Configured, endpoint_named
 from nodl.names import shown
 from nodl.node_interface import Endpoint, EndpointKind, Gap
 from nodl.source_ref import SourceRef

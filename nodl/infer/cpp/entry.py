@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from enclave_launch.boundary.light import Any, NamedTuple
+import os
+import traceback
+from typing import Any, NamedTuple
+
 from nodl.node_interface import Gap, NodeInterface
 
 
@@ -36,7 +39,18 @@ class FixedMapping(dict[Any, Any]):
 
 
 class CppSupportMissing(Exception):
-    """tree-sitter is not installed: ``pip install enclave-launch[cpp]``."""
+    """tree-sitter is not installed: ``pip install tree-sitter tree-sitter-cpp``."""
+
+
+def failure(what: str, error: Exception) -> str:
+    """Describe an exception inside ``what`` as the reason of a gap, with what to report."""
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    where = f"{os.path.basename(place.filename)}:{place.lineno}"
+    said = " ".join(str(error).split())[:120]
+    return (
+        f"{what} failed ({type(error).__name__} in {where}{f': {said}' if said else ''}); its interfaces are not "
+        "known: write them in a manifest, and report this line with the source"
+    )
 
 
 class Answer:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from nodl.infer.cpp.running.notes import Notes
-from nodl.infer.cpp.running.values import BOTTOM, Text, Value, join
+from nodl.infer.cpp.running.values import BOTTOM, Notes, Text, Value, join
 from nodl.node_interface import EndpointKind
 from nodl.source_ref import SourceRef
 

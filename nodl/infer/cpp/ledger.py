@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from nodl.infer.cpp.reading.declarations import Class, Field, FileIndex, Function
 from nodl.infer.cpp.reading.type_names import POINTER_MEMBERS
-from nodl.infer.cpp.syntax import Node, field_of, text
+from nodl.infer.cpp.syntax import Node, field_of, line_of, text
 from nodl.source_ref import SourceRef
 
 if TYPE_CHECKING:
@@ -94,7 +94,65 @@ def account(run: Machine, files: Iterable[FileIndex]) -> list[SiteAnswer]:
             answer = _answer(run, index, site, functions, starts, handled, reachable)
             if answer is not None:
                 answers.append(answer)
+    told = [*run.gaps, *(gap for record in run.nodes.values() for gap in record.gaps)]
+    settled = {(source.file, source.line) for source, _ in told}
+    settled |= {(answer.site.file, answer.site.line) for answer in answers if not answer.dead}
+    for function in sorted(reachable | run.called, key=lambda f: (f.file.file, f.node.start_byte)):
+        for site in open_calls(run, function):
+            if (site.file, site.line) not in settled and not _is_settled(run, function):
+                whose = (
+                    f"{site.word}() was not followed here"
+                    if function in run.called
+                    else (f"{site.word}() is called by {function}, and it was not understood who calls that")
+                )
+                answers.append(SiteAnswer(site, False, f"{whose}: it may make interfaces"))
     return answers
+
+
+def _is_settled(run: Machine, function: Function) -> bool:
+    return function not in run.called and _is_overridden(run, function)
+
+
+def open_calls(run: Machine, function: Function) -> Iterator[Site]:
+    """Find the calls in ``function`` of functions that lead to interfaces, as far as they were not followed."""
+    source, start = function.node.text or b"", function.node.start_byte
+    handled = run.handled.get(function.file.file, set())
+    resolved = run.resolved.get(function.file.file, set())
+    for match in _CALL.finditer(source):
+        word, offset = match[1].decode("utf-8", "replace"), start + match.start()
+        called = run.names.functions_by_name.get(word, ()) if word not in _STATEMENTS else ()
+        if not any(run.makes_interfaces(each) for each in called if _may_have_object(run, each)):
+            continue
+        node = _called_at(function.node.descendant_for_byte_range(offset, offset + len(match[1])))
+        if node is None or node.start_byte in handled | resolved or _is_dead(run, function.file.file, offset):
+            continue
+        yield Site(function.file.file, offset, line_of(node), word)
+
+
+def _may_have_object(run: Machine, function: Function) -> bool:
+    """Whether an object of the class was made; who makes one where nobody looked is told there."""
+    owner = function.owner.rpartition("::")[2]
+    return not owner or function.static or owner == function.name or owner in run.used_classes()
+
+
+_STATEMENTS = frozenset({"if", "for", "while", "switch", "catch", "return"})
+"""What the parser may take for functions in code that it does not understand."""
+_CALL = re.compile(rb'(?<!["\w])([A-Za-z_]\w*)\s*(?=[(<])')
+
+
+def _called_at(node: Node | None) -> Node | None:
+    """The call whose callee ends in the name at ``node``, or what the parser did not understand around it."""
+    while (
+        node is not None
+        and node.parent is not None
+        and node.type not in ("argument_list", "compound_statement")
+    ):
+        if node.is_error:
+            return node
+        if node.parent.type == "call_expression" and field_of(node.parent, "function") == node:
+            return node.parent
+        node = node.parent
+    return None
 
 
 def _answer(

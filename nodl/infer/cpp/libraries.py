@@ -60,11 +60,16 @@ NODE_METHODS: dict[str, FunctionModel] = {}
 
 # Classes that make no interface of their own, whoever they get. rclcpp: read in include/rclcpp of humble to rolling.
 _HARMLESS_CLASSES = re.compile(
-    r"sensor_msgs::PointCloud2\w+|(?:std|Eigen|cv|boost|pcl|YAML|nlohmann|fmt|spdlog|tinyxml2|urdf|KDL|angles|grid_map)::.*"
+    r"sensor_msgs::PointCloud2\w+"
+    r"|(?:std|Eigen|cv|boost|pcl|YAML|nlohmann|fmt|spdlog|tinyxml2|urdf|KDL|angles|grid_map|urcl|gtsam|ouster|dai|rs2|sl|asio|"
+    r"websocketpp|gz|ignition|sdf|octomap|octomath|fcl|ceres|g2o|Sophus|torch|nvinfer1|zmq|google|absl|casadi|pinocchio|ompl|"
+    r"mavconn|mavlink|zbar|open3d|tbb|Magick|xt|Ogre|libcamera|GeographicLib|proj|osqp|autoware_utils_(?:geometry|math|system)|"
+    r"cartographer|mcap|tl|gsl|CLI|toml)::.*"
     r"|rclcpp::(?:Rate|WallRate|GenericRate|GenericTimer|WallTimer|\w*Handle|\w*Guard|Event|Clock|TimeSource|Time|Duration|QoS|\w*QoS|QoSInitialization|KeepLast|KeepAll|Logger|Parameter|"
     r"ParameterValue|NodeOptions|\w*Options|Context|TimerBase|CallbackGroup|MessageInfo|SerializedMessage|Serialization|"
     r"WaitSet|GuardCondition|PublisherEventCallbacks|SubscriptionEventCallbacks|NetworkFlow\w*|ParameterMap|ParameterType|"
-    r"executors::\w+|strategies::.*|memory_strategies::.*|message_memory_strategy::.*|Executor|FutureReturnCode|exceptions::.*|QOS\w+|AnySubscriptionCallback|\w*SubscriptionOptions\w*|\w*PublisherOptions\w*)"
+    r"StaticWaitSet|ThreadSafeWaitSet|WaitSetTemplate|ParameterEventsFilter|"
+    r"(?:experimental::)?executors::\w+|strategies::.*|memory_strategies::.*|message_memory_strategy::.*|Executor|FutureReturnCode|exceptions::.*|QOS\w+|AnySubscriptionCallback|\w*SubscriptionOptions\w*|\w*PublisherOptions\w*)"
     r"|rclcpp_lifecycle::(?:State|Transition)|rclcpp_components::NodeInstanceWrapper"
     r"|rclcpp_action::(?:\w*GoalHandle|ResultCode|GoalUUID|.*Options)"
     r"|tf2::.*|tf2_ros::(?:CreateTimerROS|CreateTimerInterface|AsyncBufferInterface)"
@@ -78,7 +83,7 @@ _HARMLESS_FUNCTIONS = re.compile(
     r"|TRACEPOINT|TRACETOOLS_\w+|RCLCPP_\w+|RCUTILS_\w+|ROS_\w+|rc(?:l|utils|pputils)_(?!(?:publisher|subscription|client|service|action_\w+|node)_init)\w+|rmw_\w+|assert|ASSERT|printf|fprintf|memcpy|memset|signal|sqrt\w*|"
     r"f?abs|(?:a?sin|a?cos|a?tan2?|exp|log\w*|pow|floor|ceil|round|hypot|fmod|isnan|isinf|strcmp|strlen|atoi|atof|rand|srand|"
     r"usleep|sleep|exit|min|max|setvbuf|perror|puts|malloc|free|getenv|clamp|swap|isfinite|emplace_back|static_assert|connect|"
-    r"tolower|toupper|isspace|snprintf|sprintf|strtol|strtod|fabsf|doTransform|toMsg|fromMsg|get_logger|now)"
+    r"tolower|toupper|isspace|strtol|strtod|fabsf|doTransform|toMsg|fromMsg|get_logger|now)"
     r"|rclcpp::(?:ok|shutdown|spin|spin_some|spin_until_future_complete|get_logger|Rate|sleep_for|on_shutdown|"
     r"expand_topic_or_service_name|to_string|remove_ros_arguments|uninstall_signal_handlers|install_signal_handlers|"
     r"signal_handlers_installed|contexts::.*|executors::.*|exceptions::.*|get_message_type_support_handle|extend_name_with_sub_namespace|"

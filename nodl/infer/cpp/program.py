@@ -7,17 +7,18 @@ import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from enclave_launch.boundary.files import read_bytes
+from enclave_common.files import read_bytes
 from nodl.infer.cpp.cache.folder import digest_of, digest_of_content
-from nodl.infer.cpp.entry import Entry
+from nodl.infer.cpp.entry import CppSupportMissing, Entry, failure
 from nodl.infer.cpp.findings import AllocatedNode
-from nodl.infer.cpp.ledger import CREATES, SiteAnswer, account
+from nodl.infer.cpp.ledger import CREATES, SiteAnswer, account, leads_to_interfaces
 from nodl.infer.cpp.models.nodes import ARGUMENT
 from nodl.infer.cpp.reading.cmake import Target
 from nodl.infer.cpp.reading.collect import index_file
 from nodl.infer.cpp.reading.declarations import Class, FileIndex, Function, FunctionParameter, Global
 from nodl.infer.cpp.reading.known_headers import KNOWN_HEADERS
 from nodl.infer.cpp.reading.names import Names
+from nodl.infer.cpp.reading.parameter_library import listener_of
 from nodl.infer.cpp.reading.preprocess import Preprocessed, preprocess
 from nodl.infer.cpp.reading.project import SourcePackage, Workspace, sources_of
 from nodl.infer.cpp.reading.type_names import Type
@@ -32,7 +33,8 @@ from nodl.source_ref import SourceRef
 
 MAX_FILE_SIZE = 2_000_000
 _REGISTERED = re.compile(
-    r"(?:RCLCPP_COMPONENTS_REGISTER_NODE|CLASS_LOADER_REGISTER_CLASS)\s*\(\s*([\w:<>, ]+?)\s*[,)]"
+    r"RCLCPP_COMPONENTS_REGISTER_NODE\s*\(\s*([\w:<>, ]+?)\s*\)"
+    r"|CLASS_LOADER_REGISTER_CLASS\s*\(\s*([\w:<>, ]+?)\s*,\s*(?:rclcpp|rclcpp_lifecycle)::\w*Node\s*\)"
 )
 
 
@@ -64,6 +66,8 @@ class Sources:
         if key not in self._preprocessed:
             self._preprocessed[key] = None  # a file that includes itself
             source = self._read(file)
+            if source is not None and file.endswith((".yaml", ".yml")):
+                source = listener_of(source)
             if source is not None:
 
                 def include(name: str, quoted: bool) -> Preprocessed | None:
@@ -103,10 +107,16 @@ class Sources:
     def index(self, file: str, symbols: Mapping[str, str], complete: bool) -> FileIndex | None:
         key = (file, repr(sorted(symbols.items())) + str(complete))
         if key not in self._indexed:
-            source = self.preprocessed(file, symbols, complete)
-            if source is None:
+            try:
+                source = self.preprocessed(file, symbols, complete)
+                if source is None:
+                    return None
+                self._indexed[key] = index_file(source)
+            except CppSupportMissing:
+                raise
+            except Exception as error:
+                self.unreadable[file] = failure("reading this file", error)
                 return None
-            self._indexed[key] = index_file(source)
         return self._indexed[key]
 
     def closure(self, files: Iterable[str], symbols: Mapping[str, str], complete: bool) -> list[FileIndex]:
@@ -162,10 +172,15 @@ def run_program(sources: Sources, entry: Entry, start: Start | None) -> ProgramF
     try:
         _start(run, entry)
         run_callbacks(run)
-    except (StepLimitExceeded, RecursionError):
-        place = SourceRef(entry.files[0] if entry.files else "")
-        run.gap_at(place, "this program is too large to be followed to its end")
+    except StepLimitExceeded:
+        run.gap_at(_place(entry), "this program is too large to be followed to its end")
+    except Exception as error:
+        run.gap_at(_place(entry), failure("the analysis of this program", error))
     return _findings(run, sources)
+
+
+def _place(entry: Entry) -> SourceRef:
+    return SourceRef(entry.files[0] if entry.files else entry.place)
 
 
 def _possible_plugins(sources: Sources, files: Iterable[FileIndex]) -> list[str]:
@@ -301,16 +316,28 @@ def _text_gaps(run: Machine, index: FileIndex) -> None:
     if not any(function.file is index for function in run.called):
         return
     for _, line, written in index.errors:
-        if CREATES.search(written):
+        called = [
+            each for word in _CALLED.findall(written) for each in run.names.functions_by_name.get(word, ())
+        ]
+        if CREATES.search(written) or any(map(run.makes_interfaces, called)):
             run.gap_at(SourceRef(index.file, line), "this C++ could not be parsed")
     for line, name in index.source.unknown_macros:
         why = f"the macro {name} is not in reach: what it stands for is not known"
         run.gap_at(SourceRef(index.file, line), why)
+    for line, name, body in index.source.open_macros:
+        if leads_to_interfaces(run, frozenset(_WORD.findall(body))):
+            why = f"what the macro {name} stands for here is not known; it may make interfaces"
+            run.gap_at(SourceRef(index.file, line), why)
+
+
+_WORD = re.compile(r"[A-Za-z_]\w*")
+_CALLED = re.compile(r"([A-Za-z_]\w*)\s*\(")
 
 
 def registered_components(index: FileIndex) -> list[str]:
     """Classes that a file registers as components."""
-    return [match[1].replace(" ", "").lstrip(":") for match in _REGISTERED.finditer(index.source.text)]
+    found = ((match[1] or match[2]) for match in _REGISTERED.finditer(index.source.text))
+    return [name.replace(" ", "").lstrip(":") for name in found]
 
 
 def target_entry(target: Target, package: SourcePackage, workspace: Workspace) -> Entry:

@@ -10,9 +10,10 @@ import os
 import re
 from collections.abc import Iterator, Sequence
 from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
 
-from enclave_launch.boundary.files import as_path, read_text
-from enclave_launch.boundary.light import TYPE_CHECKING, late_pattern
+from enclave_common.files import read_text
 from nodl.infer.cpp.entry import Answer
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from nodl.infer.cpp.system import Answering
     from nodl.infer.start import Start
 
-_HOME = late_pattern(r"^CMAKE_HOME_DIRECTORY:\w+=(.+)$", re.MULTILINE)
+_HOME = re.compile(r"^CMAKE_HOME_DIRECTORY:\w+=(.+)$", re.MULTILINE)
 
 
 class SourcesInReach:
@@ -87,7 +88,7 @@ def _built(folder: str) -> Iterator[SourcePackage]:
     """The source folders that a build remembers."""
     from nodl.infer.cpp.reading.project import read_source_package
 
-    for cache in sorted(as_path(folder).glob("*/CMakeCache.txt")):
+    for cache in sorted(Path(folder).glob("*/CMakeCache.txt")):
         try:
             match = _HOME.search(read_text(cache, errors="replace"))
         except OSError:

@@ -25,7 +25,7 @@ def _parser() -> Parser:
         from tree_sitter import Language, Parser
     except ImportError as error:
         raise CppSupportMissing(
-            "C++ sources need the extra cpp: pip install 'enclave-launch[cpp]'"
+            "C++ sources need tree-sitter: pip install tree-sitter tree-sitter-cpp"
         ) from error
     return Parser(Language(tree_sitter_cpp.language()))
 

@@ -10,13 +10,14 @@ from functools import cached_property
 from pathlib import Path
 
 from nodl.infer.cpp.cache.answers import Answers, Made, WatchedStart
-from nodl.infer.cpp.entry import Answer, Entry, Solved
+from nodl.infer.cpp.entry import Answer, CppSupportMissing, Entry, Solved, failure
 from nodl.infer.cpp.program import Sources, registered_components, target_entry
 from nodl.infer.cpp.reading.project import SourcePackage, Workspace, find_packages
 from nodl.infer.cpp.solved import solve, solve_all
 from nodl.infer.cpp.syntax import check_support
 from nodl.infer.start import LaunchKey, Start
 from nodl.node_interface import Gap, NodeInterface
+from nodl.source_ref import SourceRef
 
 _SOURCES = (".cpp", ".cc", ".cxx", ".c++", ".C")
 _TESTS = frozenset({"test", "tests", "testing", "benchmark", "examples", "example", "mock"})
@@ -54,11 +55,14 @@ def _infer(files: Sequence[str], sources: Sources, answers: Answers) -> Made:
     """The programs of all files: those that are built, loose ones, then the nodes that nobody makes."""
     workspace, read = sources.workspace, dict[str, str]()
     found: list[Solved] = []
+    lasting = True
 
     def solved(listed: Sequence[tuple[LaunchKey, Entry]]) -> list[Solved]:
+        nonlocal lasting
         made = solve_all(sources, answers, listed)
         for each in made:
             read.update(each.files)
+            lasting = lasting and each.lasting
         return [each.answer for each in made]
 
     def listed(
@@ -67,7 +71,15 @@ def _infer(files: Sequence[str], sources: Sources, answers: Answers) -> Made:
         question = (name, tuple(files), tuple(sorted(made)))
         kept = answers.find(question)
         if kept is None:
-            answer = tuple(programs())
+            try:
+                answer = tuple(programs())
+            except CppSupportMissing:
+                raise
+            except Exception as error:
+                nonlocal lasting
+                lasting, why = False, failure("the search for C++ programs", error)
+                found.append(Solved(gaps=(Gap(SourceRef(files[0]), why),)))
+                return ()
             kept = Made(answer, dict(sources.digests))
             answers.keep(question, kept)
         read.update(kept.files)
@@ -84,7 +96,7 @@ def _infer(files: Sequence[str], sources: Sources, answers: Answers) -> Made:
         if entry.cls not in made and not made.issuperset(each.classes):
             made.update(each.classes)
             found.append(each)
-    return Made(tuple(found), read)
+    return Made(tuple(found), read, lasting)
 
 
 def workspace_of(files: Iterable[str], prefixes: Sequence[str] = ()) -> Workspace:
@@ -267,7 +279,13 @@ class Answering:
         self, package: SourcePackage, executable: str | None, plugin: str | None, start: Start | None
     ) -> Answer:
         """The nodes of an executable or component of ``package``. Raises ``CppSupportMissing``."""
-        for key, entry in self._programs_of(package):
+        try:
+            programs = self._programs_of(package)
+        except CppSupportMissing:
+            raise
+        except Exception as error:
+            return Answer((), failure(f"reading the build of {package.folder}", error))
+        for key, entry in programs:
             if (executable is not None and key.executable == executable) or (plugin and key.plugin == plugin):
                 return _answer(self._solved(key, entry, start))
         what = f"executable '{executable}'" if executable else f"component {plugin}"

@@ -5,8 +5,8 @@ from __future__ import annotations
 import ast
 import itertools
 from collections.abc import Callable
+from typing import Any, TypeVar
 
-from enclave_launch.boundary.light import Any, TypeVar
 from nodl.infer.state import ProgramState
 from nodl.infer.values import HeapObject, Items, LocalCells, Sequence, Value
 

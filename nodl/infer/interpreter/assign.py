@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import ast
 
-from nodl.infer.interpreter import special
-from nodl.infer.interpreter.define import program_classes
+from nodl.infer.interpreter.define import is_key, program_classes
 from nodl.infer.interpreter.frames import Arguments, Frame
 from nodl.infer.interpreter.iterate import elements
 from nodl.infer.interpreter.run import Run
 from nodl.infer.interpreter.subscripts import slice_of
-from nodl.infer.methods import PropertyValue, Variables
+from nodl.infer.methods import PropertyValue
 from nodl.infer.values import (
     ABSENT,
     ANY,
@@ -22,7 +21,6 @@ from nodl.infer.values import (
     Dictionary,
     External,
     FunctionValue,
-    HeapObject,
     Instance,
     Items,
     Key,
@@ -49,28 +47,21 @@ def assign(run: Run, target: ast.expr, value: Value, frame: Frame) -> None:
 
 
 def store_attribute(run: Run, owners: Value, name: str, value: Value, node: ast.AST, frame: Frame) -> None:
-    """``owner.name = value``, with what the owner's class makes of it (setters, ``__setattr__``)."""
+    """``owner.name = value``, with what a setter of the owner's class makes of it."""
     certain = len(owners) == 1
     for owner in owners:
-        if isinstance(owner, Instance) and _set_by_class(run, owner, name, value, node, frame):
+        if isinstance(owner, Instance) and _set_by_property(run, owner, name, value, node, frame):
             continue
         if isinstance(owner, FunctionValue):
             kept = BOTTOM if certain and not owner.shared else owner.attributes.get(name, BOTTOM)
             run.state.write(owner.attributes, name, join(kept, value))
         elif isinstance(owner, (Instance, ClassValue, ModuleValue)):
-            plain_store(run, owner, name, value, certain)
+            kept = BOTTOM if certain else owner.cells.get(name, BOTTOM)
+            run.state.store(owner, name, join(kept, value))
         else:
             run.escape_value(value)  # whoever holds it may call it
             if isinstance(owner, External):
                 _patched(run, owner, name, node, frame)
-
-
-def plain_store(run: Run, owner: HeapObject, name: str, value: Value, certain: bool = True) -> None:
-    """Write the cell past setters and ``__setattr__``; unless ``certain``, the old value may stay."""
-    if certain:
-        run.state.store(owner, name, value)
-    else:
-        run.state.write(owner.cells, name, join(owner.cells.get(name, BOTTOM), value))
 
 
 _UNMODELLED = frozenset({"unittest", "pytest", "tkinter"})  # whose objects hold attributes of the program
@@ -84,39 +75,20 @@ def _patched(run: Run, owner: External, name: str, node: ast.AST, frame: Frame) 
         run.gap(node, frame, f"{owner.path}.{name} is replaced; what its users then do is not analysed")
 
 
-def _set_by_class(run: Run, owner: Instance, name: str, value: Value, node: ast.AST, frame: Frame) -> bool:
-    """Whether a setter, a descriptor or ``__setattr__`` of the program took the value."""
-    if not isinstance(owner.cls, ClassValue) or not owner.cls.hooked:
-        return False
-    hook = special.method(owner, "__setattr__")
-    if hook:
-        run.call(hook, Arguments([(name,), value]), node, frame)
-        return True
-    for base in program_classes(owner.cls):
-        held = base.cells.get(name)
-        if held:
-            return _set_by_descriptor(run, owner, held, value, node, frame)
-    return False
-
-
-def _set_by_descriptor(
-    run: Run, owner: Instance, held: Value, value: Value, node: ast.AST, frame: Frame
-) -> bool:
-    taken = False
-    for atom in held:
-        if isinstance(atom, PropertyValue) and not atom.cached:
-            if atom.setter:
-                run.call(atom.setter, Arguments([(owner,), value]), node, frame)
-            taken = True
-        elif type(atom) is Instance and special.method(atom, "__set__"):
-            special.call_special(run, atom, "__set__", node, frame, (owner,), value)
-            taken = True
-    return taken and len(held) == 1
+def _set_by_property(run: Run, owner: Instance, name: str, value: Value, node: ast.AST, frame: Frame) -> bool:
+    """Whether a setter of the program certainly took the value."""
+    classes = program_classes(owner.cls) if isinstance(owner.cls, ClassValue) else []
+    held = next((each.cells[name] for each in classes if each.cells.get(name)), BOTTOM)
+    setters = [atom for atom in held if isinstance(atom, PropertyValue) and not atom.cached]
+    for atom in setters:
+        if atom.setter:
+            run.call(atom.setter, Arguments([(owner,), value]), node, frame)
+    return bool(setters) and len(held) == 1
 
 
 def store_item(run: Run, obj: Dictionary, key: Value, value: Value) -> None:
     """``obj[key] = value``."""
-    if len(key) == 1 and special.is_key(key[0]):
+    if len(key) == 1 and is_key(key[0]):
         cell = Key(key[0])
         if not run.repeated and obj.cells.get(cell) == ABSENT:
             del obj.cells[cell]  # it comes last again; undone, it is as absent as before
@@ -164,13 +136,10 @@ def _store_subscript(run: Run, target: ast.Subscript, value: Value, frame: Frame
             store_item(run, owner, key, value)
         elif isinstance(owner, Sequence):
             _store_element(run, owner, key, value)
-        elif isinstance(owner, Variables):
-            _store_variable(run, owner, key, value, target, frame)
         elif isinstance(owner, External) and owner.path == "os.environ":
             _set_environment(run, key, value, target, frame)
         elif isinstance(owner, Instance):
-            setter = run.attribute((owner,), "__setitem__", target, frame)
-            run.call(setter, Arguments([key, value]), target, frame)
+            run.escape_value(value)  # what its class does with it is called from outside
         else:
             run.escape_value(value)
 
@@ -197,17 +166,6 @@ def _set_environment(run: Run, key: Value, value: Value, node: ast.AST, frame: F
         run.state.write(run.environment, key[0], value)
     else:
         run.gap(node, frame, "an environment variable whose name is made at run time is set")
-
-
-def _store_variable(
-    run: Run, owner: Variables, key: Value, value: Value, node: ast.AST, frame: Frame
-) -> None:
-    for atom in key:
-        if isinstance(atom, str):
-            plain_store(run, owner.owner, atom, value, len(key) == 1)
-        else:
-            run.gap(node, frame, "a variable whose name is made at run time is set")
-            run.escape_value(value)
 
 
 def _loaded(target: ast.Subscript) -> ast.expr:
@@ -299,10 +257,7 @@ def _delete_known(run: Run, owner: Sequence, part: Value | slice | None) -> bool
 def _delete_attribute(run: Run, owner: object, name: str, certain: bool, node: ast.AST, frame: Frame) -> None:
     if isinstance(owner, Instance):
         run.state.reads.attributes.add(name)
-        hook = special.method(owner, "__delattr__")
-        if hook:
-            run.call(hook, Arguments([(name,)]), node, frame)
-        elif name in owner.cells:
+        if name in owner.cells:
             kept = BOTTOM if certain and not owner.summary else owner.cells[name]
             run.state.write(owner.cells, name, join(kept, ABSENT))
     elif isinstance(owner, ClassValue | ModuleValue) and name in owner.cells:
@@ -316,7 +271,3 @@ def _delete_item(run: Run, owner: object, key: Value, certain: bool, node: ast.A
         strong = certain and len(key) == 1 and not owner.summary
         if strong and isinstance(key[0], str | int | float | bool | type(None)):
             run.state.write(owner.cells, Key(key[0]), ABSENT)
-    elif isinstance(owner, Instance):
-        special.call_special(run, owner, "__delitem__", node, frame, key)
-    elif isinstance(owner, Variables):
-        run.gap(node, frame, "a variable is deleted by name")

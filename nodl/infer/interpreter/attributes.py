@@ -4,20 +4,17 @@ from __future__ import annotations
 
 import ast
 
-from nodl.infer.interpreter import imports, special
-from nodl.infer.interpreter.define import is_enumeration, linearized
-from nodl.infer.interpreter.frames import Arguments, Call, Frame
+from nodl.infer.interpreter import imports
+from nodl.infer.interpreter.define import is_enumeration, linearized, program_classes
+from nodl.infer.interpreter.frames import Arguments, Frame
 from nodl.infer.interpreter.run import AttributeReader, Run
 from nodl.infer.methods import (
     BoundMethod,
     ClassMethod,
     ForeignMethod,
     NativeMethod,
-    Partial,
-    PartialMethod,
     PropertyValue,
     SuperProxy,
-    Variables,
 )
 from nodl.infer.models import foreign
 from nodl.infer.text import Text
@@ -32,7 +29,6 @@ from nodl.infer.values import (
     FunctionValue,
     Instance,
     ModuleValue,
-    NativeObject,
     Sequence,
     Unknown,
     Value,
@@ -49,36 +45,25 @@ def _of_instance(run: Run, obj: Instance, name: str, node: ast.AST, frame: Frame
     held = obj.cells.get(name)
     if isinstance(obj.cls, External):
         return held if held is not None else foreign.instance_attribute(run, obj, obj.cls.path, name)
-    if obj.cls.hooked and name != "__class__":
-        hook = special.method(obj, "__getattribute__")
-        if hook:
-            return run.call(hook, Arguments([(name,)]), node, frame)
-    return plain_attribute(run, obj, obj.cls, name, node, frame)
-
-
-def plain_attribute(
-    run: Run, obj: Instance, cls: ClassValue, name: str, node: ast.AST, frame: Frame
-) -> Value:
-    """What ``object.__getattribute__`` finds, and after it ``__getattr__``."""
     run.state.reads.attributes.add(name)
-    held = obj.cells.get(name)
     if held is not None:
         if not obj.summary and ABSENT[0] not in held:
             return held
         held = tuple(atom for atom in held if atom is not ABSENT[0])
-        in_class = _class_attribute(run, obj, linearized(cls), name, node, frame)
+        in_class = _class_attribute(run, obj, linearized(obj.cls), name, node, frame)
         return join(held, in_class or BOTTOM) or ANY
     if name == "__class__":
-        return (cls,)
+        return (obj.cls,)
     if name == "__dict__":
-        run.state.reflected = True
-        return (Variables(obj),)
-    found = _class_attribute(run, obj, linearized(cls), name, node, frame)
+        return run.variables_of(obj, node, frame)
+    found = _class_attribute(run, obj, linearized(obj.cls), name, node, frame)
     if found is not None:
         return found
-    getter = special.method(obj, "__getattr__")
+    getter = next(
+        (c.cells["__getattr__"] for c in program_classes(obj.cls) if "__getattr__" in c.cells), BOTTOM
+    )
     if getter:
-        return run.call(getter, Arguments([(name,)]), node, frame)
+        return run.call(getter, Arguments([(obj,), (name,)]), node, frame)
     return unknown(f"attribute {name}, which nothing analysed sets")
 
 
@@ -102,12 +87,10 @@ def _class_attribute(
 
 def _bound(run: Run, obj: Instance, value: Value, node: ast.AST, frame: Frame, name: str = "") -> Value:
     if len(value) == 1 and type(value[0]) is FunctionValue:
-        run.bound.add(value[0].node)
         return (BoundMethod(value[0], obj),)
     result: Value = BOTTOM
     for atom in value:
         if isinstance(atom, FunctionValue):
-            run.bound.add(atom.node)
             result = join(result, (BoundMethod(atom, obj),))
         elif isinstance(atom, PropertyValue):
             made = run.call(atom.getter, Arguments([(obj,)]), node, frame)
@@ -116,12 +99,6 @@ def _bound(run: Run, obj: Instance, value: Value, node: ast.AST, frame: Frame, n
             result = join(result, made)
         elif isinstance(atom, ClassMethod):
             result = join(result, _bound_class_method(atom, obj.cls))
-        elif isinstance(atom, PartialMethod):
-            fixed = atom.partial
-            result = join(result, (Partial(fixed.function, ((obj,), *fixed.positional), fixed.keywords),))
-        elif type(atom) is Instance and special.method(atom, "__get__"):
-            given = (obj,), (obj.cls,)
-            result = join(result, special.call_special(run, atom, "__get__", node, frame, *given))
         else:
             result = join(result, (atom,))
     return result
@@ -139,10 +116,7 @@ def _of_class(run: Run, cls: ClassValue, name: str, node: ast.AST, frame: Frame)
     if name in ("__name__", "__qualname__"):
         return (cls.name,) if name == "__name__" or "." not in cls.name else ANY
     if name == "__dict__":
-        return (Variables(cls),)
-    if name in ("__mro__", "__bases__"):
-        classes = linearized(cls) if name == "__mro__" else cls.bases
-        return run.tuple_of(tuple((each,) for each in classes))
+        return run.variables_of(cls, node, frame)
     if name == "__module__":
         return cls.module.cells.get("__name__", ANY)
     order = linearized(cls)
@@ -158,10 +132,6 @@ def _of_class(run: Run, cls: ClassValue, name: str, node: ast.AST, frame: Frame)
                 found: Value = (atom,)
                 if isinstance(atom, ClassMethod):
                     found = _bound_class_method(atom, cls)
-                elif type(atom) is Instance and special.method(atom, "__get__"):
-                    found = special.call_special(run, atom, "__get__", node, frame, (None,), (cls,))
-                elif isinstance(atom, FunctionValue):
-                    run.bound.add(atom.node)
                 result = join(result, found)
             return result or ANY
         if isinstance(base, External) and base.path not in ("builtins.object", "abc.ABC", "typing.Generic"):
@@ -208,7 +178,7 @@ def _automatic(cls: ClassValue, name: str) -> Value:
 
 def _of_module(run: Run, module: ModuleValue, name: str, node: ast.AST, frame: Frame) -> Value:
     if name == "__dict__":
-        return (Variables(module),)
+        return run.variables_of(module, node, frame)
     return imports.member(run, (module,), module.source.name, name, frame)
 
 
@@ -259,10 +229,6 @@ def _of_super(run: Run, proxy: SuperProxy, name: str, node: ast.AST, frame: Fram
     return unknown(f"{name} of a base class that is not analysed")
 
 
-def _of_native_object(run: Run, atom: NativeObject, name: str, node: ast.AST, frame: Frame) -> Value:
-    return foreign.native_attribute(run, atom, name, Call(Arguments(), node, frame))
-
-
 def _of_native(run: Run, atom: object, name: str, node: ast.AST, frame: Frame) -> Value:
     return (NativeMethod(atom, name),)
 
@@ -275,7 +241,6 @@ def _of_function(run: Run, atom: FunctionValue, name: str, node: ast.AST, frame:
 
 
 def _of_unknown(run: Run, atom: Unknown, name: str, node: ast.AST, frame: Frame) -> Value:
-    run.asked.add(name)
     return (NativeMethod(atom, name),) if name in foreign.NODE_METHODS else (atom,)
 
 
@@ -299,6 +264,4 @@ ATTRIBUTES: dict[type, AttributeReader] = {
     bytes: _of_native,
     Sequence: _of_native,
     Dictionary: _of_native,
-    Variables: _of_native,
-    NativeObject: _of_native_object,
 }

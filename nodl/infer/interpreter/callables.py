@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import ast
 
-from nodl.infer.interpreter.calls import call_bound, call_function
-from nodl.infer.interpreter.frames import Arguments, Call
+from nodl.infer.interpreter.calls import call_bound, call_function, run_generator
+from nodl.infer.interpreter.frames import Call
 from nodl.infer.interpreter.instantiation import instantiate
 from nodl.infer.interpreter.run import Caller, Run
-from nodl.infer.methods import BoundMethod, ClassMethod, ForeignMethod, Getter, NativeMethod, Partial
+from nodl.infer.methods import BoundMethod, ClassMethod, ForeignMethod, NativeMethod, Partial
 from nodl.infer.models import foreign
 from nodl.infer.values import (
     ANY,
@@ -18,8 +18,8 @@ from nodl.infer.values import (
     ClassValue,
     External,
     FunctionValue,
+    GeneratorValue,
     Instance,
-    NativeObject,
     Unknown,
     Value,
 )
@@ -34,42 +34,12 @@ def _call_partial(run: Run, partial: Partial, call: Call) -> Value:
     return run.call(partial.function, args, call.node, call.frame)
 
 
-def _call_getter(run: Run, getter: Getter, call: Call) -> Value:
-    """``operator.methodcaller('m', ...)(x)`` is ``x.m(...)``."""
-    owner = call.args.at(0) or ANY
-    found: list[Value] = []
-    for given in getter.positional[: 1 if getter.kind == "methodcaller" else None]:
-        if getter.kind == "itemgetter":
-            item = run.attribute(owner, "__getitem__", call.node, call.frame)
-            found.append(run.call(item, Arguments([given]), call.node, call.frame))
-            continue
-        text = given[0] if len(given) == 1 and isinstance(given[0], str) else None
-        if text is None:
-            run.gap(call.node, call.frame, "an attribute whose name is made at run time is used")
-            return ANY
-        value = owner
-        for step in text.split("."):
-            value = run.attribute(value, step, call.node, call.frame)
-        found.append(value)
-    if getter.kind == "methodcaller":
-        args = Arguments(list(getter.positional[1:]), dict(getter.keywords))
-        return run.call(found[0], args, call.node, call.frame)
-    return found[0] if len(found) == 1 else run.tuple_of(tuple(found))
-
-
 def _call_instance(run: Run, instance: Instance, call: Call) -> Value:
     if isinstance(instance.cls, External):
         run.escape(call.args)
         return ANY
     method = run.attribute((instance,), "__call__", call.node, call.frame)
     return run.call(method, call.args, call.node, call.frame)
-
-
-def _run_generator(run: Run, atom: NativeObject, call: Call) -> Value:
-    """What others do who have a generator: its body runs to the end, and they get what it yields."""
-    if atom.place is not None and atom.fallback is not None:
-        run.escape_value(atom.fallback())
-    return ANY
 
 
 def _call_unknown(run: Run, atom: Unknown, call: Call) -> Value:
@@ -90,7 +60,6 @@ CALLABLES: dict[type, Caller] = {
     FunctionValue: call_function,
     BoundMethod: call_bound,
     Partial: _call_partial,
-    Getter: _call_getter,
     Instance: _call_instance,
     ClassMethod: lambda run, method, call: run.call(method.function, call.args, call.node, call.frame),
     ClassValue: instantiate,
@@ -98,5 +67,5 @@ CALLABLES: dict[type, Caller] = {
     External: foreign.call_external,
     ForeignMethod: foreign.call_foreign_method,
     NativeMethod: foreign.call_native,
-    NativeObject: _run_generator,
+    GeneratorValue: run_generator,
 }

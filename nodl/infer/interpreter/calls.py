@@ -1,13 +1,12 @@
-"""Calls of analysed functions: binding arguments, running bodies, recursion, memory."""
+"""Calls of analysed functions: binding arguments, running bodies, generators, recursion, memory."""
 
 from __future__ import annotations
 
 import ast
+import functools
 from collections.abc import Callable
 
-from nodl.infer.interpreter import generators
 from nodl.infer.interpreter.frames import Arguments, Call, Frame
-from nodl.infer.interpreter.iterate import elements
 from nodl.infer.interpreter.run import MAX_DEPTH, Run
 from nodl.infer.methods import BoundMethod
 from nodl.infer.values import (
@@ -17,19 +16,19 @@ from nodl.infer.values import (
     OTHER,
     Dictionary,
     FunctionValue,
+    GeneratorValue,
     Items,
     Key,
     LocalCells,
-    NativeObject,
     Value,
     join,
+    present,
     unknown,
     widen,
 )
 
 MISSING = unknown("an argument that the caller does not give")
 MAX_ROUNDS = 8
-MAX_RECURSION = 24  # calls of a function inside itself that are followed one by one
 
 
 Body = Callable[[Run, FunctionValue, LocalCells, Call], Value]
@@ -57,23 +56,69 @@ def call_function(run: Run, function: FunctionValue, call: Call) -> Value:
     cells = bind(run, function, call)
     run.called.setdefault(node)
     run.understood.add(call.node)
-    if function.cached and not function.shared:
+    if is_generator(function):
+        kind = f"generator {id(function)}"
+        made = run.allocate(call.node, kind, lambda: GeneratorValue(function, call.node))
+        for name, value in cells.items():
+            run.state.store(made, name, value)
+        return (made,)
+    if function.cached and node not in run.stack:
         return _cached(run, function, cells, call)
-    if generators.is_generator(function):
-        return _generator(run, function, cells, call)
     if node not in run.stack and not (run.repeated and node in run.recursive):
         return _remembered(run, function, cells, call)
     if node not in run.stack:
         return _remembered(run, function, cells, call, _summarised)
-    if _decided_recursion(run, node, call.frame):
-        return _remembered(run, function, cells, call)
     return _summarised(run, function, cells, call)
+
+
+def run_generator(run: Run, made: GeneratorValue, call: Call) -> Value:
+    """Whatever the body yields, now or when it was run before; nobody knows how far others let it run."""
+    if made.function.node in run.stack:
+        return unknown("what a generator yields that calls itself")
+    cells = LocalCells()
+    cells.update((name, present(value)) for name, value in made.cells.items() if name != _YIELDED)
+    found = _run_body(run, made.function, cells, Call(call.args, made.node, call.frame))
+    found = join(present(made.cells.get(_YIELDED, BOTTOM)), found)
+    run.state.write(made.cells, _YIELDED, found)
+    return found
+
+
+_YIELDED = "[yielded]"
+
+
+def is_generator(function: FunctionValue) -> bool:
+    """Whether a function's own body has a ``yield``."""
+    return function.module.source.has_yield and _is_generator(function.node)
+
+
+@functools.lru_cache(maxsize=8192)
+def _is_generator(node: ast.AST) -> bool:
+    left = [node.body] if isinstance(node, ast.Lambda) else list(getattr(node, "body", []))
+    while left:
+        part = left.pop()
+        if isinstance(part, ast.Yield | ast.YieldFrom):
+            return True
+        if not isinstance(part, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda | ast.ClassDef):
+            left.extend(ast.iter_child_nodes(part))
+    return False
+
+
+def _cached(run: Run, function: FunctionValue, cells: LocalCells, call: Call) -> Value:
+    """``functools.cache``: the body may run, or the earlier result for these arguments is taken."""
+    key = ("cached", *cells.values())
+    held = function.attributes.get(key, BOTTOM)
+    result = join(held, run.state.perhaps(lambda: _remembered(run, function, cells, call)))
+    if held and result is not held:
+        result = join(result, ANY)
+    run.state.write(function.attributes, key, result)
+    return result
 
 
 def _summarised(run: Run, function: FunctionValue, cells: LocalCells, call: Call) -> Value:
     """One of the calls that a function which calls itself gets: all of them together are one."""
     node = function.node
     run.recursive.add(node)
+    run.joined.add((node, call.node))
     summary = run.summaries.setdefault(node, Summary())
     _widen_parameters(run, summary, cells)
     if not summary.active:
@@ -82,61 +127,13 @@ def _summarised(run: Run, function: FunctionValue, cells: LocalCells, call: Call
     return result  # nothing yet: this path ends in a call that has not come back so far
 
 
-def _cached(run: Run, function: FunctionValue, cells: LocalCells, call: Call) -> Value:
-    """``functools.cache``: the same constant arguments give the first result again."""
-    key = ("cached", *cells.values())
-    constant = all(len(value) == 1 and isinstance(value[0], str | int | float) for value in cells.values())
-    held = function.attributes.get(key)
-    if constant and held and not run.repeated:
-        return held
-    if function.node in run.stack:
-        return (
-            _remembered(run, function, cells, call)
-            if _decided_recursion(run, function.node, call.frame)
-            else ANY
-        )
-    result = _remembered(run, function, cells, call)
-    if constant:
-        run.state.write(function.attributes, key, result)
-    return result
-
-
-def _generator(run: Run, function: FunctionValue, cells: LocalCells, call: Call) -> Value:
-    """An iterator that runs the body step by step; where that is not possible the body is run as a whole."""
-    given = dict(cells)
-    made = NativeObject(generators.steps(run, function, cells, call), run.state.forks, tuple(given.values()))
-
-    def as_a_whole() -> Value:
-        again = LocalCells()
-        again.update(given)
-        found = _run_body(run, function, again, call) if function.node not in run.stack else ANY
-        return elements(run, found, call.node, call.frame).any_element()
-
-    made.fallback = as_a_whole
-    made.given = given
-    made.place = function.node, call.node
-    run.state.pulled += 1
-    return (made,)
-
-
-def _decided_recursion(run: Run, node: ast.AST, caller: Frame) -> bool:
-    """Whether a function calls itself without an undecided test in between: it is followed as it runs."""
-    if run.entries.get(node) != (run.state.forks, run.repeated) or node in run.summaries or caller.early:
-        return False
-    run.turns -= 1
-    level = run.stack.count(node)
-    if level > MAX_RECURSION:
-        run.entries[node] = (-1, -1)  # it may never end: from here on its calls are joined
-    return run.fuel > 0 and level <= MAX_RECURSION and len(run.stack) < MAX_DEPTH - 8
-
-
 def _remembered(
     run: Run, function: FunctionValue, cells: LocalCells, call: Call, body: Body | None = None
 ) -> Value:
     """A call that leaves the state as it found it gives the same again while the state is the same."""
-    key = (function, tuple(cells.values()), id(call.node) if run.context else 0)
+    key = (function, tuple(cells.values()), id(call.node))
     known = run.memo.get(key)
-    version = (*run.state.version(), run.state.pulled, run.rounds)
+    version = (*run.state.version(), run.rounds)
     if known is not None and known[0] == version:
         run.state.reads.attributes |= known[2]
         return known[1]
@@ -145,7 +142,7 @@ def _remembered(
     before = run.steps if function.node not in run.stack else None  # a call inside itself counts already
     try:
         result = (body or _run_body)(run, function, cells, call)
-        if (*run.state.version(), run.state.pulled, run.rounds) == version:
+        if (*run.state.version(), run.rounds) == version:
             run.memo[key] = (version, result, reads.attributes)
     finally:
         around |= reads.attributes
@@ -168,10 +165,9 @@ def _run_body(run: Run, function: FunctionValue, cells: LocalCells, call: Call) 
     frame = Frame(function.module, cells, closure, run.state.depth)
     frame.again = earlier is not None
     frame.function = function
+    frame.entry = call.node
     frame.forks = frame.loop_forks = run.state.forks
-    entry = run.entries.get(function.node)
-    if entry is None or entry[0] >= 0:
-        run.entries[function.node] = (run.state.forks, run.repeated)
+    run.entries.setdefault(function.node, {})[call.node] = None
     run.stack.append(function.node)
     mark = run.state.mark()
     node = function.node
@@ -188,11 +184,9 @@ def _run_body(run: Run, function: FunctionValue, cells: LocalCells, call: Call) 
     else:
         cells.dead = True
     run.stack.pop()
-    if entry is not None and entry[0] >= 0:
-        run.entries[function.node] = entry
     run.context = previous
     if frame.yielded is not None:
-        return run.sequence(node, "generator", Items(None, frame.yielded or ANY))
+        return frame.yielded or ANY
     return frame.returned  # nothing, if no path comes back
 
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Callable
+from functools import partial
 
 from nodl.infer.interpreter.assign import assign, store_item
 from nodl.infer.interpreter.conditions import decide, narrowed
 from nodl.infer.interpreter.frames import Frame
 from nodl.infer.interpreter.iterate import elements
-from nodl.infer.interpreter.loops import MAX_UNROLLED
+from nodl.infer.interpreter.loops import may_unroll
 from nodl.infer.interpreter.run import Run
 from nodl.infer.values import Dictionary, Items, LocalCells, Value, join_all
 
@@ -50,6 +51,7 @@ def _inner_frame(run: Run, frame: Frame) -> Frame:
     closure = frame.closure if frame.is_class else frame
     inner = Frame(frame.module, LocalCells(), closure, run.state.depth)
     inner.function = frame.function
+    inner.entry = frame.entry
     inner.is_comprehension = True
     return inner
 
@@ -77,22 +79,27 @@ def _generate(
         assign(run, generator.target, element, frame)
         return _where(run, generators[1:], generator.ifs, frame, emit)
 
-    items = elements(run, run.evaluate(generator.iter, around or frame), generator.iter, frame)
-    if items.exact is None or len(items.exact) > (MAX_UNROLLED if run.repeated else run.fuel):
+    iterated = run.evaluate(generator.iter, around or frame)
+    items = elements(run, iterated, generator.iter, frame)
+    if items.exact is None or not may_unroll(run, len(items.exact)):
         run.repeated += 1
-        element = items.any_element()
-        if element:
-            for _ in range(2):  # the second time with what the first one left behind
-                run.state.maybe(lambda: one(element) or True)
+        for _ in range(2):  # the second time with what the first one left behind
+            element = elements(run, iterated, generator.iter, frame).any_element()
+            if element:
+                run.state.maybe(partial(_surely, one, element))
         run.repeated -= 1
         return False
     exact = True
-    run.turns -= 0 if run.repeated else len(items.exact)
     for turn, element in enumerate(items.exact):
         previous = run.enter((id(generator), turn))
         exact = one(element) and exact
         run.context = previous
     return exact
+
+
+def _surely(one: Callable[[Value], bool], element: Value) -> bool:
+    one(element)
+    return True
 
 
 def _where(

@@ -1,6 +1,6 @@
-"""Conditions: is a value certainly true or false, and what does a test tell about the tested variable.
+"""Conditions: is a value certainly true or false, and what does a test ask of a parameter.
 
-Pruning a branch is only done on certainty; narrowing only removes alternatives that the branch excludes.
+A branch is only left out on certainty. A test that asks for the value of a parameter is decided by the launch.
 """
 
 from __future__ import annotations
@@ -8,26 +8,33 @@ from __future__ import annotations
 import ast
 import operator
 from collections.abc import Callable
+from typing import Any
 
-from enclave_launch.boundary.light import Any
-from nodl.infer.interpreter import special
 from nodl.infer.interpreter.frames import Frame
 from nodl.infer.interpreter.run import Run
-from nodl.infer.text import Input, Text, input_of
+from nodl.infer.text import Input, Piece, Text, TextAtom, input_of, make_text, pieces_of
 from nodl.infer.values import (
-    BOTTOM,
     CONSTANTS,
     ITEMS,
     ClassValue,
     Dictionary,
+    External,
     FunctionValue,
     Instance,
     ModuleValue,
-    NativeObject,
     Sequence,
     Value,
     contains,
 )
+
+Condition = tuple[Input, str, tuple[str, ...]]
+"""What is asked of an input: the edit that keeps a name where it holds, with its arguments."""
+
+OPPOSITE = {
+    "only if true": "only if false", "only if false": "only if true",
+    "only if equal": "only if different", "only if different": "only if equal",
+    "only if among": "only if not among", "only if not among": "only if among",
+}  # fmt: skip
 
 
 def truth_of(atom: object) -> bool | None:
@@ -38,11 +45,10 @@ def truth_of(atom: object) -> bool | None:
         return True if any(isinstance(piece, str) for piece in atom.pieces) else None
     if isinstance(atom, Sequence):
         items = atom.items
-        return bool(items.exact) if items.exact is not None and len(atom.cells[ITEMS]) == 1 else None
+        known = items.exact is not None and len(atom.cells[ITEMS]) == 1 and not atom.escaped
+        return bool(items.exact) if known else None
     if isinstance(atom, FunctionValue | ModuleValue | ClassValue):
         return True
-    if isinstance(atom, NativeObject):
-        return bool(atom.object) if not hasattr(atom.object, "__len__") else None
     if isinstance(atom, Dictionary):
         entries = atom.entries()
         certain = any(certain for _, _, certain in entries)
@@ -67,52 +73,92 @@ def truth(value: Value) -> bool | None:
 
 def decide(run: Run, test: ast.expr, frame: Frame) -> bool | None:
     """Evaluate ``test`` once, for its effects and its truth."""
-    return truth(special.tested(run, run.evaluate(test, frame), test, frame))
+    return truth(run.evaluate(test, frame))
 
 
 def forked(run: Run, test: ast.expr, frame: Frame) -> bool | None:
-    """The outcome of an undecided test on the path that is followed; ``None``: both, joined."""
+    """The outcome of a test that asks for a parameter, on the path that is followed; ``None``: both, joined."""
     if run.state.forks or run.repeated:
         return None
     condition = _condition(run, test, frame)
-    run.undecided += 1
-    run.conditional = run.conditional or condition is not None
-    if run.decisions is None:
+    if condition is None:
         return None
-    outcome = run.decisions.next(condition)
-    narrowed(run, test, outcome, frame)
-    return outcome
+    run.conditional = True
+    return None if run.decisions is None else run.decisions.next(condition)
 
 
-def _condition(run: Run, test: ast.expr, frame: Frame) -> tuple[Input, str, tuple[str, ...]] | None:
-    """What ``test`` asks of a parameter: the input, and the edits that keep a name where it holds or does not."""
+def _condition(run: Run, test: ast.expr, frame: Frame) -> Condition | None:
+    """What ``test`` asks of a parameter; ``None`` where that cannot be said."""
     if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not):
         found = _condition(run, test.operand, frame)
         return None if found is None else (found[0], OPPOSITE[found[1]], found[2])
-    left, edit = test, "only if true"
-    given: tuple[str, ...] = ()
-    if isinstance(test, ast.Compare) and len(test.ops) == 1 and isinstance(test.ops[0], ast.Eq | ast.NotEq):
-        other = test.comparators[0]
-        if not isinstance(other, ast.Constant) or type(other.value) not in (str, int):
+    if not _only_reads(test):
+        return None
+    if isinstance(test, ast.Compare):
+        return _comparison(run, test, frame) if len(test.ops) == 1 else None
+    asked, defaults = _asked(run, test, frame)
+    if asked is None:
+        return None
+    if all(isinstance(default, bool) for default in defaults):
+        return asked, "only if true", ()
+    if all(isinstance(default, str) for default in defaults):
+        return asked, "only if different", ("",)
+    return (asked, "only if different", ("0",)) if _whole_numbers(defaults) else None
+
+
+def _comparison(run: Run, test: ast.Compare, frame: Frame) -> Condition | None:
+    asked, defaults = _asked(run, test.left, frame)
+    other = test.comparators[0]
+    if asked is None:
+        asked, defaults = _asked(run, other, frame)
+        other = test.left
+        if isinstance(test.ops[0], ast.In | ast.NotIn):
             return None
-        left, given = test.left, (str(other.value),)
-        edit = "only if equal" if isinstance(test.ops[0], ast.Eq) else "only if different"
-    if not _only_reads(left):
+    if asked is None or not (all(type(each) is str for each in defaults) or _whole_numbers(defaults)):
         return None
-    value = run.evaluate(left, frame)
+    value = run.evaluate(other, frame)
+    if isinstance(test.ops[0], ast.In | ast.NotIn):
+        among = _texts_in(value)
+        edit = "only if among" if isinstance(test.ops[0], ast.In) else "only if not among"
+        return None if among is None else (asked, edit, among)
+    if not isinstance(test.ops[0], ast.Eq | ast.NotEq) or len(value) != 1 or type(value[0]) not in (str, int):
+        return None
+    if type(value[0]) is not type(defaults[0]):
+        return None
+    return (
+        asked,
+        "only if equal" if isinstance(test.ops[0], ast.Eq) else "only if different",
+        (str(value[0]),),
+    )
+
+
+def _whole_numbers(defaults: Value) -> bool:
+    return all(type(default) is int for default in defaults)
+
+
+def _texts_in(value: Value) -> tuple[str, ...] | None:
+    container = value[0] if len(value) == 1 else None
+    if not isinstance(container, Sequence) or container.escaped or container.items.exact is None:
+        return None
+    known = [item[0] for item in container.items.exact if len(item) == 1 and type(item[0]) is str]
+    texts = tuple(each for each in known if isinstance(each, str))
+    return texts if len(texts) == len(container.items.exact) else None
+
+
+def _asked(run: Run, node: ast.expr, frame: Frame) -> tuple[Input | None, Value]:
+    value = run.evaluate(node, frame)
     asked = input_of(value[0]) if len(value) == 1 else None
-    if asked is None or asked.edits or asked.item is not None or asked.name.startswith(("-", "<", "$")):
-        return None
-    defaults = getattr(asked.owner, "parameters", {}).get(asked.name, ())
-    wanted = bool if edit == "only if true" else (str, int)
-    plain = all(isinstance(default, wanted) for default in defaults) and bool(defaults)
-    return (asked, edit, given) if plain else None
+    if asked is None or not is_plain_parameter(asked):
+        return None, ()
+    defaults: Value = getattr(asked.owner, "parameters", {}).get(asked.name, ())
+    return (asked, defaults) if defaults else (None, ())
 
 
-OPPOSITE = {
-    "only if true": "only if false", "only if false": "only if true",
-    "only if equal": "only if different", "only if different": "only if equal",
-}  # fmt: skip
+def is_plain_parameter(asked: Input) -> bool:
+    """Whether it is the whole value of a ROS parameter, as launch gives it."""
+    return not asked.edits and asked.item is None and not asked.name.startswith(("-", "<", "$"))
+
+
 _READS = frozenset({"get_parameter", "get_parameter_value", "declare_parameter"})
 
 
@@ -123,56 +169,31 @@ def _only_reads(node: ast.expr) -> bool:
 
 
 def narrowed(run: Run, test: ast.expr, outcome: bool, frame: Frame) -> None:
-    """Drop from a tested variable or field of ``self`` what the outcome of ``test`` excludes."""
+    """Drop from a variable or field of ``self`` that is tested by itself what the outcome excludes."""
     if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not):
         narrowed(run, test.operand, not outcome, frame)
-    elif isinstance(test, ast.BoolOp):
-        if isinstance(test.op, ast.And) == outcome:
-            for part in test.values:
-                narrowed(run, part, outcome, frame)
-    elif isinstance(test, ast.Compare) and len(test.ops) == 1:
-        _narrow_comparison(run, test, outcome, frame)
-    elif isinstance(test, ast.Name | ast.Attribute):
-        _filter(run, test, frame, lambda atom: truth_of(atom) in (outcome, None))
-
-
-def _narrow_comparison(run: Run, test: ast.Compare, outcome: bool, frame: Frame) -> None:
-    if not isinstance(test.ops[0], ast.Is | ast.Eq | ast.IsNot | ast.NotEq):
-        return
-    wanted = outcome == isinstance(test.ops[0], ast.Is | ast.Eq)
-    other = test.comparators[0]
-    if isinstance(other, ast.Constant) and isinstance(test.left, ast.Name | ast.Attribute):
-        constant = other.value
-        _filter(run, test.left, frame, lambda atom: _may_equal(atom, constant, wanted))
-
-
-def _may_equal(atom: object, constant: object, wanted: bool) -> bool:
-    if isinstance(atom, CONSTANTS):
-        return (atom == constant) == wanted
-    return not (constant is None and isinstance(atom, _NEVER_NONE) and wanted)
-
-
-_NEVER_NONE = (Instance, FunctionValue, ClassValue, ModuleValue, Sequence)
-
-
-def _filter(run: Run, target: ast.expr, frame: Frame, keep: Callable[[object], bool]) -> None:
-    if isinstance(target, ast.Name):
-        cells = frame.cells
-        key: object = target.id
-    elif isinstance(target, ast.Attribute) and isinstance(target.value, ast.Name):
-        owner = frame.cells.get(target.value.id, BOTTOM)
-        if len(owner) != 1 or not isinstance(owner[0], Instance) or owner[0].summary:
-            return
-        cells = owner[0].cells
-        key = target.attr
-    else:
-        return
-    value = cells.get(key)
-    if value is None or len(value) < 2:
-        return
-    kept = tuple(atom for atom in value if keep(atom))
+    elif isinstance(test, ast.BoolOp) and isinstance(test.op, ast.And) == outcome:
+        for part in test.values:
+            narrowed(run, part, outcome, frame)
+    cells: dict[object, Value] = {}
+    key: object = None
+    if isinstance(test, ast.Name):
+        cells, key = frame.cells, test.id
+    elif isinstance(test, ast.Attribute) and isinstance(test.value, ast.Name):
+        owner = frame.cells.get(test.value.id, ())
+        if len(owner) == 1 and isinstance(owner[0], Instance) and not owner[0].summary:
+            cells, key = owner[0].cells, test.attr
+    value = cells.get(key, ())
+    kept = tuple(atom for atom in value if truth_of(atom) in (outcome, None))
     if kept and len(kept) < len(value):
         run.state.write(cells, key, kept)
+
+
+def only_if(condition: Condition, text: TextAtom) -> Text:
+    """``text`` where the condition holds, and nothing elsewhere."""
+    asked, edit, given = condition
+    test: Piece = Input(asked.name, asked.owner, None, ((edit, given),))
+    return make_text((test, *(pieces_of(text) if text else ())))
 
 
 def compare(run: Run, node: ast.Compare, frame: Frame) -> Value:
@@ -181,12 +202,7 @@ def compare(run: Run, node: ast.Compare, frame: Frame) -> Value:
     results: set[bool | None] = set()
     for op, comparator in zip(node.ops, node.comparators, strict=True):
         right = run.evaluate(comparator, frame)
-        own: Value = BOTTOM
-        if special.has_own(left) or special.has_own(right):
-            own = special.comparison(run, op, left, right, node, frame)
-            if own and len(node.ops) == 1:
-                return own
-        results.add(truth(own) if own else compare_values(op, left, right))
+        results.add(compare_values(op, left, right))
         left = right
     if results == {True}:
         return (True,)
@@ -207,10 +223,30 @@ def _compare_atoms(op: ast.cmpop, left: object, right: object) -> bool | None:
         return found if found is None or isinstance(op, ast.In) else not found
     if isinstance(left, CONSTANTS) and isinstance(right, CONSTANTS):
         return _compare_constants(op, left, right)
-    with_none = isinstance(op, ast.Is | ast.IsNot | ast.Eq | ast.NotEq) and (left is None or right is None)
-    if with_none and isinstance(right if left is None else left, _NEVER_NONE):
-        return isinstance(op, ast.IsNot | ast.NotEq)
+    if not isinstance(op, ast.Is | ast.IsNot | ast.Eq | ast.NotEq):
+        return None
+    same = isinstance(op, ast.Is | ast.Eq)
+    if _is_member(left) and _is_member(right):
+        return (left is right) is same
+    if left is None or right is None:
+        other = right if left is None else left
+        own = isinstance(other, Instance) and isinstance(op, ast.Eq | ast.NotEq)
+        return not same if isinstance(other, _NEVER_NONE) and not own else None
     return None
+
+
+_NEVER_NONE = (Instance, FunctionValue, ClassValue, ModuleValue, Sequence, Dictionary)
+
+
+def _is_member(atom: object) -> bool:
+    """A member of an enumeration whose members are equal to themselves only."""
+    if not isinstance(atom, Instance) or "_value_" not in atom.cells or not isinstance(atom.cls, ClassValue):
+        return False
+    bases = [base for base in atom.cls.linear or () if isinstance(base, External)]
+    return (
+        all(base.path in ("enum.Enum", "builtins.object") for base in bases)
+        and "__eq__" not in atom.cls.cells
+    )
 
 
 def _membership(element: object, container: object) -> bool | None:
@@ -231,6 +267,8 @@ def _membership(element: object, container: object) -> bool | None:
 
 
 def _compare_constants(op: ast.cmpop, left: object, right: object) -> bool | None:
+    if isinstance(op, ast.Is | ast.IsNot) and type(left) is not type(right):
+        return isinstance(op, ast.IsNot)
     try:
         return bool(_COMPARED[type(op)](left, right))
     except TypeError:

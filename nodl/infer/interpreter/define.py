@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 
-from nodl.infer.interpreter.frames import Arguments, Frame
+from nodl.infer.interpreter.frames import Arguments, Call, Frame
 from nodl.infer.interpreter.run import Run
 from nodl.infer.methods import BoundMethod, ClassMethod, PropertyValue
 from nodl.infer.values import (
@@ -12,6 +12,7 @@ from nodl.infer.values import (
     External,
     FunctionValue,
     Instance,
+    Sequence,
     Unknown,
     Value,
     external,
@@ -24,7 +25,8 @@ FunctionNode = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda
 # Decorators that leave the function what it is, as far as names are concerned.
 _CACHES = ("functools.cache", "functools.lru_cache")
 _TRANSPARENT = frozenset({
-    *_CACHES, "abc.abstractmethod", "contextlib.contextmanager", "contextlib.asynccontextmanager",
+    *_CACHES, "abc.abstractmethod", "contextlib.contextmanager",
+    "contextlib.asynccontextmanager",
     "typing.override", "typing.overload", "typing_extensions.override", "typing.final", "pytest.fixture",
     "asyncio.coroutine",
 })  # fmt: skip
@@ -126,14 +128,12 @@ def define_class(run: Run, node: ast.ClassDef, frame: Frame) -> bool:
     body.is_class = True
     body.cells["[class]"] = (cls,)
     body.function = frame.function
+    body.entry = frame.entry
     run.execute(node.body, body)
     run.classes.setdefault(node, cls)
     if any(isinstance(base, External) and base.path == "typing.NamedTuple" for base in bases):
-        from nodl.infer.models import named_tuples
-
         cls.fields = _fields(run, cls, frame)
-        named_tuples.complete(run, cls, node, frame)
-    complete_class(run, cls, keywords, node, frame)
+    _made_otherwise(run, cls, keywords, node, frame)
     value: Value = (cls,)
     for decorator in reversed(node.decorator_list):
         value = _decorated_class(run, value, cls, decorator, frame)
@@ -141,26 +141,27 @@ def define_class(run: Run, node: ast.ClassDef, frame: Frame) -> bool:
     return True
 
 
-def complete_class(
+_HOOKS = frozenset({
+    "__setattr__", "__getattribute__", "__delattr__", "__get__", "__set__", "__set_name__", "__init_subclass__",
+    "__class_getitem__", "__prepare__", "__instancecheck__",
+})  # fmt: skip
+
+
+def _made_otherwise(
     run: Run, cls: ClassValue, keywords: dict[str, Value], node: ast.AST, frame: Frame
 ) -> None:
-    """What happens at the end of a class statement (data model, 3.3.3): metaclass, names, ``__init_subclass__``."""
-    cls.hooked = any(_hooks(base) for base in linearized(cls))
-    metaclass = sole(keywords.pop("metaclass", external("builtins.type")))
-    _inherit_metaclass(run, cls, metaclass, node, frame)
-    for name, value in list(cls.cells.items()):
-        for atom in value:
-            if type(atom) is Instance and isinstance(name, str):
-                found = run.attribute((atom,), "__set_name__", node, frame)
-                if any(isinstance(each, BoundMethod) for each in found):
-                    run.call(found, Arguments([(cls,), (name,)]), node, frame)
-    for base in linearized(cls)[1:]:
-        hook = base.cells.get("__init_subclass__") if isinstance(base, ClassValue) else None
-        if hook:
-            run.call(functions_of(hook), Arguments([(cls,)], keywords), node, frame)
-            return
-        if isinstance(base, Unknown):
-            run.escape_value((cls,))
+    """A gap for a class whose objects, attributes or subclasses are not made as ``type`` and ``object`` make them."""
+    metaclass = sole(keywords.get("metaclass", external("builtins.type")))
+    plain = isinstance(metaclass, External) and metaclass.path in _PLAIN_METACLASSES
+    if not plain or any(base.node in run.with_metaclass for base in program_classes(cls)[1:]):
+        run.with_metaclass.add(cls.node)
+        run.gap(node, frame, f"class {cls.name} has a metaclass, which is not analysed")
+        run.escape_value((cls,))
+    for name in sorted(name for name in cls.cells if isinstance(name, str) and name in _HOOKS):
+        run.gap(node, frame, f"class {cls.name} defines {name}, which is not analysed")
+        run.escape_value((cls,))
+    if any(isinstance(base, Unknown) for base in linearized(cls)):
+        run.escape_value((cls,))
 
 
 def functions_of(value: Value) -> Value:
@@ -168,28 +169,6 @@ def functions_of(value: Value) -> Value:
     return tuple(
         each for atom in value for each in (atom.function if isinstance(atom, ClassMethod) else (atom,))
     )
-
-
-def _inherit_metaclass(run: Run, cls: ClassValue, metaclass: object, node: ast.AST, frame: Frame) -> None:
-    """A metaclass of the program, or one that is not known, may do anything to the class."""
-    plain = isinstance(metaclass, External) and metaclass.path in _PLAIN_METACLASSES
-    if plain and not any(base.node in run.with_metaclass for base in program_classes(cls)[1:]):
-        return
-    run.with_metaclass.add(cls.node)
-    run.gap(node, frame, f"class {cls.name} has a metaclass, which is not analysed")
-    run.escape_value((cls,))
-
-
-def _hooks(base: object) -> bool:
-    """Whether this class defines what reading or setting an attribute does."""
-    if isinstance(base, ClassValue):
-        if not _HOOKS.isdisjoint(base.cells):
-            return True
-        return any(isinstance(a, PropertyValue | Instance) for value in base.cells.values() for a in value)
-    return isinstance(base, Unknown)
-
-
-_HOOKS = frozenset({"__setattr__", "__getattribute__", "__delattr__"})
 
 
 def _decorated_class(run: Run, value: Value, cls: ClassValue, decorator: ast.expr, frame: Frame) -> Value:
@@ -291,3 +270,39 @@ def foreign_bases(cls: ClassValue) -> list[object]:
 
 
 _HARMLESS_BASES = frozenset({"builtins.object", "typing.Generic", "abc.ABC", "typing.Protocol"})
+
+
+def new_instance(run: Run, cls: ClassValue, call: Call) -> Instance:
+    """``object.__new__(cls)``."""
+    return run.allocate(call.node, f"instance {id(cls)}", lambda: Instance(cls))
+
+
+def is_constant(atom: object) -> bool:
+    """Whether ``atom`` is a constant that a dictionary can have as a key."""
+    return isinstance(atom, str | int | float | bool | type(None))
+
+
+def is_key(atom: object) -> bool:
+    """Whether a dictionary finds ``atom`` by what it is: a constant, tuples of such, what equals itself only."""
+    if isinstance(atom, External):
+        return "(" not in atom.path  # else it stands for whatever a library gives
+    if isinstance(atom, Sequence):
+        exact = atom.items.exact if atom.kind == "tuple" else None
+        return exact is not None and all(len(part) == 1 and type(part[0]) in (str, int) for part in exact)
+    if isinstance(atom, Instance):
+        return isinstance(atom.cls, ClassValue) and not atom.summary and _equals_itself_only(atom.cls)
+    if isinstance(atom, FunctionValue):
+        return not atom.shared
+    return is_constant(atom) or (isinstance(atom, ClassValue) and not atom.summary)
+
+
+_COMPARED_BY_IDENTITY = frozenset({"builtins.object", "enum.Enum", "enum.Flag", "abc.ABC", "rclpy.node.Node"})
+
+
+def _equals_itself_only(cls: ClassValue) -> bool:
+    return all(
+        base.path in _COMPARED_BY_IDENTITY
+        if isinstance(base, External)
+        else isinstance(base, ClassValue) and base.fields is None and "__eq__" not in base.cells
+        for base in linearized(cls)
+    )

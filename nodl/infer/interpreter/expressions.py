@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import ast
 import builtins
+from functools import partial
 
-from nodl.infer.interpreter import comprehensions, special
+from nodl.infer.interpreter import comprehensions
 from nodl.infer.interpreter.assign import assign, copy_dictionary, store_item
-from nodl.infer.interpreter.conditions import compare, decide, forked, narrowed, truth, truth_of
+from nodl.infer.interpreter.conditions import compare, decide, forked, narrowed, only_if, truth, truth_of
 from nodl.infer.interpreter.define import make_function
 from nodl.infer.interpreter.formatting import f_string
 from nodl.infer.interpreter.frames import Arguments, Frame
@@ -16,6 +17,7 @@ from nodl.infer.interpreter.operators import binary
 from nodl.infer.interpreter.run import Evaluator, Run
 from nodl.infer.interpreter.subscripts import subscript
 from nodl.infer.methods import SuperProxy
+from nodl.infer.text import Text, input_of, with_edit
 from nodl.infer.values import (
     ANY,
     BOTTOM,
@@ -72,8 +74,10 @@ def _call(run: Run, node: ast.Call, frame: Frame) -> Value:
     function = node.func
     if type(function) is ast.Name and function.id == "super" and "super" not in frame.module.cells:
         return _super(run, node, frame)
-    run.evaluated.add(node)
+    run.evaluated.add((node, frame.entry))
     callee = run.evaluate(function, frame)
+    if any(type(atom) is Unknown for atom in callee):
+        run.doubtful.add(node)
     args = arguments_of(run, node, frame)
     run.at = node, frame
     return run.call(callee, args, node, frame)
@@ -190,44 +194,44 @@ def _boolean(run: Run, node: ast.BoolOp, frame: Frame) -> Value:
     stops_at = isinstance(node.op, ast.Or)
     result: Value = BOTTOM
     for index, operand in enumerate(node.values):
-        before = node.values[:index]
-        value = (
-            _perhaps(run, operand, before, not stops_at, frame) if before else run.evaluate(operand, frame)
-        )
+        evaluate = partial(_after, run, operand, node.values[:index], not stops_at, frame)
+        value = run.state.perhaps(evaluate) if index and type(operand) is not ast.Constant else evaluate()
         if index == len(node.values) - 1:
+            return join(result, _otherwise(result, value) if stops_at else value)
+        if truth(value) is stops_at:
             return join(result, value)
-        tested = special.tested(run, value, operand, frame)
-        outcome = truth(tested)
-        if outcome is stops_at:
-            return join(result, value)
-        if tested is not value:
-            result = join(result, value if outcome is None else BOTTOM)
-            continue
-        result = join(result, tuple(atom for atom in value if truth_of(atom) in (stops_at, None)))
+        stays = tuple(atom for atom in value if truth_of(atom) in (stops_at, None))
+        result = join(result, tuple(_where_set(atom) for atom in stays) if stops_at else stays)
     return result
 
 
-def _perhaps(run: Run, operand: ast.expr, before: list[ast.expr], held: bool, frame: Frame) -> Value:
+def _after(run: Run, operand: ast.expr, before: list[ast.expr], held: bool, frame: Frame) -> Value:
     """What ``operand`` gives where those ``before`` it were all true, or (unless ``held``) all false."""
-    if isinstance(operand, ast.Constant):
-        return run.evaluate(operand, frame)
+    for test in before:
+        narrowed(run, test, held, frame)
+    return run.evaluate(operand, frame)
 
-    def evaluate() -> Value:
-        for test in before:
-            narrowed(run, test, held, frame)
-        return run.evaluate(operand, frame)
 
-    return run.state.perhaps(evaluate)
+def _where_set(atom: object) -> object:
+    """An input in front of ``or``: where it is empty, what follows is taken."""
+    asked = input_of(atom)
+    return atom if asked is None or asked.item is not None else with_edit(asked, "unless empty", ())
+
+
+def _otherwise(before: Value, value: Value) -> Value:
+    """The right side of ``input or value``: what is taken where the input is empty."""
+    asked = input_of(before[0]) if len(before) == 1 else None
+    if asked is None or asked.edits != (("unless empty", ()),):
+        return value
+    condition = asked._replace(edits=()), "only if equal", ("",)
+    return tuple(only_if(condition, atom) if isinstance(atom, str | Text) else atom for atom in value)
 
 
 def _unary(run: Run, node: ast.UnaryOp, frame: Frame) -> Value:
     value = run.evaluate(node.operand, frame)
     if isinstance(node.op, ast.Not):
-        outcome = truth(special.tested(run, value, node, frame))
+        outcome = truth(value)
         return boolean(None if outcome is None else not outcome)
-    if special.has_own(value):
-        name = {ast.USub: "__neg__", ast.UAdd: "__pos__", ast.Invert: "__invert__"}[type(node.op)]
-        return special.call_special(run, value[0], name, node, frame) or ANY
     if isinstance(node.op, ast.USub) and len(value) == 1 and isinstance(value[0], int | float):
         return (-value[0],)
     return ANY

@@ -8,10 +8,8 @@ import string
 from collections.abc import Callable, Iterable
 from collections.abc import Sequence as Sequences
 from contextlib import suppress
-from pathlib import PurePath
+from typing import Any
 
-from enclave_launch.boundary.light import Any
-from nodl.infer.interpreter import special
 from nodl.infer.interpreter.frames import Arguments, Frame
 from nodl.infer.interpreter.run import Run
 from nodl.infer.text import Hole, Text, TextAtom, common_text, concatenations, make_text
@@ -19,11 +17,11 @@ from nodl.infer.values import (
     ANY,
     BOTTOM,
     RESULT,
+    ClassValue,
     Dictionary,
     External,
     Instance,
     Items,
-    NativeObject,
     Sequence,
     Unknown,
     Value,
@@ -54,11 +52,12 @@ def _text_of_atom(atom: object) -> TextAtom:
         return _hole(atom.why)
     if isinstance(atom, External):
         return _hole(f"a result of {atom.path.removesuffix(RESULT)}")
-    if isinstance(atom, NativeObject) and isinstance(atom.object, PurePath):
-        return str(atom.object)
-    if isinstance(atom, Instance) and "_value_" in atom.cells:
-        value = sole(atom.cells["_value_"])
-        if isinstance(value, str):
+    if isinstance(atom, Instance) and isinstance(atom.cls, ClassValue):
+        bases = atom.cls.linear or ()
+        value = sole(atom.cells.get("_value_", ANY))
+        if isinstance(value, str) and any(
+            isinstance(b, External) and b.path == "enum.StrEnum" for b in bases
+        ):
             return value
     return _hole("the text of an object")
 
@@ -86,10 +85,6 @@ def f_string(run: Run, node: ast.JoinedStr, frame: Frame) -> Value:
 def _formatted(run: Run, part: ast.FormattedValue, frame: Frame) -> list[TextAtom]:
     value = run.evaluate(part.value, frame)
     spec: Value = ("",) if part.format_spec is None else run.evaluate(part.format_spec, frame)
-    said = special.spoken(run, value, part, frame, spec if part.conversion == -1 else None)
-    if said is not value and part.conversion == -1:
-        return as_texts(said)
-    value = said
     if part.conversion not in (-1, 115):  # !r and !a quote their argument
         return [_hole("text made with !r")]
     if part.format_spec is None:

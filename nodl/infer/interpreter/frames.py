@@ -13,8 +13,8 @@ class Frame:
     """The variables of a running function, class body or module."""
 
     __slots__ = (
-        "again", "cells", "closure", "depth", "early", "forks", "function", "globals", "is_class", "is_comprehension",
-        "jump", "loop_forks", "module", "nonlocals", "raised", "returned", "unsettled", "yielded",
+        "again", "cells", "closure", "depth", "early", "entry", "forks", "function", "globals", "is_class",
+        "is_comprehension", "jump", "loop_forks", "module", "nonlocals", "returned", "unsettled", "yielded",
     )  # fmt: skip
 
     def __init__(self, module: ModuleValue, cells: dict[object, Value], closure: Frame | None, depth: int):
@@ -23,12 +23,12 @@ class Frame:
         self.closure = closure
         self.depth = depth  # of branches when the frame was entered
         self.function: FunctionValue | None = None
+        self.entry: ast.AST | None = None  # the call that runs the function
         self.returned: Value = BOTTOM
         self.yielded: Value | None = None
         self.early = False  # some path left before the end
         self.unsettled = False  # a break or continue that may have happened, since the loop asked last
         self.jump = ""  # the break or continue that certainly ended the latest statement
-        self.raised = False  # some path ended in an exception
         self.forks = 0  # undecided branches when the frame was entered, and when its innermost loop was
         self.loop_forks = 0
         self.again = False  # the cells also hold an earlier call, whose inner functions live on

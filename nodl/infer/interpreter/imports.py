@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ast
 import os
-import sys
 
 from nodl.infer.interpreter.frames import Frame
 from nodl.infer.interpreter.run import Run
@@ -29,8 +28,6 @@ def run_import_from(run: Run, node: ast.ImportFrom, frame: Frame) -> bool:
     """``from ... import``: bind each name to what the module holds; ``*`` of a library goes to ``stars``."""
     base = absolute_name(node, frame.module.source)
     module = import_module(run, base, frame) if base else external("")
-    if not isinstance(module[0], ModuleValue):
-        run.risks += 1  # inside of ``try``: the library may not have the name
     for alias in node.names:
         if alias.name == "*":
             _import_star(run, module, base, frame)
@@ -82,17 +79,10 @@ def _import_star(run: Run, module: Value, base: str, frame: Frame) -> None:
             run.assign_name(name, value, frame)
 
 
-_ALWAYS_THERE = sys.stdlib_module_names | {"rclpy"}
-
-
 def import_module(run: Run, name: str, frame: Frame) -> Value:
     """The module called ``name``, executed if it is new; submodules execute their packages first."""
     found = _load(run, name, frame)
-    if found is None:
-        if name.partition(".")[0] not in _ALWAYS_THERE:
-            run.risks += 1  # inside of ``try``: it may not be installed
-        return external(name)
-    return (found,)
+    return external(name) if found is None else (found,)
 
 
 def _load(run: Run, name: str, frame: Frame) -> ModuleValue | None:

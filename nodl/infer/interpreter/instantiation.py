@@ -9,6 +9,7 @@ from nodl.infer.interpreter.define import (
     is_enumeration,
     linearized,
     methods_in,
+    new_instance,
     program_classes,
 )
 from nodl.infer.interpreter.frames import Arguments, Call
@@ -62,18 +63,12 @@ def _made_by_new(run: Run, cls: ClassValue, call: Call) -> Value | None:
     return None
 
 
-def new_instance(run: Run, cls: ClassValue, call: Call) -> Instance:
-    """``object.__new__(cls)``."""
-    return run.allocate(call.node, f"instance {id(cls)}", lambda: Instance(cls))
-
-
 def initialise(run: Run, cls: ClassValue, instance: Instance, call: Call) -> None:
     """Call the constructor: the first one in the method resolution order."""
     _expect_callbacks(run, cls, instance)
+    _expect_operators(run, cls, instance)
     for base in linearized(cls):
         if isinstance(base, ClassValue):
-            if "__del__" in base.cells:
-                run.register_callback(run.attribute((instance,), "__del__", call.node, call.frame), 0)
             if base.fields is not None and "__init__" not in base.cells:
                 _fill_fields(run, base, instance, call)
                 break
@@ -98,6 +93,25 @@ def _fill_fields(run: Run, cls: ClassValue, instance: Instance, call: Call) -> N
     after = run.attribute((instance,), "__post_init__", call.node, call.frame)
     if isinstance(after[0], BoundMethod):
         run.call(after, Arguments(), call.node, call.frame)
+
+
+_FOLLOWED = frozenset({
+    "__init__", "__new__", "__call__", "__enter__", "__exit__", "__getattr__", "__post_init__", "__init_subclass__",
+    "__name__", "__module__", "__doc__", "__slots__", "__class_getitem__", "__set_name__",
+})  # fmt: skip
+
+
+def _expect_operators(run: Run, cls: ClassValue, instance: Instance) -> None:
+    """Operators, iteration, tests and texts call special methods; where is not followed, so any time they may."""
+    for base in program_classes(cls):
+        for name, value in list(base.cells.items()):
+            if (
+                isinstance(name, str)
+                and name.startswith("__")
+                and name.endswith("__")
+                and name not in _FOLLOWED
+            ):
+                run.register_callback(methods_in(value, instance, cls), None)
 
 
 def _expect_callbacks(run: Run, cls: ClassValue, instance: object) -> None:

@@ -7,15 +7,15 @@ or callable stands in the tables handed in (``Tables``), so that each concern ha
 from __future__ import annotations
 
 import ast
-import itertools
 from collections.abc import Callable
 from functools import partial
+from typing import TYPE_CHECKING, Any, NamedTuple
 
-from enclave_launch.boundary.light import TYPE_CHECKING, Any, NamedTuple
 from nodl.infer.findings import Findings, OptionDefaults
 from nodl.infer.interpreter.allocations import Allocations
 from nodl.infer.interpreter.frames import Arguments, Call, Frame
-from nodl.infer.methods import BoundMethod, ClassMethod, ForeignMethod, Partial, SuperProxy, Variables
+from nodl.infer.methods import BoundMethod, ClassMethod, ForeignMethod, Partial, SuperProxy
+from nodl.infer.packages import find_package
 from nodl.infer.program import Program, SourceModule
 from nodl.infer.state import ProgramState, WhatWasRead
 from nodl.infer.text import Text
@@ -27,16 +27,18 @@ from nodl.infer.values import (
     External,
     FieldCells,
     FunctionValue,
+    GeneratorValue,
+    HeapObject,
     Instance,
     Items,
     LocalCells,
     ModuleValue,
-    NativeObject,
     Sequence,
     Unknown,
     Value,
     join,
     join_all,
+    unknown,
 )
 from nodl.source_ref import SourceRef
 
@@ -48,8 +50,6 @@ if TYPE_CHECKING:
 MAX_STEPS = 800_000
 MAX_STEPS_IN_VAIN = 200_000  # for a program of which something stays unknown, whatever else is found
 MAX_DEPTH = 120  # analysed calls inside calls
-MAX_FOLLOWED_STEPS = 100_000  # after these, loops and recursion are joined
-MAX_TURNS = 3_000  # of loops that are followed turn by turn, in one run
 MAX_RECEIVERS = 4  # callables of one call that are followed one by one
 
 
@@ -76,8 +76,8 @@ class Tables(NamedTuple):
     statements: dict[type, Executor]
     callables: dict[type, Caller]
     attributes: dict[type, AttributeReader]
-    may_fail: Callable[[object], bool]  # whether the call that gave this object of a library may have raised
     keeps_off: Callable[[str], bool]  # whether a library leaves the program's classes and objects alone
+    lets_through: Callable[[str], bool]  # whether exceptions pass the library's context managers
     creates: Callable[[object], bool]  # whether calling this function of a library makes an interface
 
 
@@ -87,6 +87,8 @@ class Run(Allocations):
     def __init__(self, program: Program, tables: Tables, main: SourceModule):
         self.program = program
         self.main = main
+        package = find_package(main.path)
+        self.dependencies = package.dependencies if package else frozenset()
         self.beside = main.path.rpartition("/")[0]
         self.tables = tables
         self._expressions = tables.expressions
@@ -104,11 +106,13 @@ class Run(Allocations):
         self.called: dict[ast.AST, None] = {}  # functions analysed so far
         self.cost: dict[FunctionValue, int] = {}  # steps in a function and in what it calls
         self.instantiated: dict[ast.AST, None] = {}  # classes of which an object was made
-        self.bound: set[ast.AST] = set()  # functions that were read as a method
         self.with_metaclass: set[ast.AST] = set()
-        self.asked: set[str] = set()  # attributes read from what is not known
-        self.executed: set[ast.stmt] = set()
-        self.evaluated: set[ast.AST] = set()  # calls
+        # For the net: calls with the call that entered their function, what entered each function, those of which one
+        # run of the body stands for several, and calls of what is not known.
+        self.evaluated: set[tuple[ast.AST, ast.AST | None]] = set()
+        self.entries: dict[ast.AST, dict[ast.AST, None]] = {}
+        self.joined: set[tuple[ast.AST | None, ast.AST | None]] = set()
+        self.doubtful: set[ast.AST] = set()
         # Calls that made an interface, or ran a function of the program.
         self.understood: set[ast.AST] = set()
         self.stack: list[ast.AST] = []
@@ -121,8 +125,6 @@ class Run(Allocations):
         self.options = OptionDefaults()
         self.settle: Callable[[Run], None] = lambda run: None  # runs the callbacks; set by who drives the run
         self.decisions: Decisions | None = None
-        self.templates: dict[object, ast.ClassDef] = {}  # classes that a library writes for the program
-        self.shares: dict[str, None] = {}  # share directories that the program asked for by a known name
         self.environment = FieldCells()  # variables that the program sets itself
         # Calls that left the state as it was: at which version, with what result, which attributes they read.
         self.memo: dict[tuple[object, ...], tuple[tuple[object, ...], Value, set[object]]] = {}
@@ -132,49 +134,22 @@ class Run(Allocations):
         self.steps = 0
         self.limit = min(MAX_STEPS, MAX_STEPS_IN_VAIN)
         self.gave_up = False
-        self.generators: dict[object, NativeObject] = {}  # in the hands of others, by the call that made them
         # What callbacks read when they last ran.
         self.called_back: dict[tuple[object, int | None], WhatWasRead] = {}
-        self.turns = MAX_TURNS
-        self.undecided = 0  # tests outside of any undecided branch or repetition
-        self.conditional = False  # one of them asks for the value of a parameter
-        self.callback_count = itertools.count()
-        self.try_forks = 0  # undecided branches around the innermost try
-        self.tries = 0  # how many try statements surround the current point
-        self.risks = 0  # what may have raised an exception, counted inside of them
-        # Forks and repetition when a function was last entered.
-        self.entries: dict[ast.AST, tuple[int, int]] = {}
-
-    @property
-    def fuel(self) -> int:
-        """How many more turns are followed one by one; none once the run has cost much."""
-        return self.turns if self.steps < MAX_FOLLOWED_STEPS else 0
+        self.conditional = False  # an undecided test asks for the value of a parameter
 
     # --- syntax -----------------------------------------------------------------------------------------
 
     def evaluate(self, node: ast.expr, frame: Frame) -> Value:
         self.steps += 1
         handler = self._expressions.get(type(node))
-        if self.tries:
-            return self._watched(handler(self, node, frame) if handler else ANY, node)
         return handler(self, node, frame) if handler else ANY
-
-    def _watched(self, value: Value, node: ast.expr) -> Value:
-        """Count what could have failed: an unknown or symbolic value, or the call of a library."""
-        atom = value[0] if len(value) == 1 else None
-        kind = type(atom)
-        unknown = len(value) != 1 or kind is Unknown or kind is Text
-        if unknown or (type(node) is ast.Call and (kind is External or self.tables.may_fail(atom))):
-            self.risks += 1
-        return value
 
     def execute(self, body: list[ast.stmt], frame: Frame) -> bool:
         """Run statements in order. False: control cannot reach the end of ``body``."""
         self.spend(len(body))
         statements = self._statements
-        executed = self.executed
         for statement in body:
-            executed.add(statement)
             handler = statements.get(type(statement))
             if handler is not None and not handler(self, statement, frame):
                 return False
@@ -307,21 +282,10 @@ class Run(Allocations):
             elif kind is ForeignMethod or kind is External:
                 if self.tables.creates(atom):
                     self.callbacks.setdefault(atom, None)
-            elif isinstance(atom, NativeObject):
-                if atom.place is not None:
-                    self._escape_generator(atom)
-            elif isinstance(atom, (Variables, SuperProxy)) and objects:
-                held = atom.owner if isinstance(atom, Variables) else atom.receiver
-                self.escape_value((held,), opened, objects, depth + 1)
-
-    def _escape_generator(self, made: NativeObject) -> None:
-        """Others may run it to its end. What one call makes is one callback; other arguments make them unknown."""
-        first = self.generators.setdefault(made.place, made)
-        self.callbacks.setdefault(first, 0)
-        for name, value in made.given.items():
-            if join(first.given[name], value) is not first.given[name]:
-                first.given[name] = ANY
-                self.state.opened += 1
+            elif kind is GeneratorValue:
+                self.callbacks.setdefault(atom, 0)
+            elif isinstance(atom, SuperProxy) and objects:
+                self.escape_value((atom.receiver,), opened, objects, depth + 1)
 
     def escape_object(self, atom: ClassValue | Instance, trusted: bool = False) -> None:
         """Code that is not analysed has the class or object: it may make objects and call methods.
@@ -353,3 +317,11 @@ class Run(Allocations):
 
     def gap(self, node: ast.AST, frame: Frame, why: str) -> None:
         self.findings.gap(SourceRef(frame.module.source.path, getattr(node, "lineno", 0)), why)
+
+    def variables_of(self, owner: HeapObject, node: ast.AST, frame: Frame) -> Value:
+        """``vars(x)``, ``x.__dict__``, ``globals()``: a gap, for what is done with this dictionary is not followed."""
+        self.gap(node, frame, "variables are used as a dictionary, which is not analysed")
+        self.state.reflected = True
+        for value in list(owner.cells.values()):
+            self.escape_value(value, opened=False, objects=False)
+        return unknown("a dictionary of variables")

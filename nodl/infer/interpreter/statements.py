@@ -3,26 +3,36 @@
 from __future__ import annotations
 
 import ast
+import sys
 from functools import partial
+from typing import Any
 
-from nodl.infer.interpreter import imports, loops, patterns, special
+from nodl.infer.interpreter import imports, loops
 from nodl.infer.interpreter.assign import assign, delete
 from nodl.infer.interpreter.conditions import decide, forked, narrowed
-from nodl.infer.interpreter.define import define_class, define_function
+from nodl.infer.interpreter.define import define_class, define_function, program_classes
 from nodl.infer.interpreter.frames import Arguments, Frame
-from nodl.infer.interpreter.handling import run_try
-from nodl.infer.interpreter.managers import run_with
+from nodl.infer.interpreter.iterate import elements
 from nodl.infer.interpreter.operators import binary_operation
-from nodl.infer.interpreter.raising import throw, throw_value
 from nodl.infer.interpreter.run import Executor, Run
-from nodl.infer.values import ANY, NONE, ClassValue, External, Sequence, Value, join, sole
+from nodl.infer.values import (
+    ANY,
+    NONE,
+    ClassValue,
+    External,
+    GeneratorValue,
+    Instance,
+    Sequence,
+    Value,
+    join,
+    sole,
+)
 
 
 def _expression(run: Run, node: ast.Expr, frame: Frame) -> bool:
     if type(node.value) is not ast.Constant:
         run.evaluate(node.value, frame)
         if type(node.value) is ast.Call and _never_returns(run, node.value.func, frame):
-            throw(run, SystemExit)
             _leave(run, frame)
             return False
     return True
@@ -55,11 +65,6 @@ def _annotated(run: Run, node: ast.AnnAssign, frame: Frame) -> bool:
 def _augmented(run: Run, node: ast.AugAssign, frame: Frame) -> bool:
     old = run.evaluate(_as_load(node.target), frame)
     added = run.evaluate(node.value, frame)
-    if special.has_own(old):
-        changed = special.in_place(run, old, node.op, added, node, frame)
-        if changed:
-            assign(run, node.target, changed, frame)
-            return True
     if isinstance(node.op, ast.Add | ast.BitOr):
         mutated = [atom for atom in old if isinstance(atom, Sequence) and atom.kind in ("list", "set")]
         for atom in mutated:
@@ -106,13 +111,12 @@ def _leave(run: Run, frame: Frame) -> None:
 
 
 def _raise(run: Run, node: ast.Raise, frame: Frame) -> bool:
-    frame.raised = True
-    value = run.evaluate(node.exc, frame) if node.exc is not None else frame.cells.get("[exception]", ANY)
+    """An exception ends its path; a handler of any ``try`` around it may run."""
+    value = NONE if node.exc is None else run.evaluate(node.exc, frame)
     if node.cause is not None:
         run.evaluate(node.cause, frame)
     if len(value) == 1 and isinstance(value[0], ClassValue):
-        value = run.call(value, Arguments(), node, frame)
-    throw_value(run, value)
+        run.call(value, Arguments(), node, frame)
     _leave(run, frame)
     return False
 
@@ -127,21 +131,23 @@ def _jump(run: Run, node: ast.Break | ast.Continue, frame: Frame) -> bool:
 
 
 def _match(run: Run, node: ast.Match, frame: Frame) -> bool:
-    return _cases(run, node.cases, run.evaluate(node.subject, frame), frame)
+    """Any of the cases may be taken, and none of them unless the last one takes everything."""
+    subject = run.evaluate(node.subject, frame)
+    last = node.cases[-1]
+    everything = isinstance(last.pattern, ast.MatchAs) and last.pattern.pattern is None and last.guard is None
+    sides = [partial(_case, run, case, subject, frame) for case in node.cases]
+    return run.state.branches(sides if everything else [*sides, lambda: True])
 
 
-def _cases(run: Run, cases: list[ast.match_case], subject: Value, frame: Frame) -> bool:
-    """The first case that fits; from the first one of which that is not known on, any of them."""
-    for index, case in enumerate(cases):
-        outcome = patterns.matches(run, case.pattern, subject, frame)
-        if outcome is not False and case.guard is not None:
-            outcome = patterns.both(outcome, decide(run, case.guard, frame))
-        if outcome:
-            return run.execute(case.body, frame)
-        if outcome is None:
-            rest = partial(_cases, run, cases[index + 1 :], subject, frame)
-            return run.state.branches((partial(run.execute, case.body, frame), rest))
-    return True
+def _case(run: Run, case: ast.match_case, subject: Value, frame: Frame) -> bool:
+    for part in ast.walk(case.pattern):
+        name = getattr(part, "name", None) or getattr(part, "rest", None)
+        if isinstance(name, str):
+            whole = part is case.pattern and isinstance(part, ast.MatchAs)
+            run.assign_name(name, subject if whole else ANY, frame)
+    if case.guard is not None:
+        run.evaluate(case.guard, frame)
+    return run.execute(case.body, frame)
 
 
 def _global(run: Run, node: ast.Global, frame: Frame) -> bool:
@@ -165,6 +171,109 @@ def _delete(run: Run, node: ast.Delete, frame: Frame) -> bool:
     for target in node.targets:
         delete(run, target, frame)
     return True
+
+
+# --- exceptions ---------------------------------------------------------------------------------------------
+
+
+def run_try(run: Run, node: Any, frame: Frame) -> bool:
+    """Each handler may run, after any part of the body; it sees every value written on the way."""
+    mark, returned = run.state.mark(), frame.returned
+    run.state.depth += 1
+    passes = run.execute(node.body, frame)
+    run.state.depth -= 1
+    if passes and node.orelse:
+        passes = run.execute(node.orelse, frame)
+    if node.handlers and not all(_cannot_fail(statement) for statement in node.body):
+        passes = _perhaps_handled(run, node.handlers, passes, mark, frame)
+    if not node.finalbody:
+        return passes
+    jump, within = frame.jump, frame.returned
+    frame.returned = (
+        returned  # where ``finally`` returns itself, what the statement returned is replaced by that
+    )
+    if not passes:
+        run.state.join_seen(mark)
+    done = run.execute(node.finalbody, frame)
+    if done:
+        frame.returned = join(within, frame.returned)
+        frame.jump = frame.jump if passes else jump
+    return done and passes
+
+
+def _cannot_fail(statement: ast.stmt) -> bool:
+    """An import of Python's own library, or a constant that is given a name."""
+    if isinstance(statement, ast.Import):
+        return all(alias.name.partition(".")[0] in _ALWAYS_THERE for alias in statement.names)
+    constant = isinstance(statement, ast.Assign) and isinstance(statement.value, ast.Constant)
+    return constant and all(isinstance(target, ast.Name) for target in getattr(statement, "targets", ()))
+
+
+_ALWAYS_THERE = sys.stdlib_module_names | {"rclpy"}
+
+
+def _perhaps_handled(
+    run: Run, handlers: list[ast.ExceptHandler], passes: bool, mark: int, frame: Frame
+) -> bool:
+    def handle(handler: ast.ExceptHandler) -> bool:
+        run.state.join_seen(mark)
+        if handler.type is not None:
+            run.evaluate(handler.type, frame)
+        if handler.name:
+            run.assign_name(handler.name, ANY, frame)
+        return run.execute(handler.body, frame)
+
+    jump = frame.jump
+    result = run.state.branches([lambda: passes, *(partial(handle, handler) for handler in handlers)])
+    if not passes:
+        if jump:
+            frame.unsettled = True  # the jump of the body may happen, or a handler runs instead
+        else:
+            frame.early = True
+    return result
+
+
+def run_with(run: Run, node: ast.With | ast.AsyncWith, frame: Frame) -> bool:
+    """``with``: the body, whose exceptions the managers may swallow. False: control cannot pass."""
+    managers: list[object] = []
+    for item in node.items:
+        manager = run.evaluate(item.context_expr, frame)
+        managers.extend(manager)
+        entered = _entered(run, manager, node, frame)
+        if item.optional_vars is not None:
+            assign(run, item.optional_vars, entered, frame)
+    mark = run.state.mark()
+    run.state.depth += 1
+    passes = run.execute(node.body, frame)
+    run.state.depth -= 1
+    if not all(isinstance(atom, External) and run.tables.lets_through(atom.path) for atom in managers):
+        run.state.join_seen(mark)  # after any part of the body
+        passes = True
+    for atom in reversed(managers):
+        if isinstance(atom, Instance) and isinstance(atom.cls, ClassValue):
+            leave = run.attribute((atom,), "__exit__", node, frame)
+            run.call(leave, Arguments([NONE, NONE, NONE]), node, frame)
+            run.register_callback(leave, 3)
+    return passes
+
+
+def _entered(run: Run, manager: Value, node: ast.AST, frame: Frame) -> Value:
+    result: Value = ()
+    for atom in manager:
+        if isinstance(atom, Instance) and _enters(atom):
+            enter = run.attribute((atom,), "__enter__", node, frame)
+            result = join(result, run.call(enter, Arguments(), node, frame))
+        elif isinstance(atom, GeneratorValue):
+            result = join(result, elements(run, (atom,), node, frame).any_element())
+        else:
+            result = join(result, ANY)
+    return result or ANY
+
+
+def _enters(atom: Instance) -> bool:
+    """Rather than ``__aenter__``, or what only a library knows."""
+    classes = program_classes(atom.cls) if isinstance(atom.cls, ClassValue) else []
+    return isinstance(atom.cls, External) or any("__enter__" in each.cells for each in classes)
 
 
 STATEMENTS: dict[type, Executor] = {

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import ast
 
-from nodl.infer.interpreter import special
-from nodl.infer.interpreter.frames import Arguments, Call, Frame
+from nodl.infer.interpreter.conditions import is_plain_parameter, only_if
+from nodl.infer.interpreter.define import is_constant, is_key
+from nodl.infer.interpreter.frames import Arguments, Frame
 from nodl.infer.interpreter.iterate import values_of
-from nodl.infer.interpreter.raising import throw
 from nodl.infer.interpreter.run import Run
-from nodl.infer.methods import NativeMethod, Variables
-from nodl.infer.text import Input, Text, make_text
+from nodl.infer.text import Input, Text, input_of, make_text
 from nodl.infer.values import (
     ANY,
     BOTTOM,
@@ -20,10 +19,8 @@ from nodl.infer.values import (
     ClassValue,
     Dictionary,
     External,
-    Instance,
     Items,
     Key,
-    NativeObject,
     Sequence,
     Unknown,
     Value,
@@ -65,14 +62,6 @@ def _element(run: Run, atom: object, key: Value, node: ast.Subscript, frame: Fra
         if len(atom.pieces) == 1 and isinstance(piece, Input) and piece.item is None and type(index) is int:
             return (make_text((Input(piece.name, piece.owner, index, piece.edits),)),)
         return unknown("a part of a text that is not known")
-    if isinstance(atom, NativeObject):
-        call = Call(Arguments([key]), node, frame)
-        return run.call_atom(NativeMethod(atom, "__getitem__"), call)
-    if isinstance(atom, Variables):
-        return variable(run, atom, key, node, frame)
-    if isinstance(atom, Instance):
-        getter = run.attribute((atom,), "__getitem__", node, frame)
-        return run.call(getter, Arguments([key]), node, frame)
     if isinstance(atom, ClassValue):
         return _class_item(run, atom, key, node, frame)
     if isinstance(atom, External) and atom.path == "os.environ":
@@ -84,19 +73,6 @@ def _element(run: Run, atom: object, key: Value, node: ast.Subscript, frame: Fra
     return (atom,) if isinstance(atom, Unknown) else ANY
 
 
-def variable(run: Run, atom: Variables, key: Value, node: ast.AST, frame: Frame) -> Value:
-    """``globals()[key]``, ``vars(x)[key]``."""
-    result: Value = BOTTOM
-    for name in key:
-        if isinstance(name, str):
-            result = join(result, present(atom.owner.cells.get(name, BOTTOM)))
-            continue
-        for value in atom.named().values():
-            run.escape_value(value, opened=False)
-        result = join(result, unknown("a variable whose name is made at run time"))
-    return result or unknown("a variable that nothing analysed sets")
-
-
 def _class_item(run: Run, cls: ClassValue, key: Value, node: ast.AST, frame: Frame) -> Value:
     names = [atom for atom in key if isinstance(atom, str)]
     if names and all(name in cls.cells for name in names):  # Enum["MEMBER"]
@@ -104,16 +80,42 @@ def _class_item(run: Run, cls: ClassValue, key: Value, node: ast.AST, frame: Fra
     return (cls,)  # Generic[T]
 
 
+def chosen_by_parameter(obj: Dictionary, key: Value, default: Value | None = None) -> Value | None:
+    """The texts of a dictionary, each where the parameter that is the ``key`` says so; ``None``: not such a look-up.
+
+    ``default``: what is taken for any other value.
+    """
+    asked = input_of(key[0]) if len(key) == 1 else None
+    if asked is None or not is_plain_parameter(asked) or obj.is_open or obj.default:
+        return None
+    found: list[object] = []
+    keys: list[str] = []
+    for cell, value, certain in obj.entries():
+        text = value[0] if len(value) == 1 else None
+        if not certain or type(cell.constant) is not str or not isinstance(text, str | Text):
+            return None
+        keys.append(cell.constant)
+        found.append(only_if((asked, "only if equal", (cell.constant,)), text))
+    for other in default or ():
+        if not isinstance(other, str | Text):
+            return None
+        found.append(only_if((asked, "only if not among", tuple(keys)), other))
+    return tuple(found) or None
+
+
 def dictionary_item(run: Run, obj: Dictionary, key: Value, node: ast.AST, frame: Frame) -> Value:
-    """What ``obj[key]`` gives; fills a ``defaultdict``. Raises ``Raised`` where a ``KeyError`` is certain."""
+    """What ``obj[key]`` gives; fills a ``defaultdict``."""
+    chosen = chosen_by_parameter(obj, key)
+    if chosen is not None:
+        return chosen
     result: Value = BOTTOM
     everything = False
     everywhere = not obj.escaped
     for atom in key:
-        held, certain = obj.held(atom) if special.is_key(atom) else (BOTTOM, False)
+        held, certain = obj.held(atom) if is_key(atom) else (BOTTOM, False)
         result = join(result, held)
         everywhere = everywhere and certain
-        everything = everything or not (held or special.is_constant(atom))
+        everything = everything or not (held or is_constant(atom))
     if everything:
         run.spend(len(obj.cells))
         result = join(result, values_of(obj).any_element())
@@ -126,30 +128,23 @@ def dictionary_item(run: Run, obj: Dictionary, key: Value, node: ast.AST, frame:
                 old = obj.held(atom)[0]
                 run.state.write(obj.cells, Key(atom), join(old, made))
         result = join(result, made)
-    if not result and not everything and not obj.is_open and is_settled(run):
-        throw(run, KeyError)
     if obj.escaped or not result:
         result = join(result, unknown("an element of a dictionary that is filled elsewhere"))
     return result
 
 
-def is_settled(run: Run) -> bool:
-    """Whether nothing else can have changed what is seen: no callback is waiting, nothing is repeated."""
-    return not run.callbacks and not run.repeated
-
-
 def _sequence_item(run: Run, sequence: Sequence, key: Value) -> Value:
     items = sequence.items
     if items.exact is None or sequence.escaped:
-        return join(items.any_element(), ANY) if sequence.escaped else items.any_element() or ANY
+        found = items.any_element()
+        one_of_several = len(found) > 1 and all(type(index) is int for index in key)
+        return join(found, ANY) if sequence.escaped or one_of_several else found or ANY
     if all(type(index) is int for index in key):
         length = len(items.exact)
         result: Value = BOTTOM
         for index in key:
             if isinstance(index, int) and -length <= index < length:
                 result = join(result, items.exact[index])
-        if not result and is_settled(run):
-            throw(run, IndexError)
         return result or ANY
     return items.any_element() or ANY
 
@@ -159,7 +154,8 @@ def _sliced(run: Run, sequence: Sequence, node: ast.Subscript, frame: Frame) -> 
     bounds = slice_of(run, node.slice, frame)
     if items.exact is not None and bounds is not None and not sequence.escaped:
         return run.sequence(node, sequence.kind, Items(items.exact[bounds]))
-    return run.sequence(node, sequence.kind, Items(None, items.any_element()))
+    found = items.any_element()
+    return run.sequence(node, sequence.kind, Items(None, join(found, ANY) if len(found) > 1 else found))
 
 
 def slice_of(run: Run, node: ast.expr, frame: Frame) -> slice | None:

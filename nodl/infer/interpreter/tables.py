@@ -7,10 +7,10 @@ from nodl.infer.interpreter.callables import CALLABLES
 from nodl.infer.interpreter.expressions import EXPRESSIONS
 from nodl.infer.interpreter.run import Run, Tables
 from nodl.infer.interpreter.statements import STATEMENTS
-from nodl.infer.models.foreign import creates, keeps_off, may_fail
+from nodl.infer.models.foreign import creates, keeps_off, lets_through
 from nodl.infer.program import Program, SourceModule
 
-TABLES = Tables(EXPRESSIONS, STATEMENTS, CALLABLES, ATTRIBUTES, may_fail, keeps_off, creates)
+TABLES = Tables(EXPRESSIONS, STATEMENTS, CALLABLES, ATTRIBUTES, keeps_off, lets_through, creates)
 
 
 def new_run(program: Program, main: SourceModule) -> Run:

@@ -1,27 +1,66 @@
-"""Python's built-in functions: texts and numbers, and the table of all of them."""
+"""Python's built-in functions, as far as they make texts, containers and names of attributes."""
 
 from __future__ import annotations
 
-from nodl.infer.interpreter import special
+from collections.abc import Callable
+
+from nodl.infer.interpreter.assign import copy_dictionary, store_attribute
 from nodl.infer.interpreter.conditions import truth
+from nodl.infer.interpreter.define import is_key, linearized, new_instance, program_classes
 from nodl.infer.interpreter.formatting import as_texts, formatted, text_value
-from nodl.infer.interpreter.frames import Call
-from nodl.infer.interpreter.iterate import keys_of
+from nodl.infer.interpreter.frames import Arguments, Call
+from nodl.infer.interpreter.imports import import_module
+from nodl.infer.interpreter.iterate import elements, keys_of
+from nodl.infer.interpreter.loops import may_unroll
 from nodl.infer.interpreter.run import Model, Run
-from nodl.infer.models import iterables, reflection
-from nodl.infer.values import ANY, BOOLEAN, NONE, Dictionary, Sequence, Unknown, Value, boolean, sole, unknown
+from nodl.infer.methods import BoundMethod, PropertyValue
+from nodl.infer.text import Text, input_of, with_edit
+from nodl.infer.values import (
+    ANY,
+    BOOLEAN,
+    BOTTOM,
+    CONSTANTS,
+    NONE,
+    OF_A_NODE,
+    OTHER,
+    ClassValue,
+    Dictionary,
+    External,
+    FunctionValue,
+    HeapObject,
+    Instance,
+    Items,
+    Key,
+    ModuleValue,
+    Sequence,
+    Unknown,
+    Value,
+    boolean,
+    constant_strings,
+    join,
+    join_all,
+    present,
+    sole,
+    unknown,
+)
+
+MAX_RANGE = 64
+MAX_DIGITS = 300
+
+
+# --- texts and numbers --------------------------------------------------------------------------------------
 
 
 def _str(run: Run, call: Call) -> Value:
     value = call.args.at(0)
-    if value is None:
-        return ("",)
-    return text_value(as_texts(special.spoken(run, value, call.node, call.frame)))
+    return ("",) if value is None else text_value(as_texts(value))
 
 
 def _int(run: Run, call: Call) -> Value:
     atom = sole(call.args.at(0))
-    if isinstance(atom, str | int | float):
+    if isinstance(atom, str) and len(atom) > MAX_DIGITS:
+        return ANY
+    if isinstance(atom, str | int | float) and len(call.args.positional) == 1:
         try:
             return (int(atom),)
         except (ValueError, OverflowError):
@@ -31,44 +70,341 @@ def _int(run: Run, call: Call) -> Value:
 
 def _float(run: Run, call: Call) -> Value:
     atom = sole(call.args.at(0))
-    return (float(atom),) if isinstance(atom, int | float) else ANY
+    return (float(atom),) if isinstance(atom, int | float) and abs(atom) < 1 << 64 else ANY
 
 
 def _bool(run: Run, call: Call) -> Value:
-    return boolean(truth(special.tested(run, call.args.at(0) or (False,), call.node, call.frame)))
+    return boolean(truth(call.args.at(0) or (False,)))
 
 
 def _len(run: Run, call: Call) -> Value:
     atom = sole(call.args.at(0))
-    own = special.call_special(run, atom, "__len__", call.node, call.frame)
-    if own:
-        return own
     if isinstance(atom, str):
         return (len(atom),)
     if isinstance(atom, Sequence) and atom.items.exact is not None and not atom.escaped:
         return (len(atom.items.exact),)
-    if isinstance(atom, Dictionary):
-        keys = keys_of(atom).exact
-        return (len(keys),) if keys is not None else ANY
-    return ANY
+    keys = keys_of(atom).exact if isinstance(atom, Dictionary) else None
+    return ANY if keys is None else (len(keys),)
 
 
 def _format(run: Run, call: Call) -> Value:
-    given = call.args.at(1) or ("",)
-    spec = sole(given)
-    value = special.spoken(run, call.args.at(0) or ANY, call.node, call.frame, given)
-    return text_value(formatted(value, spec if isinstance(spec, str) else None))
+    spec = sole(call.args.at(1) or ("",))
+    return text_value(formatted(call.args.at(0) or ANY, spec if isinstance(spec, str) else None))
 
 
-def _repr(run: Run, call: Call) -> Value:
+# --- containers ---------------------------------------------------------------------------------------------
+
+
+def _items(run: Run, call: Call, index: int = 0) -> Items:
+    """The elements of the argument at ``index``; an empty sequence when it is not given."""
+    value = call.args.at(index)
+    return Items(()) if value is None else elements(run, value, call.node, call.frame)
+
+
+def _range(run: Run, call: Call) -> Value:
+    """The numbers if they are known and few; else any number, tied to an input that bounds it."""
+    bounds = [sole(value) for value in call.args.positional]
+    items = Items(None, unknown("a number of a loop"))
+    if not bounds or call.args.more:  # range(*bounds)
+        return run.sequence(call.node, "tuple", items)
+    counted = input_of(bounds[-1]) if len(bounds) < 3 else None
+    if counted is not None and counted.item is None and (len(bounds) == 1 or isinstance(bounds[0], int)):
+        items = Items(None, (with_edit(counted, "range", tuple(map(str, bounds[:-1]))),))
+    integers = [bound for bound in bounds if isinstance(bound, int)]
+    if len(integers) == len(bounds) and (len(bounds) in (1, 2) or (len(bounds) == 3 and integers[2])):
+        numbers = range(*integers)
+        if len(numbers) <= MAX_RANGE:
+            items = Items(tuple((number,) for number in numbers))
+    return run.sequence(call.node, "tuple", items)
+
+
+def _made(kind: str) -> Model:
+    return lambda run, call: run.sequence(call.node, kind, _items(run, call))
+
+
+def _set(run: Run, call: Call) -> Value:
+    return run.sequence(call.node, "set", Items(None, _items(run, call).any_element()))
+
+
+def _sorted(run: Run, call: Call) -> Value:
+    """Known texts in order; else any of the elements in each place."""
+    items = _items(run, call)
+    if "key" in call.args.keywords:
+        run.call(call.args.keywords["key"], Arguments([items.any_element() or ANY]), call.node, call.frame)
+    exact = items.exact
+    plain = exact is not None and not call.args.keywords and len(call.args.positional) == 1
+    if plain and exact is not None and all(len(item) == 1 and isinstance(item[0], str) for item in exact):
+        return run.sequence(call.node, "list", Items(tuple(sorted(exact, key=lambda item: str(item[0])))))
+    return run.sequence(call.node, "list", Items(None, items.any_element()))
+
+
+def _reversed(run: Run, call: Call) -> Value:
+    items = _items(run, call)
+    return run.sequence(call.node, "list", items if items.exact is None else Items(items.exact[::-1]))
+
+
+def _enumerate(run: Run, call: Call) -> Value:
+    """A list of pairs; one pair stands for all if the length or the start is not known."""
+    items = _items(run, call)
+    start = sole(call.args.at(1, "start") or (0,))
+    if items.exact is not None and type(start) is int:
+        pairs = tuple(run.tuple_of(((start + index,), element)) for index, element in enumerate(items.exact))
+        return run.sequence(call.node, "list", Items(pairs))
+    pair = run.tuple_of((unknown("a number of a loop"), items.any_element() or ANY))
+    return run.sequence(call.node, "list", Items(None, pair))
+
+
+def _zip(run: Run, call: Call) -> Value:
+    """A list of rows, one for all if a length is not known; unknown if ``*x`` cannot be counted."""
+    columns = [elements(run, value, call.node, call.frame) for value in call.args.positional]
+    if call.args.more:
+        return ANY
+    if all(column.exact is not None for column in columns):
+        rows = zip(*(column.exact or () for column in columns), strict=False)
+        return run.sequence(call.node, "list", Items(tuple(run.tuple_of(tuple(row)) for row in rows)))
+    row = run.tuple_of(tuple(column.any_element() or ANY for column in columns))
+    return run.sequence(call.node, "list", Items(None, row))
+
+
+def _map(run: Run, call: Call) -> Value:
+    """The function is called for each element, or for any of them if they are not known one by one."""
+    function, items = call.args.at(0) or ANY, _items(run, call, 1)
+    if len(call.args.positional) != 2 or items.exact is None or not may_unroll(run, len(items.exact)):
+        given = [
+            _items(run, call, index).any_element() or ANY for index in range(1, len(call.args.positional))
+        ]
+        element = run.call(function, Arguments(given, more=call.args.more), call.node, call.frame)
+        return run.sequence(call.node, "list", Items(None, element))
+    results = []
+    for index, each in enumerate(items.exact):
+        previous = run.enter(("map", id(call.node), index))
+        results.append(run.call(function, Arguments([each]), call.node, call.frame))
+        run.context = previous
+    return run.sequence(call.node, "list", Items(tuple(results)))
+
+
+def _filter(run: Run, call: Call) -> Value:
+    """Any element may be left; the function is called for any of them."""
+    element = _items(run, call, 1).any_element()
+    function = call.args.at(0) or NONE
+    if element and function != NONE:
+        run.call(function, Arguments([element]), call.node, call.frame)
+    return run.sequence(call.node, "list", Items(None, element))
+
+
+def _dict(run: Run, call: Call) -> Value:
+    """Made of dictionaries, pairs and keywords; keys that are not constant go under ``OTHER``."""
+    obj = run.allocate(call.node, "dict", Dictionary)
+    for atom in call.args.at(0) or BOTTOM:
+        if isinstance(atom, Dictionary):
+            copy_dictionary(run, obj, (atom,))
+        else:
+            store_pairs(run, obj, elements(run, (atom,), call.node, call.frame), call)
+    for name, value in call.args.keywords.items():
+        run.state.store(obj, Key(name), value)
+    if call.args.more_keywords:
+        run.state.store(obj, OTHER, join(obj.cells.get(OTHER, BOTTOM), call.args.more_keywords))
+    return (obj,)
+
+
+def store_pairs(run: Run, obj: Dictionary, items: Items, call: Call) -> None:
+    """What ``dict`` and ``dict.update`` make of pairs."""
+    for pair in items.exact if items.exact is not None else (items.any_element(),):
+        parts = elements(run, pair, call.node, call.frame).exact
+        key = sole(parts[0]) if parts and len(parts) == 2 else None
+        if parts and len(parts) == 2 and is_key(key) and items.exact is not None:
+            run.state.store(obj, Key(key), parts[1])
+        else:
+            value = parts[1] if parts and len(parts) == 2 else ANY
+            run.state.store(obj, OTHER, join(obj.cells.get(OTHER, BOTTOM), value))
+
+
+def chosen(run: Run, call: Call) -> Value:
+    """``next``, ``random.choice``: one of the elements."""
+    if len(call.args.positional) > 1 and not call.args.more:
+        return join_all((*call.args.positional, _items(run, call).any_element())) or ANY
+    return _items(run, call).any_element() or ANY
+
+
+def _extreme(run: Run, call: Call) -> Value:
+    """``min``, ``max``: what is compared is not known, but where it is one of the program's things."""
+    run.register_callback(call.args.keywords.get("key", BOTTOM), 1)
+    found = chosen(run, call)
+    return found if len(found) == 1 else join(tuple(a for a in found if not isinstance(a, CONSTANTS)), ANY)
+
+
+# --- attributes and classes ---------------------------------------------------------------------------------
+
+
+def _getattr(run: Run, call: Call) -> Value:
+    """The attribute, the default or either."""
+    owner, names = call.args.at(0) or ANY, call.args.at(1) or ANY
+    there = _has(run, sole(owner), sole(names))
+    known = constant_strings(names)
+    found = join_all(run.attribute(owner, name, call.node, call.frame) for name in known)
+    if len(known) < len(names):
+        _any_method(run, owner, names)
+        is_node = any(isinstance(atom, Instance) and atom.node is not None for atom in owner)
+        found = join(found, unknown(OF_A_NODE if is_node else "an attribute whose name is made at run time"))
+    default = call.args.at(2)
+    return found if default is None or there else join(found, default)
+
+
+def _any_method(run: Run, owner: Value, names: Value) -> None:
+    """``getattr(self, 'on_' + x)``: any method whose name fits may be meant."""
+    run.state.reflected = True
+    starts = (text.pieces[0] if isinstance(text, Text) else "" for text in names)
+    prefixes = tuple(start if isinstance(start, str) else "" for start in starts)
+    for atom in owner:
+        if isinstance(atom, ModuleValue | ClassValue):
+            for name, value in list(atom.cells.items()):
+                if isinstance(name, str) and not name.startswith(("__", "[")):
+                    run.escape_value(value, opened=False)
+        if not (isinstance(atom, Instance) and isinstance(atom.cls, ClassValue)):
+            continue
+        for name, value in list(atom.cells.items()):
+            if isinstance(name, str):
+                run.escape_value(value, opened=False, objects=False)
+        for base in program_classes(atom.cls):
+            for name, value in list(base.cells.items()):
+                if isinstance(name, str) and name.startswith(prefixes) and not name.startswith("__"):
+                    functions = [each for each in value if isinstance(each, FunctionValue)]
+                    run.register_callback(tuple(BoundMethod(each, atom) for each in functions), None)
+
+
+def _setattr(run: Run, call: Call) -> Value:
+    """An unknown name may be any attribute of an object; on a class or module it is a gap."""
+    owner, names = call.args.at(0) or ANY, call.args.at(1) or ANY
+    value = call.args.at(2) or ANY
+    known = constant_strings(names)
+    for name in known:
+        if len(names) > 1:
+            value = join(value, run.attribute(owner, name, call.node, call.frame))
+        store_attribute(run, owner, name, value, call.node, call.frame)
+    if len(known) < len(names):
+        run.escape_value(value)
+        run.state.reflected = True
+        for atom in owner:
+            if isinstance(atom, Instance):
+                for cell, old in list(atom.cells.items()):
+                    run.state.write(atom.cells, cell, join(old, value))
+            of_library = isinstance(atom, External) and "(" not in atom.path
+            if of_library or isinstance(atom, ClassValue | ModuleValue):
+                run.gap(call.node, call.frame, "an attribute whose name is made at run time is set")
+    return NONE
+
+
+def _hasattr(run: Run, call: Call) -> Value:
+    return (True,) if _has(run, sole(call.args.at(0)), sole(call.args.at(1))) else BOOLEAN
+
+
+def _has(run: Run, owner: object, name: object) -> bool:
+    """Whether the attribute is certainly there."""
+    if not isinstance(name, str) or not isinstance(owner, Instance | ClassValue | ModuleValue):
+        return False
+    run.state.reads.attributes.add(name)
+    held = owner.cells.get(name)
+    if held:
+        return present(held) is held and not owner.summary
+    cls = owner.cls if isinstance(owner, Instance) else owner
+    return isinstance(cls, ClassValue) and any(base.cells.get(name) for base in program_classes(cls))
+
+
+def _isinstance(run: Run, call: Call) -> Value:
+    outcomes = {_of_classes(atom, call.args.at(1) or ANY) for atom in call.args.at(0) or ANY}
+    return boolean(outcomes.pop() if len(outcomes) == 1 else None)
+
+
+def _of_classes(atom: object, classes: Value) -> bool | None:
+    """``isinstance``; ``None`` where that is not decided."""
+    cls = classes[0] if len(classes) == 1 else None
+    if isinstance(cls, Sequence):
+        listed = cls.items.exact
+        outcomes = {None} if listed is None else {_of_classes(atom, each) for each in listed}
+        return True if True in outcomes else None if None in outcomes else False
+    if isinstance(atom, Instance) and isinstance(atom.cls, ClassValue):
+        order = linearized(atom.cls)
+        paths = {base.path for base in order if isinstance(base, External)}
+        if cls in order or (isinstance(cls, External) and cls.path in (*paths, "builtins.object")):
+            return True
+        return (
+            False if isinstance(cls, ClassValue) and not any(isinstance(b, Unknown) for b in order) else None
+        )
+    kind = _KINDS.get(cls.path) if isinstance(cls, External) else None
+    if kind is None:
+        return False if isinstance(cls, ClassValue) and isinstance(atom, CONSTANTS) else None
+    if isinstance(atom, CONSTANTS):
+        return isinstance(atom, kind)
+    if isinstance(atom, Sequence):
+        return atom.kind == kind.__name__
+    return kind is dict if isinstance(atom, Dictionary) else None
+
+
+_KINDS: dict[str, type] = {
+    f"builtins.{kind.__name__}": kind for kind in (str, int, float, bool, bytes, list, tuple, set, dict)
+}
+
+
+def _type(run: Run, call: Call) -> Value:
+    """The class of an object, else unknown; with three arguments, a class that is not followed."""
+    if len(call.args.positional) == 3:
+        run.gap(call.node, call.frame, "a class is made at run time (type)")
+        run.escape(call.args)
+        return unknown("a class made at run time")
     atom = sole(call.args.at(0))
-    own = special.call_special(run, atom, "__repr__", call.node, call.frame)
-    if own:
-        return own
-    return (repr(atom),) if isinstance(atom, str | int | float) else unknown("repr()")
+    return (atom.cls,) if isinstance(atom, Instance) else ANY
 
 
-FUNCTIONS: dict[str, Model] = {
+def _dynamic_code(run: Run, call: Call) -> Value:
+    run.gap(call.node, call.frame, "code made at run time (eval, exec) is not analysed")
+    return unknown("the result of code made at run time")
+
+
+def import_dynamic(run: Run, call: Call) -> Value:
+    """``import_module(name)`` and ``__import__``: the modules it may be; a gap when a name is not known."""
+    given = call.args.at(0) or ANY
+    names = constant_strings(given)
+    if len(names) < len(given) or any(name.startswith(".") for name in names):
+        run.gap(call.node, call.frame, "a module whose name is made at run time is not analysed")
+    found = join_all(import_module(run, name, call.frame) for name in names if not name.startswith("."))
+    return found or unknown("a module whose name is made at run time")
+
+
+def _variables(run: Run, call: Call) -> Value:
+    """``vars``, ``globals``, ``locals``."""
+    given = call.args.at(0)
+    owners: list[HeapObject] = [call.frame.module]
+    if given is not None:
+        owners = [atom for atom in given if isinstance(atom, HeapObject)]
+        owners = [
+            each for each in owners if not (isinstance(each, Instance) and isinstance(each.cls, External))
+        ]
+    if given is None and call.frame.function is not None:
+        run.escape_value(join_all(call.frame.cells.values()), opened=False, objects=False)
+    found = [run.variables_of(owner, call.node, call.frame) for owner in owners]
+    return join_all(found) or unknown("a dictionary of variables")
+
+
+def _object_new(run: Run, call: Call) -> Value:
+    """``object.__new__(cls)``: an object whose constructor has not run."""
+    made: list[object] = []
+    for atom in call.args.at(0) or ANY:
+        if isinstance(atom, ClassValue):
+            for base in program_classes(atom):
+                run.instantiated.setdefault(base.node)
+            made.append(new_instance(run, atom, call))
+        else:
+            made.append(unknown("an object of a class that is not known")[0])
+    return tuple(made)
+
+
+def _property(run: Run, call: Call) -> Value:
+    given = [call.args.at(index, name) for index, name in enumerate(("fget", "fset", "fdel"))]
+    getter, setter, deleter = (tuple(a for a in value or () if a is not None) for value in given)
+    return (PropertyValue(getter, setter, deleter),)
+
+
+FUNCTIONS: dict[str, Callable[[Run, Call], Value]] = {
     f"builtins.{name}": model
     for name, model in {
         "str": _str,
@@ -76,37 +412,35 @@ FUNCTIONS: dict[str, Model] = {
         "float": _float,
         "bool": _bool,
         "len": _len,
-        "range": iterables.call_range,
-        "list": iterables.made_sequence("list"),
-        "tuple": iterables.made_sequence("tuple"),
-        "set": iterables.call_set,
-        "frozenset": iterables.call_set,
-        "iter": lambda run, call: call.args.at(0) or ANY,  # walking along it gives the same
-        "sorted": iterables.call_sorted,
-        "reversed": iterables.call_reversed,
-        "enumerate": iterables.call_enumerate,
-        "zip": iterables.call_zip,
-        "map": iterables.call_map,
-        "filter": iterables.call_filter,
-        "dict": iterables.call_dict,
-        "getattr": reflection.call_getattr,
-        "setattr": reflection.call_setattr,
-        "hasattr": reflection.call_hasattr,
-        "isinstance": reflection.call_isinstance,
-        "type": reflection.call_type,
         "format": _format,
-        "repr": _repr,
-        **dict.fromkeys(("min", "max", "next"), iterables.chosen),
+        "range": _range,
+        "list": _made("list"),
+        "tuple": _made("tuple"),
+        "set": _set,
+        "frozenset": _set,
+        "iter": lambda run, call: call.args.at(0) or ANY,  # walking along it gives the same
+        "sorted": _sorted,
+        "reversed": _reversed,
+        "enumerate": _enumerate,
+        "zip": _zip,
+        "map": _map,
+        "filter": _filter,
+        "dict": _dict,
+        "next": chosen,
+        **dict.fromkeys(("min", "max"), _extreme),
+        "getattr": _getattr,
+        "setattr": _setattr,
+        "hasattr": _hasattr,
+        "isinstance": _isinstance,
+        "type": _type,
         **dict.fromkeys(("any", "all", "callable"), lambda run, call: BOOLEAN),
-        **dict.fromkeys(("eval", "exec", "compile"), reflection.dynamic_code),
-        "__import__": reflection.import_dynamic,
-        "vars": reflection.call_vars,
-        "globals": reflection.call_globals,
-        "locals": reflection.call_locals,
+        **dict.fromkeys(("eval", "exec", "compile"), _dynamic_code),
+        "__import__": import_dynamic,
+        **dict.fromkeys(("vars", "globals", "locals"), _variables),
         "input": lambda run, call: unknown("text that the user types"),
         "object": lambda run, call: ANY,
-        "object.__new__": reflection.object_new,
+        "object.__new__": _object_new,
         "object.__init_subclass__": lambda run, call: NONE,
-        "property": reflection.call_property,
+        "property": _property,
     }.items()
 }

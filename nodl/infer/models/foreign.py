@@ -6,50 +6,39 @@ container it was handed. A node handed to unknown code is a gap: it may create e
 
 from __future__ import annotations
 
+import builtins
 import functools
 import sys
-from pathlib import PurePosixPath
 
-from nodl.infer.interpreter.assign import plain_store
 from nodl.infer.interpreter.frames import Call
-from nodl.infer.interpreter.iterate import lose
-from nodl.infer.interpreter.raising import is_builtin_exception
 from nodl.infer.interpreter.run import Run
 from nodl.infer.methods import ForeignMethod, NativeMethod
 from nodl.infer.models import (
     builtin,
-    concrete,
     endpoints,
-    files,
-    named_tuples,
     native,
-    pure,
     ros,
     ros_nodes,
     ros_parameters,
     stdlib,
 )
-from nodl.infer.models.library_nodes import library_node
+from nodl.infer.models.library_nodes import library_node, may_make_nodes
 from nodl.infer.models.signatures import COMMON_CALLBACKS, LIFECYCLE_HOOKS, NODE_ENDPOINTS
 from nodl.infer.values import (
     ANY,
-    NONE,
     RESULT,
-    ClassValue,
     Dictionary,
     External,
     Instance,
-    NativeObject,
     Sequence,
     Unknown,
     Value,
     external,
-    join_all,
     result_of,
     unknown,
 )
 
-_MODELS = {**stdlib.FUNCTIONS, **builtin.FUNCTIONS, **files.FUNCTIONS, **named_tuples.FUNCTIONS}
+_MODELS = {**stdlib.FUNCTIONS, **builtin.FUNCTIONS}
 NODE_METHODS = frozenset(NODE_ENDPOINTS) | frozenset(COMMON_CALLBACKS)
 
 # Libraries that create no endpoints on a node they are given, keep their hands off names and off the program's
@@ -59,12 +48,12 @@ _KEEPS_OFF = frozenset({
     "tf2_py", "message_filters", "transforms3d", "scipy", "yaml", "ament_index_python", "rosidl_runtime_py",
     "rcl_interfaces", "rosidl_parser", "launch", "launch_ros", "std_msgs", "PIL", "torch", "matplotlib",
     "pandas", "serial", "requests", "setuptools", "pytest", "tqdm", "sensor_msgs_py", "psutil", "colorama",
-    "launch_testing", "launch_testing_ros", "launch_pytest", "ament_copyright", "ament_flake8", "ament_pep257",
+    "ament_copyright", "ament_flake8", "ament_pep257",
     # of Python's own library
     "unittest",
     "builtins", "logging", "time", "math", "cmath", "random", "datetime", "typing", "abc", "json", "warnings",
     "traceback", "struct", "re", "os", "sys", "statistics", "decimal", "fractions", "hashlib", "uuid", "platform",
-    "getpass", "pprint",
+    "getpass", "pprint", "collections",
 })  # fmt: skip
 # The rest of it leaves containers alone, but calls and keeps what it is given.
 _TRUSTED = frozenset(sys.stdlib_module_names) | _KEEPS_OFF
@@ -73,11 +62,18 @@ _TRUSTED = frozenset(sys.stdlib_module_names) | _KEEPS_OFF
 # Functions that change the containers they are given, in whichever library.
 _CHANGING = frozenset({
     "shuffle", "heapify", "heappush", "heappop", "heappushpop", "heapreplace", "insort", "insort_left", "insort_right",
-    *pure.IN_PLACE,
+    "setitem", "delitem", "iadd", "iand", "iconcat", "ifloordiv", "ilshift", "imatmul", "imod", "imul", "ior", "ipow",
+    "irshift", "isub", "itruediv", "ixor",
 })  # fmt: skip
 _CHANGEABLE = ("builtins.list", "builtins.dict", "builtins.set")
 
 
+# Functions of Python's library that ask an object for nothing but its text, its identity or a number.
+_ASKS_FOR_TEXT = frozenset({
+    "print", "repr", "ascii", "id", "hash", "issubclass", "abs", "round", "sum", "divmod", "pow", "bytes", "debug",
+    "info", "warn", "warning", "error", "exception", "critical", "log", "getLogger", "basicConfig", "sleep", "pprint",
+    "pformat", "dumps",
+})  # fmt: skip
 # While these run, callbacks do.
 _WAITS = frozenset({
     "spin", "spin_once", "spin_until_future_complete", "spin_once_until_future_complete", "sleep", "wait_for_message",
@@ -94,9 +90,6 @@ def call_external(run: Run, atom: External, call: Call) -> Value:
     if owner in _CHANGEABLE and name != "fromkeys" and _holds_containers(call):
         method = run.attribute(call.args.positional[0], name, call.node, call.frame)
         return run.call(method, call.args.shifted(), call.node, call.frame)
-    computed = _computed(run, path, call)
-    if computed is not None:
-        return computed
     model = _MODELS.get(path)
     if model is not None:
         return model(run, call)
@@ -105,7 +98,7 @@ def call_external(run: Run, atom: External, call: Call) -> Value:
         return found
     if is_node_class(owner) or (owner == "builtins.object" and name.startswith("__")):
         return _unbound_method(run, owner, name, call)
-    if is_builtin_exception(path):
+    if _is_exception(path):
         run.escape(call.args, opened=False, objects=False)
         return (Instance(External(path)),)
     if "(" in path and (name in NODE_METHODS):
@@ -114,6 +107,8 @@ def call_external(run: Run, atom: External, call: Call) -> Value:
         run.understood.add(call.node)
     if name in _WAITS and run.callbacks:
         run.settle(run)
+    if not ros.interface_type(path) and not keeps_off(path):
+        _note_unknown_package(run, path, call)
     _hand_over(run, path, call)
     if ros.interface_type(path):
         return external(path + "()")
@@ -122,24 +117,16 @@ def call_external(run: Run, atom: External, call: Call) -> Value:
     return unknown(f"the result of {path}()")
 
 
+def _is_exception(path: str) -> bool:
+    """Whether the path names an exception class of Python itself."""
+    found = getattr(builtins, path.removeprefix("builtins."), None) if path.startswith("builtins.") else None
+    return isinstance(found, type) and issubclass(found, BaseException)
+
+
 def _holds_containers(call: Call) -> bool:
     """``list.append(names, 'x')``: a method of a container, called through its class."""
     first = call.args.positional[0] if call.args.positional else ()
     return bool(first) and all(isinstance(atom, Sequence | Dictionary) for atom in first)
-
-
-def _computed(run: Run, path: str, call: Call) -> Value | None:
-    """The result of a pure function of Python's library on known values; ``None``: not on the list, or not known."""
-    found = pure.function_at(path)
-    if found is None:
-        return None
-    result = concrete.compute(run, found[0], call, deep=found[1], any_size=path in pure.ANY_SIZE)
-    if result is not None:
-        run.understood.add(call.node)
-        for atom in result:
-            if isinstance(atom, NativeObject):
-                atom.sources = tuple(call.args.all_values())
-    return result
 
 
 def is_asked_of(name: str) -> bool:
@@ -147,20 +134,15 @@ def is_asked_of(name: str) -> bool:
     return name in NODE_METHODS or name in _WAITS
 
 
-def may_fail(atom: object) -> bool:
-    """Whether the call that gave ``atom`` may have raised: not one that made an endpoint with a known name."""
-    if not isinstance(atom, Instance) or not isinstance(atom.cls, External):
-        return False
-    if is_builtin_exception(atom.cls.path):
-        return False
-    names = atom.cells.get("name", ())
-    return atom.cls.path not in endpoints.CLASSES or not all(isinstance(name, str) for name in names)
-
-
 @functools.lru_cache(maxsize=4096)
 def keeps_off(path: str) -> bool:
     """Whether the library of ``path`` leaves the program's classes and objects alone."""
     return path.partition(".")[0] in _KEEPS_OFF
+
+
+def lets_through(path: str) -> bool:
+    """Whether exceptions pass the context managers of the library of ``path``."""
+    return keeps_off(path) or path.partition(".")[0] in ("threading", "multiprocessing")
 
 
 def creates(atom: object) -> bool:
@@ -196,12 +178,22 @@ def _unbound_method(run: Run, path: str, name: str, call: Call) -> Value:
     return result
 
 
+def _note_unknown_package(run: Run, path: str, call: Call) -> None:
+    """A gap for a class or function of a ROS package that cannot be read: it may make a node of its own."""
+    if may_make_nodes(path, run.dependencies):
+        why = f"{path}() is of a ROS package that is not analysed, and may make a node or interfaces"
+        run.gap(call.node, call.frame, why)
+
+
 def _hand_over(run: Run, path: str, call: Call) -> None:
     root = path.partition(".")[0]
     trusted = root in _TRUSTED or bool(ros.interface_type(path))
-    opened = not trusted or path.rpartition(".")[2] in _CHANGING
-    run.escape(call.args, opened=opened, objects=not trusted or root not in _KEEPS_OFF)
-    run.escape_value(call.args.keywords.get("cls", ()), opened=False)  # json makes an encoder of it
+    leaf = path.rpartition(".")[2]
+    opened = not trusted or leaf in _CHANGING
+    called_back = root in sys.stdlib_module_names and leaf not in _ASKS_FOR_TEXT
+    run.escape(call.args, opened=opened, objects=not trusted or root not in _KEEPS_OFF or called_back)
+    for keyword in ("cls", "file"):  # json makes an encoder of it, print writes to it
+        run.escape_value(call.args.keywords.get(keyword, ()), opened=False)
     if trusted or path.endswith(".ParamListener"):  # of generate_parameter_library: only declares parameters
         return
     for value in call.args.all_values():
@@ -230,7 +222,8 @@ def call_foreign_method(run: Run, method: ForeignMethod, call: Call) -> Value:
         _initialise_other_bases(run, receiver, path, call)
         return ANY
     if path == "builtins.object" or name in ("__setattr__", "__getattribute__", "__delattr__"):
-        return _object_method(run, receiver, name, call)
+        run.gap(call.node, call.frame, f"{name} is called by the program, which is not analysed")
+        return unknown(f"the result of object.{name}()")
     if name in NODE_ENDPOINTS and len(call.args.positional) + len(call.args.keywords) >= 2:
         record = ros_nodes.record_of_instance(run, receiver, call)
         if not record.created:
@@ -249,25 +242,6 @@ def _escape_to(run: Run, path: str, call: Call) -> None:
     run.escape(call.args, opened=path.partition(".")[0] not in _TRUSTED, objects=not keeps_off(path))
 
 
-def _object_method(run: Run, receiver: Instance, name: str, call: Call) -> Value:
-    """What ``object`` does: set, get and delete attributes without asking the class."""
-    from nodl.infer.interpreter.attributes import plain_attribute
-
-    given = call.args.positional
-    names = [atom for atom in given[0] if isinstance(atom, str)] if given else []
-    if name == "__setattr__" and len(given) == 2 and len(names) == len(given[0]):
-        for each in names:
-            plain_store(run, receiver, each, given[1], len(names) == 1)
-        return NONE
-    if name == "__getattribute__" and names and isinstance(receiver.cls, ClassValue):
-        found = [plain_attribute(run, receiver, receiver.cls, each, call.node, call.frame) for each in names]
-        return join_all(found)
-    if name in ("__setattr__", "__delattr__"):
-        run.gap(call.node, call.frame, f"an attribute is changed by {name} under a name made at run time")
-    run.escape(call.args, opened=False, objects=False)
-    return unknown(f"the result of object.{name}()")
-
-
 def _call_node_method(run: Run, receiver: Instance, path: str, name: str, call: Call) -> Value:
     if name == "__init__":
         ros_nodes.initialise_node(run, receiver, path, call)
@@ -282,6 +256,7 @@ def _call_node_method(run: Run, receiver: Instance, path: str, name: str, call: 
 def _initialise_other_bases(run: Run, receiver: Instance, path: str, call: Call) -> None:
     """An unknown base class may pass the call on to the next one in the method resolution order."""
     _escape_to(run, path, call)
+    _note_unknown_package(run, path, call)
     paths = _foreign_bases(receiver)
     after = paths[paths.index(path) + 1 :] if path in paths else []
     node_class = next(filter(is_node_class, after), None)
@@ -295,10 +270,8 @@ def _foreign_bases(obj: Instance) -> list[str]:
 
 
 def call_native(run: Run, method: NativeMethod, call: Call) -> Value:
-    """A method of a text, container or real object, or of something unknown that may be a node."""
+    """A method of a text or container, or of something unknown that may be a node."""
     receiver, name = method.receiver, method.name
-    if isinstance(receiver, NativeObject):
-        return _native_method(run, receiver, name, call)
     if isinstance(receiver, Unknown):
         if name in COMMON_CALLBACKS:
             ros.register(run, COMMON_CALLBACKS[name], call)
@@ -308,35 +281,6 @@ def call_native(run: Run, method: NativeMethod, call: Call) -> Value:
             return ros.NODE_METHODS[name](run, record, call)
         return ANY
     return native.call_method(run, receiver, name, call)
-
-
-def _native_method(run: Run, receiver: NativeObject, name: str, call: Call) -> Value:
-    if not concrete.is_usable(run, receiver):
-        return lose(run, receiver)
-    if isinstance(receiver.object, PurePosixPath) and name in pure.PATH_IO:
-        return files.path_method(run, receiver.object, name, call)
-    run.state.pulled += 1
-    found = concrete.compute(run, getattr(receiver.object, name), call)
-    if found is None:
-        run.escape(call.args)
-        return lose(run, receiver)
-    return found
-
-
-def native_attribute(run: Run, receiver: NativeObject, name: str, call: Call) -> Value:
-    """An attribute of a real object: a method of it, or a value."""
-    if isinstance(receiver.object, PurePosixPath) and name in pure.PATH_IO:
-        return (NativeMethod(receiver, name),)
-    if name.startswith("_") or not hasattr(receiver.object, name):
-        return unknown(f"attribute {name} of a {type(receiver.object).__name__}")
-    if callable(getattr(receiver.object, name)):
-        return (NativeMethod(receiver, name),)
-    if not concrete.is_usable(run, receiver):
-        return lose(run, receiver)
-    try:
-        return concrete.from_python(run, getattr(receiver.object, name), call, name)
-    except concrete.NotConcrete:
-        return ANY
 
 
 # --- attributes ---------------------------------------------------------------------------------------------
@@ -379,5 +323,4 @@ def hooks_of(base: object) -> frozenset[str] | None:
 @functools.lru_cache(maxsize=4096)
 def constant(path: str) -> Value | None:
     """Constants of foreign modules that matter for names."""
-    known = pure.constant_at(path)
-    return stdlib.CONSTANTS.get(path) if known is None else (known,)
+    return stdlib.CONSTANTS.get(path)

@@ -5,7 +5,9 @@ Source: nav2_simple_commander/robot_navigator.py (humble to rolling; the union, 
 
 from __future__ import annotations
 
-from enclave_launch.boundary.light import NamedTuple
+import re
+from typing import NamedTuple
+
 from nodl.infer.models.signatures import ACTION_CLIENT, CLIENT, PUBLISHER, SUBSCRIPTION, FixedEndpoint
 
 
@@ -68,3 +70,30 @@ LIBRARY_NODES: dict[tuple[str, str], LibraryNode] = {("nav2_simple_commander", "
 def library_node(path: str) -> LibraryNode | None:
     """The node class at ``path``, by its top package and last name."""
     return LIBRARY_NODES.get((path.partition(".")[0], path.rpartition(".")[2]))
+
+
+# ROS packages whose Python makes no node and no interface.
+_MAKES_NOTHING = frozenset({
+    "ros2_numpy", "tf_transformations", "sensor_msgs_py", "image_geometry", "cv_bridge", "rclpy_message_converter",
+    "ament_index_python", "ament_copyright", "ament_flake8", "ament_pep257", "rosidl_runtime_py", "rosidl_parser",
+    "tf2_geometry_msgs", "tf2_py", "tf2_ros", "launch", "launch_ros", "rclpy", "rospkg", "ros2cli", "rosbags",
+    "diagnostic_updater", "message_filters", "interactive_markers", "image_transport_py",
+})  # fmt: skip
+_MAKERS = {"rosbag2_py": frozenset({"Recorder", "Player"})}  # of a package that else makes nothing
+_ROS_NAME = re.compile(
+    r"(?:^|_)(?:ros\d?|ros2\w*|rcl\w*|nav2|moveit\w*|turtlebot\w*|tf2|rosbag\w*|rosbridge|rqt|irobot|controller_manager|"
+    r"ament|launch|clearpath|webots_ros2|nao|spot_utilities)(?:_|$)"
+)
+
+
+def may_make_nodes(path: str, dependencies: frozenset[str]) -> bool:
+    """Whether the class or function at ``path`` is of a ROS package of which nothing is known here.
+
+    ``dependencies``: what the program's package names in its ``package.xml``.
+    """
+    package, _, rest = path.partition(".")
+    if package in _MAKES_NOTHING or not rest or "(" in path or ".exceptions." in path:
+        return False
+    if package in _MAKERS:
+        return path.rpartition(".")[2] in _MAKERS[package]
+    return package in dependencies or _ROS_NAME.search(package) is not None

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import collections
 from collections.abc import Callable
 
-from nodl.infer.interpreter import special
 from nodl.infer.interpreter.assign import copy_dictionary, store_item
+from nodl.infer.interpreter.define import is_constant, is_key
 from nodl.infer.interpreter.formatting import joined, str_format, text_value
-from nodl.infer.interpreter.frames import Arguments, Call
+from nodl.infer.interpreter.frames import Call
 from nodl.infer.interpreter.iterate import elements, keys_of, values_of
 from nodl.infer.interpreter.run import Run
-from nodl.infer.interpreter.subscripts import variable
-from nodl.infer.methods import Variables
-from nodl.infer.models import concrete
+from nodl.infer.interpreter.subscripts import chosen_by_parameter
+from nodl.infer.models.builtin import store_pairs
 from nodl.infer.text import MAX_LENGTH, Text, TextAtom, edited, input_of, with_edit
 from nodl.infer.values import (
     ABSENT,
@@ -25,7 +23,6 @@ from nodl.infer.values import (
     OTHER,
     OTHER_KEYS,
     Dictionary,
-    Instance,
     Items,
     Key,
     Sequence,
@@ -50,88 +47,16 @@ def call_method(run: Run, receiver: object, name: str, call: Call) -> Value:
     """What a method of a text or container gives and, in a container, changes; unknown without a model."""
     if isinstance(receiver, str | Text):
         return _text_method(run, receiver, name, call)
-    if isinstance(receiver, bytes):
-        found = concrete.compute(run, getattr(receiver, name, None) or _absent, call)
-        return found if found is not None else unknown(f"the result of bytes.{name}()")
     if isinstance(receiver, Dictionary):
         run.spend(len(receiver.cells))
-        if receiver.kind == "Counter" and name in _OF_COUNTERS:
-            real = concrete.to_python(run, (receiver,), call)
-            if isinstance(real, collections.Counter):
-                return concrete.compute(run, getattr(real, name), call) or ANY
         model = _DICTIONARY.get(name)
         return model(run, receiver, call) if model else _lost(run, receiver, call)
-    if isinstance(receiver, Variables):
-        return _variables_method(run, receiver, name, call)
     if isinstance(receiver, Sequence):
         run.spend(len(receiver.items.exact or receiver.items.rest))
-        if name not in ("append", "add"):
-            changed = _real_method(run, receiver, name, call)
-            if changed is not None:
-                return changed
         method = _SEQUENCE.get(name)
         return method(run, receiver, call) if method else _lost(run, receiver, call)
     run.escape(call.args)
     return unknown(f"the result of {name}()")
-
-
-def _variables_method(run: Run, receiver: Variables, name: str, call: Call) -> Value:
-    named = receiver.named()
-    if name == "get":
-        found = variable(run, receiver, call.args.at(0) or ANY, call.node, call.frame)
-        return join(found, call.args.at(1) or NONE)
-    if name == "update":
-        run.gap(call.node, call.frame, "variables are set from a dictionary")
-        run.escape(call.args)
-        return NONE
-    if name not in ("keys", "values", "items"):
-        return _lost(run, receiver, call)
-    certain = not receiver.owner.summary and all(present(value) is value for value in named.values())
-    rows: list[tuple[Value, Value]] = [((key,), present(value)) for key, value in named.items()]
-    if name == "items":
-        items = Items(tuple(run.tuple_of(row) for row in rows))
-    else:
-        items = Items(tuple(key if name == "keys" else value for key, value in rows))
-    return run.sequence(call.node, "list", items if certain else Items(None, items.any_element()))
-
-
-_OF_COUNTERS = frozenset({"most_common", "elements", "total"})
-
-
-def _absent(*_: object) -> object:
-    raise concrete.NotConcrete
-
-
-def _real_method(run: Run, owner: Sequence, name: str, call: Call) -> Value | None:
-    """A method of a list, set or tuple whose elements are known one by one, as Python does it."""
-    real = concrete.to_python(run, (owner,), call)
-    if isinstance(real, concrete.Opaque):
-        return None
-    if isinstance(real, list) and name in _OF_QUEUES:
-        real = collections.deque(real)
-    method = getattr(real, name, None)
-    if method is None or name.startswith("_"):
-        return None
-    before = list(real)
-    given = call
-    if name in ("extend", "update", "extendleft") and call.args.positional:
-        items = [elements(run, each, call.node, call.frame) for each in call.args.positional]
-        if any(each.exact is None for each in items):
-            return None
-        rows = [run.tuple_of(each.exact or ()) for each in items]
-        given = Call(Arguments(rows), call.node, call.frame)
-    found = concrete.compute(run, method, given)
-    if found is None:
-        return None
-    after = list(real)
-    if len(after) != len(before) or any(a is not b for a, b in zip(after, before, strict=True)):
-        after = concrete.in_order(after) if isinstance(real, set) else after
-        parts = tuple(concrete.from_python(run, each, call) for each in after)
-        run.state.store(owner, ITEMS, (Items(parts),))
-    return found
-
-
-_OF_QUEUES = frozenset({"rotate", "appendleft", "popleft", "extendleft"})
 
 
 def _lost(run: Run, receiver: object, call: Call) -> Value:
@@ -146,11 +71,9 @@ def _lost(run: Run, receiver: object, call: Call) -> Value:
 
 def _text_method(run: Run, text: TextAtom, name: str, call: Call) -> Value:
     if name == "format":
-        return text_value(str_format(text, special.spoken_each(run, call.args, call.node, call.frame)))
+        return text_value(str_format(text, call.args))
     if name == "join":
         return text_value(joined((text,), elements(run, call.args.at(0) or ANY, call.node, call.frame)))
-    if isinstance(text, str) and name in ("translate", "expandtabs", "encode", "format_map"):
-        return _constant_method(run, text, name, (), call)
     arguments = tuple(sole(value) for value in call.args.positional)
     constant = all(isinstance(argument, str | int | type(None)) for argument in arguments)
     if not constant or call.args.keywords or call.args.more:
@@ -169,8 +92,7 @@ def _text_method(run: Run, text: TextAtom, name: str, call: Call) -> Value:
 
 def _constant_method(run: Run, text: str, name: str, arguments: tuple[object, ...], call: Call) -> Value:
     if name not in _PURE and name not in _SPLITS:
-        found = concrete.compute(run, getattr(text, name, None) or _absent, call, owner=text)
-        return found if found is not None else unknown(f"the result of str.{name}()")
+        return unknown(f"the result of str.{name}()")
     size = len(text) + sum(len(each) if isinstance(each, str) else 0 for each in arguments)
     if size > MAX_LENGTH or any(type(each) is int and each > MAX_LENGTH for each in arguments):
         return unknown(f"the result of str.{name}() of a very long text")
@@ -180,59 +102,98 @@ def _constant_method(run: Run, text: str, name: str, arguments: tuple[object, ..
         return ANY
     if name in _SPLITS:
         return run.sequence(call.node, "list", Items(tuple((part,) for part in result)))
-    return (result,) if not isinstance(result, str) or len(result) < 4096 else ANY
+    return (result,) if not isinstance(result, str) or len(result) < MAX_LENGTH else ANY
 
 
 # --- sequences ----------------------------------------------------------------------------------------------
 
 
+EDITED = "an element of a list that is edited while that is undecided"
+
+
+def _stored(
+    run: Run, owner: Sequence, exact: list[Value] | None, others: Value, edited: bool = False
+) -> Value:
+    """The new contents: element by element where they are ``exact``, else ``others``.
+
+    ``edited``: something was taken away, nobody knows what; a text among the elements may be the one.
+    """
+    if exact is not None and not owner.summary and len(exact) < MAX_EXACT:
+        run.state.store(owner, ITEMS, (Items(tuple(exact)),))
+        return NONE
+    if edited and any(isinstance(atom, str | Text) for atom in others):
+        others = join(others, unknown(EDITED))
+    run.state.store(owner, ITEMS, (Items(None, others),))
+    return NONE
+
+
+MAX_EXACT = 512
+
+
+def _exact(owner: Sequence) -> list[Value] | None:
+    exact = owner.items.exact
+    return None if exact is None or owner.escaped else list(exact)
+
+
 def _append(run: Run, owner: Sequence, call: Call) -> Value:
     value = call.args.at(0) or ANY
-    items = owner.items
-    if items.exact is not None and not owner.summary and len(items.exact) < 2048:
-        run.state.store(owner, ITEMS, (Items((*items.exact, value)),))
-    else:
-        run.state.store(owner, ITEMS, (Items(None, join(items.any_element(), value)),))
-    return NONE
+    exact = _exact(owner)
+    if exact is not None:
+        exact.append(value)
+    return _stored(run, owner, exact, join(owner.items.any_element(), value))
 
 
 def _extend(run: Run, owner: Sequence, call: Call) -> Value:
-    added = elements(run, call.args.at(0) or ANY, call.node, call.frame)
-    items = owner.items
-    if items.exact is not None and added.exact is not None and len(items.exact + added.exact) < 2048:
-        run.state.store(owner, ITEMS, (Items(items.exact + added.exact),))
-    else:
-        everything = join(items.any_element(), added.any_element())
-        run.state.store(owner, ITEMS, (Items(None, everything),))
-    return NONE
+    added = [elements(run, value, call.node, call.frame) for value in call.args.positional] or [
+        Items(None, ANY)
+    ]
+    exact = _exact(owner)
+    for items in added:
+        exact = None if exact is None or items.exact is None else [*exact, *items.exact]
+    return _stored(
+        run, owner, exact, join_all((owner.items.any_element(), *(i.any_element() for i in added)))
+    )
 
 
 def _insert(run: Run, owner: Sequence, call: Call) -> Value:
-    run.state.store(owner, ITEMS, (Items(None, join(owner.items.any_element(), call.args.at(1) or ANY)),))
-    return NONE
+    index, value = sole(call.args.at(0)), call.args.at(1) or ANY
+    exact = _exact(owner) if type(index) is int else None
+    if exact is not None and isinstance(index, int):
+        exact.insert(index, value)
+    return _stored(run, owner, exact, join(owner.items.any_element(), value))
 
 
-def _pop(run: Run, owner: Sequence, call: Call) -> Value:
+def _pop(run: Run, owner: Sequence, call: Call, first: bool = False) -> Value:
     element = owner.items.any_element()
-    exact = owner.items.exact
-    if exact and not call.args.positional and not owner.summary and not owner.escaped:
-        run.state.store(owner, ITEMS, (Items(exact[:-1]),))
-        return exact[-1]
-    run.state.store(owner, ITEMS, (Items(None, element),))
+    exact = _exact(owner)
+    index = 0 if first else sole(call.args.at(0) or (-1,))
+    if exact and type(index) is int and -len(exact) <= index < len(exact) and owner.kind == "list":
+        taken = exact.pop(index)
+        _stored(run, owner, exact, element)
+        return taken
+    _stored(run, owner, None, element, edited=True)
     return element or ANY
 
 
-def _forget_length(run: Run, owner: Sequence, call: Call) -> Value:
-    run.state.store(owner, ITEMS, (Items(None, owner.items.any_element()),))
-    return NONE
+def _remove(run: Run, owner: Sequence, call: Call) -> Value:
+    """Of texts that are all known, what goes is known."""
+    value = call.args.at(0) or ANY
+    exact = _exact(owner)
+    known = exact is not None and all(len(each) == 1 and isinstance(each[0], str) for each in (*exact, value))
+    if exact is not None and known and value in exact and owner.kind == "list":
+        exact.remove(value)
+        return _stored(run, owner, exact, BOTTOM)
+    return _stored(run, owner, None, owner.items.any_element(), edited=True)
 
 
-def _sorted_in_place(run: Run, owner: Sequence, call: Call) -> Value:
-    element = owner.items.any_element()
-    if "key" not in call.args.keywords and any(isinstance(atom, Instance) for atom in element):
-        element = join(element, unknown("an object in an order that the program defines"))
-    run.state.store(owner, ITEMS, (Items(None, element),))
-    return NONE
+def _clear(run: Run, owner: Sequence, call: Call) -> Value:
+    return _stored(run, owner, [], owner.items.any_element(), edited=True)
+
+
+def _forget_order(run: Run, owner: Sequence, call: Call) -> Value:
+    if "key" in call.args.keywords:
+        run.register_callback(call.args.keywords["key"], 1)
+    return _stored(run, owner, None, owner.items.any_element())
 
 
 def _copy_sequence(run: Run, owner: Sequence, call: Call) -> Value:
@@ -253,16 +214,16 @@ _SEQUENCE: dict[str, SequenceMethod] = {
     "update": _extend,
     "insert": _insert,
     "pop": _pop,
-    "popleft": _pop,
-    "remove": _forget_length,
-    "discard": _forget_length,
-    "clear": _forget_length,
-    "sort": _sorted_in_place,
-    "reverse": _forget_length,
+    "popleft": lambda run, owner, call: _pop(run, owner, call, first=True),
+    "remove": _remove,
+    "discard": _remove,
+    "clear": _clear,
+    "sort": _forget_order,
+    "reverse": _forget_order,
     "copy": _copy_sequence,
     "union": _united,
     "intersection": _united,
-    "difference": _copy_sequence,
+    "difference": _united,
 }
 
 
@@ -271,13 +232,16 @@ _SEQUENCE: dict[str, SequenceMethod] = {
 
 def _get(run: Run, owner: Dictionary, call: Call) -> Value:
     key = call.args.at(0) or ANY
+    picked = chosen_by_parameter(owner, key, call.args.at(1, "default"))
+    if picked is not None:
+        return picked
     found = present(owner.cells.get(OTHER, BOTTOM))
     missing = False
     for atom in key:
-        held, certain = owner.held(atom) if special.is_key(atom) else (BOTTOM, False)
+        held, certain = owner.held(atom) if is_key(atom) else (BOTTOM, False)
         missing = missing or not certain
         found = join(found, held)
-        if not held and not special.is_constant(atom):
+        if not held and not is_constant(atom):
             found = join(found, values_of(owner).any_element())
     if missing or owner.is_open:
         found = join(found, call.args.at(1, "default") or NONE)
@@ -303,29 +267,16 @@ def _pairs(run: Run, owner: Dictionary, call: Call) -> Value:
 
 def _update(run: Run, owner: Dictionary, call: Call) -> Value:
     given = call.args.at(0)
-    if given is not None:
-        add_entries(run, owner, given, call)
+    for atom in given or BOTTOM:
+        if isinstance(atom, Sequence):
+            store_pairs(run, owner, elements(run, (atom,), call.node, call.frame), call)
+        else:
+            copy_dictionary(run, owner, (atom,))
     for name, value in call.args.keywords.items():
         run.state.store(owner, Key(name), value)
     if call.args.more_keywords:
         run.state.store(owner, OTHER, join(owner.cells.get(OTHER, BOTTOM), call.args.more_keywords))
     return NONE
-
-
-def add_entries(run: Run, owner: Dictionary, given: Value, call: Call) -> None:
-    """What ``dict.update`` takes: a mapping, or pairs."""
-    for atom in given:
-        if not isinstance(atom, Sequence):
-            copy_dictionary(run, owner, (atom,))
-            continue
-        items = elements(run, (atom,), call.node, call.frame)
-        for pair in items.exact if items.exact is not None else (items.any_element(),):
-            parts = elements(run, pair, call.node, call.frame).exact
-            if parts and len(parts) == 2 and items.exact is not None:
-                store_item(run, owner, *parts)
-            else:
-                held = parts[1] if parts and len(parts) == 2 else ANY
-                run.state.store(owner, OTHER, join(owner.cells.get(OTHER, BOTTOM), held))
 
 
 def _pop_item(run: Run, owner: Dictionary, call: Call) -> Value:

@@ -69,9 +69,12 @@ def add_endpoints(run: Run, made: EndpointCall, records: list[NodeRecord], call:
     types = argument(call, made.type) or ANY
     qos = known_quality(call, made.qos) if made.qos else ()
     run.understood.add(call.node)
+    kinds = types_of(types)
+    if len(kinds) > 1 and len(names_of(names)) > 1:
+        kinds = [""]  # nobody knows which of them go together
     for record in records:
         for name in names_of(names):
-            for interface_type in types_of(types):
+            for interface_type in kinds:
                 record.add_endpoint(made.kind, name, interface_type, call.source, qos)
     for callback in made.callbacks:
         register(run, callback, call)

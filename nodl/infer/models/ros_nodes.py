@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import yaml
+
+from enclave_common.yaml_reader import load_yaml
 from nodl.builtin_interfaces import LOGGER_SERVICES
 from nodl.infer.findings import NodeRecord
 from nodl.infer.interpreter.conditions import truth
@@ -87,12 +90,10 @@ def _override_parameters(run: Run, record: NodeRecord, arguments: Value) -> None
 
 
 def _yaml_value(text: str) -> Value:
-    import yaml
-
     if text in ("y", "Y", "n", "N"):
         return ANY  # rcl takes them for truth values, YAML 1.2 and PyYAML for texts
     try:
-        value = yaml.safe_load(text)
+        value = load_yaml(text)
     except yaml.YAMLError:
         return ANY
     return (value,) if isinstance(value, str | int | float | bool) else ANY

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from nodl.infer.findings import NodeRecord
+from nodl.infer.interpreter.conditions import truth
 from nodl.infer.interpreter.frames import Call
 from nodl.infer.interpreter.iterate import elements
 from nodl.infer.interpreter.run import Run
@@ -13,6 +14,7 @@ from nodl.infer.values import (
     ABSENT,
     ANY,
     BOTTOM,
+    NONE,
     OTHER,
     OTHER_KEYS,
     Dictionary,
@@ -45,8 +47,13 @@ def _names(call: Call) -> list[str]:
 
 def _declare_parameter(run: Run, record: NodeRecord, call: Call) -> Value:
     names = _names(call)
+    default = _default_value(call.args.at(1, "value"))
+    ignored = truth(call.args.at(3, "ignore_override") or (False,))
     for name in names:
-        record.declare(name, _default_value(call.args.at(1, "value")))
+        record.declare(name, default)
+        if ignored is not False:  # what launch says does not count, or perhaps not
+            record.assigned[name] = default
+            run.state.write(record.cells, name, join(default or NONE, BOTTOM if ignored else ABSENT))
     return parameter_object(run, call, _inputs(run, record, names))
 
 

@@ -6,7 +6,8 @@ message_filters; diagnostic_updater; interactive_markers; image_transport_py. Po
 
 from __future__ import annotations
 
-from enclave_launch.boundary.light import NamedTuple
+from typing import NamedTuple
+
 from nodl.node_interface import EndpointKind
 
 PUBLISHER = EndpointKind.PUBLISHER

@@ -10,11 +10,8 @@ from nodl.infer.interpreter.formatting import as_texts, text_value
 from nodl.infer.interpreter.frames import Arguments, Call
 from nodl.infer.interpreter.iterate import elements
 from nodl.infer.interpreter.run import Model, Run
-from nodl.infer.methods import Getter, Partial, PartialMethod
+from nodl.infer.methods import Partial
 from nodl.infer.models import builtin, options
-from nodl.infer.models.files import CONTENTS
-from nodl.infer.models.iterables import MAX_RANGE
-from nodl.infer.models.reflection import import_dynamic
 from nodl.infer.text import Input, concatenations, make_text
 from nodl.infer.values import (
     ABSENT,
@@ -25,6 +22,7 @@ from nodl.infer.values import (
     ClassValue,
     Dictionary,
     External,
+    HeapObject,
     Instance,
     Items,
     Key,
@@ -34,11 +32,13 @@ from nodl.infer.values import (
     join,
     join_all,
     present,
+    result_of,
     sole,
     unknown,
 )
 
 Method = Callable[[Run, Instance, Call], Value]
+CONTENTS = "the contents of a file, read when the program runs"
 
 
 # --- environment, paths ---------------------------------------------------------------------------------------
@@ -92,15 +92,6 @@ def _partial(run: Run, call: Call) -> Value:
     return (Partial(function, tuple(call.args.positional[1:]), keywords),)
 
 
-def _partial_method(run: Run, call: Call) -> Value:
-    made = _partial(run, call)[0]
-    return (PartialMethod(made),) if isinstance(made, Partial) else ANY
-
-
-def _getter(kind: str) -> Model:
-    return lambda run, call: (Getter(kind, tuple(call.args.positional), tuple(call.args.keywords.items())),)
-
-
 def _thread(run: Run, call: Call) -> Value:
     """``Thread(target=f, args=(...))``: calls ``f`` with these arguments, some time later."""
     target = call.args.at(1, "target") or NONE
@@ -120,6 +111,10 @@ def _register_with(run: Run, target: Value, args: Value | None, kwargs: Value | 
         run.register_callback(target, None)
     elif target != NONE:
         run.register_callback((Partial(target, items.exact, tuple(keywords)),), 0)
+
+
+def _lock(run: Run, call: Call) -> Value:
+    return result_of("threading")
 
 
 def _timer(run: Run, call: Call) -> Value:
@@ -154,6 +149,20 @@ def _simple_namespace(run: Run, call: Call) -> Value:
     return (instance,)
 
 
+def _deep_copy(run: Run, call: Call) -> Value:
+    """A copy of a container of constants; what else is copied is not followed, but may be called."""
+    given = call.args.at(0) or ANY
+    for atom in given:
+        cells = atom.cells.values() if isinstance(atom, Sequence | Dictionary) else ()
+        parts = join_all(
+            each.any_element() if isinstance(each, Items) else (each,) for v in cells for each in v
+        )
+        if any(isinstance(part, HeapObject) for part in parts):
+            run.escape_value(given, opened=False)
+            return unknown("a deep copy")
+    return _copy(run, call)
+
+
 def _copy(run: Run, call: Call) -> Value:
     """Containers get a copy of their own; what is inside is shared, as if it were ``copy.copy``."""
     result: Value = BOTTOM
@@ -164,26 +173,6 @@ def _copy(run: Run, call: Call) -> Value:
         else:
             result = join(result, (atom,))
     return result
-
-
-def _chain(run: Run, call: Call) -> Value:
-    columns = [elements(run, value, call.node, call.frame) for value in call.args.positional]
-    items = Items(None, join_all(column.any_element() for column in columns))
-    if all(column.exact is not None for column in columns):
-        items = Items(tuple(item for column in columns for item in column.exact or ()))
-    return run.sequence(call.node, "list", items)
-
-
-def _product(run: Run, call: Call) -> Value:
-    columns = [elements(run, value, call.node, call.frame) for value in call.args.positional]
-    rows: list[tuple[Value, ...]] = [()]
-    for column in columns:
-        if column.exact is None or len(rows) * len(column.exact) > MAX_RANGE:
-            row = tuple(each.any_element() or ANY for each in columns)
-            return run.sequence(call.node, "list", Items(None, run.tuple_of(row)))
-        rows = [(*row, item) for row in rows for item in column.exact]
-    pairs = tuple(run.tuple_of(row) for row in rows)
-    return run.sequence(call.node, "list", Items(pairs))
 
 
 def _field_names(atom: object) -> list[str] | None:
@@ -235,9 +224,8 @@ FUNCTIONS: dict[str, Model] = {
     "os.path.join": _path_join,
     "os.path.basename": _base_name,
     "functools.partial": _partial,
-    "functools.partialmethod": _partial_method,
-    **{f"operator.{kind}": _getter(kind) for kind in ("methodcaller", "attrgetter", "itemgetter")},
     "functools.reduce": _registered,
+    **{f"threading.{name}": _lock for name in ("Lock", "RLock", "Condition", "Semaphore", "Event")},
     "threading.Thread": _thread,
     "threading.Timer": _timer,
     "multiprocessing.Process": _thread,
@@ -248,14 +236,14 @@ FUNCTIONS: dict[str, Model] = {
     "collections.deque": builtin.FUNCTIONS["builtins.list"],
     "types.SimpleNamespace": _simple_namespace,
     "copy.copy": _copy,
-    "copy.deepcopy": _copy,
-    "itertools.chain": _chain,
-    "itertools.product": _product,
+    "copy.deepcopy": _deep_copy,
     "random.choice": builtin.FUNCTIONS["builtins.next"],
-    "importlib.import_module": import_dynamic,
+    "importlib.import_module": builtin.import_dynamic,
     "atexit.register": _registered,
     **{f"unittest.mock.patch{method}": _patched for method in ("", ".object", ".dict", ".multiple")},
-    **dict.fromkeys(("yaml.safe_load", "yaml.load", "json.load"), lambda run, call: unknown(CONTENTS)),
+    **dict.fromkeys(
+        ("yaml.safe_load", "yaml.load", "json.load", "json.loads"), lambda run, call: unknown(CONTENTS)
+    ),
 }
 
 METHODS: dict[tuple[str, str], Method] = {

@@ -6,8 +6,8 @@ All writers read this; names here are those that apply when launch changes nothi
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from typing import NamedTuple
 
-from enclave_launch.boundary.light import NamedTuple
 from nodl.builtin_interfaces import DISTROS, BuiltinCondition, built_in_interfaces
 from nodl.infer.results import remapped
 from nodl.infer.system import InferredSystem

@@ -30,14 +30,14 @@ _UNKNOWN_QOS = (("history", "SYSTEM_DEFAULT"), ("reliability", "SYSTEM_DEFAULT")
 
 class _Entry(NamedTuple):
     """``name``: as listed, the default; ``template``: how it varies, empty if it does not; ``each``: a list; ``when``:
-    a parameter and the value with which there is such an endpoint."""
+    parameters and the tests (in the words of docs/library.md) under which there is such an endpoint."""
 
     kind: EndpointKind
     name: str
     type: str
     template: str = ""
     each: str = ""
-    when: tuple[str, str] = ("", "")
+    when: tuple[tuple[str, str], ...] = ()
     qos: QosPolicies = ()
 
 
@@ -75,6 +75,10 @@ def open_questions(node: NodeInterface) -> list[str]:
         if _entry(endpoint, node.depends) is None:
             what = f"{endpoint.kind.value.replace('_', ' ')} {endpoint.name}"
             questions.append(f"{endpoint.source}: {what} [{endpoint.type or 'type not known'}]")
+    entries = [entry for each in node.endpoints if (entry := _entry(each, node.depends)) is not None]
+    for kind, name in _clashing(entries):
+        what = f"several interfaces are the {kind.value.replace('_', ' ')} {name} by default, and vary differently"
+        questions.append(f"{node.source}: {what}")
     questions += [f"{node.source}: the program gives its node the rule {rule}" for rule in node.own_rules]
     if not node.global_arguments:
         questions.append(f"{node.source}: {DEAF}")
@@ -92,11 +96,12 @@ def _document(node: NodeInterface, *, listener: bool) -> str:
         f"  {IDENTITY_KEY}:",
         *(f"    {line}" for line in _section(node, entries, listener)),
     ]
-    if node.depends is not None and node.depends.defaults:
+    defaults = _defaults(node)
+    if defaults:
         lines.append("parameters:")
         lines += [
-            f"  {name}: {{type: string, default_value: {_quoted(str(default))}}}"
-            for name, default in sorted(node.depends.defaults.items())
+            f"  {name}: {{type: string, default_value: {_quoted(default)}}}"
+            for name, default in sorted(defaults.items())
         ]
     for category, kind in CATEGORIES.items():
         listed: dict[tuple[str, str], set[QosPolicies]] = {}
@@ -112,6 +117,16 @@ def _document(node: NodeInterface, *, listener: bool) -> str:
     return "\n".join([*lines, ""])
 
 
+def _defaults(node: NodeInterface) -> dict[str, str]:
+    """The defaults of parameters that decide whether there is an endpoint."""
+    found = {name: str(default) for name, default in (node.depends.defaults if node.depends else {}).items()}
+    for endpoint in node.endpoints:
+        for part in endpoint.name.parts:
+            if isinstance(part, ParameterPart) and part.is_condition and part.default is not None:
+                found[part.name] = part.default
+    return found
+
+
 def _qos(found: set[QosPolicies]) -> str:
     known = next(iter(found)) if len(found) == 1 else ()
     return f", qos: {{{', '.join(f'{name}: {value}' for name, value in known or _UNKNOWN_QOS)}}}"
@@ -120,7 +135,12 @@ def _qos(found: set[QosPolicies]) -> str:
 def _section(node: NodeInterface, entries: Iterable[_Entry], listener: bool) -> list[str]:
     namespace = node.namespace if node.namespace not in (None, "/") else None
     library = node.library.value if node.library is not ClientLibrary.UNKNOWN else None
-    fields = {"executable": node.executable, "plugin": node.plugin, "node": node.name}
+    fields = {
+        "package": node.package,
+        "executable": node.executable,
+        "plugin": node.plugin,
+        "node": node.name,
+    }
     fields |= {"namespace": namespace, "library": library}
     lines = [f"{key}: {_quoted(value)}" for key, value in fields.items() if value]
     lines += ["lifecycle: true"] * node.lifecycle + ["tf_listener: true"] * listener
@@ -134,17 +154,48 @@ def _section(node: NodeInterface, entries: Iterable[_Entry], listener: bool) -> 
 
 def _names(entries: Iterable[_Entry]) -> list[str]:
     lines: list[str] = []
-    varying = [entry for entry in entries if entry.template]
+    listed = _by_name(entries)
     for category, kind in CATEGORIES.items():
-        listed = {entry.name: entry for entry in varying if entry.kind is kind}
-        if listed:
+        varying = {name: each for (of, name), each in listed.items() if of is kind and not _is_plain(each)}
+        if varying:
             lines.append(f"  {category}:")
-        for name, entry in sorted(listed.items()):
-            each = f"each: {_quoted(entry.each)}, " if entry.each else ""
-            parameter, value = entry.when
-            when = f", when: {{{_quoted(parameter)}: {_quoted(value)}}}" if parameter else ""
-            lines.append(f"    {_quoted(name)}: {{{each}name: {_quoted(entry.template)}{when}}}")
+        for name, (first, *others) in sorted(varying.items()):
+            each = f"each: {_quoted(first.each)}, " if first.each else ""
+            tests = [_tests(entry.when) for entry in (first, *others)]
+            when = (
+                f", when: {tests[0] if len(tests) == 1 else '[' + ', '.join(tests) + ']'}"
+                if first.when
+                else ""
+            )
+            lines.append(f"    {_quoted(name)}: {{{each}name: {_quoted(first.template or name)}{when}}}")
     return ["names:", *lines] if lines else []
+
+
+def _tests(when: Iterable[tuple[str, str]]) -> str:
+    return "{" + ", ".join(f"{_quoted(parameter)}: {test}" for parameter, test in when) + "}"
+
+
+def _by_name(entries: Iterable[_Entry]) -> dict[tuple[EndpointKind, str], list[_Entry]]:
+    """What the document says of each listed name; QoS and type do not make a difference here."""
+    found: dict[tuple[EndpointKind, str], dict[_Entry, None]] = {}
+    for entry in entries:
+        found.setdefault((entry.kind, entry.name), {})[entry._replace(type="", qos=())] = None
+    return {key: list(each) for key, each in found.items()}
+
+
+def _is_plain(entries: list[_Entry]) -> bool:
+    """Whether the name is there in any case: nothing that it varies with matters then."""
+    return all(not entry.template for entry in entries) and any(not entry.when for entry in entries)
+
+
+def _clashing(entries: Iterable[_Entry]) -> list[tuple[EndpointKind, str]]:
+    """Names that stand for endpoints which vary in different ways; a document has one line for each name."""
+    return [
+        key
+        for key, each in _by_name(entries).items()
+        if len({(entry.template, entry.each) for entry in each}) > 1
+        or (len(each) > 1 and any(not entry.when for entry in each) and not _is_plain(each))
+    ]
 
 
 def _entry(endpoint: Endpoint, depends: Dependence | None = None) -> _Entry | None:
@@ -158,12 +209,42 @@ def _entry(endpoint: Endpoint, depends: Dependence | None = None) -> _Entry | No
     variation = depends.variations.get((endpoint.kind, endpoint.name.text)) if depends is not None else None
     if variation is not None:
         tests = [test for group in variation.when.any_of for test in group]
-        when = (tests[0].parameter, tests[0].values[0]) if tests else ("", "")
-        return _Entry(endpoint.kind, name, endpoint.type, variation.name, "", when, endpoint.qos)
+        told = ((tests[0].parameter, _quoted(tests[0].values[0])),) if tests else ()
+        return _Entry(endpoint.kind, name, endpoint.type, variation.name, "", told, endpoint.qos)
+    when = _conditions(endpoint.name)
+    if when is None:
+        return None
     if template.is_literal:
-        return _Entry(endpoint.kind, name, endpoint.type, qos=endpoint.qos)
+        return _Entry(endpoint.kind, name, endpoint.type, when=when, qos=endpoint.qos)
     written = _written(template)
-    return None if written is None else _Entry(endpoint.kind, name, endpoint.type, *written, qos=endpoint.qos)
+    return (
+        None if written is None else _Entry(endpoint.kind, name, endpoint.type, *written, when, endpoint.qos)
+    )
+
+
+def _conditions(template: NameTemplate) -> tuple[tuple[str, str], ...] | None:
+    """The tests of parameters on which the name depends; ``None`` where a document cannot say them."""
+    parts = [part for part in template.parts if isinstance(part, ParameterPart) and part.is_condition]
+    if len({part.name for part in parts}) < len(parts):
+        return None
+    found: list[tuple[str, str]] = []
+    for part in parts:
+        edit, given = part.edits[-1]
+        if len(part.edits) > 1 or part.item is not None or not _PARAMETER.match(part.name):
+            return None
+        listed = "[" + ", ".join(map(_quoted, given)) + "]"
+        test = {
+            "only if true": '"true"',
+            "only if false": '{not: "true"}',
+            "only if equal": listed,
+            "only if among": listed,
+            "only if different": f"{{not: {listed}}}",
+            "only if not among": f"{{not: {listed}}}",
+        }.get(edit)
+        if test is None or any(text != text.lower() for text in given):
+            return None  # tests of documents do not tell capital letters from small ones
+        found.append((part.name, test))
+    return tuple(found)
 
 
 def _written(template: NameTemplate) -> tuple[str, str] | None:

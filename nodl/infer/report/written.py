@@ -6,7 +6,7 @@ before launch changes them; ``secure-launch`` derives policies per process with 
 
 from __future__ import annotations
 
-from enclave_launch.boundary.terminal import json_text, printable
+from enclave_common.terminal import json_text, printable
 from nodl.infer.report.expanded import ExpandedInterface, ExpandedNode, ExpandedSystem
 from nodl.node_interface import EndpointKind
 from nodl.policy_text import policy_text, profile_lines

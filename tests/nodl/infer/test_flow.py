@@ -226,24 +226,20 @@ _HANDED = """
     """
 
 
-def test_a_generator_function_that_creates_is_a_gap_in_the_hands_of_others(infer: Infer) -> None:
-    system = infer(_HANDED.format(body="yield node.create_publisher(String, name, 1)", handed="topics"))
-    assert [(gap.source.line, gap.why) for gap in system.gaps] == [
-        (
-            7,
-            "topics may be called from somewhere that the analysis did not follow, and would create interfaces",
-        )
-    ]
-
-
 @pytest.mark.parametrize(
     ("body", "handed", "made"),
     [
         ("yield name", "topics", []),
         ("yield node.create_publisher(String, name, 1)", "topics()", ["a", "b"]),
+        ("yield node.create_publisher(String, name, 1)", "topics", ["a", "b"]),
         ("node.create_publisher(String, name, 1)", "topics", ["a", "b"]),
     ],
-    ids=["it creates nothing", "the generator itself is handed over", "an ordinary function"],
+    ids=[
+        "it creates nothing",
+        "the generator itself is handed over",
+        "what makes it is",
+        "an ordinary function",
+    ],
 )
 def test_what_others_may_run_and_was_followed_is_no_gap(
     body: str, handed: str, made: list[str], infer: Infer
@@ -251,3 +247,10 @@ def test_what_others_may_run_and_was_followed_is_no_gap(
     system = infer(_HANDED.format(body=body, handed=handed))
     assert sorted(str(each.name) for node in system.nodes for each in node.endpoints) == made
     assert (list(system.gaps), [gap for node in system.nodes for gap in node.gaps]) == ([], [])
+
+
+def test_parts_of_an_element_that_may_not_go_together_are_a_pattern(node_body: NodeBody) -> None:
+    entries = "self.declare_parameter('l', ['motor:left', 'arm:right']).value"
+    body = f"for each in {entries}:\n    first, last = each.split(':')\n    self.P(first + '/' + last)"
+    assert node_body(body) == ["param:l/?"]
+    assert node_body(body.replace(entries, "['motor:left', 'arm:right']")) == ["arm/right", "motor/left"]

@@ -17,31 +17,27 @@ from nodl.infer.start import LaunchKey
 
 PROGRAM = """\
 #!/usr/bin/python3
-import json
 import rclpy
 from std_msgs.msg import String
-from ament_index_python.packages import get_package_share_directory
-import names
+import names, more, some_library
 rclpy.init()
 node = rclpy.create_node("n")
-with open(get_package_share_directory("data") + "/topics.json") as file:
-    for topic in json.load(file):
-        node.create_publisher(String, topic, 1)
+for topic in more.TOPICS:
+    node.create_publisher(String, topic, 1)
 node.create_publisher(String, names.FIRST, 1)
 """
 
 
 @pytest.fixture
 def prefix(tmp_path: Path) -> Path:
-    """A program with a module beside it, which reads a file of another package."""
+    """A program with two modules beside it."""
     prefix = tmp_path / "install"
-    for package in ("demo", "data"):
-        _install(prefix, package)
+    _install(prefix, "demo")
     (prefix / "lib/demo").mkdir(parents=True)
     (prefix / "lib/demo/program").write_text(PROGRAM)
     (prefix / "lib/demo/program").chmod(0o755)
     (prefix / "lib/demo/names.py").write_text("FIRST = 'first'\n")
-    (prefix / "share/data/topics.json").write_text('["second"]')
+    (prefix / "lib/demo/more.py").write_text("TOPICS = ['second']\n")
     return prefix
 
 
@@ -88,15 +84,15 @@ CHANGES: dict[str, tuple[Callable[[Path], object], list[str]]] = {
         lambda prefix: (prefix / "lib/demo/names.py").write_text("FIRST = 'other'\n"),
         ["other", "second"],
     ),
-    "a file that it reads": (
-        lambda prefix: (prefix / "share/data/topics.json").write_text('["fourth"]'),
+    "another module that it imports": (
+        lambda prefix: (prefix / "lib/demo/more.py").write_text("TOPICS = ['fourth']\n"),
         ["first", "fourth"],
     ),
     "a library that was not there and now is": (
-        lambda prefix: (prefix / "lib/demo/json.py").write_text(
-            "def load(file):\n    return ['from the module']\n"
+        lambda prefix: (prefix / "lib/demo/some_library.py").write_text(
+            "import more\nmore.TOPICS.append('third')\n"
         ),
-        ["first", "from the module"],
+        ["first", "second", "third"],
     ),
 }
 
@@ -109,26 +105,17 @@ def test_a_change_is_seen(what: str, prefix: Path) -> None:
     assert _names(prefix) == after
 
 
-def test_a_package_in_a_prefix_that_comes_first_is_seen(prefix: Path, tmp_path: Path) -> None:
-    overlay = tmp_path / "overlay"
-    _install(overlay, "other")
-    assert _names(overlay, prefix) == ["first", "second"]
-    _install(overlay, "data")
-    (overlay / "share/data/topics.json").write_text('["overlaid"]')
-    assert _names(overlay, prefix) == ["first", "overlaid"]
-
-
 def test_what_was_changed_back_is_known_again(prefix: Path, analyses: list[str]) -> None:
-    topics = prefix / "share/data/topics.json"
-    for content in ('["second"]', '["fourth"]', '["second"]', '["fourth"]'):
-        topics.write_text(content)
+    topics = prefix / "lib/demo/more.py"
+    for content in ("second", "fourth", "second", "fourth"):
+        topics.write_text(f"TOPICS = ['{content}']\n")
         _names(prefix)
     assert len(analyses) == 2
 
 
 def test_an_answer_ends_with_any_change_of_our_own_code() -> None:
     script = (
-        "import sys, nodl.infer.python_program, nodl.infer.models.named_tuples\n"
+        "import sys, nodl.infer.python_program\n"
         "print(*(m.__file__ for n, m in sys.modules.items() if n.startswith('nodl.')), sep='\\n')"
     )
     loaded = subprocess.run(
@@ -142,7 +129,7 @@ def test_an_answer_ends_with_any_change_of_our_own_code() -> None:
 def test_a_damaged_entry_is_not_believed(prefix: Path, kept_answers: Path, analyses: list[str]) -> None:
     _names(prefix)
     (entry,) = (
-        each for each in kept_answers.rglob("*") if each.is_file() and b"topics.json" in each.read_bytes()
+        each for each in kept_answers.rglob("*") if each.is_file() and b"more.py" in each.read_bytes()
         and str(prefix).encode() in each.read_bytes()
     )  # fmt: skip
     entry.write_bytes(entry.read_bytes().replace(b"second", b"stolen"))

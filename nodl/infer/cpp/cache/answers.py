@@ -48,10 +48,14 @@ def _says_the_same(start: Start | None, asked: Iterable[Asked]) -> bool:
 
 
 class Made(NamedTuple):
-    """An answer, with the digest of each file that it was made from."""
+    """An answer, with the digest of each file that it was made from.
+
+    ``lasting``: another run would answer the same; one that failed for want of memory may not.
+    """
 
     answer: Any
     files: Mapping[str, str]
+    lasting: bool = True
 
 
 class Answers:
@@ -75,7 +79,9 @@ class Answers:
         return None
 
     def keep(self, question: object, made: Made, start: WatchedStart | None = None) -> None:
-        """Kept for the next run, with what was asked of the launch."""
+        """Keep a lasting answer for the next run, with what was asked of the launch."""
+        if not made.lasting:
+            return
         key = self._key(question, start)
         asked = tuple(start.asked) if start is not None else ()
         variant = (asked, tuple(sorted(made.files.items())), made.answer)

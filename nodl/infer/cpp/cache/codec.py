@@ -7,9 +7,9 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
+from enum import Enum
 from typing import Any
 
-from enclave_launch.boundary.light import TextEnum
 from nodl.dependence import Dependence, Test, Variation, When
 from nodl.infer.cpp.cache.folder import CacheFolder
 from nodl.infer.cpp.entry import Entry, FixedMapping, Solved
@@ -25,14 +25,14 @@ _RECORDS: dict[str, Callable[..., Any]] = {
         Test, UnknownPart, Variation, When,
     )
 }  # fmt: skip
-_ENUMERATIONS: dict[str, type[TextEnum]] = {
+_ENUMERATIONS: dict[str, type[Enum]] = {
     each.__name__: each for each in (Certainty, ClientLibrary, EndpointKind)
 }
 
 
 def encoded(value: object) -> object:
     """``value`` as what JSON has. Raises ``TypeError`` for what is not on the list."""
-    if isinstance(value, TextEnum):
+    if isinstance(value, Enum):
         return {"enum": type(value).__name__, "value": value.value}
     if value is None or isinstance(value, str | bool | int | float):
         return value

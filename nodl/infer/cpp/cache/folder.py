@@ -11,7 +11,7 @@ import os
 import stat
 import tempfile
 
-from enclave_launch.boundary.files import read_bytes
+from enclave_common.files import read_bytes
 
 _LIMIT = 32 * 2**20  # of one entry
 _MOST_ENTRIES = 2_000

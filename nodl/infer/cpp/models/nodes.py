@@ -19,11 +19,11 @@ from nodl.infer.cpp.libraries import (
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.launch_values import text_of
 from nodl.infer.cpp.running.machine import Machine
-from nodl.infer.cpp.running.notes import Notes
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     Map,
     NodeNamePart,
+    Notes,
     Obj,
     Param,
     Seq,

@@ -8,7 +8,7 @@ from __future__ import annotations
 from nodl.builtin_interfaces import PARAMETER_SERVICES
 from nodl.infer.cpp.findings import AllocatedNode
 from nodl.infer.cpp.libraries import Call, library_class, library_function, library_method, node_method
-from nodl.infer.cpp.models.interfaces import CLI, SUB, named_in, node_of, owner_in
+from nodl.infer.cpp.models.interfaces import CLI, SUB, node_of, owner_in
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.contents import handed_over, nodes_in
 from nodl.infer.cpp.running.launch_values import text_of
@@ -147,14 +147,17 @@ _CLIENTS = ("rclcpp::AsyncParametersClient", "rclcpp::SyncParametersClient")
 
 @library_class(*_CLIENTS)
 def _client(run: Machine, call: Call) -> None:
-    """Six clients below the name of the remote node; without one, of the node itself."""
-    record, texts = node_of(run, call, call.this.type.last), named_in(call.values)
+    """(node or its four interfaces, name of the remote node, ...): six clients below that name; below the node's own
+    where it is empty."""
+    record = node_of(run, call, call.this.type.last)
     if record is None:
         return
-    remote = texts[0] if texts else (Text((NodeNamePart(record, "fqn"),)),)
-    unclear = [v for v in call.values if v and all(isinstance(a, Unknown) for a in v)]
-    if not texts and any("name" in a.why or "node" in a.why for v in unclear for a in v):
-        remote = unclear[0]
+    position = 4 if nodes_in(call.value(1)) else 1
+    own = Text((NodeNamePart(record, "fqn"),))
+    given = call.value(position) or (
+        literal("") if position >= len(call.values) else unknown("a name that is not set")
+    )
+    remote = tuple(own if atom == Text(()) else atom for atom in given)
     for service, kind in PARAMETER_SERVICES.items():
         run.endpoint(record, CLI, concatenated(remote, literal(f"/{service}")), kind, call)
     call.this.data["owner"] = owner_in(call.values)
@@ -171,10 +174,13 @@ def _on_event(run: Machine, call: Call) -> Value:
 
 
 def _client_method(run: Machine, call: Call) -> Value:
+    if call.this.type.last.startswith("Sync"):  # it spins its node until the answer is there
+        run.store.others_run()
     handed_over(run, "a parameter client", call.values, call.node, call.frame)
     return unknown("what another node's parameters are")
 
 
+library_function(*(f"{cls}::on_parameter_event" for cls in _CLIENTS))(_on_event)
 for _cls in _CLIENTS:
     library_method(_cls, "on_parameter_event")(_on_event)
     library_method(_cls, "wait_for_service", "service_is_ready", "get_parameters", "get_parameter", "set_parameters",

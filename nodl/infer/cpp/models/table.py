@@ -40,7 +40,7 @@ from nodl.infer.cpp.models.nodes import become_node
 from nodl.infer.cpp.models.parameters import read
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.machine import Machine
-from nodl.infer.cpp.running.values import BOTTOM, Text, Value, concatenated, literal, unknown
+from nodl.infer.cpp.running.values import BOTTOM, NodeNamePart, Text, Value, concatenated, literal, unknown
 from nodl.name_template import ParameterPart
 from nodl.node_interface import EndpointKind
 
@@ -78,6 +78,8 @@ ROWS: dict[str, tuple[Makes, ...]] = {
         Makes(PUB, "{0}/update", "visualization_msgs/msg/InteractiveMarkerUpdate"),
         Makes(SUB, "{0}/feedback", "visualization_msgs/msg/InteractiveMarkerFeedback"),
     ),
+    # ros/diagnostics ros2 431926f: self_test/include/self_test/test_runner.hpp
+    "self_test::TestRunner": (Makes(SRV, "{node}/self_test", "diagnostic_msgs/srv/SelfTest"),),
     # Where the sources of nav2 are not in reach. ros-navigation/navigation2 humble 3c3db59d6, jazzy f4108e5b1,
     # kilted 71a1d84f4, main a3a97043e: nav2_util (nav2_ros_common in main) simple_action_server.hpp,
     # service_client.hpp, odometry_utils.hpp, lifecycle_service_client.hpp, twist_publisher.hpp,
@@ -132,7 +134,11 @@ def _make(row: Sequence[Makes], run: Machine, call: Call) -> None:
     for each in row:
         kind = call.interface if each.type == "T0" else each.type
         alone = Call(call.node, call.frame, [], receiver=owner)
-        add(run, owner, each.kind, _named(each.name, texts_in(call.values)), kind, alone)
+        assert owner.node is not None
+        own = (Text((NodeNamePart(owner.node, "name"),)),)
+        name = each.name.removeprefix("{node}")
+        named = _named(name, texts_in(call.values))
+        add(run, owner, each.kind, concatenated(own, named) if name != each.name else named, kind, alone)
 
 
 _GIVEN = re.compile(r"\{(\d)(?:=([^}]*))?\}")
@@ -199,6 +205,13 @@ def _listener(run: Machine, call: Call) -> None:
 
 def _may_be_node(value: Value) -> bool:
     return not value or not all(isinstance(atom, bool) for atom in value)
+
+
+@library_class("rclcpp::node_interfaces::NodeInterfaces")
+def _node_interfaces(run: Machine, call: Call) -> Value | None:
+    """rclcpp/node_interfaces/node_interfaces.hpp: parts of a node, which stand for it."""
+    owner = owner_in(call.values)
+    return (owner,) if owner is not None else None
 
 
 @library_class("tf2_ros::StaticTransformListener")

@@ -8,24 +8,12 @@ from __future__ import annotations
 import glob
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from enclave_launch.boundary.files import read_text
-from nodl.infer.cpp.reading.cmake_language import (
-    BLOCK_ENDS,
-    LINK_WORDS,
-    Command,
-    Layer,
-    absolute,
-    commands,
-    compile_definitions,
-    condition_state,
-    end_of_block,
-    expand,
-    recursive_pattern,
-)
+from enclave_common.files import read_text
 
 _SOURCE_SUFFIXES = (".cpp", ".cc", ".cxx", ".c++", ".C")
 _EXECUTABLES = frozenset({
@@ -61,6 +49,9 @@ class Build:
     plugin_files: list[str] = field(default_factory=list)
     includes: list[str] = field(default_factory=list)
     renamed: dict[str, str] = field(default_factory=dict)  # target -> OUTPUT_NAME
+    parameter_files: dict[str, str] = field(
+        default_factory=dict
+    )  # header of generate_parameter_library -> YAML
 
 
 def read_build(folder: str | None) -> Build:
@@ -76,6 +67,7 @@ class _Reader:
         self.build = build
         self.functions: dict[str, tuple[bool, list[str], list[Command]]] = {}
         self.steps = 0
+        self.included: list[str] = []  # files that are being read
         self.definitions: dict[str, str] = {}
 
     def read(self, folder: str, variables: dict[str, str]) -> None:
@@ -173,6 +165,8 @@ class _Reader:
                 target.links.append(word[len("$<TARGET_OBJECTS:") :].rstrip(">"))
                 continue
             file = absolute(word, variables)
+            if not os.path.splitext(file)[1]:  # CMP0115: a name without its suffix
+                file = next((file + each for each in _SOURCE_SUFFIXES if os.path.isfile(file + each)), file)
             if file.endswith(_SOURCE_SUFFIXES) and file not in target.sources:
                 target.sources.append(file)
 
@@ -183,9 +177,11 @@ class _Reader:
         variables[given[0]] = ";".join(word for word in words if word != "PARENT_SCOPE")
 
     def _do_list(self, given: list[str], variables: dict[str, str]) -> None:
+        before = [variables[given[1]]] if len(given) > 1 and variables.get(given[1]) else []
         if given[0] == "APPEND" and len(given) > 1:
-            before = [variables[given[1]]] if variables.get(given[1]) else []
             variables[given[1]] = ";".join([*before, *given[2:]])
+        elif given[0] in ("INSERT", "PREPEND") and len(given) > 2:
+            variables[given[1]] = ";".join([*given[2 + (given[0] == "INSERT") :], *before])
 
     def _do_cmake_parse_arguments(self, given: list[str], variables: dict[str, str]) -> None:
         """``PREFIX options one-value-words multi-value-words arguments...``; empty lists are kept as empty words."""
@@ -245,6 +241,24 @@ class _Reader:
         if os.path.basename(folder) not in ("test", "tests"):
             self.read(folder, variables)
 
+    def _do_include(self, given: list[str], variables: dict[str, str]) -> None:
+        """A file of the package, or a module in a folder of ``CMAKE_MODULE_PATH``."""
+        folders = (".", *variables.get("CMAKE_MODULE_PATH", "").split(";"))
+        names = (given[0], f"{given[0]}.cmake")
+        paths = (absolute(os.path.join(folder, name), variables) for folder in folders for name in names)
+        file = next((path for path in paths if os.path.isfile(path)), None)
+        if file is None or file in self.included:
+            return
+        self.included.append(file)
+        with suppress(OSError):
+            listed = list(commands(read_text(file, errors="replace")))
+            self.run(listed, Layer(variables, {"CMAKE_CURRENT_LIST_DIR": os.path.dirname(file)}))
+        self.included.pop()
+
+    def _do_generate_parameter_library(self, given: list[str], variables: dict[str, str]) -> None:
+        if len(given) > 1:
+            self.build.parameter_files[given[0]] = absolute(given[1], variables)
+
     def _do_include_directories(self, given: list[str], variables: dict[str, str]) -> None:
         self.build.includes += [absolute(word, variables) for word in given if not word.startswith("$")]
 
@@ -280,3 +294,112 @@ class _Reader:
     ) -> None:
         if len(given) > 1:
             self.build.plugin_files.append(absolute(given[1], variables))
+
+
+_ARGUMENT = re.compile(
+    r'\[(=*)\[((?:.|\n)*?)\]\1\]|"((?:\\.|[^"\\])*)"|((?:\\.|[^\s()"\\])(?:\\.|"(?:\\.|[^"\\])*"|[^\s()"\\])*)|([()])'
+)
+_COMMAND = re.compile(r"[ \t]*(\w+)\s*\(")
+_VARIABLE = re.compile(r"\$\{([\w.\-]+)\}")
+LINK_WORDS = frozenset({"PUBLIC", "PRIVATE", "INTERFACE", "SYSTEM"})
+BLOCK_ENDS = {name: f"end{name}" for name in ("if", "foreach", "function", "macro", "while")}
+
+Command = tuple[str, list[str]]
+
+
+def commands(source: str) -> Iterator[Command]:
+    """Every command with its arguments, parentheses kept as arguments of their own."""
+    source = re.sub(r"#\[(=*)\[(?:.|\n)*?\]\1\]|(?<!\\)#[^\n]*", "", source)
+    position = 0
+    while True:
+        match = _COMMAND.search(source, position)
+        if match is None:
+            return
+        words: list[str] = []
+        depth, position = 1, match.end()
+        while depth and (found := _ARGUMENT.search(source, position)):
+            position = found.end()
+            if found[5]:
+                depth += 1 if found[5] == "(" else -1
+                if depth:
+                    words.append(found[5])
+            elif found[3] is not None:
+                words.append('"' + found[3])
+            else:
+                words.append(found[2] or found[4] or "")
+        yield match[1].lower(), words
+        if depth:
+            return
+
+
+class Layer(dict[str, str]):
+    """Variables of a loop or macro: new ones here, all others written through."""
+
+    def __init__(self, outer: dict[str, str], own: dict[str, str]):
+        super().__init__({**outer, **own})
+        self._outer, self._own = outer, set(own)
+
+    def __setitem__(self, name: str, value: str) -> None:
+        super().__setitem__(name, value)
+        if name not in self._own:
+            self._outer[name] = value
+
+
+def end_of_block(listed: Sequence[Command], start: int) -> int:
+    """The index of the command that closes the block at ``start``; of the last command if none does."""
+    name = listed[start][0]
+    depth = 0
+    for index in range(start, len(listed)):
+        depth += (listed[index][0] == name) - (listed[index][0] == BLOCK_ENDS[name])
+        if depth == 0:
+            return index
+    return len(listed) - 1
+
+
+def expand(words: list[str], variables: dict[str, str]) -> list[str]:
+    """Variables filled in; lists become several arguments unless they stand in quotes."""
+    found: list[str] = []
+    for word in words:
+        quoted = word.startswith('"')
+        for _ in range(8):
+            filled = _VARIABLE.sub(lambda match: variables.get(match[1], ""), word)
+            if filled == word:
+                break
+            word = filled
+        found += [word[1:]] if quoted else [part for part in word.split(";") if part]
+    return found
+
+
+def condition_state(condition: list[str]) -> bool | None:
+    """Whether a condition holds on Linux without tests; ``None`` for all but a few simple ones."""
+    words = [word.lstrip('"') for word in condition if word not in ("(", ")")]
+    written = " ".join(words)
+    if written in ("BUILD_TESTING", "CATKIN_ENABLE_TESTING", "WIN32", "APPLE", "MSVC", "ANDROID", "FALSE"):
+        return False
+    if written in ("NOT WIN32", "UNIX", "TRUE", "NOT APPLE"):
+        return True
+    return False if "BUILD_TESTING" in words and "NOT" not in words and "OR" not in words else None
+
+
+def absolute(word: str, variables: dict[str, str]) -> str:
+    """A path as seen from ``CMAKE_CURRENT_SOURCE_DIR``, normalised; an absolute one stays where it is."""
+    return os.path.normpath(os.path.join(variables.get("CMAKE_CURRENT_SOURCE_DIR", ""), word))
+
+
+def recursive_pattern(pattern: str, how: str) -> str:
+    """For ``GLOB_RECURSE`` the pattern with ``**`` before the file name; else the pattern as it is."""
+    folder, name = os.path.split(pattern)
+    return os.path.join(folder, "**", name) if how == "GLOB_RECURSE" else pattern
+
+
+def compile_definitions(words: list[str], only_flags: bool = False) -> dict[str, str]:
+    """Macros with their values, ``1`` by default; with ``only_flags`` only words that start with ``-D``."""
+    found = {}
+    for word in words:
+        if word.startswith("-D"):
+            word = word[2:]
+        elif only_flags or word.startswith(("-", "$")) or word in LINK_WORDS:
+            continue
+        name, _, value = word.partition("=")
+        found[name] = value.replace('\\"', '"') or "1"
+    return found

@@ -20,12 +20,14 @@ from nodl.infer.cpp.reading.declarations import (
     template_defaults,
     template_names,
     type_text,
+    unnamed,
     written_name,
 )
 from nodl.infer.cpp.reading.preprocess import Preprocessed
 from nodl.infer.cpp.reading.type_names import split_type
 from nodl.infer.cpp.syntax import Node, children, field_of, line_of, parse, parse_expression, text, walk
 
+_STRUCTURES = ("class_specifier", "struct_specifier", "union_specifier")
 _USING = re.compile(r"\busing\s+namespace\s+([\w:]+)\s*;")
 
 
@@ -61,7 +63,7 @@ class _Collector:
                 *(part.strip() for part in name.removeprefix("inline").split("::") if part.strip()),
             )
             self.collect(_required(child, "body"), inner, [])
-        elif kind in ("class_specifier", "struct_specifier"):
+        elif kind in _STRUCTURES:
             self.class_(child, scope, templates)
         elif kind == "function_definition":
             self.function(child, scope, templates, cls)
@@ -89,18 +91,16 @@ class _Collector:
 
     # --- classes ----------------------------------------------------------------------------------------
 
-    def class_(self, node: Node, scope: Scope, templates: list[str]) -> None:
+    def class_(self, node: Node, scope: Scope, templates: list[str], name: str = "") -> None:
+        """Add a class; ``name``: what a ``typedef`` calls one that has none itself."""
         body = field_of(node, "body")
         named = field_of(node, "name")
         if body is None:
             return
-        written = text(named).partition("<")[0]
+        written = text(named).partition("<")[0] or name or unnamed(node)
         steps = [step for step in written.split("::") if step]
-        name = steps[-1] if steps else f"(unnamed at {line_of(node)})"
-        inner = (*scope, *steps) if steps else scope
-        made = Class(
-            name, "::".join((*scope, *(steps or [name]))), self.index, node, inner, templates=templates
-        )
+        name, inner = steps[-1], (*scope, *steps)
+        made = Class(name, "::".join(inner), self.index, node, inner, templates=templates)
         made.specialises = split_type(text(named))[1] or None
         made.template_defaults, self.defaults = (self.defaults if templates else {}), {}
         for child in node.named_children:
@@ -192,7 +192,7 @@ class _Collector:
 
     def declaration(self, node: Node, scope: Scope, templates: list[str], cls: Class | None) -> None:
         kind = field_of(node, "type")
-        if kind is not None and kind.type in ("class_specifier", "struct_specifier"):
+        if kind is not None and kind.type in _STRUCTURES:
             self.class_(kind, scope, templates)
         elif kind is not None and kind.type == "enum_specifier":
             self.enum(kind, scope)
@@ -249,8 +249,12 @@ class _Collector:
         if node.type == "type_definition":
             names = [child for child in node.named_children if child.type == "type_identifier"]
             kind = field_of(node, "type")
-            if kind is not None and kind.type in ("struct_specifier", "class_specifier"):
-                self.class_(kind, scope, [])
+            if kind is not None and kind.type in _STRUCTURES and field_of(kind, "body") is not None:
+                own = "" if field_of(kind, "name") is not None or not names else text(names[-1])
+                self.class_(kind, scope, [], own)
+                if own:
+                    return
+                kind = field_of(kind, "name") or kind
             if kind is not None and kind.type == "enum_specifier":
                 self.enum(kind, scope)
                 self.index.enums |= {text(name) for name in names}
@@ -321,11 +325,11 @@ class DeclaredVariable(NamedTuple):
 def declared_names(node: Node) -> list[DeclaredVariable]:
     """The variables of a declaration."""
     found: list[DeclaredVariable] = []
-    values = node.children_by_field_name("default_value")
+    values = node.children_by_field_name("default_value") or node.children_by_field_name("value")
     for declarator in node.children_by_field_name("declarator"):
         value = None
         inner: Node | None = declarator
-        pointer, array = False, False
+        pointer, array, size = False, False, ""
         while inner is not None and inner.type not in (
             "identifier",
             "field_identifier",
@@ -334,7 +338,8 @@ def declared_names(node: Node) -> list[DeclaredVariable]:
             if inner.type == "init_declarator":
                 value = field_of(inner, "value")
             pointer = pointer or inner.type in ("pointer_declarator", "reference_declarator")
-            array = array or inner.type == "array_declarator"
+            if inner.type == "array_declarator":
+                array, size = True, "" if array else text(field_of(inner, "size"))
             inner = field_of(inner, "declarator") or next(
                 (c for c in inner.named_children if c.type.endswith(("declarator", "identifier"))), None
             )
@@ -342,7 +347,8 @@ def declared_names(node: Node) -> list[DeclaredVariable]:
             later = [v for v in values if v.start_byte >= declarator.end_byte]
             written = type_text(node)
             if array and (pointer or written not in ("char", "unsigned char")):
-                written, pointer = f"std::array<{written}{' *' if pointer else ''}>", False
+                counted = f", {size}" if size.isdigit() else ""
+                written, pointer = f"std::array<{written}{' *' if pointer else ''}{counted}>", False
             found.append(
                 DeclaredVariable(text(inner), value or (later[0] if later else None), pointer, written)
             )

@@ -18,6 +18,7 @@ _LITERAL = re.compile(r'"(?:\\.|[^"\\\n])*"')
 Scope = tuple[str, ...]  # namespaces and classes around a declaration
 
 
+_MENTIONED = re.compile(r"[A-Za-z_]\w*\b(?!\s*::(?!\s*(?:make_|[Cc]reate|Make)))")
 _NUMBERS = frozenset({
     "bool", "int", "double", "float", "size_t", "unsigned", "unsigned int", "std::size_t", "unsigned char",
 })  # fmt: skip
@@ -54,9 +55,14 @@ class Function:
 
     @property
     def words(self) -> frozenset[str]:
-        """Every identifier in it: whoever it may call is among them."""
+        """Every identifier in it but for its own name, and for scopes: whoever it may call is among them."""
         if self._words is None:
-            self._words = frozenset(re.findall(r"[A-Za-z_]\w*", _LITERAL.sub("", text(self.node))))
+            named = field_of(function_declarator(self.node), "declarator")
+            source, start = self.node.text or b"", self.node.start_byte
+            if named is not None:
+                source = source[: named.start_byte - start] + source[named.end_byte - start :]
+            written = _LITERAL.sub("", source.decode("utf-8", "replace"))
+            self._words = frozenset(_MENTIONED.findall(written))
         return self._words
 
     @property
@@ -187,7 +193,19 @@ def function_declarator(node: Node) -> Node | None:
 
 def type_text(node: Node) -> str:
     """The type as written, on one line, without ``const``, ``&`` and ``*`` around it; may be empty."""
-    return " ".join(text(field_of(node, "type")).split())
+    kind = field_of(node, "type")
+    if kind is not None and kind.type in BODIES and field_of(kind, "body") is not None:
+        return text(field_of(kind, "name")) or unnamed(kind)
+    return " ".join(text(kind).split())
+
+
+BODIES = ("class_specifier", "struct_specifier", "union_specifier", "enum_specifier")
+"""What declares a type where it is used."""
+
+
+def unnamed(node: Node) -> str:
+    """A name for a structure without one."""
+    return f"unnamed_{line_of(node)}_{node.start_point[1]}"
 
 
 def parameters_of(declarator: Node, function: Function | None = None) -> list[FunctionParameter]:

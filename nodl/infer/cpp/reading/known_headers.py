@@ -18,10 +18,17 @@ KNOWN_HEADERS = frozenset({
     "image_geometry", "angles", "rosidl_runtime_cpp", "kdl_parser", "rosidl_runtime_c", "rosidl_typesupport_cpp",
     "rosidl_typesupport_introspection_cpp", "Eigen", "opencv2", "boost", "pcl", "yaml-cpp", "nlohmann", "sys", "linux",
     "netinet", "arpa", "gtest", "gmock", "benchmark", "ompl", "ceres", "pcl_conversions", "urdf_parser", "suitesparse",
-    "filters", "resource_retriever", "tracetools", "tinyxml2", "behaviortree_cpp", "behaviortree_cpp_v3", "nanoflann",
+    "filters", "point_cloud_transport",
+    "resource_retriever", "tracetools", "tinyxml2", "behaviortree_cpp", "behaviortree_cpp_v3", "nanoflann",
     "geographic_msgs", "GeographicLib", "eigen3_cmake_module", "rsl", "fmt", "parameter_traits", "control_toolbox",
     "urdf_model", "sdf", "lifecycle_msgs", "OGRE", "tbb", "xtensor", "Magick++", "GraphicsMagick", "console_bridge",
-    "ruckig", "octomap", "fcl", "grid_map_core", "libstatistics_collector",
+    "ruckig", "octomap", "fcl", "grid_map_core", "libstatistics_collector", "libphidget22", "urg_c", "rttest",
+    "ur_client_library", "gtsam", "ouster", "depthai", "librealsense2", "sl", "libobsensor", "apriltag", "asio", "zmq",
+    "websocketpp", "open3d", "gz", "ignition", "cartographer", "Sophus", "sophus", "g2o", "torch", "absl", "glog",
+    "gflags", "google", "mavconn", "mavlink", "async_web_server_cpp", "dynamixel_sdk", "serial", "serial_driver",
+    "io_context", "udp_driver", "libcamera", "nlohmann_json", "spdlog", "casadi", "pinocchio", "osqp", "gps", "libgps",
+    "mcap", "zstd", "rosbag2_storage", "geometric_shapes", "eigen_stl_containers", "random_numbers", "srdfdom",
+    "rviz_rendering", "rviz_ogre_vendor", "polyclipping", "backward_ros", "range", "magic_enum", "tl_expected",
 })  # fmt: skip
 
 
@@ -29,6 +36,7 @@ KNOWN_HEADERS = frozenset({
 ROS_LIBRARIES = frozenset({
     "rclcpp", "rclcpp_lifecycle", "rclcpp_action", "rclcpp_components", "tf2_ros", "image_transport", "message_filters",
     "diagnostic_updater", "nav2_util", "interactive_markers", "camera_info_manager", "realtime_tools", "bond",
+    "point_cloud_transport",
 })  # fmt: skip
 
 

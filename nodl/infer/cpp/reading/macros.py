@@ -32,16 +32,15 @@ class Macro(NamedTuple):
 
 def expanded(source: str, macros: Mapping[str, Macro], depth: int = 0) -> str:
     """``source`` with every use of ``macros`` replaced, on the line where the use begins."""
-    names = {name for name, macro in macros.items() if not macro.uncertain}
-    if not names or depth > MAX_DEPTH:
+    if not macros or depth > MAX_DEPTH:
         return source
     out: list[str] = []
     position = 0
     for match in _WORD.finditer(source):
         word = match[0]
-        if match.start() < position or word not in names:
+        macro = macros.get(word)
+        if match.start() < position or macro is None or macro.uncertain:
             continue
-        macro = macros[word]
         end, given = match.end(), None
         if macro.parameters is not None:
             given, end = _arguments(source, match.end())

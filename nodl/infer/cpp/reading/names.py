@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property, update_wrapper
 from typing import Any, Concatenate, ParamSpec, TypeVar
@@ -18,6 +19,14 @@ _WRAPPERS = frozenset({
 })  # fmt: skip
 
 
+STANDARD_TYPES = frozenset({
+    "string", "stringstream", "ostringstream", "istringstream", "vector", "array", "list", "deque", "set", "map",
+    "unordered_set", "unordered_map", "multiset", "multimap", "queue", "stack", "pair", "tuple", "optional", "variant",
+    "function", "shared_ptr", "unique_ptr", "weak_ptr", "thread", "mutex", "recursive_mutex", "lock_guard",
+    "unique_lock", "scoped_lock", "atomic", "ifstream", "ofstream", "fstream", "string_view", "initializer_list",
+    "condition_variable", "reference_wrapper", "any", "exception", "runtime_error", "bitset", "complex", "future",
+    "promise", "regex", "random_device", "mt19937", "priority_queue", "forward_list", "jthread",
+})  # fmt: skip
 _INTERFACES = re.compile(r"/(?:msg|srv|action)/")
 
 Asked = ParamSpec("Asked")
@@ -115,11 +124,6 @@ class Names:
         """Those that ``using namespace`` brings into a file, its headers included."""
         seen = (self.files[each] for each in sorted(self.visible(file)) if each in self.files)
         return tuple(used for index in seen for used in index.using)
-
-    @cached_property
-    def has_conversions(self) -> bool:
-        """Whether a class has a conversion operator with a body."""
-        return any(name.startswith("operator ") for found in self.methods.values() for name in found)
 
     @cached_property
     def functions_by_name(self) -> dict[str, list[Function]]:
@@ -238,10 +242,13 @@ class Names:
     @_once
     def ancestry(self, cls: Class | None) -> list[Class]:
         """The class and its bases, nearest first; nothing for no class."""
-        order = [cls] if cls is not None else []
-        for _, base in self.bases(cls) if cls is not None else ():
-            if base is not None and base is not cls and len(order) < 40:
-                order += [each for each in self.ancestry(base) if each not in order]
+        order: list[Class] = []
+        waiting = [cls] if cls is not None else []
+        while waiting:
+            each = waiting.pop()
+            if each not in order:
+                order.append(each)
+                waiting += [base for _, base in reversed(self.bases(each)) if base is not None]
         return order
 
     @_once
@@ -319,6 +326,8 @@ class Names:
         name, given, rest, pointer = split_type(written)
         if depth > 12:
             return Type(name, (), pointer)
+        if name in STANDARD_TYPES and name not in bindings and self.is_standard(name, scope, file):
+            name = f"std::{name}"
         if rest.startswith("::"):
             outer = self._resolve(f"{name}<{', '.join(given)}>", scope, file, bindings, depth + 1)
             return self._member(outer, rest[2:], pointer, scope, file)
@@ -339,6 +348,12 @@ class Names:
                 inner = self._resolve(target[0], target[1], target[2], bindings, depth + 1)
             return inner._replace(pointer=pointer or inner.pointer, arguments=arguments or inner.arguments)
         return self._qualified(name, arguments, pointer, scope, file, bindings, depth)
+
+    @_once
+    def is_standard(self, name: str, scope: Scope, file: FileIndex) -> bool:
+        """Whether a name without a namespace is one of ``std``, which ``using namespace std`` brings in."""
+        own = self.find_class(name, scope, file) is not None or self.alias(name, scope, file) is not None
+        return "std" in self._used_namespaces(file.file) and not own
 
     def _qualified(
         self, name: str, arguments: tuple[Type, ...], pointer: bool, scope: Scope, file: FileIndex,
@@ -397,3 +412,31 @@ def _complete(function: Function, declared: Iterable[Function]) -> None:
         function.virtual = function.virtual or each.virtual
         for own, other in zip(function.parameters, each.parameters, strict=False):
             own.default = own.default or other.default
+
+
+def hidden(names: Names, cls: Class) -> frozenset[str]:
+    """Names of members, and of methods that are not virtual, which the class or a base of it hides from another."""
+    if cls not in names.hidden:
+        listed = [name for each in names.ancestry(cls) for name in {*each.fields, *_fixed(names, each)}]
+        names.hidden[cls] = frozenset(name for name, times in Counter(listed).items() if times > 1)
+    return names.hidden[cls]
+
+
+def _fixed(names: Names, cls: Class) -> set[str]:
+    """Methods that the class seen at compile time decides, without constructors and destructors."""
+    found = [*names.methods.get(cls, {}).items(), *cls.declared.items()]
+    virtual = {name for name, listed in found if any(each.virtual for each in listed)}
+    return {name for name, _ in found if name != cls.name and not name.startswith("~")} - virtual
+
+
+def repeated_base(names: Names, cls: Class) -> Class | None:
+    """A base with members of its own that an object of the class has twice."""
+    if len(cls.bases) < 2:
+        return None
+    listed = Counter(each for _, base in names.bases(cls) if base is not None for each in _parts(names, base))
+    return next((each for each, times in listed.items() if times > 1 and each.fields), None)
+
+
+def _parts(names: Names, cls: Class) -> list[Class]:
+    own = [base for written, base in names.bases(cls) if written not in cls.virtual_bases and base is not cls]
+    return [cls, *(part for base in own if base is not None for part in _parts(names, base))]

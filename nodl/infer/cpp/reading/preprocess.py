@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import pairwise
 
 from nodl.infer.cpp.reading.macros import Macro, decided, expanded
@@ -20,6 +21,8 @@ Include = Callable[[str, bool], "Preprocessed | None"]
 _TOKENS = re.compile(
     r'R"(?P<d>[^\s()\\]{0,16})\((?:.|\n)*?\)(?P=d)"|"(?:\\.|[^"\\\n])*"|\'(?:\\.|[^\'\\\n])+\'|//[^\n]*|/\*(?:.|\n)*?\*/'
 )
+_USED = re.compile(r'(?<!["\w])[A-Za-z_]\w*')
+_CALLED = re.compile(r"\b([A-Za-z_]\w*)\s*\(")
 _DIRECTIVE = re.compile(r"\s*#\s*(\w+)\s*(.*)")
 _DEFINE = re.compile(r"(\w+)(\(([^)]*)\))?\s*(.*)", re.DOTALL)
 _INCLUDE = re.compile(r'([<"])([^>"]+)[>"]')
@@ -38,7 +41,9 @@ _ATTRIBUTE = re.compile(
 )
 _HARMLESS_MACROS = re.compile(
     r"(?:Q_|RCLCPP_|RCUTILS_|RCPPUTILS_|PLUGINLIB_|CLASS_LOADER_|EIGEN_|BOOST_|TEST|CERES_|CREATE_LOGGER|"
-    r"GENERATE_|COMPOSITION_|YAML_|TRACETOOLS_|TRACEPOINT|ROSIDL_|DIAGNOSTIC_|NOLINT|POINT_CLOUD_REGISTER|G2O_)"
+    r"GENERATE_|COMPOSITION_|YAML_|TRACETOOLS_|TRACEPOINT|ROSIDL_|DIAGNOSTIC_|NOLINT|POINT_CLOUD_REGISTER|G2O_|PCL_ADD_|"
+    r"(?:ROS|U|RVIZ_COMMON_LOG|LOG|SPDLOG)_?(?:DEBUG|INFO|WARN|WARNING|ERROR|FATAL|ASSERT)(?:_STREAM)?(?:_THROTTLE|_ONCE|_COND|_NAMED)?\b|"
+    r"ASSERT_|EXPECT_|MOVEIT_(?:CLASS|STRUCT)_FORWARD)"
 )  # fmt: skip
 
 
@@ -57,7 +62,13 @@ class Preprocessed:
     foreign: dict[str, int] = field(default_factory=dict)  # headers that are not, with their line
     uncertain: list[tuple[int, int, str, int]] = field(default_factory=list)
     unknown_macros: list[tuple[int, str]] = field(default_factory=list)
-    dead: list[tuple[int, int, str]] = field(default_factory=list)
+    # Line, name and body of those that are used where it is not known, or not followed, what they stand for.
+    open_macros: list[tuple[int, str, str]] = field(default_factory=list)
+
+    @cached_property
+    def called(self) -> frozenset[str]:
+        """Every word in front of a parenthesis: a macro of who includes the file may be among them."""
+        return frozenset(_CALLED.findall(self.text))
 
 
 def preprocess(
@@ -85,12 +96,13 @@ class _Pass:
         self.complete = complete
         self.include = include
         self.stack: list[_Conditional] = []
-        self.undecided: set[str] = set()
+        self.pending: list[str] = []
+        self.expanded: list[str] = []
 
     def run(self, source: str) -> Preprocessed:
         lines = _without_comments(source).split("\n")
         self.guards = _guards_of(lines)
-        out: list[str] = []
+        out = self.pending
         index = 0
         while index < len(lines):
             line, first = lines[index], index
@@ -103,9 +115,24 @@ class _Pass:
             else:
                 out.append(line if self._active() else "")
             index += 1
-        self.result.text = self._tidied("\n".join(out))
+        self._expand()
+        self.result.text = self._tidied("\n".join(self.expanded))
         self.result.macros = self.macros
         return self.result
+
+    def _expand(self) -> None:
+        """Expand what was read by the macros that are defined here; those behind it may be others."""
+        source = "\n".join(self.pending)
+        if self.pending:
+            first = 1 + sum(part.count("\n") + 1 for part in self.expanded)
+            source = expanded(source, self.macros)
+            self.expanded.append(source)
+            self.pending.clear()
+            for match in _USED.finditer(source):
+                macro = self.macros.get(match[0])
+                if macro is not None and macro.uncertain:
+                    line = first + source.count("\n", 0, match.start())
+                    self.result.open_macros.append((line, match[0], macro.body))
 
     def _active(self) -> bool:
         return not self.stack or (self.stack[-1].parent and self.stack[-1].state is not False)
@@ -119,12 +146,14 @@ class _Pass:
             return self._open(word, rest, number)
         if word in ("elif", "else", "endif"):
             return self._next(word, rest, number) if self.stack else ""
-        if self._active():
+        if self._active() and word in ("define", "undef", "include"):
+            if any(map(str.strip, self.pending)):
+                self._expand()
             if word == "define":
                 self._define(rest)
             elif word == "undef":
-                self.macros.pop(rest, None)
-            elif word == "include":
+                self._undefine(rest)
+            else:
                 self._include(rest, number)
         return ""
 
@@ -168,8 +197,6 @@ class _Pass:
     def _close(self, top: _Conditional, number: int) -> None:
         if top.parent and top.state is None:
             self.result.uncertain.append((top.start + 1, number - 1, top.condition, top.line))
-        elif top.parent and top.state is False:
-            self.result.dead.append((top.start + 1, number - 1, top.condition))
 
     def _decide(self, condition: str) -> bool | None:
         return decided(condition, self.macros, self.complete, self._has_include)
@@ -183,7 +210,18 @@ class _Pass:
             return
         parameters = [part.strip() for part in match[3].split(",")] if match[2] else None
         uncertain = any(each.state is None for each in self.stack)
-        self.macros[match[1]] = Macro(parameters, match[4].strip(), uncertain)
+        body = match[4].strip()
+        before = self.macros.get(match[1])
+        if uncertain and before is not None:
+            body = f"{before.body} {body}"  # either may be meant: who asks what an uncertain one leads to reads both
+        self.macros[match[1]] = Macro(parameters, body, uncertain)
+
+    def _undefine(self, name: str) -> None:
+        """Forget a macro; one that is undefined under an open condition may still be there."""
+        if not any(each.state is None for each in self.stack):
+            self.macros.pop(name, None)
+        elif name in self.macros:
+            self.macros[name] = self.macros[name]._replace(uncertain=True)
 
     def _include(self, rest: str, number: int) -> None:
         match = _INCLUDE.search(rest)
@@ -194,12 +232,14 @@ class _Pass:
             self.result.foreign.setdefault(match[2], number)
             return
         self.result.includes.append(found.file)
+        for name in sorted(found.called & self.macros.keys() - found.macros.keys()):
+            if self.macros[name].parameters is not None:
+                self.result.open_macros.append((number, name, self.macros[name].body))
         for name, macro in found.macros.items():
             self.macros.setdefault(name, macro)
 
     def _tidied(self, source: str) -> str:
         """Macros expanded; what only the compiler and linker read, such as export macros, blanked."""
-        source = expanded(source, {n: m for n, m in self.macros.items() if n not in self.guards})
         source = _EXPORT.sub(_blank, source)
         source = _ATTRIBUTE.sub(_blank, source)
         source = _DISAMBIGUATOR.sub(_blank, source)

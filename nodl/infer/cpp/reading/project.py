@@ -11,8 +11,8 @@ from functools import cached_property
 from html import unescape
 from pathlib import Path
 
-from enclave_launch.boundary.files import read_text, text_or_nothing
-from enclave_launch.boundary.shell_words import split_words
+from enclave_common.files import read_text, text_or_nothing
+from enclave_common.shell_words import split_words
 from nodl.infer.cpp.reading.cmake import Build, Target, read_build
 
 _TAG = re.compile(r"<(?:\w*depend|exec_depend|build_depend)(?:\s[^<>]*)?>\s*([\w\-.]+)\s*</")
@@ -95,6 +95,14 @@ class Workspace:
             path = os.path.normpath(os.path.join(folder, name))
             if os.path.isfile(path):
                 return path
+        return self._generated(name, package, first)
+
+    def _generated(self, name: str, *packages: SourcePackage | None) -> str | None:
+        """The file of parameters that generate_parameter_library makes this header of."""
+        target, suffix = os.path.splitext(os.path.basename(name))
+        for package in filter(None, (*packages, *self.packages.values())) if suffix == ".hpp" else ():
+            if "generate_parameter_library" in package.depends and target in package.build.parameter_files:
+                return package.build.parameter_files[target]
         return None
 
     @cached_property

@@ -1,30 +1,18 @@
-"""Which specialisation of a template is meant: explicit and partial ones, for given arguments ([temp.spec]). Pure."""
+"""Which explicit specialisation of a template is meant; where a partial one may be, that is a doubt ([temp.spec])."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.reading.declarations import Class, Function
-from nodl.infer.cpp.reading.type_names import Type, split_type
+from nodl.infer.cpp.reading.type_names import Type
 
 if TYPE_CHECKING:
     from nodl.infer.cpp.reading.names import Names
 
-Resolve = Callable[[str], Type]
-_CHANGED = re.compile(r"[&*]|\b(?:const|volatile)\b|\(|\.\.\.")
-_VALUE = re.compile(r"-?\d\w*|true|false|'.'")
 _OPEN = re.compile(r"[A-Z][a-z\d]?|[A-Z]\w*T|.*[-+*/%()!?.].*|(?:auto|decltype|typename)\b.*")
 """A parameter of a template around it, or what the compiler computes."""
-
-
-class Chosen(NamedTuple):
-    """``certain``: whether no other specialisation may be meant; ``bindings``: of the parameters of a partial one."""
-
-    cls: Class
-    bindings: Mapping[str, Type]
-    certain: bool = True
 
 
 class Specialisations:
@@ -47,13 +35,11 @@ class Specialisations:
 
     def meant(self, cls: Class, kind: Type) -> Class:
         """Of the template ``cls`` the class for the arguments of ``kind``; a doubt is noted."""
-        return self._chosen(cls, kind).cls if cls.qualified in self._of else cls
+        return self._chosen(cls, kind) if cls.qualified in self._of else cls
 
     def bindings(self, cls: Class, kind: Type) -> dict[str, Type]:
-        """What the parameters of the template ``cls`` stand for; those of a partial specialisation by its pattern."""
-        if cls.specialises is not None:
-            return dict(self._chosen(cls, kind).bindings)
-        return self._with_defaults(cls, kind)
+        """What the parameters of the template ``cls`` stand for."""
+        return self._with_defaults(cls, kind) if cls.specialises is None else {}
 
     def _with_defaults(self, cls: Class, kind: Type) -> dict[str, Type]:
         bound = dict(zip(cls.templates, kind.arguments, strict=False))
@@ -61,71 +47,17 @@ class Specialisations:
             bound.setdefault(name, self._names.resolve(default, cls.scope, cls.file, bound))
         return bound
 
-    def _chosen(self, cls: Class, kind: Type) -> Chosen:
+    def _chosen(self, cls: Class, kind: Type) -> Class:
+        """The explicit specialisation for these very arguments, else the template; any other is a doubt."""
         listed, names = self._of[cls.qualified], self._names
         same = [c for c in names.classes[cls.name] if c.qualified == cls.qualified and not c.specialises]
         primary = same[0] if same else cls
         bound = self._with_defaults(primary, kind)
-        given = [bound[name] for name in primary.templates if name in bound] or kind.arguments
-        found = specialised(primary, listed, given, lambda t: names.resolve(t, cls.scope, cls.file))
-        has_parts = any(c.fields or c.declared or names.methods.get(c) for c in (primary, *listed))
-        if not found.certain and has_parts:
-            self.doubts.setdefault(kind, found.cls)
-        return found
-
-
-def specialised(
-    primary: Class, others: Iterable[Class], arguments: Sequence[Type], resolve: Resolve
-) -> Chosen:
-    """The class that ``arguments`` select: an explicit specialisation, the partial one that fits, else the primary."""
-    fitting: list[tuple[Class, dict[str, Type]]] = []
-    certain = True
-    for each in others:
-        bindings: dict[str, Type] = {}
-        fits = _fit(each.specialises or (), arguments, each.templates, bindings, resolve)
-        if fits:
-            fitting.append((each, bindings))
-        certain = certain and fits is not None
-    full = [one for one in fitting if not one[0].templates]
-    if full or len(fitting) == 1:
-        cls, found = (full or fitting)[0]
-        return Chosen(cls, found, bool(full) or certain)
-    return Chosen(primary, dict(zip(primary.templates, arguments, strict=False)), certain and not fitting)
-
-
-def _fit(
-    patterns: Sequence[str],
-    given: Sequence[Type],
-    variables: Sequence[str],
-    bindings: dict[str, Type],
-    resolve: Resolve,
-) -> bool | None:
-    """Whether the arguments are those of a specialisation; ``None`` where that is not known."""
-    if len(patterns) != len(given):
-        return None
-    found = [
-        _fits(pattern, each, variables, bindings, resolve)
-        for pattern, each in zip(patterns, given, strict=True)
-    ]
-    return False if False in found else None if None in found else True
-
-
-def _fits(
-    pattern: str, given: Type, variables: Sequence[str], bindings: dict[str, Type], resolve: Resolve
-) -> bool | None:
-    if pattern in variables:
-        return bindings.setdefault(pattern, given) == given
-    if _VALUE.fullmatch(pattern) or _VALUE.fullmatch(given.name):
-        both = _VALUE.fullmatch(pattern) and _VALUE.fullmatch(given.name)
-        return pattern == given.name if both else None
-    if _OPEN.fullmatch(given.name):
-        return None
-    if _CHANGED.search(pattern):
-        return None if given.pointer or not pattern.rstrip().endswith("*") else False
-    name, inner, rest, _ = split_type(pattern)
-    kind = resolve(name if inner else pattern)
-    if given.pointer != kind.pointer or rest:
-        return None
-    if kind.name != given.name:
-        return False
-    return _fit(inner, given.arguments, variables, bindings, resolve) if inner else kind == given
+        given = [bound[name] for name in primary.templates if name in bound] or [*kind.arguments]
+        for each in (one for one in listed if not one.templates):
+            if [names.resolve(written, cls.scope, cls.file) for written in each.specialises or ()] == given:
+                return each
+        is_open = any(each.templates for each in listed) or any(_OPEN.fullmatch(one.name) for one in given)
+        if is_open and any(c.fields or c.declared or names.methods.get(c) for c in (primary, *listed)):
+            self.doubts.setdefault(kind, primary)
+        return primary

@@ -6,10 +6,10 @@ import re
 from collections.abc import Sequence
 
 from nodl.infer.cpp.reading.declarations import Class
-from nodl.infer.cpp.running.contents import copied, overwrite
+from nodl.infer.cpp.running.arithmetic import added, as_type
+from nodl.infer.cpp.running.contents import copied, elements_copied, overwrite
 from nodl.infer.cpp.running.hiding import cell_of, class_of_member, lexical_class, seen_class, seen_type
 from nodl.infer.cpp.running.machine import Frame, Machine, expression
-from nodl.infer.cpp.running.numbers import added, as_type
 from nodl.infer.cpp.running.references import is_plain, through, told
 from nodl.infer.cpp.running.values import (
     BOTTOM,
@@ -62,6 +62,8 @@ def assignment(run: Machine, node: Node, frame: Frame) -> Value:
         if objects and _assigned(run, before, value, node, frame):
             return before
         value = copied(run, value, node, frame, cls)
+        if any(isinstance(atom, Seq | Map) for atom in value):
+            value = elements_copied(run, declared_type(run, left, frame)[0], value, node, frame)
     elif operator == "+=":
         before = run.evaluate(left, frame)
         if has_text(before) and any(isinstance(atom, int | float) for atom in value):
@@ -173,6 +175,11 @@ def _assign_result(run: Machine, call: Node, value: Value, frame: Frame) -> None
     from nodl.infer.cpp.libraries import LIBRARY_METHODS, Call
 
     function = field_of(call, "function")
+    if text(function) in ("std::tie", "tie"):
+        for index, each in enumerate(children(field_of(call, "arguments"))):
+            parts = [a.items[index] for a in value if isinstance(a, Group) and index < len(a.items)]
+            assign(run, each, join(*parts) if parts else unknown("what is taken apart"), frame)
+        return
     name = text(field_of(function, "field"))
     owner = field_of(function, "argument")
     holders = run.evaluate(owner, frame) if owner is not None else BOTTOM
@@ -233,7 +240,8 @@ def _assign_name(run: Machine, target: Node, value: Value, frame: Frame) -> None
     if this_object is not None and declaring is not None and not declaring.fields[name].static:
         cell = (this_object, cell_of(run, this_object, name, declaring))
         told(run, cell, value, target, frame)
-        run.store.set(cell, value)
+        before = run.store.get(cell) or BOTTOM
+        run.store.set(cell, join(before, value) if this_object.several else value)
         return
     static = (declaring, name) if declaring is not None else static_by_name(run, name, frame)
     if static is not None:
@@ -258,7 +266,7 @@ def _assign_field(run: Machine, node: Node, value: Value, frame: Frame) -> None:
     if any(not isinstance(atom, Obj) or atom.cls is None for atom in owners) or not owners:
         run.later([value], frame)  # a library keeps it and may call it
     for each in objects:
-        strong = len(owners) == 1
+        strong = len(owners) == 1 and not each.several
         cell = (each, cell_of(run, each, name, class_of_member(run, each, name, node, frame)))
         before = run.store.get(cell) or BOTTOM
         run.store.set(cell, value if strong else join(before, value))

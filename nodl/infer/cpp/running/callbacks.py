@@ -68,6 +68,7 @@ def run_callbacks(run: Machine) -> None:
                 _call(rounds, key, atom, frame, certainly=True)
     for number in range(MAX_ROUNDS):
         _find_overrides(run)
+        run.store.as_others_find_it()
         mark = run.store.mark()
         if not _round(rounds):
             return

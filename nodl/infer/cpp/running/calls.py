@@ -6,9 +6,11 @@ its name makes an interface in rclcpp.
 
 from __future__ import annotations
 
+import re
+
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES, LIBRARY_FUNCTIONS, NODE_BASES
+from nodl.infer.cpp.reading.names import STANDARD_TYPES
 from nodl.infer.cpp.reading.type_names import NO_TYPE
-from nodl.infer.cpp.running.algorithms import as_algorithm, writes_elements
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.constructors import construct
 from nodl.infer.cpp.running.hiding import class_around, lexical_class
@@ -24,7 +26,7 @@ from nodl.infer.cpp.running.method_calls import (
 )
 from nodl.infer.cpp.running.objects import cast, is_plain_type, made
 from nodl.infer.cpp.running.references import is_plain, keep_references
-from nodl.infer.cpp.running.standard import CASTS, STANDARD, may_write
+from nodl.infer.cpp.running.standard import CASTS, STANDARD, as_algorithm, may_write, writes_elements
 from nodl.infer.cpp.running.unknown_calls import changed_by_standard, unknown_call
 from nodl.infer.cpp.running.values import BOTTOM, Bound, Lambda, Obj, Value, join, unknown
 from nodl.infer.cpp.running.variables import current_object, member, variable
@@ -39,6 +41,12 @@ _MAKERS = frozenset({
 })  # fmt: skip
 
 
+_RUNS_OTHERS = re.compile(
+    r"spin\w*$|(?:^|\W)(?:execute(?:_\w+)?|handle_(?:message|request|response|loaned_message))$"
+)
+"""Functions of rclcpp that run callbacks of a node (executors.hpp, timer.hpp, subscription.hpp, service.hpp)."""
+
+
 @expression("call_expression")
 def call_expression(run: Machine, node: Node, frame: Frame) -> Value:
     """Calls a method on an object, something by its name, or else whatever the callee evaluates to."""
@@ -46,6 +54,8 @@ def call_expression(run: Machine, node: Node, frame: Frame) -> Value:
     if callee is None:
         return unknown("a call")
     site = CallSite(run, node, callee, frame)
+    if _RUNS_OTHERS.search(callee_name(callee)):
+        run.store.others_run()
     if callee.type == "field_expression":
         return method_call(run, site)
     if callee.type in _NAMES:
@@ -59,9 +69,11 @@ def call_expression(run: Machine, node: Node, frame: Frame) -> Value:
 
 def _named_call(run: Machine, name: str, site: CallSite) -> Value:
     if name in CASTS:
+        run.resolve(site.node, site.frame)
         return _cast(run, name, site)
     owner = site.frame.owner_of(name) if "::" not in name else None
     if owner is not None:
+        run.resolve(site.node, site.frame)
         values = site.values
         return call_values(run, run.store.get((owner, name)) or BOTTOM, values, site.node, site.frame)
     found = _own_method(run, name, site)
@@ -106,7 +118,8 @@ def _of_named_class(run: Machine, this: Obj, head: str, last: str, site: CallSit
     methods = run.names.find_methods(cls, last) if cls in run.names.ancestry(this.cls) else []
     if methods:
         return site.call_methods(methods, this, exactly=True)
-    if cls is None and kind.name in NODE_BASES | {this.foreign_base}:
+    known = NODE_BASES | {this.foreign_base, this.foreign_base.rpartition("::")[2]}
+    if cls is None and kind.name in known:
         return by_model(run, this, last, site)
     return None
 
@@ -123,18 +136,20 @@ def _free_call(run: Machine, name: str, site: CallSite) -> Value:
     if functions:
         return call_functions(run, functions, site.values, node, frame, site.types)
     qualified = as_algorithm(qualified, site.given)
-    standard = STANDARD.get(qualified)
-    if standard is not None or may_write(qualified):
-        given_back = standard(run, site.values, node, frame) if standard is not None else BOTTOM
-        if may_write(qualified) or writes_elements(run, qualified, site.values):
-            changed_by_standard(run, qualified, site.given, frame)
-            given_back = given_back or unknown_call(run, qualified, site.values, node, [], frame)
-        return given_back
     model = LIBRARY_FUNCTIONS.get(qualified)
     if model is not None:
         call = site.call()
         run.handle(node, frame)
         return model(run, call)
+    standard = STANDARD.get(qualified)
+    if standard is not None or may_write(qualified):
+        run.resolve(node, frame)
+        given_back = standard(run, site.values, node, frame) if standard is not None else BOTTOM
+        if may_write(qualified) or writes_elements(run, qualified, site.values):
+            changed_by_standard(run, qualified, site.given, frame)
+            if standard is None:
+                given_back = unknown_call(run, qualified, site.values, node, [], frame)
+        return given_back
     return _made_or_unknown(run, name, qualified, site)
 
 
@@ -168,8 +183,11 @@ def _qualified(run: Machine, name: str, frame: Frame) -> str:
     target = run.names.alias(name, frame.scope, frame.file)
     if target is not None and "::" in target[0]:
         return target[0].lstrip(":")
+    whole = f"std::{name}"
     if name in ("to_string", "make_shared", "make_unique", "move", "bind", "ref"):
-        return f"std::{name}"
+        return whole
+    if (whole in STANDARD or name in STANDARD_TYPES) and run.names.is_standard(name, frame.scope, frame.file):
+        return whole
     return name
 
 

@@ -8,9 +8,10 @@ from dataclasses import replace
 
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES, Call, is_harmless_class
 from nodl.infer.cpp.reading.declarations import Class, Field, Function, FunctionParameter
-from nodl.infer.cpp.reading.inheritance import repeated_base
 from nodl.infer.cpp.reading.known_headers import KNOWN_HEADERS, ROS_LIBRARIES
+from nodl.infer.cpp.reading.names import repeated_base
 from nodl.infer.cpp.reading.type_names import Type
+from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.contents import copied, handed_over
 from nodl.infer.cpp.running.hiding import cell_of
 from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
@@ -55,12 +56,14 @@ def construct(
         if twice is not None:
             why = f"{cls.name} has the members of {twice.name} twice: which are meant is not followed"
             run.gap(node, frame, why)
+        _check_conversions(run, cls, node, frame)
         _start_fields(run, made_object, cls)
         construct_class(run, made_object, cls, kind, arguments, node, frame)
         return (made_object,)
     if kind.name in ("std::thread", "std::jthread") and arguments:
         from nodl.infer.cpp.running.standard import STANDARD
 
+        run.store.others_run()
         STANDARD[kind.name](run, arguments, node, frame)
     model = LIBRARY_CLASSES.get(kind.name)
     if model is not None:
@@ -74,21 +77,11 @@ def construct(
     return (made_object,)
 
 
-_NUMBERS_ONLY = re.compile(
-    r"\{(?:\s*(?:const |unsigned )*(?:double|float|int|bool|char|long|short|size_t|\w+_t)\b[^;{}()]*;)*\s*\}"
-)
-"""A structure without a name whose members are numbers or structures of C."""
-
-
 def _unmodelled(run: Machine, kind: Type, node: Node, frame: Frame, deliberate: bool) -> None:
     """A class that is neither in reach nor in the table may be a node or make one.
 
     ``deliberate``: it is made with arguments or with new, as structures of C are not.
     """
-    if kind.name.startswith("{"):
-        if not _NUMBERS_ONLY.fullmatch(kind.name):
-            run.gap(node, frame, "a structure without a name is made: its members may make interfaces")
-        return
     if run.names.is_of_c(kind.name, frame.file):
         return
     first = kind.name.partition("::")[0]
@@ -106,6 +99,22 @@ def _unmodelled(run: Machine, kind: Type, node: Node, frame: Frame, deliberate: 
         run.gap(node, frame, why)
 
 
+def _check_conversions(run: Machine, cls: Class, node: Node, frame: Frame) -> None:
+    """A gap for a class with a conversion operator that changes something: where it runs is not followed."""
+    ancestry = run.names.ancestry(cls)
+    kept = {name for each in ancestry for name in each.fields} | run.names.globals.keys()
+    listed = [
+        (name, f) for each in ancestry for name, found in run.names.methods[each].items() for f in found
+    ]
+    for name, method in listed:
+        is_conversion = name.startswith("operator ") and name not in ("operator new", "operator delete")
+        if is_conversion and (run.makes_interfaces(method) or writes_of(method.node).changed & kept):
+            why = (
+                f"an operator of {cls.name} that converts it changes something: where it runs is not followed"
+            )
+            run.gap(node, frame, why)
+
+
 def _start_fields(run: Machine, made_object: Obj, cls: Class) -> None:
     for each in run.names.ancestry(cls):
         for name, member in each.fields.items():
@@ -117,6 +126,9 @@ def construct_class(
     run: Machine, this: Obj, cls: Class, kind: Type, arguments: Sequence[Value], node: Node, frame: Frame
 ) -> None:
     """Run the constructor of ``cls`` (a base or the class itself) on ``this``."""
+    if frame.depth > MAX_DEPTH:
+        run.gap(node, frame, f"the bases of {cls.name} are deeper than is followed")
+        return
     this.bindings[cls] = run.names.specialisations.bindings(cls, kind)
     constructor = chosen(
         run.names.find_methods(cls, cls.name) if cls.name in run.names.methods[cls] else [], arguments
@@ -126,7 +138,7 @@ def construct_class(
         (cls, this, path), Frame(cls.file, cls.scope, None, this, this.bindings[cls], path=frame.path)
     )
     if constructor is not None:
-        if run.active.count(constructor) > MAX_RECURSION or frame.depth > MAX_DEPTH:
+        if run.active.count(constructor) > MAX_RECURSION:
             run.gap(node, frame, f"the constructor of {cls.name} calls itself")
             return
         inner.function, inner.file, inner.scope = constructor, constructor.file, constructor.scope

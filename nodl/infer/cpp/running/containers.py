@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import re
 
-from nodl.infer.cpp.running import texts
-from nodl.infer.cpp.running.algorithms import called_now
+from nodl.infer.cpp.running.arithmetic import CHANGES_TEXT, added, asked_of_text, changed_text
 from nodl.infer.cpp.running.assignments import assign, with_entry
 from nodl.infer.cpp.running.constructors import construct
 from nodl.infer.cpp.running.contents import copied, handed_over, items_of
 from nodl.infer.cpp.running.invocation import CallSite
 from nodl.infer.cpp.running.launch_values import settled_text
 from nodl.infer.cpp.running.machine import Machine
-from nodl.infer.cpp.running.numbers import added
 from nodl.infer.cpp.running.objects import ORDERED, SETS, as_set, made
 from nodl.infer.cpp.running.operators import element
+from nodl.infer.cpp.running.standard import called_now
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     END,
@@ -98,7 +97,9 @@ def _added(run: Machine, atom: object, name: str, site: CallSite) -> Value:
     elif given and given[-1].type == "initializer_list" and inner is not None and inner.name:
         value = made(run, given[-1], inner, children(given[-1]), frame)
     else:
-        listed = [copied(run, run.evaluate(each, frame), each, frame, cls) for each in given]
+        listed = [run.evaluate(each, frame) for each in given]
+        if inner is None or not inner.pointer:
+            listed = [copied(run, v, each, frame, cls) for v, each in zip(listed, given, strict=True)]
         if name == "insert" and len(listed) == 3:
             return _inserted(run, atom, listed[1], site)
         value = listed[-1] if listed else BOTTOM
@@ -290,13 +291,13 @@ def _text_call(run: Machine, atom: Text | Param, name: str, site: CallSite) -> V
             assign(run, site.receiver, values[0], site.frame)
         return (atom,)
     known = settled_text(run, atom)
-    if name in texts.CHANGES:
-        after = texts.changed(known, name, values) if known is not None else None
+    if name in CHANGES_TEXT:
+        after = changed_text(known, name, values) if known is not None else None
         if after is None and name in ("append", "push_back") and len(values) == 1:
             found = added((atom,), values[0])
         else:
             found = literal(after) if after is not None else unknown(f"what {name}() makes of a text")
         assign(run, site.receiver, found, site.frame)
         return found
-    found_value = texts.asked(known, name, values) if known is not None else None
+    found_value = asked_of_text(known, name, values) if known is not None else None
     return unknown(f"the result of {name}()") if found_value is None else found_value

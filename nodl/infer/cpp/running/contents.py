@@ -108,8 +108,35 @@ def _copy(run: Machine, atom: object, node: Node, frame: Frame, cls: Class | Non
     twin = run.obj(key, kind, cls=target, bindings=atom.bindings, foreign_base=atom.foreign_base)
     for (each, name), value in cells.items():
         if value is not None:
-            run.store.set((twin, cell_of(run, twin, name, each)), value)
+            taken = _member_copied(run, each, name, value, node, frame)
+            run.store.set((twin, cell_of(run, twin, name, each)), taken)
     return twin
+
+
+def _member_copied(run: Machine, cls: Class, name: str, value: Value, node: Node, frame: Frame) -> Value:
+    """A member as a copy has it: objects within are copied too, those that it points to are not."""
+    field = cls.fields[name]
+    kind = run.names.resolve(field.type, cls.scope, cls.file)
+    if field.static or field.pointer or kind.pointer:
+        return value
+    if run.class_of(kind, cls) is not None:
+        return copied(run, value, node, frame)
+    return elements_copied(run, kind, value, node, frame)
+
+
+def elements_copied(run: Machine, kind: Type, value: Value, node: Node, frame: Frame) -> Value:
+    """A container of type ``kind`` as a copy has it: its elements are copied unless they are pointers."""
+    if not kind.arguments or kind.arguments[-1].pointer:
+        return value
+    return tuple(_elements_copied(run, atom, node, frame) for atom in value)
+
+
+def _elements_copied(run: Machine, atom: object, node: Node, frame: Frame) -> object:
+    if isinstance(atom, Seq):
+        return Seq(tuple(copied(run, item, node, frame) for item in atom.items), atom.open)
+    if isinstance(atom, Map):
+        return Map(tuple((key, copied(run, item, node, frame)) for key, item in atom.entries), atom.open)
+    return atom
 
 
 def _takes_another(constructor: Function) -> bool:
@@ -127,7 +154,8 @@ def overwrite(run: Machine, targets: Sequence[Obj], value: Value) -> None:
             for name in each.fields:
                 cell = (target, cell_of(run, target, name, each))
                 read = [run.store.get((o, cell_of(run, o, name, each))) or BOTTOM for o in others]
-                before = [] if len(targets) == 1 else [run.store.get(cell) or BOTTOM]
+                is_one = len(targets) == 1 and not target.several
+                before = [] if is_one else [run.store.get(cell) or BOTTOM]
                 run.store.set(cell, join(*before, *read))
 
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 from contextlib import suppress
 
+from nodl.infer.cpp.running.arithmetic import SIZES
 from nodl.infer.cpp.running.constructors import construct
+from nodl.infer.cpp.running.invocation import call_functions
 from nodl.infer.cpp.running.machine import Frame, Machine, expression
-from nodl.infer.cpp.running.numbers import SIZES
 from nodl.infer.cpp.running.objects import as_map, cast, made
 from nodl.infer.cpp.running.operators import has_text
 from nodl.infer.cpp.running.own_operators import by_operator
@@ -53,6 +54,15 @@ def user_defined(run: Machine, node: Node, frame: Frame) -> Value:
     inner = children(node)
     suffix = text(inner[-1]) if len(inner) > 1 else ""
     plain = suffix in ("s", "sv") and inner[0].type.endswith("string_literal")
+    own = [
+        f
+        for name in (f'operator""{suffix}', f'operator"" {suffix}')
+        for f in run.names.functions_by_name.get(name, ())
+    ]
+    if own:
+        given = run.evaluate(inner[0], frame)
+        counted = [given, unknown("the length of a literal")][: len(own[0].parameters)]
+        return call_functions(run, own, counted, node, frame, ())
     return run.evaluate(inner[0], frame) if plain else unknown(f"a literal with {suffix or 'a suffix'}")
 
 
@@ -181,7 +191,10 @@ def new(run: Machine, node: Node, frame: Frame) -> Value:
     values = [run.evaluate(child, frame) for child in given]
     if kind.name in SIZES and field_of(node, "declarator") is not None:
         return unknown("an array of numbers")
+    several = field_of(node, "declarator") is not None
+    run.repeated += several
     found = construct(run, kind._replace(pointer=False), values, node, frame, heap=True)
+    run.repeated -= several
     keep_references(run, found, given, frame)
     return found
 

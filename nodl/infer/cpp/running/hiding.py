@@ -10,7 +10,7 @@ import re
 
 from nodl.infer.cpp.reading.collect import declared_names
 from nodl.infer.cpp.reading.declarations import Class, type_text
-from nodl.infer.cpp.reading.inheritance import hidden
+from nodl.infer.cpp.reading.names import hidden
 from nodl.infer.cpp.reading.type_names import NO_TYPE, Type
 from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.values import Obj
@@ -34,7 +34,7 @@ def cell_of(run: Machine, owner: Obj, name: str, seen: Class | None) -> str:
     nearest = next(
         (c for c in run.names.ancestry(seen or owner.cls) if name in c.fields and c in ancestry), None
     )
-    first = next(c for c in ancestry if name in c.fields)
+    first = next((c for c in ancestry if name in c.fields), None)
     return name if nearest is None or nearest is first else f"{nearest.qualified}::{name}"
 
 

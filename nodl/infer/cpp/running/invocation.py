@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 
 from nodl.infer.cpp.libraries import NODE_METHODS, Call
-from nodl.infer.cpp.reading.declarations import Function, parameters_of, type_text
+from nodl.infer.cpp.reading.declarations import Function, FunctionParameter, parameters_of, type_text
 from nodl.infer.cpp.reading.type_names import Type
+from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.constructors import as_parameter, bind_parameters, is_written_back
 from nodl.infer.cpp.running.contents import copied, handed_over
 from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
@@ -18,7 +19,6 @@ from nodl.infer.cpp.running.overloads import candidates, chosen
 from nodl.infer.cpp.running.unknown_calls import unknown_call
 from nodl.infer.cpp.running.values import Bound, Lambda, Obj, Unknown, Value, join, unknown
 from nodl.infer.cpp.running.variables import declared_type
-from nodl.infer.cpp.running.written_back import write_back
 from nodl.infer.cpp.syntax import Node, children, field_of, template_arguments, text, unwrapped
 
 
@@ -30,21 +30,27 @@ class CallSite:
     node: Node
     callee: Node
     frame: Frame
+    _given: list[Node] | None = None
+    _values: list[Value] | None = None
 
     @property
     def receiver(self) -> Node:
         """What stands before the name of a method."""
         return field_of(self.callee, "argument") or self.callee
 
-    @cached_property
+    @property
     def given(self) -> list[Node]:
-        return children(field_of(self.node, "arguments"))
+        if self._given is None:
+            self._given = children(field_of(self.node, "arguments"))
+        return self._given
 
-    @cached_property
+    @property
     def values(self) -> list[Value]:
-        return [self.run.evaluate(each, self.frame) for each in self.given]
+        if self._values is None:
+            self._values = [self.run.evaluate(each, self.frame) for each in self.given]
+        return self._values
 
-    @cached_property
+    @property
     def types(self) -> list[Type]:
         """The template arguments that are written out."""
         return [self.run.type_of(text(each), self.frame) for each in template_arguments(self.callee)]
@@ -123,6 +129,8 @@ def _placed(fixed: Sequence[Value], values: Sequence[Value]) -> list[Value]:
 def call_lambda(run: Machine, atom: Lambda, values: Sequence[Value], node: Node, frame: Frame) -> Value:
     """Runs the body where the lambda was made and gives what it returns; unknown when calls nest too deep."""
     if frame.depth > MAX_DEPTH:
+        if run.subtree_matters(atom.node):
+            run.gap(node, frame, "a closure is called deeper than is followed; it may make interfaces")
         return unknown("a recursion")
     outer = atom.frame
     inner = Frame(
@@ -158,7 +166,7 @@ def call_functions(
     types: Sequence[Type],
 ) -> Value:
     """What the overloads that fit best may return; ``unknown_call`` decides if none fits."""
-    fitting = candidates(_meant(run, functions, types, node, frame), values)
+    fitting = candidates(_meant(run, functions, types, node, frame), values, run.makes_interfaces)
     if not fitting:
         return unknown_call(run, functions[0].name, values, node, [], frame)
     return _any_of(run, [partial(invoke, run, each, None, values, node, frame, types) for each in fitting])
@@ -234,7 +242,7 @@ def call_methods(
         return unknown_call(run, name, values, node, [], frame)
     if this_object is not None and not exactly and len(values) < len(function.parameters):
         _check_defaults(run, function, this_object, len(values), node, frame)
-    fitting = candidates(methods, values) if function in methods else [function]
+    fitting = candidates(methods, values, run.makes_interfaces) if function in methods else [function]
     calls = [
         partial(invoke, run, each, this_object, values, node, frame, types, bindings) for each in fitting
     ]
@@ -270,7 +278,7 @@ def invoke(
     run.handle(node, frame)
     run.called.add(function)
     if run.active.count(function) > MAX_RECURSION or frame.depth > MAX_DEPTH:
-        if function.parameters and run.makes_interfaces(function):
+        if run.makes_interfaces(function) and (function.parameters or not _stands_still(run, function)):
             run.gap(node, frame, f"{function} calls itself, deeper than is followed")
         return unknown("a recursion")
     if function.only_computes and not run.makes_interfaces(function):
@@ -291,6 +299,15 @@ def invoke(
     write_back(run, function.parameters, outcome.parameters, node, frame)
     run.left = node.id if outcome.ends else None
     return outcome.returned
+
+
+def _stands_still(run: Machine, function: Function) -> bool:
+    """Whether nothing has changed since the last call of ``function`` began, so that this one does what that does."""
+    begun = run.begun.get(function)
+    mark = begun[-1] if begun else 0
+    before = run.store.before(mark)
+    changed = (cell for cell, value in run.store.changes(mark).items() if set(before[cell]) != set(value))
+    return all(isinstance(cell[0], Frame) for cell in changed)
 
 
 def _outcome(
@@ -314,12 +331,14 @@ def _outcome(
 def _run_body(run: Machine, function: Function, values: Sequence[Value], inner: Frame) -> CallOutcome:
     inner.active, inner.mark = True, run.store.mark()
     run.active.append(function)
+    run.begun.setdefault(function, []).append(inner.mark)
     bind_parameters(run, function, values, inner)
     outcome = run.execute(function.body, inner) if function.body is not None else NEXT
     if function.name in HOOKS:
         inner.exits = _successes(inner)
     run.settle(inner.mark, inner.exits, bool(outcome & NEXT))
     run.active.pop()
+    run.begun[function] = run.begun.get(function, [])[:-1]
     left = {p.name: run.store.get((inner, p.name)) for p in function.parameters if is_written_back(p)}
     ends = not outcome & NEXT and not inner.exits
     inner.active, inner.finished = False, not inner.captured
@@ -397,3 +416,40 @@ def _deduced(function: Function, values: Sequence[Value], types: Sequence[Type])
             if kinds:
                 bound[name] = kinds[0]
     return bound
+
+
+_WRITTEN_BACK = frozenset({
+    "identifier", "field_expression", "subscript_expression", "call_expression", "pointer_expression",
+})  # fmt: skip
+
+
+def _is_element(call: Node) -> bool:
+    """``x.at(i)``: an element that a call gives by reference, and whose evaluation changes nothing."""
+    callee = field_of(call, "function")
+    name = text(field_of(callee, "field"))
+    return name in ("at", "front", "back", "begin", "rbegin", "data", "value")
+
+
+def write_back(
+    run: Machine,
+    parameters: Sequence[FunctionParameter],
+    left: Mapping[str, Value | None],
+    node: Node,
+    frame: Frame,
+) -> None:
+    """What a function does to its reference parameters shows in the caller's variables."""
+    given = children(field_of(node, "arguments"))
+    for parameter, argument in zip(parameters, given, strict=False):
+        if not is_written_back(parameter):
+            continue
+        target = unwrapped(argument)
+        if target is not None and target.type == "pointer_expression":
+            inner = unwrapped(field_of(target, "argument"))
+            target = target if inner is not None and inner.type == "call_expression" else inner
+        if target is None or target.type not in _WRITTEN_BACK:
+            continue
+        if target.type == "call_expression" and not _is_element(target):
+            continue
+        value = left[parameter.name]
+        if value is not None and value != run.evaluate(target, frame):
+            assign(run, target, value, frame)

@@ -24,7 +24,8 @@ MAX_ROUNDS = 3
 def for_range_loop(run: Machine, node: Node, frame: Frame) -> int:
     """One turn for each item; each turn may also be left out where the items are not exactly known."""
     right, body = field_of(node, "right"), field_of(node, "body")
-    items, exact = iterated(run, run.evaluate(right, frame))
+    subject = run.evaluate(right, frame)
+    items, exact = iterated(run, subject)
     declarator, written = field_of(node, "declarator"), type_text(node)
     parts = list(walk(declarator)) if declarator is not None else []
     names = [text(part) for part in parts if part.type == "identifier"]
@@ -45,7 +46,7 @@ def for_range_loop(run: Machine, node: Node, frame: Frame) -> int:
         is_reference
         and right is not None
         and right.type in _VARIABLES
-        and elements_written(run, body, names, frame)
+        and elements_written(run, body, names, subject, frame)
     ):
         assign(run, right, unknown("what a loop writes to the elements"), frame)
     return outcome

@@ -17,13 +17,13 @@ from nodl.infer.cpp.reading.declarations import Class, FileIndex, Function, Scop
 from nodl.infer.cpp.reading.names import Names
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.memory import AbstractStore, Cell, Changes, Memory
-from nodl.infer.cpp.running.notes import Notes
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     Atom,
     Bound,
     DerivedName,
     Lambda,
+    Notes,
     Obj,
     Text,
     Value,
@@ -93,14 +93,16 @@ class Machine:
         self.objects: dict[object, Obj] = {}
         self.frames: dict[object, Frame] = {}
         self.callbacks: dict[tuple[object, object], tuple[Atom, Frame]] = {}
-        self.ran: dict[str, set[int]] = {}  # file -> first bytes of what was run
         self.handled: dict[str, set[int]] = {}  # file -> first bytes of calls with a result
+        self.resolved: dict[str, set[int]] = {}  # file -> first bytes of calls of what is not ours
         self.called: set[Function] = set()
         self.dead: dict[tuple[str, int, int], str] = {}
         self.global_arguments: list[tuple[str | None, ...]] = []  # that the program gives to rclcpp::init
         self.active: list[Function] = []
+        self.begun: dict[Function, list[int]] = {}  # where in the store those that are active began
         self.left: object = None  # the last call that certainly threw, or ended the program
         self.steps = 0
+        self.repeated = 0  # how many of the elements being made stand for several each
         self.limit = MAX_STEPS
         self.consulted: dict[str, object] = {}  # parameters whose value decided what is made
         self.from_default: dict[str, None] = {}  # those of them that no launch was asked for
@@ -126,13 +128,7 @@ class Machine:
             if node.type in _CALLS_ALL and self.subtree_matters(node):
                 self.gap(node, frame, f"{what} is not followed; it may make interfaces")
             return unknown(what)
-        value = handler(self, node, frame)
-        return self._converted(node, value, frame) if self.names.has_conversions else value
-
-    def _converted(self, node: Node, value: Value, frame: Frame) -> Value:
-        from nodl.infer.cpp.running.own_operators import converted_where_it_stands
-
-        return converted_where_it_stands(self, node, value, frame)
+        return handler(self, node, frame)
 
     def _misread(self, node: Node, frame: Frame) -> Value:
         """What the parser did not understand in an expression: its parts are run, its value is not known."""
@@ -151,7 +147,6 @@ class Machine:
         if node is None:
             return NEXT
         self.count(1)
-        self.ran.setdefault(frame.file.file, set()).add(node.start_byte)
         handler = STATEMENTS.get(node.type)
         if handler is None:
             self.evaluate(node, frame)
@@ -172,6 +167,7 @@ class Machine:
                 raise
             self.store.undo(mark)
             del self.active[active:]
+            self.begun.clear()
             return False
         finally:
             self.limit = before
@@ -236,6 +232,7 @@ class Machine:
         found = self.objects.get(key)
         if found is None:
             found = self.objects[key] = Obj(kind, data=Notes(self.store.log))
+            found.several = self.repeated > 0
             for name, value in values.items():
                 setattr(found, name, value)
             self._uses(found.cls)
@@ -271,6 +268,10 @@ class Machine:
         """This place has its result: an interface, a gap, or somebody who was followed."""
         self.handled.setdefault(frame.file.file, set()).add(node.start_byte)
 
+    def resolve(self, node: Node, frame: Frame) -> None:
+        """Note that this call ran, and that it calls none of the program's functions or has a gap of its own."""
+        self.resolved.setdefault(frame.file.file, set()).add(node.start_byte)
+
     def kill(self, node: Node | None, frame: Frame, why: str) -> None:
         if node is not None:
             self.dead[(frame.file.file, node.start_byte, node.end_byte)] = why
@@ -301,11 +302,21 @@ class Machine:
 
     def later(self, values: Iterable[Value], frame: Frame) -> None:
         """Closures that somebody outside keeps: they may be called at any time."""
-        for atom in chain.from_iterable(values):
+        atoms = [*chain.from_iterable(values)]
+        for atom in atoms:
             if isinstance(atom, Lambda):
                 self.callbacks.setdefault((atom.node.id, atom.frame.path), (atom, frame))
             elif isinstance(atom, Bound):
-                self.callbacks.setdefault((atom.function, atom.this), (atom, frame))
+                for each in self._with_objects(atom, atoms):
+                    self.callbacks.setdefault((each.function, each.this), (each, frame))
+
+    def _with_objects(self, atom: Bound, atoms: Sequence[Atom]) -> list[Bound]:
+        """A method that is handed over beside objects that have it is called on those."""
+        if atom.this is not None or atom.function.static or not atom.function.owner:
+            return [atom]
+        name = atom.function.name
+        owners = [each for each in atoms if atom.function in self.methods_of(each, name)]
+        return [Bound(atom.function, each) for each in owners] or [atom]
 
     def made_classes(self) -> set[Class]:
         return {each.cls for each in self.objects.values() if each.cls is not None}

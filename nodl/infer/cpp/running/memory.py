@@ -6,8 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from nodl.infer.cpp.running.notes import Noted, NoteLog, hold
-from nodl.infer.cpp.running.values import BOTTOM, Value, join
+from nodl.infer.cpp.running.values import BOTTOM, Noted, NoteLog, Value, bounded, hold, join
 
 MEMORY_DEPTH = 20
 """Paths of calls are whole up to this depth (``Frame.path``): then the same path means the same callers."""
@@ -33,6 +32,7 @@ class AbstractStore:
         self._cells: dict[Cell, Value] = {}
         self._trail: list[tuple[Cell, Value]] = []
         self._reads: set[Cell] | None = None
+        self._history: Changes | None = None
         self.log = NoteLog()
 
     def get(self, cell: Cell) -> Value | None:
@@ -81,8 +81,29 @@ class AbstractStore:
     def set(self, cell: Cell, value: Value) -> None:
         old = self._cells.get(cell, _ABSENT)
         if old is not value:
+            value = bounded(value)
             self._trail.append((cell, old))
             self._cells[cell] = value
+            if self._history is not None:
+                self._remember(cell, value)
+
+    def others_run(self) -> None:
+        """From now on others may run at any time: what they find are all values that cells have from here on."""
+        if self._history is None:
+            self._history = dict(self._cells)
+
+    def _remember(self, cell: Cell, value: Value) -> None:
+        assert self._history is not None
+        before = self._history.get(cell, value)
+        self._history[cell] = before if before is value else join(before, value)
+
+    def as_others_find_it(self) -> None:
+        """Continue with what a callback may find that ran while the program still changed its variables."""
+        history, self._history = self._history or {}, None
+        for cell, value in history.items():
+            present = self._cells.get(cell)
+            if present is not None and not _is_over(cell) and set(value) - set(present):
+                self.set(cell, join(present, value))
 
     def mark(self) -> int:
         return len(self._trail)
@@ -91,11 +112,7 @@ class AbstractStore:
         """What was written since ``mark``, as it is now."""
         self._spend((len(self._trail) - mark) // _LOOKED_AT_IN_A_STEP)
         cells = self._cells
-        return {
-            cell: cells[cell]
-            for cell, _ in self._trail[mark:]
-            if cell in cells and not getattr(cell[0], "finished", False)
-        }
+        return {cell: cells[cell] for cell, _ in self._trail[mark:] if cell in cells and not _is_over(cell)}
 
     def before(self, mark: int) -> Changes:
         """The values at ``mark`` of all cells that were written since."""
@@ -111,12 +128,19 @@ class AbstractStore:
                 self._cells.pop(cell, None)
             else:
                 self._cells[cell] = old
+                if self._history is not None:
+                    self._remember(cell, old)
 
     def merge(self, alternatives: Sequence[Changes]) -> None:
         """Continue with any of ``alternatives``, each made from the present state."""
         for cell in dict.fromkeys(cell for changes in alternatives for cell in changes):
             present = self._cells.get(cell, BOTTOM)
             self.set(cell, join(*(changes.get(cell, present) for changes in alternatives)))
+
+
+def _is_over(cell: Cell) -> bool:
+    """Whether it is a variable of a call that nobody can see any more."""
+    return bool(getattr(cell[0], "finished", False))
 
 
 def _is_local(cell: Cell) -> bool:

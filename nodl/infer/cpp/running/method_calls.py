@@ -6,6 +6,7 @@ from nodl.infer.cpp.ledger import CREATES
 from nodl.infer.cpp.libraries import LIBRARY_METHODS, NODE_METHODS, FunctionModel
 from nodl.infer.cpp.reading.declarations import Class, Function
 from nodl.infer.cpp.running.assignments import assign
+from nodl.infer.cpp.running.constructors import construct
 from nodl.infer.cpp.running.containers import CONTAINER_METHODS, container_call, is_standard
 from nodl.infer.cpp.running.contents import handed_over
 from nodl.infer.cpp.running.hiding import GIVES_INNER, class_around, class_of_member, lexical_class
@@ -35,8 +36,14 @@ def method_call(run: Machine, site: CallSite) -> Value:
         value = run.evaluate(site.given[0], frame) if site.given else BOTTOM
         assign(run, subject, value, frame)  # pointer.reset(new Foo(...))
         return BOTTOM
+    if name == "emplace" and _declared_pointer(run, subject, frame):  # of an optional
+        kind, _ = declared_type(run, subject, frame)
+        made = construct(run, kind._replace(pointer=False), site.values, site.node, frame)
+        assign(run, subject, made, frame)
+        return made
     if not receiver:
         run.later(site.values, frame)
+        run.resolve(site.node, frame)
         if _could_make(run, subject, name, frame):
             found_at = (frame.file.file, site.node.start_byte)
             run.unset[found_at] = (run.place(site.node, frame), text(subject)[:40], name)
@@ -99,6 +106,8 @@ def on_object(run: Machine, atom: Obj, name: str, site: CallSite) -> Value:
         field = member(run, atom, name, seen or lexical_class(run, atom, frame))
         if field is not None and name not in NODE_METHODS:
             return site.call_value(field)
+    if atom.cls is None and atom.type.name:
+        run.resolve(site.node, frame)
     found = by_model(run, atom, name, site)
     if found is None:
         found = only_declared(run, atom.cls, name, site, atom)
@@ -159,6 +168,8 @@ def _on_unknown(run: Machine, atom: Unknown, name: str, site: CallSite) -> Value
         return unknown(f"the result of {name}()")
     kind, _ = declared_type(run, subject, frame)
     is_own = kind.last in run.names.classes  # in whatever namespace
+    if kind.name not in ("", "auto") or not is_standard(name):
+        run.resolve(node, frame)
     if (kind.name in ("", "auto") or is_own) and not is_standard(name):
         every = (f for table in run.names.methods.values() for f in table.get(name, ()))
         possible = [f for f in every if run.makes_interfaces(f)]

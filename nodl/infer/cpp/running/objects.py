@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 
 from nodl.infer.cpp.reading.declarations import Class
 from nodl.infer.cpp.reading.type_names import NO_TYPE, Type
-from nodl.infer.cpp.running.contents import copied, items_of
+from nodl.infer.cpp.running.arithmetic import as_type
+from nodl.infer.cpp.running.contents import copied, elements_copied, items_of
+from nodl.infer.cpp.running.hiding import seen_type
 from nodl.infer.cpp.running.launch_values import settled_text
 from nodl.infer.cpp.running.machine import Frame, Machine
-from nodl.infer.cpp.running.numbers import as_type
 from nodl.infer.cpp.running.references import keep_references
 from nodl.infer.cpp.running.values import (
     BOTTOM,
@@ -45,6 +47,10 @@ _SCALARS = frozenset({
     "uint8_t", "uint16_t", "uint32_t", "uint64_t", "int8_t", "int16_t", "int32_t", "int64_t", "unsigned int",
     "std::atomic_bool", "std::chrono::milliseconds", "std::chrono::seconds",
 })  # fmt: skip
+
+
+MAX_ELEMENTS = 32
+"""Of a list that is made with so many elements; of longer ones one element stands for all."""
 
 
 def is_plain_type(name: str) -> bool:
@@ -82,7 +88,11 @@ def initial_value(run: Machine, value: Node, frame: Frame, reference: bool = Fal
             return initial_value(run, inner[0], frame, reference)
         return BOTTOM if not inner else run.evaluate(value, frame)
     found = run.evaluate(value, frame)
-    return found if reference or _gives_iterator(value) else copied(run, found, value, frame)
+    if reference or _gives_iterator(value):
+        return found
+    if any(isinstance(atom, Seq | Map) for atom in found):
+        return elements_copied(run, seen_type(run, value, frame), found, value, frame)
+    return copied(run, found, value, frame)
 
 
 def _gives_iterator(value: Node) -> bool:
@@ -123,15 +133,18 @@ def made(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame: Fra
         if kind.name in _TEXTS:
             return text_of(run, [run.evaluate(each, frame) for each in given])
         return as_type(kind.name, run.evaluate(given[0], frame))
+    values: list[Value] | None = None
+    if cls is not None and len(given) == 1 and not given[0].type.startswith("initializer_"):
+        values = [run.evaluate(given[0], frame)]
+        if _copies(run, cls, values[0]):
+            return copied(run, values[0], node, frame, cls)
     if cls is not None and is_aggregate(run, cls) and given:
-        found = _aggregate(run, node, kind, cls, given, frame)
+        found = _aggregate(run, node, kind, cls, given, frame, values)
         keep_references(run, found, given, frame)
         return found
-    values = [run.evaluate(each, frame) for each in given]
+    values = values or [run.evaluate(each, frame) for each in given]
     if cls is None and len(values) == 1 and _all_of(kind, values[0]):
         return values[0]  # a copy of a library's object
-    if cls is not None and len(values) == 1 and _copies(run, cls, values[0]):
-        return copied(run, values[0], node, frame, cls)
     found = construct(run, kind, values, node, frame)
     keep_references(run, found, given, frame)
     return found
@@ -151,6 +164,8 @@ def _sequence(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame
     items = [
         made(run, each, inner, children(each), frame)
         if cls is not None and each.type == "initializer_list"
+        else run.evaluate(each, frame)
+        if inner.pointer
         else copied(run, run.evaluate(each, frame), each, frame, cls)
         for each in given
     ]
@@ -163,8 +178,30 @@ def _sequence(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame
         parts = [items_of(run, atom) for atom in items[0]]
         listed = [item for part, _ in parts for item in part]
         return (Seq(tuple(listed)) if len(parts) == 1 and parts[0][1] else open_sequence(listed),)
-    one = items[1] if len(items) > 1 else default_value(run, node, inner, frame) if inner.name else BOTTOM
+    count = items[0][0] if len(items[0]) == 1 else None
+    return _repeated(run, node, inner, count, frame, items[1] if len(items) > 1 else None)
+
+
+def _repeated(
+    run: Machine, node: Node, inner: Type, count: object, frame: Frame, value: Value | None = None
+) -> Value:
+    """So many elements of type ``inner``: each an object of its own, or one for all where that is not known."""
+    if isinstance(count, int) and 0 <= count <= MAX_ELEMENTS:
+        made_ones = []
+        for index in range(count):
+            of_one = replace(frame, path=(*frame.path, index))
+            made_ones.append(_element(run, node, inner, of_one, value))
+        return (Seq(tuple(made_ones)),)
+    run.repeated += 1
+    one = _element(run, node, inner, frame, value)
+    run.repeated -= 1
     return (open_sequence((one,)),)
+
+
+def _element(run: Machine, node: Node, inner: Type, frame: Frame, value: Value | None) -> Value:
+    if value is not None:
+        return copied(run, value, node, frame, run.held_class(inner, frame))
+    return default_value(run, node, inner, frame) if inner.name and not inner.pointer else BOTTOM
 
 
 def as_set(items: Sequence[Value]) -> Seq:
@@ -201,8 +238,8 @@ def text_of(run: Machine, values: Sequence[Value]) -> Value:
     known = [settled_text(run, atom) if isinstance(atom, Text) else None for atom in single]
     numbers = [atom if isinstance(atom, int) else -1 for atom in single]
     whole = known[0]
-    if len(values) == 2 and numbers[0] >= 0 and known[1] is not None and len(known[1]) == 1:
-        return literal(known[1] * min(numbers[0], 256))
+    if len(values) == 2 and 0 <= numbers[0] <= 256 and known[1] is not None and len(known[1]) == 1:
+        return literal(known[1] * numbers[0])
     if len(values) == 3 and whole is not None and 0 <= numbers[1] <= len(whole) and numbers[2] >= 0:
         return literal(whole[numbers[1] : numbers[1] + numbers[2]])
     return unknown("a text made of several values")
@@ -243,8 +280,15 @@ def fields_of(cls: Class) -> list[str]:
 
 
 def _aggregate(
-    run: Machine, node: Node, kind: Type, cls: Class, given: Sequence[Node], frame: Frame
+    run: Machine,
+    node: Node,
+    kind: Type,
+    cls: Class,
+    given: Sequence[Node],
+    frame: Frame,
+    values: list[Value] | None,
 ) -> Value:
+    """An object whose fields braces fill; ``values``: what was given, where that ran already."""
     from nodl.infer.cpp.running.constructors import construct
 
     names = fields_of(cls)
@@ -258,7 +302,7 @@ def _aggregate(
         if name:
             member = cls.fields.get(name)
             inner = run.names.resolve(member.type, cls.scope, cls.file, bindings) if member else NO_TYPE
-            members[name] = in_braces(run, value, inner, frame)
+            members[name] = values[position] if values else in_braces(run, value, inner, frame)
     return construct(run, kind, [], node, frame, members=members)
 
 
@@ -269,7 +313,8 @@ def default_value(run: Machine, node: Node, kind: Type, frame: Frame) -> Value:
     if kind.name in _TEXTS:
         return literal("")
     if kind.name == "std::array" and kind.arguments and not kind.arguments[0].pointer:
-        return (open_sequence((default_value(run, node, kind.arguments[0], frame),)),)
+        size = kind.arguments[1].name if len(kind.arguments) > 1 else ""
+        return _repeated(run, node, kind.arguments[0], int(size) if size.isdigit() else None, frame)
     if kind.name in SEQUENCES:
         return (Seq(()),)
     if kind.name in MAPS:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 from nodl.infer.cpp.reading.type_names import Type
+from nodl.infer.cpp.running.arithmetic import added, arithmetic
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.contents import items_of
-from nodl.infer.cpp.running.hiding import class_of_member
+from nodl.infer.cpp.running.hiding import class_of_member, seen_type
 from nodl.infer.cpp.running.launch_values import settled_text, text_of
 from nodl.infer.cpp.running.machine import NEXT, Frame, Machine, expression
-from nodl.infer.cpp.running.numbers import added, arithmetic
+from nodl.infer.cpp.running.objects import default_value
 from nodl.infer.cpp.running.own_operators import by_operator, pointed_to
 from nodl.infer.cpp.running.values import (
     BOTTOM,
@@ -26,6 +28,7 @@ from nodl.infer.cpp.running.values import (
     Text,
     Unknown,
     Value,
+    as_one_map,
     concatenated,
     join,
     literal,
@@ -218,7 +221,10 @@ def pointer(run: Machine, node: Node, frame: Frame) -> Value:
     found = run.evaluate(argument, frame)
     if argument is not None and argument.type == "subscript_expression" and has_text(found):
         return unknown("a text from some letter on")
-    return found if text(node).startswith("&") else pointed_to(run, found, "operator*", node, frame)
+    if not text(node).startswith("&"):
+        return pointed_to(run, found, "operator*", node, frame)
+    own = by_operator(run, "&", found, [], node, frame)
+    return found if own is None else own
 
 
 def method_pointer(run: Machine, node: Node, frame: Frame) -> Value | None:
@@ -276,9 +282,38 @@ def subscript(run: Machine, node: Node, frame: Frame) -> Value:
     own = by_operator(run, "[]", held, keys, node, frame)
     if own is not None:
         return own
+    if container is not None and keys and any(isinstance(atom, Map) for atom in held):
+        held = _with_new_entries(run, held, keys[0], container, node, frame)
     found = [element(run, atom, keys[0] if keys else BOTTOM) for atom in held]
     result = join(*found) if found else BOTTOM
     return result or unknown(f"the value of {text(node)[:60]}")
+
+
+def _with_new_entries(
+    run: Machine, held: Value, key: Value, container: Node, node: Node, frame: Frame
+) -> Value:
+    """The maps after ``map[key]``, which makes an entry where there is none under the key ([map.access]).
+
+    Entries of plain values are made for keys that are known alone.
+    """
+    kind = seen_type(run, container, frame)
+    inner = kind.arguments[1] if len(kind.arguments) > 1 else None
+    written = plain(key[0]) if len(key) == 1 else None
+    if inner is None or (written is None and run.held_class(inner, frame) is None):
+        return held
+    after: list[object] = []
+    for atom in held:
+        known = isinstance(atom, Map) and any(entry[0] == key for entry in atom.entries)
+        if isinstance(atom, Map) and not known:
+            run.repeated += written is None
+            place = replace(frame, path=(*frame.path, written))
+            made = BOTTOM if inner.pointer else default_value(run, node, inner, place)
+            run.repeated -= written is None
+            atom = as_one_map((*atom.entries, (key, made)), atom.open or written is None)
+        after.append(atom)
+    if after != list(held):
+        assign(run, container, tuple(after), frame)
+    return tuple(after)
 
 
 def element(run: Machine, atom: object, key: Value) -> Value:

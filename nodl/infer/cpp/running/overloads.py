@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from nodl.infer.cpp.reading.declarations import Function, FunctionParameter
-from nodl.infer.cpp.running.values import Bound, Lambda, Map, Obj, Seq, Text, Value
+from nodl.infer.cpp.running.values import Bound, Lambda, Map, Obj, Seq, Text, Unknown, Value
 
 
 def chosen(functions: Sequence[Function], arguments: Sequence[Value]) -> Function | None:
@@ -18,16 +18,23 @@ def chosen(functions: Sequence[Function], arguments: Sequence[Value]) -> Functio
 MAX_OVERLOADS = 3
 
 
-def candidates(functions: Sequence[Function], arguments: Sequence[Value]) -> Sequence[Function]:
-    """The overloads that fit best: more than one where a text may be meant in several ways. Of arguments that are not
-    known the first decides; the ledger asks about the others."""
+def candidates(
+    functions: Sequence[Function],
+    arguments: Sequence[Value],
+    makes: Callable[[Function], bool] = lambda function: False,
+) -> Sequence[Function]:
+    """Find the overloads that fit best: several where a text may be meant in several ways, or where one
+    that ``makes`` interfaces may be meant by an argument that is not known."""
     fitting = [each for each in functions if _takes(each, len(arguments))]
     if len(fitting) <= 1:
         return fitting or (functions if len(functions) == 1 else ())
     scores = [sum(map(_likeness, each.parameters, arguments)) for each in fitting]
     best = [each for each, score in zip(fitting, scores, strict=True) if score == max(scores)]
-    is_text = any(isinstance(atom, Text) for value in arguments for atom in value)
-    return best if is_text and len(best) <= MAX_OVERLOADS else best[:1]
+    atoms = [atom for value in arguments for atom in value or (Unknown("nothing"),)]
+    if any(isinstance(atom, Text) for atom in atoms) and len(best) <= MAX_OVERLOADS:
+        return best
+    is_open = any(isinstance(atom, Unknown) for atom in atoms)
+    return best if is_open and any(map(makes, best)) else best[:1]
 
 
 def _takes(function: Function, count: int) -> bool:

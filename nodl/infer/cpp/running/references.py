@@ -66,9 +66,12 @@ def forget_shadowed(run: Machine, name: str, frame: Frame) -> None:
             frame.aliases[alias] = None
 
 
-def elements_written(run: Machine, body: Node | None, names: Sequence[str], frame: Frame) -> bool:
-    """Whether a loop writes to the plain elements that its references ``names`` stand for."""
-    held = [atom for name in names for atom in run.store.get((frame, name)) or BOTTOM]
+def elements_written(
+    run: Machine, body: Node | None, names: Sequence[str], subject: Value, frame: Frame
+) -> bool:
+    """Whether a loop over ``subject`` writes to the plain elements, or letters, that ``names`` stand for."""
+    held: list[object] = [atom for atom in subject if isinstance(atom, Text | Param)]
+    held += [atom for name in names for atom in run.store.get((frame, name)) or BOTTOM]
     held += [inner for atom in held if isinstance(atom, Group) for item in atom.items[1:] for inner in item]
     if not any(isinstance(atom, Text | Param | int | float) for atom in held):
         return False

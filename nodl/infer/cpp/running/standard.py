@@ -1,4 +1,4 @@
-"""Functions of the C++ standard library that names pass through: texts, pairs, bind, threads."""
+"""Functions of the C++ standard library: texts, pairs, bind, threads, and what algorithms write through closures."""
 
 from __future__ import annotations
 
@@ -6,7 +6,10 @@ import re
 from collections.abc import Callable, Sequence
 from functools import partial
 
+from nodl.infer.cpp.reading.declarations import parameters_of
 from nodl.infer.cpp.reading.type_names import Type
+from nodl.infer.cpp.reading.writes import writes_of
+from nodl.infer.cpp.running.constructors import is_written_back
 from nodl.infer.cpp.running.contents import items_of
 from nodl.infer.cpp.running.machine import NEXT, Frame, Machine, registered
 from nodl.infer.cpp.running.values import (
@@ -27,7 +30,7 @@ from nodl.infer.cpp.running.values import (
     truth,
     unknown,
 )
-from nodl.infer.cpp.syntax import Node, text
+from nodl.infer.cpp.syntax import Node, field_of, text
 
 Standard = Callable[[Machine, Sequence[Value], Node, Frame], Value]
 STANDARD: dict[str, Standard] = {}
@@ -129,20 +132,33 @@ def _placeholder(value: Value) -> int:
 def _calls_back(run: Machine, values: Sequence[Value], node: Node, frame: Frame) -> Value:
     from nodl.infer.cpp.running.invocation import call_values
 
+    if text(node).startswith("std::invoke") and values:
+        is_method = any(isinstance(a, Bound) and a.this is None and a.function.owner for a in values[0])
+        first = 2 if is_method else 1
+        callee = _bind(run, values[:2], node, frame) if is_method else values[0]
+        return call_values(run, callee, values[first:], node, frame)
+    if text(node).startswith("std::async"):
+        run.store.others_run()
     elements = tuple(join(*items_of(run, atom)[0]) for atom in values[0]) if values else ()
     for atom in (atom for value in values for atom in value if isinstance(atom, Lambda)):
         # Before what follows, or not.
         run.branches([partial(_once, run, atom, elements, node, frame), lambda: NEXT])
-    callee = next(
+    position = next(
         (at for at, value in enumerate(values) if any(isinstance(a, Lambda | Bound) for a in value)), 0
     )
-    for atom in _bind(run, list(values[callee:]), node, frame):
+    if text(field_of(node, "function")).startswith(_ALGORITHMS):
+        return unknown("the result of an algorithm")
+    for atom in _bind(run, list(values[position:]), node, frame):
         if isinstance(atom, Obj) and atom.data.get("partial"):
             call_values(run, (atom,), [], node, frame)  # with its arguments
         else:
             run.later([(atom,)], frame)
-    run.later(values, frame)
+    run.later([tuple(a for a in value if not isinstance(a, Bound)) for value in values], frame)
     return unknown(f"the result of {text(node.child_by_field_name('function'))[:40]}()")
+
+
+_ALGORITHMS = ("std::for_each", "std::transform", "std::sort", "std::any_of", "std::all_of")
+"""They call their closure, and keep it not."""
 
 
 def _once(run: Machine, atom: Lambda, elements: Sequence[Value], node: Node, frame: Frame) -> int:
@@ -184,3 +200,59 @@ def _itself(run: Machine, values: Sequence[Value], node: Node, frame: Frame) -> 
 @_standard("getenv", "std::getenv", "rcpputils::get_env_var")
 def _environment(run: Machine, values: Sequence[Value], node: Node, frame: Frame) -> Value:
     return unknown("an environment variable")
+
+
+_BY_ARGUMENT = re.compile(
+    r"for_each(?:_n)?|transform|(?:stable_|partial_)?sort|reverse|rotate|shuffle|fill(?:_n)?|generate(?:_n)?|copy(?:_if|_n)?|"
+    r"replace(?:_if)?|remove_if|unique|iota|(?:stable_)?partition|swap(?:_ranges)?|iter_swap|accumulate|getline|"
+    r"(?:all|any|none)_of|(?:count|find)(?:_if)?"
+)
+_KEEPS = re.compile(
+    r"std::(?:thread|jthread|async|bind\w*|function|make_\w+|pair|tuple|optional|any|\w+_ptr|forward_as_tuple|tie)"
+)
+"""Takes copies of its arguments, or only keeps them."""
+_CALLS = frozenset({"std::for_each", "std::invoke", "std::apply", "std::visit"})
+
+
+def as_algorithm(name: str, given: Sequence[Node]) -> str:
+    """``for_each(v.begin(), ...)`` is found in ``std`` by its arguments ([basic.lookup.argdep])."""
+    return f"std::{name}" if len(given) > 1 and _BY_ARGUMENT.fullmatch(name) else name
+
+
+def writes_elements(run: Machine, name: str, values: Sequence[Value]) -> bool:
+    """Whether a function of the standard library calls something that writes to what it gets by reference."""
+    if not name.startswith("std::") or _KEEPS.fullmatch(name):
+        return False
+    atoms = [atom for value in values for atom in value]
+    called = [a for a in atoms if isinstance(a, Lambda | Bound) or (isinstance(a, Obj) and _callable(run, a))]
+    return any(_writes(run, atom) for atom in called) or (name in _CALLS and not called)
+
+
+def _callable(run: Machine, atom: Obj) -> bool:
+    return bool(run.methods_of(atom, "operator()") or atom.data.get("partial"))
+
+
+def _writes(run: Machine, atom: object) -> bool:
+    if isinstance(atom, Lambda):
+        declarator = field_of(atom.node, "declarator")
+        given = [p.name for p in parameters_of(declarator) if is_written_back(p)] if declarator else []
+        return bool(given) and not writes_of(atom.node).changed.isdisjoint(given)
+    if isinstance(atom, Bound):
+        given = [p.name for p in atom.function.parameters if is_written_back(p)]
+        return bool(given) and not writes_of(atom.function.node).changed.isdisjoint(given)
+    if isinstance(atom, Obj) and atom.data.get("partial"):
+        return any(_writes(run, each) for each in atom.data["partial"][0])
+    return any(_writes(run, Bound(each, None)) for each in run.methods_of(atom, "operator()"))
+
+
+def called_now(run: Machine, values: Sequence[Value], node: Node, frame: Frame) -> None:
+    """Closures that write to what they captured may be called before what follows, or not."""
+    from nodl.infer.cpp.running.invocation import call_lambda
+
+    def once(atom: Lambda) -> int:
+        call_lambda(run, atom, [unknown("an argument")] * 8, node, frame)
+        return NEXT
+
+    for atom in (atom for value in values for atom in value if isinstance(atom, Lambda)):
+        if writes_of(atom.node).changed:
+            run.branches([partial(once, atom), lambda: NEXT])

@@ -18,9 +18,10 @@ from nodl.infer.cpp.running.machine import (
     StatementHandler,
     statement,
 )
-from nodl.infer.cpp.running.objects import declared_value
+from nodl.infer.cpp.running.objects import declared_value, fields_of
 from nodl.infer.cpp.running.references import bind_reference
-from nodl.infer.cpp.running.values import BOTTOM, Const, Group, Value, join, truth, unknown
+from nodl.infer.cpp.running.values import BOTTOM, Const, Group, Obj, Seq, Value, join, truth, unknown
+from nodl.infer.cpp.running.variables import member
 from nodl.infer.cpp.syntax import Node, children, field_of, parse_expression, text, unwrapped, walk
 
 
@@ -123,6 +124,21 @@ def break_statement(run: Machine, node: Node, frame: Frame) -> int:
     return BREAK
 
 
+@statement("goto_statement")
+def goto_statement(run: Machine, node: Node, frame: Frame) -> int:
+    """Goes on as if it were not there; a gap where it jumps back in a function that could make interfaces."""
+    function, name = frame.function, text(field_of(node, "label"))
+    labels = walk(function.node) if function is not None else ()
+    back = any(
+        each.type == "labeled_statement" and text(field_of(each, "label")) == name
+        for each in labels
+        if each.start_byte < node.start_byte
+    )
+    if function is None or (back and run.makes_interfaces(function)):
+        run.gap(node, frame, f"goto {name}: what runs again behind the label is not followed")
+    return NEXT
+
+
 @statement("continue_statement")
 def continue_statement(run: Machine, node: Node, frame: Frame) -> int:
     """Keeps what was written for the end of this turn of the innermost loop, past any switch."""
@@ -142,9 +158,8 @@ def if_statement(run: Machine, node: Node, frame: Frame) -> int:
     """The side that the condition chooses, the other one dead; both, joined, if that is not decided."""
     condition = field_of(node, "condition")
     for child in children(condition):
-        if child.type in ("init_statement", "declaration"):
-            for inner in children(child) if child.type == "init_statement" else [child]:
-                run.execute(inner, frame)
+        for inner in children(child) if child.type == "init_statement" else ():
+            run.execute(inner, frame)
     value = condition_value(run, condition, frame)
     then, other = field_of(node, "consequence"), field_of(node, "alternative")
     if value is None:
@@ -162,8 +177,7 @@ def condition_value(run: Machine, condition: Node | None, frame: Frame) -> bool 
         else condition
     )
     if inner is not None and inner.type == "declaration":
-        if run.names.has_conversions:
-            run.evaluate(field_of(inner, "value"), frame)
+        run.execute(inner, frame)
         return None
     return truth(run.evaluate(inner, frame))
 
@@ -366,5 +380,17 @@ def _local_alias(run: Machine, node: Node, frame: Frame) -> None:
 def bind_names(run: Machine, names: list[str], value: Value, frame: Frame) -> None:
     """A structured binding."""
     for index, name in enumerate(names):
-        parts = [a.items[index] for a in value if isinstance(a, Group) and index < len(a.items)]
+        parts = [part for atom in value for part in _bound_part(run, atom, index)]
         run.local(frame, name, join(*parts) if parts else unknown(f"the value of {name}"))
+
+
+def _bound_part(run: Machine, atom: object, index: int) -> list[Value]:
+    """What the name at ``index`` is bound to: an element, or a member of a structure."""
+    if isinstance(atom, Group | Seq):
+        exact = not (isinstance(atom, Seq) and atom.open) and index < len(atom.items)
+        return [atom.items[index]] if exact else list(atom.items)
+    if isinstance(atom, Obj) and atom.cls is not None:
+        fields = fields_of(atom.cls)
+        found = member(run, atom, fields[index], atom.cls) if index < len(fields) else None
+        return [found] if found is not None else []
+    return []

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 
 from nodl.infer.cpp.ledger import CREATES
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES, is_harmless_class, is_harmless_function
-from nodl.infer.cpp.running.algorithms import called_now
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.contents import copied, handed_over, nodes_in, overwrite
 from nodl.infer.cpp.running.hiding import element_type, seen_type
 from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.objects import is_plain_type
 from nodl.infer.cpp.running.references import through
+from nodl.infer.cpp.running.standard import called_now
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     Group,
@@ -24,12 +24,15 @@ from nodl.infer.cpp.running.values import (
     Text,
     Value,
     as_one_map,
+    as_parts,
     join,
     open_sequence,
+    plain,
     unknown,
 )
 from nodl.infer.cpp.running.variables import declared_type
 from nodl.infer.cpp.syntax import Node, field_of, text, unwrapped, walk
+from nodl.name_template import ParameterPart, Part
 
 
 def without_source(
@@ -79,6 +82,7 @@ def unknown_call(
     if not (harmless and (receiver is not None or name.startswith("rclcpp"))):  # a timer calls nobody at once
         called_now(run, values, node, frame)
     if harmless:
+        run.resolve(node, frame)
         run.later(values, frame)
         return unknown(f"the result of {name}()")
     handed_over(run, f"{name}()", values, node, frame)
@@ -106,13 +110,27 @@ def changed_by_standard(run: Machine, name: str, given: Sequence[Node], frame: F
     targets = [target for each in given for target in _variables(each)]
     if name == "std::swap" and len(targets) == 2 and _swapped(run, targets, frame):
         return
+    if name == "std::replace" and _replaced(run, given, targets, frame):
+        return
     for each in given:
         if not _variables(each) and _RANGE.search(text(each)):
             through(run, each, frame)
         for target in _variables(each):
             if text(target) not in seen:
                 seen.add(text(target))
-                _changed(run, name, target, frame)
+                if name != "std::reverse" or not _reversed(run, target, given, frame):
+                    _changed(run, name, target, frame)
+
+
+def _reversed(run: Machine, target: Node, given: Sequence[Node], frame: Frame) -> bool:
+    """``std::reverse(x.begin(), x.end())`` of a list that is known; whether it was one."""
+    whole = [f"{text(target)}.begin()", f"{text(target)}.end()"]
+    value = run.evaluate(target, frame)
+    if [text(each) for each in given] != whole or len(value) != 1 or not isinstance(value[0], Seq):
+        return False
+    if not value[0].open:
+        assign(run, target, (Seq(value[0].items[::-1]),), frame)
+    return not value[0].open
 
 
 def _swapped(run: Machine, targets: Sequence[Node], frame: Frame) -> bool:
@@ -129,6 +147,35 @@ def _swapped(run: Machine, targets: Sequence[Node], frame: Frame) -> bool:
     overwrite(run, objects[:1], second)
     overwrite(run, objects[1:], kept)
     return True
+
+
+def _replaced(run: Machine, given: Sequence[Node], targets: Sequence[Node], frame: Frame) -> bool:
+    """``std::replace(s.begin(), s.end(), 'a', 'b')`` in a text; whether that could be followed."""
+    if len(given) != 4 or len({text(target) for target in targets}) != 1:
+        return False
+    old, new = (run.evaluate(each, frame) for each in given[2:])
+    letters = [
+        plain(value[0]) if len(value) == 1 and isinstance(value[0], Text) else None for value in (old, new)
+    ]
+    found = [_with_letter(atom, letters[0], letters[1]) for atom in run.evaluate(targets[0], frame)]
+    if not found or None in found:
+        return False
+    assign(run, targets[0], tuple(each for each in found if each is not None), frame)
+    return True
+
+
+def _with_letter(atom: object, old: str | None, new: str | None) -> Text | None:
+    if not isinstance(atom, Text | Param) or old is None or new is None:
+        return None
+    parts: list[Part] = []
+    for part in as_parts(atom):
+        if isinstance(part, ParameterPart):
+            parts.append(part._replace(edits=(*part.edits, ("replace", (old, new)))))
+        elif isinstance(part, str) and type(part) is str:
+            parts.append(part.replace(old, new))
+        else:
+            return None
+    return Text(tuple(parts))
 
 
 def _variables(given: Node) -> list[Node]:

@@ -8,20 +8,71 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from nodl.infer.cpp.reading.declarations import Class, Function
 from nodl.infer.cpp.reading.type_names import Type
-from nodl.infer.cpp.running.notes import Notes
 from nodl.infer.cpp.syntax import Node
 from nodl.name_template import ParameterPart, Part, UnknownPart, melted
 
 if TYPE_CHECKING:
     from nodl.infer.cpp.findings import AllocatedNode
     from nodl.infer.cpp.running.machine import Frame
+from collections.abc import Iterator
 
 MAX_ALTERNATIVES = 32
 MAX_SEQUENCES = 6
 MAX_ITEMS = 128
+MAX_LETTERS = 10_000
+MAX_PARTS = 2_000
+"""What a value may hold in all: larger ones count as not known."""
 Atom = Any  # one of the classes below, or bool, int, float
 Value = tuple[Atom, ...]
 BOTTOM: Value = ()
+
+
+Noted = dict[tuple["Notes", str], object]  # what was asked for, and the answer at the first time
+_ABSENT = object()
+
+
+class NoteLog:
+    """The notes that were read since somebody wanted to know; ``None`` while nobody does."""
+
+    def __init__(self) -> None:
+        self.noted: Noted | None = None
+
+
+class Notes:
+    """Values by name, equal to themselves alone. What is read is told to the log."""
+
+    def __init__(self, log: NoteLog | None = None) -> None:
+        self._log = log
+        self._values: dict[str, Any] = {}
+
+    def get(self, name: str, default: Any = None) -> Any:
+        if self._log is not None and self._log.noted is not None:
+            self._log.noted.setdefault((self, name), self._values.get(name, _ABSENT))
+        return self._values.get(name, default)
+
+    def __getitem__(self, name: str) -> Any:
+        return self.get(name)
+
+    def __setitem__(self, name: str, value: Any) -> None:
+        self._values[name] = value
+
+    def update(self, **values: Any) -> None:
+        self._values.update(values)
+
+    def __contains__(self, name: str) -> bool:
+        return self.get(name, _ABSENT) is not _ABSENT
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._values)
+
+
+def hold(noted: Noted) -> bool:
+    """Whether all these notes say what they said."""
+    for (notes, name), said in noted.items():
+        says = notes._values.get(name, _ABSENT)
+        if says is not said and says != said:
+            return False
+    return True
 
 
 class NodeNamePart(NamedTuple):
@@ -131,10 +182,35 @@ class Obj:
     heap: bool = False
     foreign_base: str = ""
     is_node: bool = False  # the node itself; else something that belongs to it
+    several: bool = False  # stands for several objects: what is written to it may be written to another one
     building: Class | None = None  # the class whose constructor runs: no method of a derived class is called
 
     def __repr__(self) -> str:
         return f"<{self.type.name}>"
+
+
+def bounded(value: Value) -> Value:
+    """``value``, or one that is not known where containers in it hold too much in all."""
+    containers = [atom for atom in value if isinstance(atom, Seq | Map | Group)]
+    if not containers or sum(_parts(atom, MAX_PARTS) for atom in containers) <= MAX_PARTS:
+        return value
+    kept = tuple(atom for atom in value if not isinstance(atom, Seq | Map | Group))
+    return (*kept, Unknown("a container that holds too much"))
+
+
+def _parts(atom: Atom, most: int) -> int:
+    """How many values a container holds in all; any number above ``most`` where it is more."""
+    found = 0
+    waiting = [atom]
+    while waiting and found <= most:
+        each = waiting.pop()
+        items = (pair for pair in each.entries) if isinstance(each, Map) else ((item,) for item in each.items)
+        for item in (value for pair in items for value in pair):
+            found += 1
+            waiting += [inner for inner in item if isinstance(inner, Seq | Map | Group)]
+            if found > most:
+                break
+    return found
 
 
 def join(*values: Value) -> Value:
@@ -239,6 +315,9 @@ def concatenated(*values: Value) -> Value:
     """Every way to put one alternative of each behind another."""
     results: list[tuple[Part | NodeNamePart, ...]] = [()]
     for value in values:
+        size = sum(len(part) if isinstance(part, str) else 1 for parts in results for part in parts)
+        if size > MAX_LETTERS:
+            return unknown("a text that is too long to be a name")
         pieces = [piece for atom in value for piece in spread(atom)] or [
             (UnknownPart("a text that is never set"),)
         ]

@@ -58,3 +58,54 @@ template<> void make<int>(rclcpp::Node * n) { n->create_publisher<std_msgs::msg:
 """
     assert names(infer(tmp_path, in_class("make<Other>(this);", before=before))) == ["number"]
     assert names(infer(tmp_path, in_class("make<int>(this);", before=before))) == ["number"]
+
+
+GROWING = {
+    "a text": ('std::string s = "x";', "s += s;", "s"),
+    "a text by a method": ('std::string s = "x";', "s.append(s);", "s"),
+    "a list": ('std::vector<std::string> s{"x"};', "s.insert(s.end(), s.begin(), s.end());", "s[0]"),
+    "a pair of pairs": ('auto s = std::make_pair("x", "y");', "s = std::make_pair(s, s);", "s.first"),
+    "a number": ("double s = 1e300; int i = 0;", "s = s * s; i = s;", "std::to_string(i)"),
+}
+
+
+@pytest.mark.parametrize(("start", "step", "name"), GROWING.values(), ids=GROWING)
+def test_a_value_that_grows_without_end_is_not_known(
+    start: str, step: str, name: str, tmp_path: Path
+) -> None:
+    body = f"{start} for (int n = 0; n < 60; ++n) {{ {step} }} create_publisher<std_msgs::msg::String>({name}, 1);"
+    system = infer(tmp_path, in_class(body))
+    assert all("?" in made for made in names(system)) or gaps(system)
+
+
+def test_classes_that_are_bases_of_each_other_are_told(tmp_path: Path) -> None:
+    before = "class A : public B {}; class B : public A {};\n"
+    system = infer(tmp_path, in_class('A a; create_publisher<std_msgs::msg::String>("a", 1);', before=before))
+    assert names(system) == ["a"]
+    assert any("deeper than is followed" in why for why in gaps(system))
+
+
+BROKEN = (
+    "nodl.infer.cpp.program._start",
+    "nodl.infer.cpp.program.run_callbacks",
+    "nodl.infer.cpp.program.account",
+    "nodl.infer.cpp.program.Names",
+    "nodl.infer.cpp.program.index_file",
+    "nodl.infer.cpp.program.preprocess",
+    "nodl.infer.cpp.solved.interfaces_of",
+    "nodl.infer.cpp.system.programs",
+    "nodl.infer.cpp.reading.project.read_build",
+)
+
+
+@pytest.mark.parametrize("error", [StopIteration, RecursionError, MemoryError, KeyError])
+@pytest.mark.parametrize("place", BROKEN)
+def test_a_mistake_of_the_analysis_is_a_gap_of_the_program(
+    place: str, error: type[Exception], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def broken(*args: object, **named: object) -> object:
+        raise error("a mistake of ours")
+
+    monkeypatch.setattr(place, broken)
+    told = gaps(infer(tmp_path, in_class('create_publisher<std_msgs::msg::String>("a", 1);')))
+    assert any(error.__name__ in why and "report this line" in why for why in told)

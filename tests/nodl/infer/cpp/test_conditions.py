@@ -62,13 +62,6 @@ def test_python_says_the_same(body: str, made: set[str], tmp_path: Path) -> None
     assert gaps(system) == []
 
 
-def test_a_module_that_python_always_has_decides_its_import(tmp_path: Path) -> None:
-    program = tmp_path / "program.py"
-    body = "try:\n    import json\n    pub('a')\nexcept ImportError:\n    pub('b')"
-    program.write_text(_PYTHON + body, encoding="utf-8")
-    assert set(certainties(infer_paths([program]))) == {"a"}
-
-
 @pytest.mark.parametrize(
     ("body", "certainty"),
     [

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.nodl.infer.cpp.test_in_a_launch import install, may, plan
-from tests.nodl.infer.cpp.workspace import HEAD, endpoints, gaps, in_class, infer, package
+from tests.nodl.infer.cpp.workspace import HEAD, endpoints, gaps, in_class, infer
 
 pytest.importorskip("tree_sitter_cpp", reason="the extra cpp is not installed")
 
@@ -82,32 +81,13 @@ def test_the_service_of_a_camera_with_a_namespace(tmp_path: Path) -> None:
     assert {name for _, name in endpoints(system)} == {"ns/set_camera_info"}
 
 
-def test_a_point_cloud_is_published_by_each_transport(tmp_path: Path) -> None:
-    body = 'point_cloud_transport::PointCloudTransport t(shared_from_this()); p_ = t.advertise("out", 1);'
-    system = infer(tmp_path, in_class(body, "point_cloud_transport::Publisher p_;", before=CLOUDS))
-    assert {name for _, name in endpoints(system)} == {"out", "out/draco", "out/zlib", "out/zstd"}
-
-
 @pytest.mark.parametrize(
-    ("parameter", "topic", "other"),
-    [("", "/in", "/in/zstd"), ('<param name="point_cloud_transport" value="zstd"/>', "/in/zstd", "/in")],
+    "body",
+    [
+        "point_cloud_transport::PointCloudTransport t(shared_from_this());",
+        'auto p = point_cloud_transport::create_publisher(shared_from_this(), "out");',
+        'auto s = point_cloud_transport::create_subscription(shared_from_this(), "in", cb, "raw");',
+    ],
 )
-def test_a_parameter_chooses_the_transport_of_a_point_cloud(
-    parameter: str, topic: str, other: str, tmp_path: Path
-) -> None:
-    body = 'point_cloud_transport::PointCloudTransport t(shared_from_this()); s_ = t.subscribe("in", 1, cb);'
-    package(
-        tmp_path / "src/demo",
-        {"src/main.cpp": in_class(body, before=CLOUDS)},
-        "add_executable(filter_node src/main.cpp)",
-    )
-    install(tmp_path)
-    node = f'<node pkg="demo" exec="filter_node" name="n">{parameter}</node>'
-    planned = plan(tmp_path, f"<launch>{node}</launch>")
-    assert may(planned, topic)
-    assert not may(planned, other)
-
-
-def test_a_transport_of_point_clouds_that_nobody_knows_is_a_gap(tmp_path: Path) -> None:
-    body = 'point_cloud_transport::create_subscription(shared_from_this(), "in", cb, chosen());'
-    assert any("transport" in why for why in gaps(infer(tmp_path, in_class(body, before=CLOUDS))))
+def test_transports_of_point_clouds_are_told(body: str, tmp_path: Path) -> None:
+    assert gaps(infer(tmp_path, in_class(body, before=CLOUDS)))

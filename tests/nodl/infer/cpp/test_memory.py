@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 
 from nodl.infer.cpp.running.memory import AbstractStore, CallOutcome, Memory
-from nodl.infer.cpp.running.notes import Notes
-from nodl.infer.cpp.running.values import Value, literal
+from nodl.infer.cpp.running.values import Notes, Value, literal
 from tests.nodl.infer.cpp.workspace import in_class, infer, names
 
 pytest.importorskip("tree_sitter_cpp", reason="the extra cpp is not installed")

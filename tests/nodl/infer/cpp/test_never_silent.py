@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from nodl.infer import infer_paths
 from tests.nodl.infer.cpp.workspace import HEAD, gaps, in_class, infer, names, package
 
 pytest.importorskip("tree_sitter_cpp", reason="the extra cpp is not installed")
@@ -274,7 +275,10 @@ def test_structures_of_numbers_are_no_gap(made: str, tmp_path: Path) -> None:
 
 def test_a_structure_that_holds_something_else_is_one(tmp_path: Path) -> None:
     source = in_class("span s;", before="#include <acme/acme.hpp>\ntypedef struct { acme::Thing a; } span;\n")
-    assert gaps(infer(tmp_path, source))
+    made = package(tmp_path / "demo", {"src/main.cpp": source}, depends=("rclcpp", "acme"))
+    assert gaps(infer_paths([made])) == [
+        "the class acme::Thing is not in reach (acme/acme.hpp): it may be a node or make one"
+    ]
 
 
 UNFOLLOWED = {
@@ -382,8 +386,6 @@ def test_elements_that_an_algorithm_only_reads_stay(body: str, tmp_path: Path) -
 
 
 BY_OPERATOR = {
-    "a condition": ("if (b) {}", 'operator bool() { t = "b"; return true; }'),
-    "a negation": ("if (!b) {}", 'explicit operator bool() { t = "b"; return true; }'),
     "a comma": ("b, 1, 2;", 'B & operator,(int) { t = t == "a" ? "c" : "b"; return *this; }'),
     "a comma of a loop": (
         "for (int i = 0; i < 2; b, ++i) {}",
@@ -391,7 +393,6 @@ BY_OPERATOR = {
     ),
     "an index": ("b[0];", 'int operator[](int) { t = "b"; return 1; }'),
 }
-TO_TEXT = 'operator std::string() { t = "b"; return "x"; }'
 
 
 @pytest.mark.parametrize(("body", "member"), BY_OPERATOR.values(), ids=BY_OPERATOR)
@@ -401,21 +402,12 @@ def test_an_operator_that_certainly_runs_is_followed(body: str, member: str, tmp
     assert names(system) == ["b"]
 
 
-@pytest.mark.parametrize("body", ["std::string s = b;", "take(b);", "s_ = b;", "auto s = std::string(b);"])
-def test_a_conversion_that_writes_is_told_where_it_may_run(body: str, tmp_path: Path) -> None:
-    before = f'struct B {{ std::string t = "a"; {TO_TEXT} }};\nvoid take(std::string) {{}}\n'
-    use = f"B b; {body} create_publisher<std_msgs::msg::String>(b.t, 1);"
-    told = gaps(infer(tmp_path, in_class(use, "std::string s_;", before=before)))
-    assert any("whether b is converted here by an operator of B" in why for why in told)
-
-
-@pytest.mark.parametrize("body", ["B c = b;", "auto & c = b;", "same(b);", "b.t.size();"])
-def test_an_object_that_is_taken_as_it_is_is_not_converted(body: str, tmp_path: Path) -> None:
-    before = f'struct B {{ std::string t = "a"; {TO_TEXT} }};\nvoid same(const B &) {{}}\n'
-    system = infer(
-        tmp_path, in_class(f"B b; {body} create_publisher<std_msgs::msg::String>(b.t, 1);", before=before)
-    )
-    assert (names(system), gaps(system)) == (["a"], [])
+@pytest.mark.parametrize("operator", ["operator std::string()", "explicit operator bool()"])
+def test_a_conversion_that_writes_is_told_where_its_class_is_made(operator: str, tmp_path: Path) -> None:
+    before = f'struct B {{ std::string t = "a"; {operator} {{ t = "b"; return {{}}; }} }};\n'
+    assert gaps(infer(tmp_path, in_class("B b;", before=before))) == [
+        "an operator of B that converts it changes something: where it runs is not followed"
+    ]
 
 
 def test_a_conversion_that_only_reads_is_no_gap(tmp_path: Path) -> None:
@@ -443,3 +435,148 @@ def test_a_pointer_in_a_condition_is_not_what_its_object_converts_to(held: str, 
     use = f'{held} if (p) {{ create_publisher<std_msgs::msg::String>("a", 1); }}'
     before = "struct B { explicit operator bool() const { return false; } };\n"
     assert names(infer(tmp_path, in_class(use, before=before))) == ["a"]
+
+
+S = "std_msgs::msg::String"
+AS_OTHERS_FIND_IT = {
+    "a variable that is changed back behind spin": f"""
+bool late = false;
+int main() {{ auto n = std::make_shared<rclcpp::Node>("n");
+  auto t = n->create_wall_timer(1s, [&] {{ if (late) {{ n->create_publisher<{S}>("seen", 1); }} }});
+  late = true; rclcpp::spin(n); late = false; }}""",
+    "a member between two calls of an executor": f"""
+struct D : rclcpp::Node {{
+  D() : Node("n") {{ t = create_wall_timer(1s, [this] {{ go(); }}); }}
+  void go() {{ if (mode == "b") {{ create_publisher<{S}>("seen", 1); }} }}
+  std::string mode = "a"; rclcpp::TimerBase::SharedPtr t; }};
+int main() {{ auto n = std::make_shared<D>(); rclcpp::executors::SingleThreadedExecutor e; e.add_node(n);
+  n->mode = "b"; e.spin_some(); n->mode = "c"; e.spin(); }}""",
+    "a variable that one callback changes back behind a wait of its own": f"""
+struct D : rclcpp::Node {{
+  D() : Node("n") {{
+    a = create_wall_timer(1s, [this] {{ late = true; rclcpp::spin_until_future_complete(other, f); late = false; }});
+    b = create_wall_timer(1s, [this] {{ if (late) {{ create_publisher<{S}>("seen", 1); }} }}); }}
+  bool late = false; rclcpp::TimerBase::SharedPtr a, b; rclcpp::Node::SharedPtr other; std::shared_future<int> f; }};
+int main() {{ rclcpp::spin(std::make_shared<D>()); }}""",
+    **{
+        f"a variable while {what} runs others": f"""
+int main() {{ auto n = std::make_shared<rclcpp::Node>("n"); bool late = false; {before}
+  auto t = n->create_wall_timer(1s, [&] {{ if (late) {{ n->create_publisher<{S}>("seen", 1); }} }});
+  late = true; {call} late = false; }}"""
+        for what, before, call in (
+            ("a timer", "", "t->execute_callback(nullptr);"),
+            ("a subscription", 'auto s = n->create_subscription<X>("s", 1, f);', "s->handle_message(m, i);"),
+            ("a parameter client", "rclcpp::SyncParametersClient c(n);", 'c.get_parameters({"x"});'),
+        )
+    },
+    "a name while a thread runs": f"""
+int main() {{ auto n = std::make_shared<rclcpp::Node>("n"); std::string name = "first";
+  std::thread t([&] {{ n->create_publisher<{S}>(name, 1); }}); name = "seen"; t.join(); name = "last"; }}""",
+}
+
+
+@pytest.mark.parametrize("source", AS_OTHERS_FIND_IT.values(), ids=AS_OTHERS_FIND_IT)
+def test_what_runs_beside_the_program_finds_every_value_of_that_time(source: str, tmp_path: Path) -> None:
+    assert "seen" in names(infer(tmp_path, HEAD + source))
+
+
+def test_what_was_before_spin_is_not_seen_by_a_callback(tmp_path: Path) -> None:
+    source = AS_OTHERS_FIND_IT["a variable that is changed back behind spin"].replace(
+        "late = true; rclcpp::spin(n); late = false;", "late = true; late = false; rclcpp::spin(n);"
+    )
+    assert names(infer(tmp_path, HEAD + source)) == []
+
+
+MACROS = {
+    "a macro that is undefined behind its use": (
+        f"#define X(n) create_publisher<{S}>(#n, 1);\nX(a) X(b)\n#undef X\n", ["a", "b"]
+    ),
+    "one list with two meanings": (
+        f"#define X(n) create_publisher<{S}>(#n, 1);\nLIST\n#undef X\n"
+        f"#define X(n) create_service<{S}>(#n \"_srv\", cb);\nLIST\n#undef X\n",
+        ["a", "a_srv", "b", "b_srv"],
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("body", "made"), MACROS.values(), ids=MACROS)
+def test_a_macro_is_what_it_is_where_it_stands(body: str, made: list[str], tmp_path: Path) -> None:
+    source = in_class(f"\n{body}", before="#define LIST X(a) X(b)\n")
+    system = infer(tmp_path, source)
+    assert (names(system), gaps(system)) == (made, [])
+
+
+def test_a_file_that_uses_a_macro_of_who_includes_it_is_told(tmp_path: Path) -> None:
+    body = f'\n#define X(n) create_publisher<{S}>(#n, 1);\n#include "list.def"\n#undef X\n'
+    told = gaps(infer(tmp_path, in_class(body), **{"src__list.def": "X(a)\nX(b)\n"}))
+    assert told == ["what the macro X stands for here is not known; it may make interfaces"]
+
+
+def test_a_macro_that_the_build_defines_in_one_of_two_ways_is_told(tmp_path: Path) -> None:
+    before = f"#ifdef F\n#define M(n) create_publisher<{S}>(n, 1)\n#else\n#define M(n) advertise(n)\n#endif\n"
+    told = gaps(infer(tmp_path, in_class('M("a");', before=before)))
+    assert told == ["what the macro M stands for here is not known; it may make interfaces"]
+    harmless = "#ifdef F\n#define M(n) printf(n)\n#else\n#define M(n) puts(n)\n#endif\n"
+    assert gaps(infer(tmp_path / "harmless", in_class('M("a");', before=harmless))) == []
+
+
+HELPER = f"void make(rclcpp::Node * n, const std::string & s) {{ n->create_publisher<{S}>(s, 1); }}\n"
+
+
+def test_a_helper_that_ran_for_one_caller_is_told_for_another_who_did_not(tmp_path: Path) -> None:
+    more = 'struct Other { virtual void start() { make(the_node, "b"); } };\n'
+    made = 'make(this, "a"); auto other = std::make_shared<Other>(); somebody::keep(other);'
+    system = infer(tmp_path, in_class(made, before=f"rclcpp::Node * the_node;\n{HELPER}{more}"))
+    assert names(system) == ["a"]
+    assert gaps(system) == [
+        "make() is called by Other::start, and it was not understood who calls that: it may make interfaces"
+    ]
+
+
+def test_a_function_that_calls_itself_is_told_where_it_is_no_longer_followed(tmp_path: Path) -> None:
+    member = f"int i = 0; void next() {{ if (i < 6) {{ create_publisher<{S}>(std::to_string(i), 1); ++i; next(); }} }}"
+    assert gaps(infer(tmp_path, in_class("next();", member))) == [
+        "Demo::next calls itself, deeper than is followed"
+    ]
+
+
+OWN_SIGNS = {
+    "the address": ("P * operator&() {{ {} return nullptr; }}", "&p;"),
+    "a comparison derived from another": (
+        "bool operator==(const P &) const {{ {} return true; }}",
+        "p != q;",
+    ),
+    "one of the other side": ("bool operator==(int) const {{ {} return true; }}", "1 == p;"),
+    "an order derived from another": ("auto operator<=>(const P &) const {{ {} return 1; }}", "p < q;"),
+}
+
+
+@pytest.mark.parametrize(("operator", "use"), OWN_SIGNS.values(), ids=OWN_SIGNS)
+def test_an_operator_of_the_program_runs(operator: str, use: str, tmp_path: Path) -> None:
+    body = operator.format(f'n->create_publisher<{S}>("made", 1);')
+    before = f"struct P {{ rclcpp::Node * n; {body} }};\n"
+    assert names(infer(tmp_path, in_class(f"P p{{this}}; P q{{this}}; {use}", before=before))) == ["made"]
+    assert names(infer(tmp_path / "b", in_class("P p{this}; P q{this};", before=before))) == []
+
+
+def test_a_literal_of_the_program_runs(tmp_path: Path) -> None:
+    before = f"""rclcpp::Node * the_node;
+int operator""_topic(const char * s, size_t) {{ the_node->create_publisher<{S}>(s, 1); return 1; }}
+"""
+    assert names(infer(tmp_path, in_class('the_node = this; "a"_topic;', before=before))) == ["a"]
+
+
+@pytest.mark.parametrize(
+    ("body", "told"),
+    [
+        (
+            f'int i = 0; again: create_publisher<{S}>("t" + std::to_string(i), 1); if (++i < 3) {{ goto again; }}',
+            True,
+        ),
+        (f'if (wrong()) {{ goto out; }} create_publisher<{S}>("t0", 1); out: return;', False),
+    ],
+)
+def test_a_jump_back_is_told_and_one_ahead_is_not(body: str, told: bool, tmp_path: Path) -> None:
+    system = infer(tmp_path, in_class(body))
+    assert names(system) == ["t0"]
+    assert bool(gaps(system)) == told

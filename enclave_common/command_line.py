@@ -1,0 +1,197 @@
+"""The manners that all commands share: how they read options, name their version, and answer a slip of the fingers."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any, NoReturn
+
+from enclave_common import VERSION
+from enclave_common.dependencies import missing_dependency
+from enclave_common.terminal import OutputError
+from enclave_common.words import did_you_mean
+
+_INVALID_CHOICE = re.compile(r"^(.*invalid choice: '([^']*)') \(choose from .*\)$", re.DOTALL)
+
+
+Kind = Mapping[str, Any]
+Option = tuple[str, Kind, str]
+"""As the help shows it, with its metavar (a positional by its name); what it takes, in argparse's words; what it is
+for."""
+
+
+def given_path(text: str) -> Path:
+    """:raises argparse.ArgumentTypeError: no text, which is what a shell gives for a variable that is not set."""
+    if not text:
+        raise argparse.ArgumentTypeError("an empty path; is a variable of the shell not set?")
+    return Path(text)
+
+
+FLAG: Kind = {"action": "store_true"}
+TEXT: Kind = {}
+PATH: Kind = {"type": given_path}
+TEXTS: Kind = {"action": "append", "default": []}
+PATHS: Kind = {**TEXTS, **PATH}
+
+
+def one_of(*choices: str) -> Kind:
+    """Return the kind of an option with choices; the first is the default."""
+    return {"choices": choices, "default": choices[0]}
+
+
+def add_options(group: argparse._ActionsContainer, options: Iterable[Option]) -> None:
+    """Add each to a parser, or to a group of its options."""
+    for written, kind, text in options:
+        words = written.split()
+        flags = [word for word in words if word.startswith("-")] or words[:1]
+        metavar = {"metavar": words[-1]} if len(words) > len(flags) else {}
+        group.add_argument(*flags, **{**metavar, **kind, "help": text})
+
+
+class CommandParser(argparse.ArgumentParser):
+    """Options are written out, since an abbreviation can mean another option after an update; what is mistyped is
+    answered with what was probably meant."""
+
+    def __init__(self, **settings: Any):
+        settings.setdefault("allow_abbrev", False)
+        super().__init__(**settings)
+
+    def error(self, message: str) -> NoReturn:
+        """Usage, message and exit status 2, as argparse."""
+        super().error(message + self._suggestion(message))
+
+    def _suggestion(self, message: str) -> str:
+        if message.startswith("unrecognized arguments: "):
+            options = [word.partition("=")[0] for word in message.split()[2:] if word.startswith("-")]
+            known = [flag for parser in parsers(self) for flag in parser._option_string_actions]
+            return did_you_mean(options[0], known) if options else ""
+        if choice := _INVALID_CHOICE.match(message):
+            return did_you_mean(choice[2], [str(known) for known in self._choices()])
+        return ""
+
+    def _choices(self) -> Iterator[object]:
+        for action in self._actions:
+            yield from action.choices or ()
+
+
+def parsers(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
+    """``parser`` and those of its verbs, of any depth, each once."""
+    yield parser
+    for action in parser._actions:
+        if isinstance(action, argparse._SubParsersAction):
+            for below in dict.fromkeys(action.choices.values()):
+                yield from parsers(below)
+
+
+def add_version(parser: argparse.ArgumentParser) -> None:
+    """``--version``, the same for all commands."""
+    parser.add_argument("--version", action="version", version=f"{parser.prog} {VERSION}")
+
+
+def complete_with(
+    commands: Iterable[argparse.ArgumentParser], name: str, completer: Callable[..., Iterable[str]]
+) -> None:
+    """Let the positional argument ``name`` of ``commands`` be completed by ``completer``, which argcomplete calls."""
+    for each in commands:
+        for action in each._actions:
+            if action.dest == name and not action.option_strings:
+                setattr(action, "completer", completer)  # noqa: B010  # argcomplete's own attribute
+
+
+def complete(
+    parser: argparse.ArgumentParser, offer: Callable[[argparse.ArgumentParser], None] | None = None
+) -> None:
+    """Answer a shell that asks for completions, and end; otherwise do nothing. ``offer`` tells the arguments of
+    ``parser`` what can be offered for them.
+
+    The shell asks through argcomplete (``register-python-argcomplete``, as for ``ros2``), an optional dependency:
+    without it the shell gets no answer.
+    """
+    if "_ARGCOMPLETE" not in os.environ:
+        return
+    try:
+        import argcomplete
+    except ImportError:
+        raise SystemExit(1) from None
+    if offer is not None:
+        offer(parser)
+    argcomplete.autocomplete(parser, always_complete_options="long")
+
+
+def add_verbosity(parser: argparse.ArgumentParser) -> None:
+    """``-q`` and ``-v`` for a command, or for each of its verbs."""
+    verbs = [each for each in parsers(parser) if each is not parser]
+    for each in verbs or [parser]:
+        if each.prefix_chars != "-":  # an absent verb, which takes no options
+            continue
+        group = each.add_mutually_exclusive_group()
+        group.add_argument(
+            "-q",
+            "--quiet",
+            action="store_true",
+            help="no warnings and remarks; errors, and what was asked for",
+        )
+        group.add_argument("-v", "--verbose", action="store_true", help="everything, nothing summed up")
+
+
+def add_absent_verb(
+    verbs: argparse._SubParsersAction[CommandParser],
+    name: str,
+    error: ImportError,
+    handler: str = "run",
+) -> None:
+    """Add a verb of an add-on that is not installed: it says so, whatever follows it.
+
+    Raises ``error`` again if it is about something else.
+    """
+    if missing_dependency(error) is None:
+        raise error
+    missing = error
+
+    def run(_: argparse.Namespace) -> int:
+        raise missing
+
+    # No word begins with this prefix, so options of the verb are words like others.
+    verb = verbs.add_parser(name, help="not part of this installation", add_help=False, prefix_chars="\0")
+    verb.add_argument("words", nargs="*")
+    verb.set_defaults(**{handler: run})
+
+
+def guarded(program: str, work: Callable[[], int], *mistakes: type[Exception]) -> int:
+    """Return the exit status of ``work``, or of the error that ended it: one line on stderr, no traceback.
+
+    An error of ``mistakes`` tells its own ``exit_status``, else 1. 130: interrupted (Ctrl-C). 0: who read our output
+    has enough. What is nobody's mistake but ours is raised.
+    """
+    try:
+        status = work()
+        sys.stdout.flush()
+        return status
+    except mistakes as error:
+        print(f"{program}: error: {error}", file=sys.stderr)
+        return int(getattr(error, "exit_status", 1))
+    except ImportError as error:
+        text = missing_dependency(error)
+        if text is None:
+            raise
+        print(f"{program}: error: {text}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print(f"{program}: interrupted", file=sys.stderr)
+        return 130
+    except OutputError as error:
+        print(f"{program}: error: {error}", file=sys.stderr)
+        _drop_output()
+        return 1
+    except BrokenPipeError:
+        _drop_output()
+        return 0
+
+
+def _drop_output() -> None:
+    """What is still buffered goes nowhere; else the interpreter would report it once more at its end."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

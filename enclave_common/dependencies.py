@@ -1,0 +1,45 @@
+"""What is not installed, in one line that says how to get it: a Python package, or a room of ours.
+
+The main job (evaluate, assign enclaves, look manifests up, derive the policy, provision, run) works without the
+add-ons: inference, recording, observation, review and reports, deployment. A distribution may leave them out. Whoever
+needs one imports it where it is requested; ``installed`` says whether it is there.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from importlib.util import find_spec
+
+_OURS = ("enclave_launch", "nodl", "keystore")
+_APT_AND_PIP = {
+    "asn1crypto": ("python3-asn1crypto", "asn1crypto"),
+    "cryptography": ("python3-cryptography", "cryptography"),
+    "lxml": ("python3-lxml", "lxml"),
+    "yaml": ("python3-yaml", "PyYAML"),
+    "pydantic": ("python3-pydantic", "pydantic"),
+}
+
+
+def require(*packages: str) -> None:
+    """Import them, before anything is written that would stay incomplete. Raises ``ImportError``."""
+    for package in packages:
+        import_module(package)
+
+
+def missing_dependency(error: ImportError) -> str | None:
+    """Return what to do about ``error``, or None if it is about another package than those we need."""
+    name = (error.name or "").partition(".")[0]
+    if name in _OURS and isinstance(error, ModuleNotFoundError):
+        return f"{error.name} is not part of this installation; install the whole of enclave-launch"
+    if name not in _APT_AND_PIP:
+        return None
+    apt, pip = _APT_AND_PIP[name]
+    return f"the Python package {name} is not installed: apt install {apt}, or pip install {pip}"
+
+
+def installed(module: str) -> bool:
+    """Return True if the add-on ``module`` is part of this installation."""
+    try:
+        return find_spec(module) is not None
+    except ModuleNotFoundError:  # a package above it is not
+        return False

@@ -1,0 +1,93 @@
+"""Read a file that somebody else wrote, in bounded time and memory.
+
+A path in a launch file, a manifest or a keystore may name anything: a pipe that nobody writes to, a device that
+never ends, a file that fills the memory. Each of these is refused with an ``OSError`` that says why, so that callers
+treat it as any other file that cannot be read. Touches the file system, reads only.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+
+MEBIBYTE = 2**20
+DEFAULT_LIMIT = 16 * MEBIBYTE
+
+# To open a pipe must not wait for its writer.
+_FLAGS = os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK | os.O_NOCTTY
+
+
+def read_bytes(path: str | bytes | os.PathLike[str], limit: int = DEFAULT_LIMIT) -> bytes:
+    """Read all bytes of the regular file ``path``; links are followed.
+
+    Raises ``OSError``: as ``open`` does, and for what is not a regular file or has more than ``limit`` bytes.
+    """
+    descriptor = os.open(path, _FLAGS)
+    try:
+        status = os.fstat(descriptor)
+        if not stat.S_ISREG(status.st_mode):
+            raise _not_regular(path, status.st_mode)
+        if status.st_size > limit:
+            raise _too_large(path, limit)
+        return _read_all(descriptor, path, status.st_size, limit)
+    finally:
+        os.close(descriptor)
+
+
+def read_text(
+    path: str | bytes | os.PathLike[str], limit: int = DEFAULT_LIMIT, *, errors: str = "strict"
+) -> str:
+    """Read the text of a UTF-8 file, with line ends as ``open`` gives them.
+
+    Raises as ``read_bytes``, and ``UnicodeDecodeError``.
+    """
+    text = read_bytes(path, limit).decode("utf-8", errors)
+    return text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text
+
+
+def text_or_nothing(path: str | bytes | os.PathLike[str]) -> str:
+    """Read the text of a file; empty for one that cannot be read."""
+    try:
+        return read_text(path, errors="replace")
+    except OSError:
+        return ""
+
+
+def check_regular(path: str | bytes | os.PathLike[str]) -> os.stat_result:
+    """Return the state of a file that is safe to open and read. Raises ``OSError`` for anything but a regular file."""
+    status = os.stat(path)
+    if not stat.S_ISREG(status.st_mode):
+        raise _not_regular(path, status.st_mode)
+    return status
+
+
+def _read_all(descriptor: int, path: str | bytes | os.PathLike[str], expected: int, limit: int) -> bytes:
+    """Read to the end: some files, as those of /proc, have more content than their size says."""
+    pieces: list[bytes] = []
+    length = 0
+    while piece := os.read(descriptor, max(expected - length, 0) + 1):
+        pieces.append(piece)
+        length += len(piece)
+        if length > limit:
+            raise _too_large(path, limit)
+        expected = max(expected, 2 * length)
+    return b"".join(pieces)
+
+
+def _not_regular(path: str | bytes | os.PathLike[str], mode: int) -> OSError:
+    number, what = next((number, what) for is_kind, number, what in _OTHER_KINDS if is_kind(mode))
+    return OSError(number, what, os.fsdecode(path))
+
+
+def _too_large(path: str | bytes | os.PathLike[str], limit: int) -> OSError:
+    return OSError(errno.EFBIG, f"File is larger than the allowed {limit} bytes", os.fsdecode(path))
+
+
+_OTHER_KINDS = (
+    (stat.S_ISDIR, errno.EISDIR, "Is a directory"),
+    (stat.S_ISFIFO, errno.EINVAL, "A pipe, not a file"),
+    (stat.S_ISCHR, errno.EINVAL, "A device, not a file"),
+    (stat.S_ISBLK, errno.EINVAL, "A device, not a file"),
+    (lambda mode: True, errno.EINVAL, "Not a regular file"),
+)

@@ -1,0 +1,204 @@
+"""Text that others chose (names, arguments, file names, foreign sources) -> text that is safe on a terminal.
+
+Control characters move the cursor, set the title or answer on the person's behalf; bidirectional marks show a name in
+another order than it is compared in. Both are written as escapes. What Unicode does not count as printable is such a
+character (``str.isprintable``); a blank is printable, other spaces are not.
+
+Machine formats use escapes of their own: ``json_text`` here, quoted scalars in YAML.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, ExitStack, contextmanager, redirect_stderr, redirect_stdout
+from os import PathLike
+from typing import Any, TextIO, cast
+
+_PERHAPS_UNSAFE = re.compile(r"[^ -~\n\t]")
+
+
+def printable(text: str) -> str:
+    """``text`` for use within a line: everything that is not printable escaped, line ends too."""
+    return text if text.isprintable() else "".join(map(_escaped, text))
+
+
+def printable_lines(text: str) -> str:
+    """``text`` of several lines: line ends and tabs stay, everything else that is not printable is escaped."""
+    return _PERHAPS_UNSAFE.sub(lambda match: _escaped(match[0]), text)
+
+
+def message(text: object) -> str:
+    """What a person is told in one or more lines: as ``printable_lines``, later lines indented, so that no name in it
+    can begin a line that looks like one of ours."""
+    return printable_lines(str(text)).replace("\n", "\n    ")
+
+
+def warn(*texts: object) -> None:
+    """Print each on stderr as a warning of ``secure-launch``."""
+    for text in texts:
+        print(f"secure-launch: warning: {message(text)}", file=sys.stderr)
+
+
+def quoted(text: str | PathLike[str]) -> str:
+    """``text`` in quotes, as it is or as a Python literal where it holds a quote or is not printable."""
+    plain = str(text)
+    return f"'{plain}'" if plain.isprintable() and "'" not in plain else repr(plain)
+
+
+def json_text(content: object, **options: Any) -> str:
+    """``json.dumps``; readable characters as they are, all others (DEL and C1 too) as JSON's escapes."""
+    return _PERHAPS_UNSAFE.sub(_escaped_in_json, json.dumps(content, ensure_ascii=False, **options))
+
+
+class OutputError(Exception):
+    """Standard output cannot be written: the disk is full."""
+
+
+@contextmanager
+def safe_output() -> Iterator[None]:
+    """Within the block, text that Python code writes to standard output and standard error is made safe as by
+    ``printable_lines``: what argparse and warnings write, too. What goes to the file descriptors is not touched.
+
+    A stream that was closed before we started is replaced by one that drops what it is given.
+    """
+    with ExitStack() as stack:
+        if sys.stdout is None:
+            stack.enter_context(redirect_stdout(stack.enter_context(open(os.devnull, "w"))))
+        if sys.stderr is None:
+            stack.enter_context(redirect_stderr(stack.enter_context(open(os.devnull, "w"))))
+        stack.enter_context(redirect_stdout(_safe(sys.stdout)))
+        stack.enter_context(redirect_stderr(_safe(sys.stderr)))
+        yield
+
+
+def stdout_is_for_the_plan() -> AbstractContextManager[Any]:
+    """Within the block, what launch files print goes to stderr."""
+    return redirect_stdout(sys.stderr)
+
+
+def raw(stream: TextIO) -> TextIO:
+    """Return the stream behind one of ``safe_output``: for control characters of our own, such as a progress bar's."""
+    return stream._stream if isinstance(stream, _SafeText) else stream
+
+
+def write_coloured(text: str, stream: TextIO) -> None:
+    """Write ``text``, whose parts were made safe before colours were added, past ``safe_output``."""
+    _write(raw(stream), text)
+
+
+class _SafeText:
+    """A text stream that escapes what it is given; otherwise the stream itself."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        _write(self._stream, printable_lines(text))
+        return len(text)
+
+    def flush(self) -> None:
+        with _output_errors():
+            self._stream.flush()
+
+    def writelines(self, lines: Iterator[str]) -> None:
+        for line in lines:
+            self.write(line)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+
+@contextmanager
+def _output_errors() -> Iterator[None]:
+    try:
+        yield
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise OutputError(f"the output cannot be written: {error.strerror}") from error
+
+
+def _write(stream: TextIO, text: str) -> None:
+    encoding = getattr(stream, "encoding", None) or "utf-8"
+    with _output_errors():
+        stream.write(text.encode(encoding, "backslashreplace").decode(encoding))
+
+
+def _safe(stream: TextIO) -> TextIO:
+    return stream if isinstance(stream, _SafeText) else cast("TextIO", _SafeText(stream))
+
+
+def _escaped(character: str) -> str:
+    return character if character.isprintable() else repr(character)[1:-1]
+
+
+def _escaped_in_json(match: re.Match[str]) -> str:
+    character = match[0]
+    if character.isprintable():
+        return character
+    units = character.encode("utf-16-be", "surrogatepass")
+    return "".join(f"\\u{units[at : at + 2].hex()}" for at in range(0, len(units), 2))
+
+
+_REST = r"/([^\s:,;'\"()<>]+)"
+
+
+def short_paths(text: str, folder: str) -> str:
+    """``text`` without ``folder`` before the paths of files that are there.
+
+    Only of files: a ROS name can begin like a folder (``/robot/cmd_vel`` seen from ``/robot``) and must stay whole.
+    """
+    root = folder.rstrip("/")
+    if not root or root not in text:
+        return text
+    pattern = re.compile(rf"(?<![\w./-]){re.escape(root)}{_REST}")
+    return pattern.sub(lambda found: found[1] if os.path.isfile(found[0]) else found[0], text)
+
+
+_PATIENCE = 1.0  # seconds
+_BAR_WIDTH = 30
+_CLEAR = "\r\033[K"
+
+
+def wanted(quiet: bool) -> bool:
+    """Return True if a person may be looking at stderr."""
+    return sys.stderr.isatty() and not quiet
+
+
+class ProgressBar:
+    """Called with how many of how many are done; on stderr."""
+
+    def __init__(self, what: str) -> None:
+        self.what = what
+        self._started = time.monotonic()
+
+    def __call__(self, done: int, total: int) -> None:
+        if time.monotonic() - self._started < _PATIENCE:
+            return
+        filled = _BAR_WIDTH * done // max(total, 1)
+        bar = f"\r[{'#' * filled}{'.' * (_BAR_WIDTH - filled)}] {done}/{total} {self.what}"
+        print(bar + (_CLEAR if done == total else ""), end="", file=raw(sys.stderr), flush=True)
+
+
+class ProgressLine:
+    """Called with what is done next; on stderr. ``clear`` at the end."""
+
+    def __init__(self, doing: str, _started: float | None = None) -> None:
+        self.doing = doing
+        self._started = time.monotonic() if _started is None else _started
+        self._shown = False
+
+    def __call__(self, subject: str) -> None:
+        if time.monotonic() - self._started >= _PATIENCE:
+            print(f"{_CLEAR}{self.doing} {printable(subject)} ...", end="", file=raw(sys.stderr), flush=True)
+            self._shown = True
+
+    def clear(self) -> None:
+        """Take the line away, if there is one."""
+        if self._shown:
+            print(_CLEAR, end="", file=raw(sys.stderr), flush=True)

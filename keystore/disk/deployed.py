@@ -1,0 +1,76 @@
+"""An imported keystore held against the signed manifest that came with it: every file has its hash there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from keystore.disk import layout, safe_files
+from keystore.disk.view import KeystoreView
+from keystore.errors import DamagedKeystoreError, KeystoreError, printable
+from keystore.formats.bundle import Manifest, parse_manifest
+from keystore.formats.role import Role
+from keystore.signing import smime
+from keystore.signing.public_key import fingerprint
+
+
+def deployed_manifest(view: KeystoreView) -> Manifest | None:
+    """Returns the manifest of an imported keystore, signed by its permissions CA; None where nothing was imported.
+
+    Raises DamagedKeystoreError.
+    """
+    signed = safe_files.read_if_there(view.root, layout.BUNDLE)
+    if signed is None:
+        return None
+    place = printable(view.root / layout.BUNDLE)
+    document = smime.read(signed, place)
+    smime.check(document, view.ca_bundle(Role.PERMISSIONS), place)
+    return parse_manifest(document.document, place)
+
+
+def differing_files(
+    view: KeystoreView, manifest: Manifest, enclaves: Iterable[str] | None = None
+) -> Iterator[tuple[str, str]]:
+    """Yields each file that is not as the manifest has it, and what is wrong with it.
+
+    ``enclaves``: look only at what these read; None for all.
+    """
+    chosen = manifest.names if enclaves is None else [name for name in enclaves if name in manifest.names]
+    has_key = {one.enclave: one.has_key for one in manifest.enclaves}
+    wanted = layout.bundle_files(((name, has_key[name]) for name in chosen), crl=layout.CRL in manifest.files)
+    for name in sorted(wanted & set(manifest.files)):
+        found = safe_files.read_if_there(view.root, name)
+        if found is None:
+            yield name, "is missing: the bundle that was imported has it"
+        elif fingerprint(found) != manifest.files[name]:
+            yield name, "is not the file of the bundle that was imported"
+    if layout.CRL not in manifest.files and view.has_crl:
+        yield layout.CRL, "was not in the bundle that was imported"
+
+
+def deployment_problem(view: KeystoreView, enclaves: Iterable[str]) -> str | None:
+    """Says why what these enclaves read is not what was imported; None where it is, or where nothing was imported."""
+    try:
+        manifest = deployed_manifest(view)
+    except DamagedKeystoreError as error:
+        return str(error)
+    if manifest is None:
+        return None
+    first = next(differing_files(view, manifest, enclaves), None)
+    return f"{printable(view.root / first[0])} {first[1]}" if first is not None else None
+
+
+def refuse_changed_deployment(view: KeystoreView, enclaves: Iterable[str]) -> None:
+    """Raises DamagedKeystoreError where an imported keystore is not as its bundle left it."""
+    if (problem := deployment_problem(view, enclaves)) is not None:
+        raise DamagedKeystoreError(
+            f"{problem}. Import the bundle again, which restores it: secure-keystore import KEYSTORE HOST.bundle"
+        )
+
+
+def find_differences(view: KeystoreView) -> list[tuple[str, str]]:
+    """Returns what differs in an imported keystore, including a manifest that cannot be trusted; nothing elsewhere."""
+    try:
+        manifest = deployed_manifest(view)
+        return list(differing_files(view, manifest)) if manifest is not None else []
+    except KeystoreError as error:
+        return [(layout.BUNDLE, str(error))]

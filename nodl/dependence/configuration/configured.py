@@ -1,0 +1,37 @@
+"""What a configuration file of a tool asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+from nodl.name_template import NameTemplate
+from nodl.names import InvalidNameError, validate_written_name
+from nodl.node_interface import Endpoint, EndpointKind, Gap
+from nodl.source_ref import SourceRef
+
+
+class Configured(NamedTuple):
+    """``nodes``: names of further nodes that the program makes, of which nothing else is known to differ."""
+
+    endpoints: tuple[Endpoint, ...] = ()
+    gaps: tuple[Gap, ...] = ()
+    nodes: tuple[str, ...] = ()
+
+
+def collected(parts: Iterable[Endpoint | Gap]) -> Configured:
+    """Each once, in their order."""
+    found = list(dict.fromkeys(parts))
+    endpoints = tuple(part for part in found if isinstance(part, Endpoint))
+    return Configured(endpoints, tuple(part for part in found if isinstance(part, Gap)))
+
+
+def endpoint_named(
+    kind: EndpointKind, name: str, type_name: str, place: SourceRef, note: str
+) -> Endpoint | InvalidNameError:
+    """The endpoint that a tool makes under the ``name`` in its file, or why there can be none of that name."""
+    try:
+        validate_written_name(name)
+    except InvalidNameError as error:
+        return error
+    return Endpoint(kind, NameTemplate.literal(name), type_name, place, note=note)

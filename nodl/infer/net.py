@@ -1,0 +1,543 @@
+"""The net under the analysis: was every call that reaches an interface evaluated, from each of its callers?
+
+Takes a finished ``Run``, gives a gap for what was lost. It reads the text alone and knows nothing of values. A *place*
+is a call of something that makes nodes or interfaces (``create_publisher``, ``ActionClient`` ...), or of a function or
+class of the program whose text reaches one, by its name. For every function that live text refers to, and for every
+call that entered it, each place in it must have been evaluated, unless constants in the text say that control does not
+get there: a test of literals (also of an argument or default that the caller writes as one), or a statement behind
+``return`` or ``raise``. A function that something live refers to and that nothing entered is a gap as a whole.
+
+So a mistake of the analysis that skips a branch, ends a path too early, loses a caller, a callback or a module shows up
+here. What it cannot see: a wrong value, and creation behind names that do not stand in the text.
+"""
+
+from __future__ import annotations
+
+import ast
+import functools
+import itertools
+import operator
+import re
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, NamedTuple
+
+from nodl.infer.interpreter.imports import absolute_name
+from nodl.infer.interpreter.run import Run
+from nodl.infer.models import ros
+from nodl.infer.models.signatures import NODE_ENDPOINTS
+from nodl.infer.program import Program, SourceModule
+from nodl.node_interface import Gap
+from nodl.source_ref import SourceRef
+
+Function = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda
+Constants = dict[str, object]  # names that stand for a literal
+CREATING_NAMES = frozenset(NODE_ENDPOINTS) | ros.CREATING_NAMES
+_CREATING_TEXT = re.compile("|".join(sorted(map(re.escape, CREATING_NAMES))))
+_ELSEWHERE = re.compile(r"rclpy|\b(?:importlib|__import__|eval|exec|runpy|pickle)\b")
+_LOST = "may be called from somewhere that the analysis did not follow, and would create interfaces"
+
+
+def may_make_interfaces(program: Program, main: SourceModule) -> bool:
+    """Whether running this file could: it, or a file of the program that it imports, says so or runs other code.
+
+    A file that cannot be parsed could do anything.
+    """
+    beside = main.path.rpartition("/")[0]
+    found = {main.path: main}
+    left = [main]
+    while left:
+        module = left.pop()
+        if module.error or _CREATING_TEXT.search(module.text) or _ELSEWHERE.search(module.text):
+            return True
+        for name in dict.fromkeys(n for node in ast.walk(module.tree) for n in _imported(node, module)):
+            path = program.find(name, beside) or program.find(name, module.path.rpartition("/")[0])
+            if path is not None and path not in found:
+                found[path] = program.load(path, name)
+                left.append(found[path])
+    return False
+
+
+def _imported(node: ast.AST, module: SourceModule) -> Iterator[str]:
+    """The modules that an import statement may mean, with the packages around them."""
+    names: list[str] = []
+    if isinstance(node, ast.Import):
+        names = [alias.name for alias in node.names]
+    elif isinstance(node, ast.ImportFrom):
+        package = absolute_name(node, module)
+        names = [package, *(f"{package}.{alias.name}" for alias in node.names)]
+    for name in names:
+        steps = name.split(".")
+        yield from (".".join(steps[:count]) for count in range(1, len(steps) + 1))
+
+
+# --- what stands in the text --------------------------------------------------------------------------------
+
+
+class CallPlace(NamedTuple):
+    """A call by name, with what surrounds it inside of its function, from outside in."""
+
+    node: ast.Call
+    name: str
+    around: tuple[ast.AST, ...]
+
+
+class FunctionText:
+    """The text of one function without the functions in it; ``node`` is ``None`` for a module with its class bodies."""
+
+    def __init__(self, node: Function | None, cls: ast.ClassDef | None, path: str) -> None:
+        self.node = node
+        self.cls = cls
+        self.path = path
+        self.calls: list[CallPlace] = []
+        self.names: set[str] = set()  # that are read, and not just called
+        self.attributes: set[str] = set()  # the same, with identifiers in texts
+        self.inner: list[FunctionText] = []  # lambdas and decorated functions, whose use needs no name
+        self.imports: list[ast.Import | ast.ImportFrom] = []
+
+    @property
+    def name(self) -> str:
+        return "" if self.node is None else getattr(self.node, "name", "a lambda")
+
+
+class _Text(NamedTuple):
+    scopes: list[FunctionText]
+    classes: dict[str, list[ast.ClassDef]]
+    imported: set[str]  # names that come from other modules
+    constants: Constants
+
+
+@functools.lru_cache(maxsize=256)
+def _text_of(module: SourceModule) -> _Text:
+    reader = _Reader(module)
+    top = FunctionText(None, None, module.path)
+    reader.scopes.append(top)
+    reader.block(module.tree.body, top, ())
+    return _Text(reader.scopes, reader.classes, reader.imported, _literals(module.tree))
+
+
+def _literals(tree: ast.AST) -> Constants:
+    """Names that are given a value once, and a literal."""
+    values: Constants = {}
+    stores: dict[str, int] = {}
+    for part in ast.walk(tree):
+        names: list[str] = []
+        if isinstance(part, ast.Name | ast.Attribute) and not isinstance(part.ctx, ast.Load):
+            names = [last_name(part)]
+        elif isinstance(part, ast.arg):
+            names = [part.arg]
+        elif isinstance(part, ast.Global | ast.Nonlocal):
+            names = part.names
+        elif isinstance(part, ast.alias):
+            names = [part.asname or part.name]
+        elif isinstance(part, ast.Assign) and len(part.targets) == 1 and isinstance(part.value, ast.Constant):
+            values[last_name(part.targets[0])] = part.value.value
+        for name in names:
+            stores[name] = stores.get(name, 0) + 1
+    return {name: value for name, value in values.items() if stores.get(name) == 1}
+
+
+class _Reader:
+    """Walks a module's tree once."""
+
+    def __init__(self, module: SourceModule) -> None:
+        self.module = module
+        self.scopes: list[FunctionText] = []
+        self.classes: dict[str, list[ast.ClassDef]] = {}
+        self.imported: set[str] = set()
+
+    def block(self, body: list[ast.stmt], scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
+        """Statements in order, up to one that control cannot pass."""
+        for statement in body:
+            self.visit(statement, scope, around)
+            if isinstance(statement, ast.Return | ast.Raise | ast.Continue | ast.Break):
+                return
+
+    def visit(self, node: ast.AST, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
+        if isinstance(node, Function):
+            self._function(node, scope, around)
+            return
+        if isinstance(node, ast.ClassDef):
+            self._class(node, scope, around)
+            return
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            scope.imports.append(node)
+            if isinstance(node, ast.ImportFrom):
+                scope.attributes.update(alias.name for alias in node.names if alias.asname)
+                self.imported.update(alias.name for alias in node.names)
+        elif isinstance(node, ast.Call):
+            name = last_name(node.func)
+            scope.calls.append(CallPlace(node, name, (*around, node)))
+            if name in ("isinstance", "issubclass"):
+                self._each(node.args[:1], scope, (*around, node))
+                return
+            inside = [node.func.value] if isinstance(node.func, ast.Attribute) else []
+            inside += [node.func] if not isinstance(node.func, ast.Attribute | ast.Name) else []
+            self._each([*inside, *node.args, *node.keywords], scope, (*around, node))
+            return
+        elif isinstance(node, ast.Name | ast.Attribute) and isinstance(node.ctx, ast.Load):
+            (scope.names if isinstance(node, ast.Name) else scope.attributes).add(last_name(node))
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and node.value.isidentifier():
+            scope.attributes.add(node.value)
+        elif isinstance(node, ast.Assign) and any(last_name(each) == "__all__" for each in node.targets):
+            return
+        elif isinstance(node, ast.AnnAssign):
+            self._each([node.target, *([node.value] if node.value else [])], scope, (*around, node))
+            return
+        for _, value in ast.iter_fields(node):
+            if isinstance(value, list) and value and isinstance(value[0], ast.stmt):
+                self.block(value, scope, (*around, node))
+            elif isinstance(value, list):
+                self._each([each for each in value if isinstance(each, ast.AST)], scope, (*around, node))
+            elif isinstance(value, ast.AST):
+                self.visit(value, scope, (*around, node))
+
+    def _each(self, nodes: Iterable[ast.AST], scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
+        for node in nodes:
+            self.visit(node, scope, around)
+
+    def _function(self, node: Function, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
+        cls = around[-1] if around and isinstance(around[-1], ast.ClassDef) else None
+        inner = FunctionText(node, cls if isinstance(cls, ast.ClassDef) else None, self.module.path)
+        self.scopes.append(inner)
+        defaults = [*node.args.defaults, *(each for each in node.args.kw_defaults if each is not None)]
+        if isinstance(node, ast.Lambda):
+            scope.inner.append(inner)
+            self._each(defaults, scope, around)
+            self.visit(node.body, inner, ())
+            return
+        self._each([*defaults, *node.decorator_list], scope, around)
+        if any(last_name(each) not in _PLAIN_DECORATORS for each in node.decorator_list):
+            scope.inner.append(inner)
+        self.block(node.body, inner, ())
+
+    def _class(self, node: ast.ClassDef, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
+        self.classes.setdefault(node.name, []).append(node)
+        self._each(node.decorator_list, scope, around)
+        self.block(node.body, scope, (*around, node))
+
+
+_PLAIN_DECORATORS = frozenset({
+    "property", "cached_property", "staticmethod", "classmethod", "abstractmethod", "override", "overload", "setter",
+    "getter", "deleter", "lru_cache", "cache", "contextmanager", "asynccontextmanager", "final", "wraps", "fixture",
+})  # fmt: skip
+
+
+def last_name(node: ast.AST) -> str:
+    """``c`` of ``a.b.c``, ``c`` or ``a.b.c(...)``; nothing for the rest."""
+    if isinstance(node, ast.Attribute):
+        return node.attr
+    if isinstance(node, ast.Call):
+        return last_name(node.func)
+    return node.id if isinstance(node, ast.Name) else ""
+
+
+# --- what the run made of it --------------------------------------------------------------------------------
+
+
+def unsettled_places(
+    run: Run, called: Iterable[ast.AST] = (), instantiated: Iterable[ast.AST] = ()
+) -> list[Gap]:
+    """A gap for each place whose fate is not known; ``called``, ``instantiated``: what other runs have followed."""
+    modules = list(dict.fromkeys(module.source for module in run.modules.values()))
+    if run.gave_up or not any(_CREATING_TEXT.search(module.text) for module in modules):
+        return []
+    net = _Net(run, modules, {*called}, {*instantiated})
+    net.settle()
+    return list(dict.fromkeys(net.gaps))
+
+
+class _Net:
+    def __init__(
+        self, run: Run, modules: list[SourceModule], called: set[ast.AST], instantiated: set[ast.AST]
+    ) -> None:
+        self.gaps: list[Gap] = []
+        self._run = run
+        self._known_constants: dict[tuple[FunctionText, ast.AST | None], Constants] = {}
+        self._elsewhere = called
+        self._instantiated = instantiated | set(run.instantiated)
+        self._modules = {module.path: module for module in modules}
+        self._names = {module.source.path: name for name, module in reversed(run.modules.items())}
+        self._texts = {module.path: _text_of(module) for module in modules}
+        self._scopes = [scope for text in self._texts.values() for scope in text.scopes]
+        self._classes: dict[str, list[ast.ClassDef]] = {}
+        for text in self._texts.values():
+            for name, nodes in text.classes.items():
+                self._classes.setdefault(name, []).extend(nodes)
+        self._callers = {place.node: scope for scope in self._scopes for place in scope.calls}
+        self._makers = self._reaching()
+
+    def settle(self) -> None:
+        """Look at every place in what is live."""
+        for scope in self._live():
+            places = [place for place in scope.calls if self._makes(place, scope)]
+            if scope.node is None:
+                self._entered(scope, None, places)
+            elif scope.node in self._run.entries:
+                for entry in self._run.entries[scope.node]:
+                    self._entered(scope, entry, places)
+            elif places and scope.node not in self._elsewhere:
+                self._gap(scope, places[0].node, f"{scope.name} {_LOST}")
+        for path, text in self._texts.items():
+            for name in sorted(self._node_classes & text.classes.keys()):
+                lost = [node for node in text.classes[name] if node not in self._instantiated]
+                if lost and self._is_meant(name, path):
+                    self.gaps.append(Gap(SourceRef(path, lost[0].lineno), f"class {name} {_LOST}"))
+
+    # --- which names reach an interface ---------------------------------------------------------------------
+
+    def _reaching(self) -> set[str]:
+        """The names of functions and classes whose text reaches an interface, by names."""
+        classes = self._class_makers(set())
+        self._node_classes = frozenset(classes)
+        makers = set(CREATING_NAMES) | classes
+        while True:
+            found = {
+                scope.name
+                for scope in self._scopes
+                if scope.node is not None
+                and not isinstance(scope.node, ast.Lambda)
+                and scope.name not in makers
+                if any(place.name in makers for place in self._with_inner(scope))
+            }
+            constructed = {
+                scope.cls.name
+                for scope in self._scopes
+                if scope.cls is not None and scope.name in _CONSTRUCTORS
+                if any(place.name in makers for place in scope.calls)
+            }
+            more = (found | self._class_makers(constructed)) - makers - _CONSTRUCTORS
+            if not more:
+                return makers
+            makers |= more
+
+    def _with_inner(self, scope: FunctionText) -> Iterator[CallPlace]:
+        yield from scope.calls
+        for inner in scope.inner:
+            yield from self._with_inner(inner)
+
+    def _class_makers(self, known: set[str]) -> set[str]:
+        """Classes with a base, near or far, that makes a node, or is among ``known``."""
+        found = set(known)
+        while True:
+            more = {
+                name
+                for name, nodes in self._classes.items()
+                if name not in found
+                if any(last_name(base) in found | CREATING_NAMES for node in nodes for base in node.bases)
+            }
+            if not more:
+                return found
+            found |= more
+
+    def _makes(self, place: CallPlace, scope: FunctionText) -> bool:
+        if place.name == "__init__":  # of a base class, which makes the node
+            return scope.cls is not None and scope.cls.name in self._makers
+        return place.name in self._makers
+
+    # --- what is live ---------------------------------------------------------------------------------------
+
+    def _live(self) -> list[FunctionText]:
+        """Modules, what their text refers to, what that refers to, and so on."""
+        self._meant: set[tuple[str, str]] = set()  # names by file, or for any file ("")
+        live = [scope for scope in self._scopes if scope.node is None]
+        waiting = [scope for scope in self._scopes if scope.node is not None]
+        seen = 0
+        while True:
+            for scope in live[seen:]:
+                self._refer(scope)
+                self._imports(scope)
+            inner = {each for scope in live[seen:] for each in scope.inner}
+            seen = len(live)
+            more = [scope for scope in waiting if scope in inner or self._is_live(scope)]
+            if not more:
+                return live
+            live.extend(more)
+            waiting = [scope for scope in waiting if scope not in more]
+
+    def _refer(self, scope: FunctionText) -> None:
+        """Note what the text refers to, and calls that were not evaluated, or on something that is not known."""
+        self._meant.update(("", name) for name in scope.attributes)
+        names = set(scope.names)
+        entries = [None] if scope.node is None else list(self._run.entries.get(scope.node, [None]))
+        for place in scope.calls:
+            seen = place.node in self._evaluated or all(
+                is_dead(place.around, self._constants(scope, entry)) for entry in entries
+            )
+            if not seen or place.node in self._run.doubtful:
+                if isinstance(place.node.func, ast.Name):
+                    names.add(place.name)
+                else:
+                    self._meant.add(("", place.name))
+        self._meant.update((scope.path, name) for name in names)
+        self._meant.update(("", name) for name in names & self._texts[scope.path].imported)
+
+    @functools.cached_property
+    def _evaluated(self) -> set[ast.AST]:
+        return {node for node, _ in self._run.evaluated}
+
+    def _is_meant(self, name: str, path: str) -> bool:
+        return ("", name) in self._meant or (path, name) in self._meant
+
+    def _is_live(self, scope: FunctionText) -> bool:
+        if scope.node in self._run.entries:
+            return True
+        if isinstance(scope.node, ast.Lambda):
+            return False
+        name, cls = scope.name, scope.cls
+        if cls is None:
+            return self._is_meant(name, scope.path)
+        used = cls in self._instantiated or self._is_meant(cls.name, scope.path)
+        special = name.startswith("__") and name.endswith("__")
+        return used and (special or self._is_meant(name, scope.path))
+
+    def _imports(self, scope: FunctionText) -> None:
+        """A module of the program that live text imports, makes interfaces and was not followed."""
+        if scope.node is not None and scope.node not in self._run.entries:
+            return
+        module = self._modules[scope.path]
+        for node in scope.imports:
+            for name in _imported(node, module):
+                path = self._run.program.find(name, self._run.beside)
+                if path is None or path in self._modules:
+                    continue
+                if _CREATING_TEXT.search(self._run.program.load(path, name).text):
+                    self._gap(scope, node, f"the module {name} was not followed, and would create interfaces")
+
+    # --- one function, entered by one call ------------------------------------------------------------------
+
+    def _entered(self, scope: FunctionText, entry: ast.AST | None, places: list[CallPlace]) -> None:
+        if (scope.node, entry) in self._run.joined:
+            return  # a recursion: one run of the body stands for all of its calls
+        constants = self._constants(scope, entry) if places else {}
+        for place in places:
+            if (place.node, entry) in self._run.evaluated:
+                if place.name in CREATING_NAMES and place.node not in self._run.understood:
+                    self._gap(
+                        scope, place.node, f"{place.name}() is called on something that is not understood"
+                    )
+            elif not is_dead(place.around, constants):
+                self._gap(scope, place.node, self._skipped(scope, place, entry))
+
+    def _skipped(self, scope: FunctionText, place: CallPlace, entry: ast.AST | None) -> str:
+        caller = self._callers.get(entry) if isinstance(entry, ast.Call) else None
+        line = getattr(entry, "lineno", 0)
+        where = f" where {scope.name} is called at {caller.path.rpartition('/')[2]}:{line}" if caller else ""
+        return f"{place.name}() was not reached{where}; what it would make there is not listed"
+
+    def _constants(self, scope: FunctionText, entry: ast.AST | None) -> Constants:
+        found = self._known_constants.get((scope, entry))
+        if found is None:
+            found = self._known_constants[scope, entry] = self._constants_of(scope, entry)
+        return found
+
+    def _constants_of(self, scope: FunctionText, entry: ast.AST | None) -> Constants:
+        """Names that are literals in this call of the function: of its module, its arguments and its defaults."""
+        module = self._texts[scope.path].constants
+        constants: Constants = {**module, "__name__": self._names[scope.path], "TYPE_CHECKING": False}
+        function = scope.node
+        if function is None:
+            return constants
+        parameters = [*function.args.posonlyargs, *function.args.args]
+        every = [*parameters, *function.args.kwonlyargs]
+        stored = {
+            n.id for n in ast.walk(function) if isinstance(n, ast.Name) and not isinstance(n.ctx, ast.Load)
+        }
+        for each in every:
+            constants.pop(each.arg, None)
+        for name in stored:
+            constants.pop(name, None)
+        if not isinstance(entry, ast.Call) or not self._is_plain(entry):
+            return constants
+        given: dict[str, ast.expr | None] = {}
+        first = len(parameters) - len(function.args.defaults)
+        for index, default in enumerate(function.args.defaults):
+            given[parameters[first + index].arg] = default
+        for each, none in zip(function.args.kwonlyargs, function.args.kw_defaults, strict=True):
+            given[each.arg] = none
+        shift = 1 if scope.cls is not None and not _is_static(function) else 0
+        for each, argument in zip(parameters[shift:], entry.args, strict=False):
+            given[each.arg] = argument
+        given.update({each.arg: each.value for each in entry.keywords if each.arg is not None})
+        caller = self._callers.get(entry)
+        outer = self._texts[caller.path].constants if caller is not None and caller.node is None else {}
+        for name, value in given.items():
+            known = None if value is None or name in stored else _literal(value, outer)
+            if known is not None:
+                constants[name] = known[0]
+        return constants
+
+    def _is_plain(self, entry: ast.Call) -> bool:
+        """Whether its arguments are those of the function: no ``*``, no ``partial`` or thread between the two."""
+        starred = any(isinstance(each, ast.Starred) for each in entry.args)
+        starred = starred or any(each.arg is None for each in entry.keywords)
+        return not starred and last_name(entry.func) in self._makers
+
+    def _gap(self, scope: FunctionText, node: ast.AST, why: str) -> None:
+        self.gaps.append(Gap(SourceRef(scope.path, getattr(node, "lineno", 0)), why))
+
+
+_CONSTRUCTORS = frozenset({"__init__", "__new__", "__post_init__"})
+
+
+def _is_static(function: Function) -> bool:
+    decorators = [] if isinstance(function, ast.Lambda) else function.decorator_list
+    return any(last_name(each) == "staticmethod" for each in decorators)
+
+
+# --- constants in the text ----------------------------------------------------------------------------------
+
+
+def is_dead(around: tuple[ast.AST, ...], constants: Constants) -> bool:
+    """Whether a test of literals keeps control from the last of ``around``."""
+    for outer, inner in itertools.pairwise(around):
+        if isinstance(outer, ast.If | ast.While | ast.IfExp):
+            outcome = _decided(outer.test, constants)
+            body = outer.body if isinstance(outer.body, list) else [outer.body]
+            orelse = outer.orelse if isinstance(outer.orelse, list) else [outer.orelse]
+            if (outcome is False and inner in body) or (
+                outcome and not isinstance(outer, ast.While) and inner in orelse
+            ):
+                return True
+        if isinstance(outer, ast.BoolOp) and inner in outer.values:
+            stops = isinstance(outer.op, ast.Or)
+            before = outer.values[: outer.values.index(inner)]
+            if any(_decided(each, constants) is stops for each in before):
+                return True
+    return False
+
+
+def _decided(test: ast.expr, constants: Constants) -> bool | None:
+    """The truth of a test of literals; ``None`` for all others."""
+    if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not):
+        outcome = _decided(test.operand, constants)
+        return None if outcome is None else not outcome
+    if isinstance(test, ast.BoolOp):
+        outcomes = [_decided(each, constants) for each in test.values]
+        stops = isinstance(test.op, ast.Or)
+        return stops if stops in outcomes else None if None in outcomes else not stops
+    if isinstance(test, ast.Compare) and len(test.ops) == 1:
+        compared = _COMPARED.get(type(test.ops[0]))
+        left, right = _literal(test.left, constants), _literal(test.comparators[0], constants)
+        return bool(compared(left[0], right[0])) if compared and left and right else None
+    known = _literal(test, constants)
+    return None if known is None else bool(known[0])
+
+
+_COMPARED: dict[type, Callable[[Any, Any], object]] = {
+    ast.Eq: operator.eq, ast.NotEq: operator.ne,
+    ast.Is: lambda a, b: a is b, ast.IsNot: lambda a, b: a is not b,
+    ast.In: lambda a, b: a in b if isinstance(b, tuple) else True,
+}  # fmt: skip
+
+
+def _literal(node: ast.expr, constants: Constants) -> tuple[object] | None:
+    if isinstance(node, ast.Constant):
+        return (node.value,)
+    if isinstance(node, ast.Name | ast.Attribute) and last_name(node) in constants:
+        plain = isinstance(node, ast.Name) or node.attr == "TYPE_CHECKING"
+        return (constants[last_name(node)],) if plain else None
+    if isinstance(node, ast.Tuple | ast.List | ast.Set) and all(
+        isinstance(each, ast.Constant) for each in node.elts
+    ):
+        return (tuple(each.value for each in node.elts if isinstance(each, ast.Constant)),)
+    return None

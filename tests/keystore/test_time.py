@@ -1,0 +1,128 @@
+"""Time: a renewal keeps what was granted, a clock that is wrong forgets nobody, an order that cannot be is refused."""
+
+from __future__ import annotations
+
+from datetime import datetime, timedelta
+from pathlib import Path
+
+import pytest
+from cryptography import x509
+
+from keystore.disk import layout
+from keystore.errors import DamagedKeystoreError, InvalidInputError
+from keystore.formats.certificate import read_certificate
+from keystore.formats.policy import Policy
+from keystore.formats.validity import utc_now
+from keystore.steps import opening, provisioning, renewal, tool_enclaves
+from keystore.steps.provisioning import apply_policy
+from keystore.steps.removal import RemoveOptions, remove
+from keystore.steps.renewal import RenewOptions, renew
+from keystore.steps.rollover import Step, roll_over
+from keystore.steps.tool_enclaves import create_tool_enclave
+from keystore.verb import main
+from tests.keystore.kit import DAY, contents, filled, options, policy
+
+
+def renewing(**changes: object) -> RenewOptions:
+    return RenewOptions(provisioning=options(), **changes)  # type: ignore[arg-type]
+
+
+def remaining(root: Path, enclave: str, now: datetime | None = None) -> timedelta:
+    facts = read_certificate((root / layout.enclave_directory(enclave) / layout.CERT).read_bytes())
+    return facts.validity.not_after - (now or utc_now())
+
+
+@pytest.fixture
+def root(tmp_path: Path) -> Path:
+    return filled(tmp_path / "ks", ["/a", "/b"])
+
+
+def test_a_renewal_keeps_the_lifetime_that_was_granted(root: Path) -> None:
+    apply_policy(root, Policy((policy("/a"),)), options=options(lifetime=20 * DAY))
+    for enclave, days in (("/a", 20), ("/b", 3650)):
+        renew(root, [enclave], options=renewing())
+        assert abs(remaining(root, enclave) - days * DAY) < DAY
+    longer = RenewOptions(provisioning=options(lifetime=40 * DAY))
+    renew(root, ["/a"], options=longer)
+    renew(root, ["/a"], options=renewing())
+    assert abs(remaining(root, "/a") - 40 * DAY) < DAY
+
+
+def test_a_tool_is_renewed_by_name_only(root: Path) -> None:
+    made = create_tool_enclave(root, "observe", options=options())
+    before = remaining(root, made.enclave)
+    later = utc_now() + DAY
+    for general in ({}, {"everything": True}, {"everything": True, "new_keys": True}):
+        renew(root, options=RenewOptions(provisioning=options(now=later), **general))  # type: ignore[arg-type]
+        assert abs(remaining(root, made.enclave) - before) < timedelta(minutes=1)
+    renew(root, [made.enclave], options=RenewOptions(provisioning=options(now=later)))
+    assert remaining(root, made.enclave, later) <= tool_enclaves.DEFAULT_LIFETIME
+
+
+def test_each_new_expiry_is_told_and_what_of_the_old_stays_valid(
+    root: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["renew", str(root), "/a"]) == 0
+    printed = capsys.readouterr()
+    (line,) = [line for line in printed.out.splitlines() if line.startswith("/a: ")]
+    assert (
+        f"valid until {read_certificate((root / 'enclaves/a/cert.pem').read_bytes()).validity.not_after:%Y-%m-%d}"
+        in line
+    )
+    assert "earlier certificate of /a" in printed.err and "--revoke-old" in printed.err
+    assert main(["renew", str(root), "/a", "--revoke-old"]) == 0
+    assert "earlier certificate" not in capsys.readouterr().err
+
+
+def test_what_changes_nothing_is_wrong_usage(root: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["renew", str(root), "--new-keys"]) == 2
+    assert "--all" in capsys.readouterr().err
+    assert main(["renew", str(root), "--ca", "finish"]) == 2
+    assert "--ca start" in capsys.readouterr().err
+    assert main(["renew", str(root), "--all", "--new-keys"]) == 0
+    for step in Step:
+        roll_over(root, step, options=options())
+    with pytest.raises(InvalidInputError, match="there is no new"):
+        roll_over(filled(root.parent / "other", ["/a"]), Step.SWITCH, options=options())
+
+
+def revoked(root: Path) -> set[int]:
+    crl = x509.load_pem_x509_crl((root / layout.CRL).read_bytes())
+    return {entry.serial_number for entry in crl}
+
+
+@pytest.mark.parametrize("ahead", [40 * DAY, 365 * DAY])
+def test_a_clock_that_is_ahead_takes_nobody_off_the_crl(root: Path, ahead: timedelta) -> None:
+    apply_policy(root, Policy((policy("/gone"),)), options=options(lifetime=10 * DAY))
+    remove(root, ["/gone"], options=RemoveOptions(durable=False))
+    before = revoked(root)
+    assert before
+    for _ in range(2):
+        renew(
+            root, ["/a"], options=RenewOptions(provisioning=options(now=utc_now() + ahead), revoke_old=True)
+        )
+    assert before < revoked(root)
+
+
+@pytest.mark.parametrize("shift", [-2 * DAY, -4000 * DAY, 400 * DAY])
+def test_a_clock_far_from_the_registers_time_is_refused(
+    root: Path, shift: timedelta, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = contents(root)
+    for module in (renewal, provisioning):
+        monkeypatch.setattr(module, "utc_now", lambda: utc_now() + shift)
+    with pytest.raises(DamagedKeystoreError, match="--accept-clock"):
+        renew(root, ["/a"], options=renewing())
+    assert contents(root) == before
+    if shift > timedelta(0):
+        accepting = RenewOptions(provisioning=options(accept_clock=True))
+        assert renew(root, ["/b"], options=accepting).changed
+        assert renew(root, ["/a"], options=renewing()).changed
+
+
+def test_a_clock_near_it_is_not(root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert timedelta(days=400) > opening._AHEAD
+    for shift in (-timedelta(hours=20), 300 * DAY):
+        for module in (renewal, provisioning):
+            monkeypatch.setattr(module, "utc_now", lambda moved=shift: utc_now() + moved)
+        assert renew(root, ["/a"], options=renewing()).changed

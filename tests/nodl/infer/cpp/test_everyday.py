@@ -1,0 +1,326 @@
+"""What ordinary packages do: parameter libraries, formats, structures in structures, CMake modules."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from nodl.infer import infer_paths
+from tests.nodl.infer.cpp.workspace import HEAD, endpoints, gaps, in_class, infer, names, package
+
+pytest.importorskip("tree_sitter_cpp", reason="the extra cpp is not installed")
+
+PUB = "create_publisher<std_msgs::msg::String>"
+
+LISTENER = """demo:
+  topic: {type: string, default_value: "chatter"}
+  topics: {type: string_array, default_value: ["a", "b"]}
+  out:
+    name: {type: string}
+  __map_joints:
+    gain: {type: double}
+"""
+
+
+def _with_listener(folder: Path, body: str, parameters: str = LISTENER) -> Path:
+    source = in_class(
+        f"listener_ = std::make_shared<demo::ParamListener>(get_node_parameters_interface()); "
+        f"params_ = listener_->get_params(); {body}",
+        "std::shared_ptr<demo::ParamListener> listener_; demo::Params params_;",
+        before='#include "demo_parameters.hpp"\n',
+    )
+    cmake = "generate_parameter_library(demo_parameters src/p.yaml)\nadd_executable(node src/main.cpp)"
+    files = {"src/main.cpp": source, "src/p.yaml": parameters}
+    return package(folder / "demo", files, cmake, ("rclcpp", "generate_parameter_library"))
+
+
+def test_a_parameter_library_names_parameters_with_their_defaults(tmp_path: Path) -> None:
+    system = infer_paths([_with_listener(tmp_path, f"{PUB}(params_.topic, 1); {PUB}(params_.out.name, 1);")])
+    (node,) = system.nodes
+    assert gaps(system) == []
+    assert [str(e.name) for e in node.endpoints] == ["param:topic", "param:out.name"]
+    assert [e.name.fill({}).text for e in node.endpoints] == ["chatter", "*"]
+    assert [e.name.fill({"out.name": "x"}).text for e in node.endpoints] == ["chatter", "x"]
+
+
+def test_entries_that_other_parameters_name_are_not_known(tmp_path: Path) -> None:
+    body = f"for (auto & [name, joint] : params_.joints_map) {{ {PUB}(name, 1); }}"
+    assert names(infer_paths([_with_listener(tmp_path, body)])) == ["?"]
+
+
+def test_a_file_of_parameters_that_is_none_is_told(tmp_path: Path) -> None:
+    system = infer_paths([_with_listener(tmp_path, f'{PUB}("a", 1);', "[not, a, mapping]")])
+    assert any("a file of parameters has one name at its top" in why for why in gaps(system))
+
+
+FOUND = {
+    "structures by typedef, one in another": (
+        f'o.i.t = "x"; {PUB}(o.i.t, 1);',
+        "typedef struct { typedef struct { std::string t; } I; I i; } O; O o;",
+        ["x"],
+    ),
+    "structures without a name": (
+        f'o.i.t = "x"; {PUB}(o.i.t, 1);',
+        "struct { struct { std::string t; } i; } o;",
+        ["x"],
+    ),
+    "an enumeration where it is used": (f'{PUB}("x", 1);', "enum class S { a, b } s_; union { int i; } u_;", ["x"]),
+    "names bound to members": (
+        f"auto [a, b] = get(); {PUB}(a, 1); {PUB}(b, 1);",
+        'struct P { std::string a; std::string b; }; P get() { P p; p.a = "x"; p.b = "y"; return p; }',
+        ["x", "y"],
+    ),
+    "names bound to an array": (f'std::string l[2] = {{"x", "y"}}; auto & [a, b] = l; {PUB}(b, 1);', "", ["y"]),
+    "letters that are replaced": (
+        f"std::string s = \"a-b-c\"; std::replace(s.begin(), s.end(), '-', '_'); {PUB}(s, 1);",
+        "",
+        ["a_b_c"],
+    ),
+    "a text by snprintf": (
+        f'char b[32]; snprintf(b, sizeof(b), "t%02d/%s", 3, "x"); {PUB}(b, 1);', "", ["t03/x"]
+    ),
+    "a text by fmt": (f'{PUB}(fmt::format("{{}}/{{}}", "x", 2), 1);', "", ["x/2"]),
+    "a format that is not followed": (f'{PUB}(fmt::format("{{:>4}}", "x"), 1);', "", ["?:>4?"]),
+    "a text that may be cut off": (f'char b[4]; snprintf(b, 4, "%s", "long"); {PUB}(b, 1);', "", ["?"]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("body", "members", "made"), FOUND.values(), ids=FOUND)
+def test_a_name_is_known(body: str, members: str, made: list[str], tmp_path: Path) -> None:
+    system = infer(tmp_path, in_class(body, members))
+    assert (names(system), gaps(system)) == (made, [])
+
+
+def test_the_letters_of_a_parameter_are_replaced_at_launch(tmp_path: Path) -> None:
+    declared = 'auto s = declare_parameter<std::string>("p", "a-b");'
+    body = f"{declared} std::replace(s.begin(), s.end(), '-', '_'); {PUB}(s, 1);"
+    ((endpoint,),) = (node.endpoints for node in infer(tmp_path, in_class(body)).nodes)
+    assert [endpoint.name.fill(given).text for given in ({}, {"p": "x-y"})] == ["a_b", "x_y"]
+
+
+def test_a_header_may_bring_in_the_names_of_std(tmp_path: Path) -> None:
+    body = f'stringstream s; s << "a" << 1; {PUB}(s.str(), 1); vector<string> v{{"b"}}; for (auto & e : v) {PUB}(e, 1);'
+    source = '#include "all.hpp"\n' + in_class(body)
+    assert names(infer(tmp_path, source, src__all_hpp="using namespace std;\n")) == ["a1", "b"]
+    assert "a1" not in names(infer(tmp_path / "without", source, src__all_hpp=""))
+
+
+def test_texts_that_the_build_defines_are_known(tmp_path: Path) -> None:
+    cmake = (
+        'add_executable(node src/main.cpp)\ntarget_compile_definitions(node PRIVATE A="x" "B=\\"y\\"")\n'
+        'add_definitions(-DC="z")'
+    )
+    source = in_class(f'{PUB}(A, 1); {PUB}(B "/b", 1);')
+    assert names(infer_paths([package(tmp_path / "demo", {"src/main.cpp": source}, cmake)])) == ["x", "y/b"]
+
+
+MODULE = "macro(robot_node name)\n  add_executable(${name} ${ARGN})\nendmacro()\n"
+
+
+@pytest.mark.parametrize(
+    "include",
+    [
+        "include(cmake/robot.cmake)",
+        "include(${CMAKE_CURRENT_SOURCE_DIR}/cmake/robot.cmake)",
+        "list(APPEND CMAKE_MODULE_PATH ${CMAKE_CURRENT_SOURCE_DIR}/cmake)\ninclude(robot)",
+        "list(INSERT CMAKE_MODULE_PATH 0 ${PROJECT_SOURCE_DIR}/cmake)\ninclude(robot)",
+    ],
+)
+def test_a_module_of_cmake_is_read_where_it_is_included(include: str, tmp_path: Path) -> None:
+    files = {"src/main.cpp": in_class(f'{PUB}("a", 1);'), "cmake/robot.cmake": MODULE}
+    system = infer_paths([package(tmp_path / "demo", files, f"{include}\nrobot_node(talker src/main.cpp)")])
+    assert [(node.executable, str(e.name)) for node in system.nodes for e in node.endpoints] == [
+        ("talker", "a")
+    ]
+
+
+def test_a_source_without_its_suffix_is_found(tmp_path: Path) -> None:
+    cmake = "add_library(lib src/lib)\nadd_executable(node src/main.cpp)\ntarget_link_libraries(node lib)"
+    files = {
+        "src/main.cpp": HEAD + 'void make(rclcpp::Node & n);\nint main() { rclcpp::Node n("n"); make(n); }',
+        "src/lib.cpp": HEAD + f'void make(rclcpp::Node & n) {{ n.{PUB}("a", 1); }}',
+    }
+    system = infer_paths([package(tmp_path / "demo", files, cmake)])
+    assert (names(system), gaps(system)) == (["a"], [])
+
+
+def test_parameter_clients_of_a_node_whose_name_is_not_known_are_not_of_the_node_itself(
+    tmp_path: Path,
+) -> None:
+    made = "std::make_shared<rclcpp::AsyncParametersClient>(this{});"
+    own = endpoints(infer(tmp_path / "own", in_class(made.format(""))))
+    other = endpoints(infer(tmp_path / "other", in_class(made.format(", compute()"))))
+    assert ("service_client", "~/get_parameters") in own
+    assert not any(name.startswith("~") for _, name in other)
+
+
+@pytest.mark.parametrize(
+    "executor", ["rclcpp::experimental::executors::EventsExecutor", "rclcpp::StaticWaitSet<1>"]
+)
+def test_what_waits_for_a_node_makes_nothing_on_it(executor: str, tmp_path: Path) -> None:
+    body = f'{executor} e; e.add_node(n); n->{PUB}("a", 1);'
+    main = f'int main() {{ auto n = std::make_shared<rclcpp::Node>("n"); {body} }}'
+    system = infer(tmp_path, HEAD + main)
+    assert (names(system), gaps(system)) == (["a"], [])
+
+
+def test_a_self_test_is_a_service_below_the_name_of_the_node(tmp_path: Path) -> None:
+    body = "t = std::make_shared<self_test::TestRunner>(get_node_base_interface(), get_node_services_interface());"
+    system = infer(tmp_path, in_class(body, "std::shared_ptr<self_test::TestRunner> t;"))
+    ((made,),) = (node.endpoints for node in system.nodes)
+    assert (made.kind.value, str(made.name), gaps(system)) == ("service_server", "{node}/self_test", [])
+
+
+def test_a_class_of_a_plugin_loader_is_no_component(tmp_path: Path) -> None:
+    source = in_class("").partition("int main")[0] + "CLASS_LOADER_REGISTER_CLASS({})\n"
+    for number, (registered, nodes) in enumerate(
+        [("Demo, rclcpp::Node", ["n"]), ("Factory<Demo>, Base", [])]
+    ):
+        files = {
+            "src/a.cpp": source.format(registered) if "{}" not in source else source.replace("{}", registered)
+        }
+        found = infer_paths([package(tmp_path / str(number), files, "add_library(l SHARED src/a.cpp)")])
+        assert [node.name for node in found.nodes if node.plugin] == nodes
+
+
+MADE_LATER = f"struct A {{ void go(rclcpp::Node * n, const char * t) {{ n->{PUB}(t, 1); }} }};"
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        'if (auto a = w_.lock()) { a->go(this, "a"); }',
+        'if (A * a = get()) { a->go(this, "a"); }',
+        'while (auto * a = get()) { a->go(this, "a"); break; }',
+        'if (auto * a = dynamic_cast<A *>(b_)) { a->go(this, "a"); }',
+        'o_.emplace(); if (o_) { o_->go(this, "a"); }',
+        'std::invoke(&A::go, a_, this, "a");',
+        't_ = std::thread(&A::go, &a_, this, "a");',
+    ],
+)
+def test_an_object_is_known_where_it_is_got(body: str, tmp_path: Path) -> None:
+    members = """std::shared_ptr<A> s_ = std::make_shared<A>(); std::weak_ptr<A> w_ = s_; A a_; A * b_ = new A();
+A * get() { return &a_; } std::optional<A> o_; std::thread t_;"""
+    system = infer(tmp_path, in_class(body, members, before=f"{MADE_LATER}\n"))
+    assert (names(system), gaps(system)) == (["a"], [])
+
+
+def test_a_method_that_is_handed_over_beside_its_object_runs_on_that(tmp_path: Path) -> None:
+    member = f'void run() {{ {PUB}(topic_, 1); }} std::string topic_ = "a";'
+    system = infer(tmp_path, in_class("somebody::call_back(&Demo::run, this);", member))
+    assert names(system) == ["a"]
+    assert gaps(system) == ["the node is handed to somebody::call_back(), which may make interfaces on it"]
+
+
+CONFIG = """struct Config { std::string in{"in"}; std::string out{"out"}; };
+Config load() { Config c; c.out = "set"; return c; }
+"""
+
+
+@pytest.mark.parametrize(
+    ("taken", "member"),
+    [
+        ("const Config & c", "c_(c)"),
+        ("const Config & c", "c_{c}"),
+        ("Config c", "c_{std::move(c)}"),
+        ("Config", "c_{load()}"),
+        ("Config", "c_(load())"),
+    ],
+)
+def test_a_structure_made_of_another_one_is_its_copy(taken: str, member: str, tmp_path: Path) -> None:
+    source = f"""{HEAD}{CONFIG}class D : public rclcpp::Node {{ public:
+  explicit D({taken}) : Node("n"), {member} {{ {PUB}(c_.out, 1); create_subscription<X>(c_.in, 1, cb); }}
+  Config c_; }};
+int main() {{ auto d = std::make_shared<D>(load()); }}"""
+    system = infer(tmp_path, source)
+    assert (names(system), gaps(system)) == (["in", "set"], [])
+
+
+def test_what_fills_the_only_field_of_a_structure_runs_once(tmp_path: Path) -> None:
+    members = "struct F { int n; }; int i = 0; int next() { return i++; }"
+    body = f'F f{{next()}}; F g{{next()}}; {PUB}("t" + std::to_string(f.n) + std::to_string(g.n), 1);'
+    assert names(infer(tmp_path, in_class(body, members))) == ["t01"]
+
+
+def test_letters_that_a_loop_writes_are_not_what_they_were(tmp_path: Path) -> None:
+    body = f'std::string s = "abc"; for (auto & c : s) {{ c = toupper(c); }} {PUB}(s, 1);'
+    assert names(infer(tmp_path, in_class(body))) == ["?"]
+    read = f'std::string s = "abc"; for (auto & c : s) {{ count(c); }} {PUB}(s, 1);'
+    assert names(infer(tmp_path / "read", in_class(read.replace("auto &", "const auto &")))) == ["abc"]
+
+
+ITEM = 'struct Item { std::string t = "d"; };'
+ELEMENTS = {
+    "a vector of so many": ("std::vector<Item> v(2);", "v[0].t", "v[1].t"),
+    "an array": ("Item v[2];", "v[0].t", "v[1].t"),
+    "a std::array": ("std::array<Item, 2> v;", "v[0].t", "v[1].t"),
+}
+
+
+@pytest.mark.parametrize(("made", "first", "second"), ELEMENTS.values(), ids=ELEMENTS)
+def test_each_element_is_an_object_of_its_own(made: str, first: str, second: str, tmp_path: Path) -> None:
+    body = f'{made} {first} = "a"; {second} = "b"; {PUB}({first}, 1); {PUB}({second}, 1);'
+    assert names(infer(tmp_path, in_class(body, ITEM))) == ["a", "b"]
+
+
+@pytest.mark.parametrize(
+    "made", ["std::vector<Item> v(count());", "Item v[N];", "auto * v = new Item[count()];"]
+)
+def test_an_element_that_stands_for_all_keeps_what_was_written(made: str, tmp_path: Path) -> None:
+    body = f'{made} v[0].t = "a"; v[1].t = "b"; {PUB}(v[0].t, 1); {PUB}(v[1].t, 1);'
+    found = set(names(infer(tmp_path, in_class(body, ITEM))))
+    assert {"a", "b"} <= found or "?" in found
+
+
+PARTS = {
+    "taken apart": ('std::string a = "d"; int b; std::tie(a, b) = std::make_tuple("x", 1);', "a", ["x"]),
+    "taken apart of what is not known": ('std::string a = "d"; int b; std::tie(a, b) = get();', "a", ["?"]),
+    "turned round": (
+        'std::vector<std::string> a{"x", "y"}; std::reverse(a.begin(), a.end());',
+        "a[0]",
+        ["y"],
+    ),
+}
+
+
+@pytest.mark.parametrize(("body", "name", "made"), PARTS.values(), ids=PARTS)
+def test_what_the_standard_library_writes_is_seen(
+    body: str, name: str, made: list[str], tmp_path: Path
+) -> None:
+    assert names(infer(tmp_path, in_class(f"{body} {PUB}({name}, 1);"))) == made
+
+
+NESTED = f"{ITEM} struct Box {{ Item item; std::vector<Item> list; std::map<std::string, Item> m; }};"
+COPIES = {
+    "a member": ("Box a; Box b = a;", "a.item.t", "b.item.t"),
+    "a list": ("std::vector<Item> a(1); auto b = a;", "a[0].t", "b[0].t"),
+    "a list that is assigned": ("std::vector<Item> a(1); std::vector<Item> b; b = a;", "a[0].t", "b[0].t"),
+    "a list in a structure": ("Box a; a.list.push_back(Item()); Box b = a;", "a.list[0].t", "b.list[0].t"),
+    "a map in a structure": ('Box a; a.m["k"] = Item(); Box b(a);', 'a.m["k"].t', 'b.m["k"].t'),
+    "two keys of a map": ("Box a;", 'a.m["k"].t', 'a.m["l"].t'),
+}
+
+
+@pytest.mark.parametrize(("made", "first", "second"), COPIES.values(), ids=COPIES)
+def test_what_is_copied_is_another_one(made: str, first: str, second: str, tmp_path: Path) -> None:
+    body = f'{made} {first} = "a"; {second} = "b"; {PUB}({first}, 1); {PUB}({second}, 1);'
+    assert names(infer(tmp_path, in_class(body, NESTED))) == ["a", "b"]
+
+
+@pytest.mark.parametrize(
+    "made", ["std::vector<Item *> v{&item_};", "std::vector<Item *> v; v.push_back(&item_);"]
+)
+def test_pointers_in_a_list_that_is_copied_point_to_the_same(made: str, tmp_path: Path) -> None:
+    body = f'{made} auto w = v; w[0]->t = "b"; {PUB}(item_.t, 1);'
+    assert names(infer(tmp_path, in_class(body, f"{ITEM} Item item_;"))) == ["b"]
+
+
+def test_a_key_that_a_map_does_not_have_makes_an_entry(tmp_path: Path) -> None:
+    body = f'm_["k"].t = "a"; m_["l"].t = "b"; for (auto & [k, item] : m_) {{ {PUB}(item.t, 1); }}'
+    assert names(infer(tmp_path, in_class(body, f"{ITEM} std::map<std::string, Item> m_;"))) == ["a", "b"]
+
+
+def test_a_key_that_is_only_read_is_in_the_map_afterwards(tmp_path: Path) -> None:
+    body = f'm_["a"]; int n = m_["b"]; for (auto & [k, v] : m_) {{ {PUB}(k, 1); }}'
+    assert names(infer(tmp_path, in_class(body, "std::map<std::string, int> m_;"))) == ["a", "b"]

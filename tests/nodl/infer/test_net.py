@@ -1,0 +1,88 @@
+"""The net: what the analysis did not evaluate for some caller is a gap, unless constants in the text forbid it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from nodl.infer import InferredSystem
+from nodl.infer.interpreter import tables
+
+Infer = Callable[..., InferredSystem]
+PROGRAM = """
+    import rclpy
+    from rclpy.node import Node
+    from std_msgs.msg import String
+    {before}
+    class N(Node):
+        def __init__(self, kind='plain', loud=False):
+            super().__init__('n')
+            self.kind = kind
+            {body}
+        def make(self, name):
+            self.create_publisher(String, name, 10)
+    def main():
+        rclpy.init()
+        {main}
+    if __name__ == '__main__':
+        main()
+    """
+
+
+def _gaps(infer: Infer, body: str, main: str = "N()", before: str = "pass") -> list[str]:
+    gap_lines = infer(PROGRAM.format(body=body, main=main, before=before))
+    return [gap.why for gap in gap_lines.gaps]
+
+
+@pytest.mark.parametrize(
+    ("body", "main"),
+    [
+        ("self.make('a') if loud else None", "N()"),
+        ("self.make('a') if kind == 'other' else None", "N(); N('plain')"),
+        ("loud and self.make('a')", "N(loud=False)"),
+        ("self.make('a') if DEBUG else None", "N()"),
+        ("self.make('a') if not loud else None", "N(loud=True)"),
+    ],
+)
+def test_what_constants_forbid_is_no_gap(body: str, main: str, infer: Infer) -> None:
+    assert not _gaps(infer, body, main, "DEBUG = False")
+
+
+@pytest.mark.parametrize(
+    ("body", "main"),
+    [
+        ("self.make('a') if self.kind == 'other' else None", "N()"),
+        ("self.make('a') if ''.join(['x']) == kind else None", "N()"),
+        ("self.make('a') if DEBUG else None", "global DEBUG; DEBUG = False; N()"),
+        ("[self.make(each) for each in list(())]", "N()"),
+    ],
+)
+def test_what_only_values_forbid_is_a_gap(body: str, main: str, infer: Infer) -> None:
+    assert any("make() was not reached" in why for why in _gaps(infer, body, main, "DEBUG = False"))
+
+
+def test_each_caller_counts_for_itself(infer: Infer) -> None:
+    body = "self.make('a') if self.kind == 'loud' else None"
+    assert not _gaps(infer, body, "N('loud')")
+    (why,) = _gaps(infer, body, "N('loud'); N('quiet')")
+    assert "make() was not reached where __init__ is called at main.py" in why
+
+
+def test_a_function_that_is_referred_to_and_never_entered_is_a_gap(infer: Infer) -> None:
+    before = "def helper(node): node.create_client(String, 'c')\n    TABLE = {'f': helper}"
+    assert any("helper may be called" in why for why in _gaps(infer, "pass", "N()", before))
+    assert not _gaps(infer, "pass", "N()", "def helper(node): node.create_client(String, 'c')")
+
+
+def test_it_does_not_believe_the_interpreter(infer: Infer, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An interpreter that skips every second statement is found out."""
+    kind = next(each for each in tables.TABLES.statements if each.__name__ == "Expr")
+    really = tables.TABLES.statements[kind]
+
+    def skip(run: object, node: object, frame: object) -> bool:
+        return getattr(node, "lineno", 0) % 2 == 0 or bool(really(run, node, frame))  # type: ignore[arg-type]
+
+    monkeypatch.setitem(tables.TABLES.statements, kind, skip)
+    body = "self.make('a')\n            self.make('b')\n            self.make('c')"
+    assert sum("was not reached" in why for why in _gaps(infer, body)) >= 1

@@ -1,0 +1,107 @@
+"""A document that inference writes grants exactly what inference grants in the launch, and to no other program."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from nodl.dependence import Situation
+from nodl.dependence.apply import applied
+from nodl.document.v2 import parse_v2
+from nodl.infer import infer_executable
+from nodl.infer.report.v2_report import open_questions, to_v2
+from nodl.node_interface import NodeInterface
+
+PROGRAM = """#!/usr/bin/python3
+import rclpy
+from rclpy.node import Node
+from std_msgs.msg import String
+class N(Node):
+    def __init__(self):
+        super().__init__('n')
+        def p(name, default):
+            return self.declare_parameter(name, default).value
+        {body}
+    def P(self, name):
+        self.create_publisher(String, name, 10)
+rclpy.init()
+rclpy.spin(N())
+"""
+
+
+def _inferred(prefix: Path, body: str) -> NodeInterface:
+    (prefix / "share/ament_index/resource_index/packages").mkdir(parents=True)
+    (prefix / "share/ament_index/resource_index/packages/demo").touch()
+    file = prefix / "lib/demo/program"
+    file.parent.mkdir(parents=True)
+    file.write_text(PROGRAM.format(body=body.replace("\n", "\n        ")), encoding="utf-8")
+    file.chmod(0o755)
+    (node,) = infer_executable("demo", "program", prefixes=[str(prefix)]).interfaces
+    return node
+
+
+def _names(node: NodeInterface, parameters: dict[str, object]) -> set[str]:
+    return {name.text for endpoint in node.endpoints for name in endpoint.name.fill_each(parameters)}
+
+
+class _NoDocuments:
+    def of_class(self, plugin_class: str) -> None:
+        return None
+
+    def named(self, name: str) -> None:
+        return None
+
+    def transports(self) -> tuple[tuple[str, str, NodeInterface], ...]:
+        return ()
+
+
+CASES: dict[str, tuple[str, list[dict[str, object]]]] = {
+    "a truth value": (
+        "if p('debug', False):\n    self.P('debug')\nself.P('always')",
+        [{}, {"debug": True}, {"debug": False}],
+    ),
+    "its opposite": ("if not p('quiet', False):\n    self.P('log')", [{}, {"quiet": True}]),
+    "a text": ("if p('mode', 'a') == 'b':\n    self.P('b')\nelse:\n    self.P('other')", [{}, {"mode": "b"}]),
+    "a set of texts": (
+        "if p('mode', 'a') in ('a', 'b'):\n    self.P('ab')",
+        [{}, {"mode": "b"}, {"mode": "c"}],
+    ),
+    "the truth of a text": (
+        "t = p('topic', '')\nif t:\n    self.P(t)\nself.P('x')",
+        [{}, {"topic": "chatter"}],
+    ),
+    "a look-up": ("self.P({'a': 'left', 'b': 'right'}[p('side', 'a')])", [{}, {"side": "b"}]),
+    "a name and a test": (
+        "t = p('topic', 'chatter')\nif p('debug', True):\n    self.P(t)",
+        [{}, {"topic": "speech"}, {"debug": False, "topic": "speech"}],
+    ),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_document_grants_what_live_inference_grants(case: str, tmp_path: Path) -> None:
+    body, launches = CASES[case]
+    node = _inferred(tmp_path, body)
+    assert not node.gaps
+    ((file, text),) = to_v2([node]).items()
+    questions = open_questions(node)
+    read = parse_v2(text.encode(), file, package=None, name="program").interface
+    assert (read.package, read.executable, read.name) == ("demo", "program", "n")
+    assert bool(questions) == (case == "the truth of a text"), questions
+    for parameters in [] if questions else launches:
+        situation = Situation("jazzy", "n", "/", parameters)
+        described = applied(read, situation, _NoDocuments()).interface
+        assert _names(described, {}) == _names(node, parameters), parameters
+
+
+def test_two_parameters_with_one_default_are_a_question(tmp_path: Path) -> None:
+    node = _inferred(tmp_path, "self.P(p('a', 'chatter'))\nself.P(p('b', 'chatter'))")
+    (question,) = open_questions(node)
+    assert "several interfaces are the publisher chatter by default" in question
+
+
+def test_what_is_there_in_any_case_has_no_condition(tmp_path: Path) -> None:
+    node = _inferred(tmp_path, "if p('debug', False):\n    self.P('x')\nself.P('x')")
+    assert not open_questions(node)
+    assert "when" not in "".join(to_v2([node]).values())

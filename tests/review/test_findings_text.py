@@ -1,0 +1,39 @@
+"""What a person reads of many findings: one paragraph for each kind, everything with ``-v``."""
+
+from __future__ import annotations
+
+from enclave_launch.report.review_text import findings_text
+from enclave_launch.review.document import Told
+
+
+def told(code: str, subject: str, severity: str = "warning") -> tuple[Told, str | None]:
+    return Told(severity, code, subject, None, 0, f"{subject} is odd", "mend it"), None  # type: ignore[arg-type]
+
+
+def test_findings_of_one_kind_are_one_paragraph() -> None:
+    text = findings_text([told("no-publisher", name) for name in ("/a", "/b", "/c")])
+    assert text == (
+        "warning: /a is odd (and 2 more of this kind, about /a, /b, /c) [no-publisher]\n  mend it\n"
+        "0 errors, 3 warnings\n"
+    )
+
+
+def test_findings_of_two_kinds_are_two_paragraphs_errors_first() -> None:
+    text = findings_text([told("no-publisher", "/a"), told("no-manifest", "p/x", "error")])
+    assert [line for line in text.splitlines() if "[" in line] == [
+        "error: p/x is odd [no-manifest]",
+        "warning: /a is odd [no-publisher]",
+    ]
+
+
+def test_shared_enclaves_are_counted_and_listed_when_asked_for() -> None:
+    shared = [told("enclave-shared", name) for name in ("/a", "/b")]
+    assert findings_text(shared) == "0 errors, 2 warnings (2 enclave-shared; -v lists them)\n"
+    assert findings_text(shared, verbose=True).count("[enclave-shared]") == 2
+
+
+def test_an_accepted_finding_is_never_summed_up() -> None:
+    (finding, _) = told("enclave-shared", "/a")
+    text = findings_text([(finding, "one process"), told("enclave-shared", "/b")])
+    assert "accepted (one process): /a is odd [enclave-shared]" in text
+    assert "0 errors, 1 warning, 1 accepted (1 enclave-shared; -v lists them)" in text

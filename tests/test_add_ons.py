@@ -1,0 +1,118 @@
+"""The main job works without the add-ons, alone or all removed; nodl and keystore work without enclave_launch."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+PACKAGES = ("enclave_common", "enclave_launch", "keystore", "nodl")
+REPORTS = (
+    "diagrams.py markdown.py graph.py sarif.py changes.py review_text.py contents.py hosts.py evidence html"
+)
+
+# add-on -> what a distribution without it leaves out
+ADD_ONS: dict[str, tuple[str, ...]] = {
+    "inference": ("nodl/infer",),
+    "recording": ("enclave_launch/recording", "nodl/record"),
+    "observation": ("nodl/graph", "enclave_launch/drift", "enclave_launch/drift_watch.py"),
+    "review": ("enclave_launch/review", *(f"enclave_launch/report/{each}" for each in REPORTS.split())),
+    "deployment": ("enclave_launch/deployment",),
+}
+REMOVALS = {**ADD_ONS, "all": tuple(path for paths in ADD_ONS.values() for path in paths)}
+
+DRY_RUN = ("enclave_launch", "--dry-run", "--prefix", str(ROOT / "fixtures/demo_ws"), "demo_nodes")
+CORE_TESTS = ("tests/admission", "tests/policy/test_derivation.py", "tests/test_enclave_assignment.py")
+MANIFEST = ROOT / "fixtures/demo_ws/share/demo_nodes/demo_nodes.nodl.xml"
+TALKER = "talker_listener.launch.xml"
+
+# add-on -> a command line that needs it
+NEEDS: dict[str, tuple[str, ...]] = {
+    "inference": ("nodl.verb", "infer", "."),
+    "recording": ("enclave_launch", "--learn", "learnt", *DRY_RUN[2:], "talker_listener.launch.xml"),
+    "observation": ("nodl.verb", "observe", "--for", "1s"),
+    "review": ("enclave_launch.verb.secure_plan", "check", "demo_nodes", "talker_listener.launch.xml"),
+    "deployment": ("enclave_launch.verb.secure_plan", "export", "demo_nodes", "talker_listener.launch.xml"),
+}
+
+
+def copy_without(removed: tuple[str, ...], folder: Path) -> Path:
+    for package in PACKAGES:
+        shutil.copytree(ROOT / package, folder / package, ignore=shutil.ignore_patterns("__pycache__"))
+    for path in removed:
+        found = folder / path
+        assert found.exists(), f"{path} has moved: name what the add-on is now"
+        if found.is_dir():
+            shutil.rmtree(found)
+        else:
+            found.unlink()
+    return folder
+
+
+def python(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
+    """Run ``python -m``. Without ``site``, where this checkout is installed."""
+    path = os.pathsep.join([str(folder), sysconfig.get_path("purelib")])
+    return subprocess.run(
+        [sys.executable, "-S", "-m", *words],
+        env={**os.environ, "PYTHONPATH": path},
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=120,
+    )
+
+
+@pytest.mark.parametrize("add_on", REMOVALS)
+def test_the_main_job_works_without_an_add_on(add_on: str, tmp_path: Path) -> None:
+    whole, folder = copy_without((), tmp_path / "whole"), copy_without(REMOVALS[add_on], tmp_path / "part")
+    for form in ("tree", "json", "policy"):
+        expected, found = (python(root, *DRY_RUN, TALKER, "--format", form) for root in (whole, folder))
+        assert (found.returncode, found.stdout) == (0, expected.stdout), found.stderr
+    made = python(folder, "keystore.verb", "create", "ks")
+    assert made.returncode == 0, made.stderr
+    policy = folder / "policy.xml"
+    policy.write_text(python(folder, *DRY_RUN, TALKER, "--format", "policy").stdout)
+    applied = python(folder, "keystore.verb", "apply-policy", "ks", str(policy))
+    assert applied.returncode == 0, applied.stderr
+    assert (folder / "ks/enclaves/permissions.p7s").is_file()
+
+
+@pytest.mark.parametrize("add_on", ADD_ONS)
+def test_a_verb_of_an_add_on_that_is_not_installed_says_so(add_on: str, tmp_path: Path) -> None:
+    for removed in (ADD_ONS[add_on], REMOVALS["all"]):
+        folder = copy_without(removed, tmp_path / str(len(removed)))
+        ran = python(folder, *NEEDS[add_on])
+        assert ran.returncode == 1
+        assert "is not part of this installation" in ran.stderr
+        assert ran.stderr.count("\n") == 1, ran.stderr
+
+
+@pytest.mark.parametrize(
+    ("package", "words"),
+    [("keystore", ("create", "ks")), ("nodl", ("validate", str(MANIFEST)))],
+)
+def test_keystore_and_nodl_work_alone(package: str, words: tuple[str, ...], tmp_path: Path) -> None:
+    folder = tmp_path / "installed"
+    for each in ("enclave_common", package):
+        shutil.copytree(ROOT / each, folder / each, ignore=shutil.ignore_patterns("__pycache__"))
+    helped = python(folder, f"{package}.verb", "--help")
+    assert helped.returncode == 0 and "not part of this installation" not in helped.stdout, helped.stderr
+    ran = python(folder, f"{package}.verb", *words)
+    assert ran.returncode == 0, ran.stderr
+
+
+def test_the_tests_of_the_core_pass_without_all_add_ons(tmp_path: Path) -> None:
+    folder = copy_without(REMOVALS["all"], tmp_path)
+    for shared in ("tests", "fixtures", "pyproject.toml", "bench"):
+        copy = shutil.copytree if (ROOT / shared).is_dir() else shutil.copy
+        copy(ROOT / shared, folder / shared)
+    ran = python(folder, "pytest", "-q", "-p", "no:cacheprovider", *CORE_TESTS)
+    assert ran.returncode == 0, ran.stdout[-3000:]
+    assert " passed" in ran.stdout
