@@ -129,7 +129,8 @@ def test_each_intruder_beside_a_secured_launch_is_told(
         double = start(cyclone, str(root / "enclaves"), enclave="/").tell("node /talker", "list")
         told = launch.wait_until_told("stranger")  # right in enclave and name: only its process gives it away
         assert f"process {double.pid} " in told["who"]
-        assert {each["kind"] for each in launch.told} == {
+        # On a busy machine a participant may be seen before it says which node it is.
+        assert {each["kind"] for each in launch.told} - {"unplanned-process"} == {
             "not-secured", "other-ca", "enclave-of-another", "stranger",
         }  # fmt: skip
 
