@@ -29,15 +29,18 @@ from enclave_launch.policy import DerivedPolicy, PolicyOptions, RunningNode
 from enclave_launch.process import UNSPECIFIED_NODE_NAME, Evaluation, ResolvedComponent, ResolvedProcess
 from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.source_location import SourceLocation
-from nodl.node_interface import Endpoint, NodeInterface
+from keystore.formats.policy import Operation
+from nodl.node_interface import NodeInterface
 
 if TYPE_CHECKING:
     from enclave_launch.planner import Planner
 
 
 class InterfaceOrigin(str, Enum):
-    """Where the interfaces of a node come from; the first that knows it decides, in this order. Manifests that were
-    learnt from runs are ``RECORDED`` wherever they lie."""
+    """A source of knowledge about a node, in the order in which ``interfaces.descriptions`` prefers them.
+
+    Manifests that were learnt from runs are ``RECORDED`` wherever they lie.
+    """
 
     __str__ = str.__str__
 
@@ -48,14 +51,33 @@ class InterfaceOrigin(str, Enum):
     LIBRARY = "library"
 
 
+Named = tuple[Operation, str]
+"""One operation on a final name."""
+
+
+class Described(NamedTuple):
+    """What one source of knowledge says of a program under one start.
+
+    ``source``: the file that says it; ``names``: each with the place that says it; ``complete``: nothing is left open;
+    ``used``: the plan grants what it says; ``doubt``: it was written for another version.
+    """
+
+    origin: InterfaceOrigin
+    source: str
+    names: Mapping[Named, str]
+    complete: bool
+    used: bool
+    doubt: str = ""
+
+
 class Found(NamedTuple):
-    """The nodes of one executable or component. ``doubt``: what they were described for is another version; ``lacks``:
-    what their manifest leaves out of that which their source makes."""
+    """The nodes of one executable or component. ``doubt``: what they were described for is another version;
+    ``descriptions``: all that were compared, if there are several."""
 
     interfaces: tuple[NodeInterface, ...]
     origin: InterfaceOrigin = InterfaceOrigin.PACKAGE
     doubt: str = ""
-    lacks: tuple[Endpoint, ...] = ()
+    descriptions: tuple[Described, ...] = ()
 
 
 class Missing(NamedTuple):
@@ -76,7 +98,7 @@ class PlannedProcess(NamedTuple):
     """One process with its enclave (``None``: it runs unsecured by the launch file's own word) and its nodes.
 
     ``origin``: where their interfaces come from; ``doubt``: why they may not be those of the installed version;
-    ``lacks``: what their manifest leaves out of that which their source makes.
+    ``descriptions``: all that were compared, if there are several.
     """
 
     process: ResolvedProcess
@@ -85,7 +107,7 @@ class PlannedProcess(NamedTuple):
     missing: Missing | None = None
     origin: InterfaceOrigin | None = None
     doubt: str = ""
-    lacks: tuple[Endpoint, ...] = ()
+    descriptions: tuple[Described, ...] = ()
     refusals: tuple[Diagnostic, ...] = ()
     domain: int = 0
     middleware: str = DEFAULT_MIDDLEWARE
@@ -140,7 +162,7 @@ class PlannedComponent(NamedTuple):
     missing: Missing | None = None
     origin: InterfaceOrigin | None = None
     doubt: str = ""
-    lacks: tuple[Endpoint, ...] = ()
+    descriptions: tuple[Described, ...] = ()
 
     @property
     def package(self) -> str:

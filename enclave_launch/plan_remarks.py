@@ -5,7 +5,7 @@ What could not be found out stands in the plan as a value with a reason; here it
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 from enclave_launch.admission.middleware import failing
 from enclave_launch.diagnostics import Diagnostic
@@ -22,14 +22,18 @@ from enclave_launch.diagnostics.enclaves import (
 )
 from enclave_launch.diagnostics.evaluation import parameters_unknown
 from enclave_launch.diagnostics.permissions import (
+    descriptions_differ,
     library_version,
     manifest_lacks,
     no_manifest,
     node_name_unknown,
+    record_lacks,
     recording_incomplete,
 )
 from enclave_launch.plan import (
+    InterfaceOrigin,
     Missing,
+    Named,
     PlannedComponent,
     PlannedProcess,
     enclave_domains,
@@ -80,7 +84,7 @@ def notes(
             yield container_elsewhere(component.fqn, target, _alike(target, processes), component.location)
     started: list[PlannedProcess | PlannedComponent] = [*processes, *components]
     yield from (library_version(each.program, each.doubt, each.location) for each in started if each.doubt)
-    yield from _lacking_manifests(started)
+    yield from _differences(started)
     yield from _incomplete(nodes_of(processes, components, None))
     for item in processes:
         process, attribute = item.process, item.process.enclave.attribute
@@ -91,16 +95,39 @@ def notes(
         yield enclave_shared_with_launcher(launcher.enclave)
 
 
-def _lacking_manifests(started: Iterable[PlannedProcess | PlannedComponent]) -> Iterator[Diagnostic]:
-    """Each program once, where it is started first."""
-    lacking: dict[str, PlannedProcess | PlannedComponent] = {}
+def _differences(started: Iterable[PlannedProcess | PlannedComponent]) -> Iterator[Diagnostic]:
+    """Report where the descriptions of a program differ; each program once, where it is started first."""
+    differing: dict[str, PlannedProcess | PlannedComponent] = {}
     for item in started:
-        if item.lacks:
-            lacking.setdefault(item.program, item)
-    for program, item in lacking.items():
-        manifest = str(item.nodes[0].interface.source) if item.nodes else "of its package"
-        lacks = [f"{each.kind.value.replace('_', ' ')} {each.name} ({each.source})" for each in item.lacks]
-        yield manifest_lacks(program, manifest, lacks, item.location)
+        if item.descriptions:
+            differing.setdefault(item.program, item)
+    for program, item in differing.items():
+        yield from _difference(program, item)
+
+
+def _difference(program: str, item: PlannedProcess | PlannedComponent) -> Iterator[Diagnostic]:
+    first = item.descriptions[0]
+    granted = {named for each in item.descriptions if each.used for named in each.names}
+    others = [each for each in item.descriptions[1:] if not each.doubt]
+    beyond = {named: place for each in others for named, place in each.names.items() if named not in granted}
+    if first.origin in (InterfaceOrigin.RECORDED, InterfaceOrigin.PACKAGE):
+        lacking = record_lacks if first.origin is InterfaceOrigin.RECORDED else manifest_lacks
+        if first.used and beyond:
+            yield lacking(program, first.source, _places(beyond), item.location)
+        return
+    library = item.descriptions[-1]
+    if library.doubt or not (first.complete and library.complete):
+        return
+    apart = {named: place for named, place in library.names.items() if named not in first.names}
+    apart |= {named: place for named, place in first.names.items() if named not in library.names}
+    if apart:
+        words = ("the source is used", "the document is used", "both are used")
+        used = words[first.used + 2 * library.used - 1]
+        yield descriptions_differ(program, used, library.source, _places(apart), item.location)
+
+
+def _places(names: Mapping[Named, str]) -> list[str]:
+    return [f"{operation.verb} {name} ({place})" for (operation, name), place in sorted(names.items())]
 
 
 def _incomplete(nodes: Iterable[RunningNode]) -> Iterator[Diagnostic]:

@@ -109,7 +109,9 @@ def _plan_process(process: ResolvedProcess, lookup: InterfaceLookup, scope: Encl
     except UnknownNodeName as error:
         missing = Missing(process.process_name, error.message, unnamed=True)
         return PlannedProcess(process, enclave, (), missing)
-    return PlannedProcess(process, enclave, nodes, origin=found.origin, doubt=found.doubt, lacks=found.lacks)
+    return PlannedProcess(
+        process, enclave, nodes, origin=found.origin, doubt=found.doubt, descriptions=found.descriptions
+    )
 
 
 def _role(process: ResolvedProcess) -> Role:
@@ -126,7 +128,7 @@ def _plan_component(
     if isinstance(found, Missing):
         return PlannedComponent(component, container, (), found)
     planned = PlannedComponent(
-        component, container, (), origin=found.origin, doubt=found.doubt, lacks=found.lacks
+        component, container, (), origin=found.origin, doubt=found.doubt, descriptions=found.descriptions
     )
     if container is None or container.enclave is None:
         return planned

@@ -58,10 +58,16 @@ class ManifestLookup:
         chosen = [node for node in self._chosen_nodes() if fits(node) and _same_package(node, package)]
         if chosen:
             return Lookup(_agreed(subject, chosen), self._manifests, named=True)
+        installed = self.installed(package, executable=executable, plugin=plugin)
+        others = tuple(dict.fromkeys(map(_program, self._chosen_nodes())))
+        return installed._replace(searched=(*self._manifests, *installed.searched), described=others)
+
+    def installed(self, package: str, *, executable: str | None = None, plugin: str | None = None) -> Lookup:
+        """Return what the documents of the package itself say, whatever the user names. Raises as ``find``."""
+        fits = partial(_describes, executable=executable, plugin=plugin)
         installed = self._package(package)
         found = [node for node in installed.nodes if fits(node)]
-        others = tuple(dict.fromkeys(map(_program, self._chosen_nodes())))
-        return Lookup(_agreed(subject, found), (*self._manifests, *installed.searched), described=others)
+        return Lookup(_agreed(f"{package}/{executable or plugin}", found), installed.searched)
 
     def all_of(self, package: str) -> Lookup:
         """Every node that the documents of ``package`` describe, conflicts included."""

@@ -48,12 +48,17 @@ class Code(str, Enum):
     PROGRAM_NOT_EXECUTABLE = "program-not-executable", "A program that launch would start is not there"
     # of interfaces and permissions
     ACTION_REMAP_IDLE = "action-remap-idle", "A remap rule for an action has no effect in this distribution"
+    DESCRIPTIONS_DIFFER = (
+        "descriptions-differ",
+        "The source of a program and the library say different things",
+    )
     INTERFACE_UNKNOWN = "interface-unknown", "The name of an interface is not (wholly) known"
     LIBRARY_VERSION = "library-version", "A document of the library was written for another version"
     MANIFEST_LACKS = (
         "manifest-lacks",
         "The source of a program makes interfaces that its manifest does not have",
     )
+    RECORD_LACKS = "record-lacks", "Other descriptions of a node have names that were never recorded"
     RECORDING_INCOMPLETE = "recording-incomplete", "What was learnt of a node may not be all of it"
     NAME_UNREMAPPABLE = "name-unremappable", "A name with two underscores, which no remap rule can name"
     NO_MANIFEST = "no-manifest", "Nothing says what a node or component does"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from enclave_common.words import counted, some_of
 from enclave_launch.diagnostics import Code, Diagnostic
 from enclave_launch.source_location import SourceLocation
 
@@ -24,16 +25,40 @@ def library_version(program: str, doubt: str, location: SourceLocation) -> Diagn
 
 
 def manifest_lacks(program: str, manifest: str, lacks: Sequence[str], place: SourceLocation) -> Diagnostic:
-    """``lacks``: each interface with the place in the source that makes it."""
-    listed = "; ".join(lacks[:_INTERFACES]) + (
-        "" if len(lacks) <= _INTERFACES else f" and {len(lacks) - _INTERFACES} more"
-    )
+    """``lacks``: each name with the place that makes it."""
     text = (
-        f"the manifest of {program} ({manifest}) lacks {len(lacks)} interface{'s' * (len(lacks) != 1)} that its source "
-        f"makes, so {'they are' if len(lacks) != 1 else 'it is'} not permitted: {listed}"
+        f"the manifest of {program} ({manifest}) lacks {counted(len(lacks), 'interface')} that another description "
+        f"has, so {_they_are(lacks)} not permitted: {some_of(lacks, _INTERFACES, '; ')}"
     )
     remedy = "add what it needs to the manifest (secure-nodl infer --compare shows all)"
     return Diagnostic(Code.MANIFEST_LACKS, program, text, place, remedy)
+
+
+def record_lacks(program: str, record: str, lacks: Sequence[str], place: SourceLocation) -> Diagnostic:
+    """``lacks``: each name with the place that says it."""
+    text = (
+        f"the record of {program} ({record}) lacks {counted(len(lacks), 'name')} that another description has, so "
+        f"{_they_are(lacks)} not permitted: {some_of(lacks, _INTERFACES, '; ')}"
+    )
+    remedy = (
+        "--also unseen grants what was never seen; or record again while somebody uses it, as some names exist only "
+        "while somebody reads another"
+    )
+    return Diagnostic(Code.RECORD_LACKS, program, text, place, remedy)
+
+
+def descriptions_differ(
+    program: str, used: str, other: str, differing: Sequence[str], place: SourceLocation
+) -> Diagnostic:
+    """``used``: what the plan takes; ``differing``: each name that one of the two has, with its place."""
+    names = some_of(differing, _INTERFACES, "; ")
+    text = f"{program}: its source and the library document ({other}) differ, {used}: {names}"
+    remedy = "correct the one that is wrong (secure-nodl library check shows all)"
+    return Diagnostic(Code.DESCRIPTIONS_DIFFER, program, text, place, remedy)
+
+
+def _they_are(names: Sequence[str]) -> str:
+    return "they are" if len(names) != 1 else "it is"
 
 
 def recording_incomplete(node: str, why: str, manifest: str, place: SourceLocation) -> Diagnostic:

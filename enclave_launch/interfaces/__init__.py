@@ -1,11 +1,12 @@
-"""Where the interfaces of a node come from: its manifest, else (unless forbidden) its source, else the library.
+"""All that is known of a node: its manifest, records, its source and the library.
 
-Takes a process or component that launch starts; gives ``Found`` or ``Missing`` with what to do next. Reads the
-ament index, manifests, sources and documents of the library; next is the plan.
+Takes a process or component that launch starts; ``descriptions`` makes one answer of what is found. Reads the ament
+index, manifests, sources and documents of the library; next is the plan.
 """
 
 from __future__ import annotations
 
+import contextlib
 import os
 from collections.abc import Sequence
 from functools import cached_property
@@ -13,15 +14,16 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from enclave_common.dependencies import installed
 from enclave_launch.errors import ManifestError, translated
+from enclave_launch.interfaces.descriptions import ProgramDescription, ProgramStart, meeting
 from enclave_launch.interfaces.library_access import LibraryAccess
 from enclave_launch.interfaces.started_program import StartedProgram
 from enclave_launch.options import ResolveOptions
 from enclave_launch.plan import Found, InterfaceOrigin, Missing
+from enclave_launch.policy.node_permissions import UNSEEN
 from enclave_launch.process import Evaluation, ResolvedComponent, ResolvedProcess
-from nodl.errors import NoDLError
+from nodl.errors import ConflictingNoDLError, NoDLError
 from nodl.lookup import Lookup, ManifestLookup
-from nodl.name_template import UnknownPart
-from nodl.node_interface import ClientLibrary, Endpoint, NodeInterface
+from nodl.node_interface import ClientLibrary, NodeInterface
 from nodl.source_ref import SourceRef
 
 if TYPE_CHECKING:
@@ -50,8 +52,16 @@ class _Subject(NamedTuple):
         return f"{self.package or '(no package)'}/{self.executable or self.plugin}"
 
 
+class _Known(NamedTuple):
+    """What describes a program; ``of_this_start``: another start of it has to be looked up again."""
+
+    descriptions: tuple[ProgramDescription, ...]
+    searched: tuple[str, ...] = ()
+    of_this_start: bool = False
+
+
 class InterfaceFinder:
-    """Answers for one launch, by the rules of ``distro``; what can be said without knowing the start is kept."""
+    """Answers for one launch, by the rules of ``distro``; what can be said without knowing the start is cached."""
 
     def __init__(
         self,
@@ -67,83 +77,81 @@ class InterfaceFinder:
         self._distro = distro
         self._lookup = ManifestLookup(prefixes, self._options.manifests)
         self._library = LibraryAccess(prefixes, self._options, distro, launch)
-        self._known: dict[_Subject, Found | Missing] = {}
+        self._known: dict[_Subject, _Known] = {}
         self._infers = self._options.infer and installed("nodl.infer")
 
     def __call__(
         self, started: ResolvedProcess | ResolvedComponent, container: ResolvedProcess | None = None
     ) -> Found | Missing:
-        """``container``: that of a component. Raises ``ManifestError`` for manifests that are broken or contradict
-        each other, ``LaunchFileError`` for a remap rule at which the process would end."""
+        """Return what is known of ``started``; ``container`` is that of a component.
+
+        Raises ``ManifestError`` for manifests that are broken or contradict each other, ``LaunchFileError`` for a remap
+        rule at which the process would end.
+        """
         if isinstance(started, ResolvedProcess):
             subject = _Subject(started.package, executable=_executable_name(started))
         else:
             subject = _Subject(started.package, plugin=started.plugin)
-        found = self._known.get(subject)
-        if found is None:
-            found, of_this_start = self._find(subject, StartedProgram(started, container, self._distro))
-            if not of_this_start:
-                self._known[subject] = found
-        if isinstance(found, Missing) or not any(each.depends for each in found.interfaces):
-            return found
+        known = self._known.get(subject)
         with translated(NoDLError, ManifestError):
-            return found._replace(interfaces=self._library.complete(found.interfaces, started, container))
+            if known is None:
+                known = self._look_up(subject, StartedProgram(started, container, self._distro))
+                if not known.of_this_start:
+                    self._known[subject] = known
+            if not known.descriptions:
+                return Missing(str(subject), "; ".join(known.searched))
+            applied = [
+                each._replace(interfaces=self._library.complete(each.interfaces, started, container))
+                for each in known.descriptions
+            ]
+            start = ProgramStart(started, container, self._distro)
+            return meeting(applied, start, also_unseen=UNSEEN in self._options.also)
 
-    def _find(self, subject: _Subject, started: StartedProgram) -> tuple[Found | Missing, bool]:
-        """The answer, and whether it holds for this start alone."""
-        with translated(NoDLError, ManifestError):
-            manifest = self._lookup.find(
-                subject.package or "", executable=subject.executable, plugin=subject.plugin
-            )
-            if manifest:
-                lacks, of_this_start = self._lacks(subject, manifest, started)
-                return Found(manifest.found, _origin(manifest), lacks=lacks), of_this_start
-            if subject.package == CONTAINER_PACKAGE and subject.executable:
-                return Found((_container(subject),)), False
-            return self._without_manifest(subject, manifest, started)
+    def _look_up(self, subject: _Subject, started: StartedProgram) -> _Known:
+        """Collect every description of ``subject``, in the order of ``InterfaceOrigin``.
 
-    def _lacks(
-        self, subject: _Subject, manifest: Lookup, started: StartedProgram
-    ) -> tuple[tuple[Endpoint, ...], bool]:
-        """What an installed manifest leaves out, where the sources of the compiled program are in reach."""
-        if not self._infers or manifest.named or not self._sources.hold(subject.package):
-            return (), False
-        from nodl.infer.report.comparison import lacking  # an add-on: inference
-
-        analysed = self._inferred(subject, started, compiled_only=True)
-        if not analysed:
-            return (), False
-        return lacking(manifest.found, analysed.interfaces).endpoints, analysed.of_this_start
-
-    def _without_manifest(
-        self, subject: _Subject, manifest: Lookup, started: StartedProgram
-    ) -> tuple[Found | Missing, bool]:
-        """What the user recorded, else the analysis where it leaves nothing open, else the library, else what the
-        analysis has."""
+        A manifest that the user names is not compared. Python sources are read for programs without a manifest only,
+        as that takes time at each start.
+        """
         name = subject.executable or subject.plugin or ""
+        named = self._lookup.find(subject.package or "", executable=subject.executable, plugin=subject.plugin)
+        found = [_of_manifest(named)] if named else []
+        if found and found[0].origin is InterfaceOrigin.NAMED:
+            return _Known((*found,))
+        if named.named:
+            with contextlib.suppress(ConflictingNoDLError):  # which is why the user names another
+                installed = self._lookup.installed(
+                    subject.package or "", executable=subject.executable, plugin=subject.plugin
+                )
+                found += [_of_manifest(installed)] if installed else []
+        if not found and subject.package == CONTAINER_PACKAGE and subject.executable:
+            return _Known((ProgramDescription(InterfaceOrigin.PACKAGE, (_container(subject),)),))
         recorded = self._library.recorded(subject.package, name)
         if recorded:
             interfaces = tuple(hit.document.interface for hit in recorded)
             doubt = next((hit.doubt for hit in recorded if hit.doubt), "")
-            return Found(interfaces, InterfaceOrigin.RECORDED, doubt), False
-        searched = ["looked at " + _shortly(manifest.searched)]
-        searched += [f"--nodl describes {', '.join(manifest.described)}"] if manifest.described else []
-        analysed = self._inferred(subject, started)
+            found.append(ProgramDescription(InterfaceOrigin.RECORDED, interfaces, doubt))
+        analysed = None
+        by_hand = any(each.origin is InterfaceOrigin.PACKAGE for each in found)
+        if not by_hand or (self._infers and self._sources.hold(subject.package)):
+            analysed = self._inferred(subject, started, compiled_only=by_hand)
+        if analysed:
+            found.append(ProgramDescription(InterfaceOrigin.ANALYSIS, analysed.interfaces))
+        hit = self._library.find(subject.package, name)
+        if hit:
+            document = hit.document
+            of_this_version = bool(document.versions) and not hit.doubt
+            found.append(
+                ProgramDescription(InterfaceOrigin.LIBRARY, (document.interface,), hit.doubt, of_this_version)
+            )
+        searched = ["looked at " + _shortly(named.searched)]
+        searched += [f"--nodl describes {', '.join(named.described)}"] if named.described else []
         searched += [analysed.why] if analysed is not None and analysed.why else []
         if self._options.infer and not self._infers:
             searched.append("inference is not part of this installation")
-        inferred = analysed.interfaces if analysed is not None else ()
-        of_this_start = analysed is not None and analysed.of_this_start
-        if inferred and all(map(_complete, inferred)):
-            return Found(inferred, InterfaceOrigin.ANALYSIS), of_this_start
-        hit = self._library.find(subject.package, name)
-        if hit:
-            return Found((hit.document.interface,), InterfaceOrigin.LIBRARY, hit.doubt), of_this_start
-        if inferred:
-            return Found(inferred, InterfaceOrigin.ANALYSIS), of_this_start
         if self._options.library:
             searched.append("the library has no document of it")
-        return Missing(str(subject), "; ".join(searched)), of_this_start
+        return _Known((*found,), (*searched,), analysed is not None and analysed.of_this_start)
 
     def _inferred(
         self, subject: _Subject, started: StartedProgram, *, compiled_only: bool = False
@@ -180,20 +188,12 @@ def _shortly(places: Sequence[str]) -> str:
     return f"{', '.join(places[:_PLACES])} and {len(places) - _PLACES} more places"
 
 
-def _origin(manifest: Lookup) -> InterfaceOrigin:
+def _of_manifest(manifest: Lookup) -> ProgramDescription:
     """A manifest that was learnt says so itself, wherever it lies."""
+    origin = InterfaceOrigin.NAMED if manifest.named else InterfaceOrigin.PACKAGE
     if any(each.runs for each in manifest.found):
-        return InterfaceOrigin.RECORDED
-    return InterfaceOrigin.NAMED if manifest.named else InterfaceOrigin.PACKAGE
-
-
-def _complete(interface: NodeInterface) -> bool:
-    """Whether an analysis answered everything: no gap, and no name that is unknown in part or empty."""
-    return not interface.gaps and all(
-        endpoint.name.parts
-        and not any(part == "" or isinstance(part, UnknownPart) for part in endpoint.name.parts)
-        for endpoint in interface.endpoints
-    )
+        origin = InterfaceOrigin.RECORDED
+    return ProgramDescription(origin, manifest.found)
 
 
 def _executable_name(process: ResolvedProcess) -> str:

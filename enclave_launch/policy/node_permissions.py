@@ -51,13 +51,17 @@ _PARTS = {
 }
 
 
+UNSEEN = "unseen"
+
 ALSO: dict[str, frozenset[BuiltinCondition]] = {
     "clock": frozenset({BuiltinCondition.SIM_TIME}),
     "logger-services": frozenset({BuiltinCondition.LOGGER_SERVICES}),
     "service-events": frozenset(),
+    UNSEEN: frozenset(),
 }
 """What ``--also`` grants every node beyond what it has by itself: ``/clock``, which a node needs once somebody sets
-``use_sim_time`` while it runs; the logger services; ``<service>/_service_event`` of service introspection."""
+``use_sim_time`` while it runs; the logger services; ``<service>/_service_event`` of service introspection; of a
+recorded node the names that only its other descriptions have (``interfaces.descriptions``)."""
 
 
 class Reason(NamedTuple):

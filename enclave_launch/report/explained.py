@@ -19,13 +19,35 @@ def explained(plan: LaunchPlan, subject: str) -> list[str]:
     lines += [line for item in unknown_by_enclave(plan).get(path, ()) for line in _unknown(item)]
     planned: list[PlannedProcess | PlannedComponent] = [*plan.processes, *plan.components]
     for item in planned:
-        if path in {node.fqn for node in item.nodes} and item.origin:
+        of_node = path in {node.fqn for node in item.nodes}
+        if of_node and item.origin:
             lines.append(f"  interfaces of {label(item)}: {origin_text(item)}")
+        lines += _descriptions(item, None if of_node else path)
         if subject.strip("[]") == label(item) or (is_unknown(item) and path == shown_fqn(item)):
             lines += _of_process(plan, item)
     if lines and any(item.middleware == ZENOH for item in plan.processes):
         lines += zenoh_lines(plan, path)
     return lines
+
+
+def _descriptions(item: PlannedProcess | PlannedComponent, name: str | None) -> Iterator[str]:
+    """List the names that any description has, or ``name`` alone, with the descriptions that have them."""
+    shown = sorted(
+        {each for described in item.descriptions for each in described.names if name in (None, each[1])}
+    )
+    if not shown:
+        return
+    yield f"  what describes {label(item)}:"
+    for described in item.descriptions:
+        doubt = f", {described.doubt}" if described.doubt else ""
+        is_open = "" if described.complete else ", which leaves something open"
+        use = "used" if described.used else "not used"
+        yield f"    {described.origin} ({described.source}{is_open}{doubt}): {use}"
+    for named in shown:
+        having = [each for each in item.descriptions if named in each.names]
+        granted = "" if any(each.used for each in having) else ", not granted"
+        operation, final = named
+        yield f"    {operation.verb} {final}: {', '.join(str(each.origin) for each in having)}{granted}"
 
 
 def explainable(plan: LaunchPlan) -> set[str]:
@@ -34,6 +56,7 @@ def explainable(plan: LaunchPlan) -> set[str]:
     names = {enclave.path for enclave in plan.derived.policy.enclaves} | {label(item) for item in planned}
     names |= {node.fqn for item in planned for node in item.nodes}
     names |= {shown_fqn(item) for item in planned if is_unknown(item)} - {""}
+    names |= {named[1] for item in planned for each in item.descriptions for named in each.names}
     return names | {rule.expression for reasons in plan.derived.reasons.values() for rule in reasons}
 
 

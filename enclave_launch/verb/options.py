@@ -24,6 +24,7 @@ from enclave_common.command_line import (
 from enclave_launch.enclave import EnclaveScope
 from enclave_launch.errors import UsageError, translated
 from enclave_launch.options import ResolveOptions
+from enclave_launch.policy.node_permissions import ALSO
 from enclave_launch.ros_rules.distro import Distro
 
 DESCRIPTION = """\
@@ -85,9 +86,9 @@ POLICY: tuple[Option, ...] = (
      "accept names of which inference knows only a part, as wildcards; each is reported"),
     ("--enclave-scope", one_of("namespace", "node", "process", "launch"),
      "enclave of a process that names none (default: namespace)"),
-    ("--also WHAT", {**TEXTS, "choices": ("clock", "logger-services", "service-events")},
+    ("--also WHAT", {**TEXTS, "choices": tuple(ALSO)},
      "grant every node also: clock (use_sim_time set at run time), logger-services, service-events "
-     "(service introspection) (repeatable)"),
+     "(service introspection), unseen (names that a record lacks and another description has) (repeatable)"),
     ("--accept-prefix NAME", TEXTS,
      "a launch prefix that keeps the environment, though it is not known to (repeatable; 'shell' for shells)"),
     ("--accept-middleware NAME", TEXTS,

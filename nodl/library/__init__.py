@@ -38,16 +38,17 @@ class Library:
         self._documents: dict[tuple[str, str], LibraryDocument] = {}
 
     def find(self, package: str, name: str, *, distro: str = "", version: str | None = None) -> Hit | None:
-        """The document of executable or plugin ``name``. ``version``: of the installed package, if known.
+        """Return the document of executable or plugin ``name``, not counting what was recorded.
 
-        Raises ``InvalidNoDLError`` for a broken document.
+        ``version`` is that of the installed package, if known. Raises ``InvalidNoDLError`` for a broken document.
         """
         for folder in self._all():
             if folder == SHIPPED and not os.path.isdir(os.path.join(folder, package)):
                 continue  # the documents of a package lie in its folder
             entries = [e for e in self._entries(folder) if e.package == package and name in e.programs]
-            if entries:
-                return self._chosen(folder, entries, distro, version)
+            hit = self._chosen(folder, entries, distro, version) if entries else None
+            if hit and not hit.document.recorded:
+                return hit
         return None
 
     def recorded(self, package: str, name: str, *, distro: str, version: str | None) -> tuple[Hit, ...]:

@@ -90,7 +90,8 @@ def _found(arguments: argparse.Namespace) -> Hit | None:
     library = Library(arguments.library)
     version = package_version(arguments.package, search_prefixes(arguments.prefix))
     hit = library.find(arguments.package, arguments.name, distro=arguments.distro, version=version)
-    hit = hit or library.of_class(arguments.name, distro=arguments.distro)
+    recorded = library.recorded(arguments.package, arguments.name, distro=arguments.distro, version=version)
+    hit = hit or next(iter(recorded), None) or library.of_class(arguments.name, distro=arguments.distro)
     if hit is None:
         print(f"the library has no document of {arguments.package}/{arguments.name}", file=sys.stderr)
     return hit

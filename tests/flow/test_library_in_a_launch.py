@@ -283,3 +283,101 @@ def test_a_broken_document_is_told_with_file_and_line(launch: Launch, document: 
     folder = document("pkg/prog", "a", "{surprise: 1}")
     with pytest.raises(ManifestError, match=r"prog\.nodl\.yaml:2.*surprise"):
         launch(NODE, library_folders=(folder,))
+
+
+FOLLOWS = "node.declare_parameter('out', {default}).value"
+VERSIONED = "{library: rclcpp, versions: {jazzy: '1.0'}NAMES}"
+IN_RECORD = "{runs: [{id: a}]}"
+
+
+def codes(plan: LaunchPlan) -> set[str]:
+    return {str(each.code.value) for each in plan.warnings}
+
+
+def test_a_gap_that_only_this_start_has_sends_it_to_the_next_description(
+    launch: Launch, install: Callable[..., Path], document: Callable[..., Path]
+) -> None:
+    """topic_tools: with ``output_topic`` the source is enough, without it only the library knows the name."""
+    install("pkg", "prog", source=PYTHON.format(topic="node.get_parameter('out').value"))
+    own = (document("pkg/prog", "from_library"),)
+    param = '<param name="out" value="given"/>'
+    node = '<node pkg="pkg" exec="prog" name="n">{}</node>'
+    assert allowed(launch(node.format(param), library_folders=own), "publish") == ["/given"]
+    plan = launch(node.format(""), library_folders=own)
+    assert allowed(plan, "publish") == ["/from_library"] and not plan.problems
+    assert launch(node.format("")).problems
+
+
+@pytest.mark.parametrize("names", ["", ", names: {publishers: {a: {when: {more: true}}}}"])
+def test_of_two_complete_descriptions_the_narrower_is_used_and_the_difference_told(
+    launch: Launch, install: Callable[..., Path], document: Callable[..., Path], names: str
+) -> None:
+    """A parameter that is not set switches the name of the document off."""
+    source = PYTHON.format(topic="'a'").replace(
+        "rclpy.spin", "node.create_publisher(String, 'b', 1)\nrclpy.spin"
+    )
+    install("pkg", "prog", source=source)
+    own = (document("pkg/prog", "a", VERSIONED.replace("NAMES", names)),)
+    plan = launch(NODE, library_folders=own)
+    assert allowed(plan, "publish") == ([] if names else ["/a"])
+    assert "descriptions-differ" in codes(plan)
+    assert "publish /b: inferred, not granted" in "\n".join(explained(plan, "/n"))
+
+
+def test_of_two_complete_descriptions_that_contradict_each_other_both_are_used(
+    launch: Launch, install: Callable[..., Path], document: Callable[..., Path]
+) -> None:
+    install("pkg", "prog", source=PYTHON.format(topic="'b'"))
+    own = (document("pkg/prog", "a", VERSIONED.replace("NAMES", "")),)
+    plan = launch(NODE, library_folders=own)
+    assert allowed(plan, "publish") == ["/a", "/b"]
+    assert "descriptions-differ" in codes(plan)
+
+
+def test_a_document_of_another_version_does_not_contradict_the_source(
+    launch: Launch, install: Callable[..., Path], document: Callable[..., Path]
+) -> None:
+    install("pkg", "prog", "2.0.0", source=PYTHON.format(topic="'b'"))
+    own = (document("pkg/prog", "a", VERSIONED.replace("NAMES", "")),)
+    plan = launch(NODE, library_folders=own)
+    assert allowed(plan, "publish") == ["/b"]
+    assert codes(plan).isdisjoint({"descriptions-differ", "library-version"})
+
+
+def test_what_a_record_lacks_is_told_with_the_option_that_grants_it(
+    launch: Launch, install: Callable[..., Path], document: Callable[..., Path], tmp_path: Path
+) -> None:
+    """The record is named with ``--nodl`` or lies in a folder of the library; both mean the same."""
+    install("pkg", "prog", source=PYTHON.format(topic="'unseen'"))
+    folder = document("pkg__prog", "seen", IN_RECORD.replace("runs", "package: pkg, executable: prog, runs"))
+    for given in ({"manifests": (folder,)}, {"library_folders": (folder,)}):
+        plan = launch(NODE, **given)
+        assert allowed(plan, "publish") == ["/seen"]
+        (told,) = (each for each in plan.warnings if each.code.value == "record-lacks")
+        assert "publish /unseen" in told.text and "--also unseen" in told.remedy
+        assert "publish /unseen: inferred, not granted" in "\n".join(explained(plan, "/n"))
+        granted = launch(NODE, **given, also=("unseen",))
+        assert allowed(granted, "publish") == ["/seen", "/unseen"]
+        assert "record-lacks" not in codes(granted)
+
+
+def test_a_record_that_leaves_a_name_open_gives_way_to_who_knows_it(
+    launch: Launch, install: Callable[..., Path], document: Callable[..., Path]
+) -> None:
+    section = "{runs: [{id: a}], endpoints: [{in: publishers, name: seen, parameter: out, runs: [a]}]}"
+    install("pkg", "prog")
+    document("pkg/prog", "seen", section)
+    assert launch(NODE, library_folders=(document("pkg/prog", "seen", section),)).problems
+    install("pkg", "prog", source=PYTHON.format(topic=FOLLOWS.format(default="'known'")))
+    plan = launch(NODE, library_folders=(document("pkg/prog", "seen", section),))
+    assert allowed(plan, "publish") == ["/known"] and not plan.problems
+
+
+def test_explain_says_of_one_name_which_descriptions_have_it(
+    launch: Launch, install: Callable[..., Path], document: Callable[..., Path]
+) -> None:
+    install("pkg", "prog", source=PYTHON.format(topic="'a'"))
+    own = (document("pkg/prog", "a", VERSIONED.replace("NAMES", "")),)
+    lines = explained(launch(NODE, library_folders=own), "/a")
+    assert "    publish /a: inferred, library" in lines
+    assert not explained(launch(NODE, library_folders=own), "/other")

@@ -11,9 +11,18 @@ from enclave_launch.diagnostics import Code
 from enclave_launch.enclave import EnclaveScope
 from enclave_launch.evaluation.evaluate import evaluate
 from enclave_launch.host.plan_host import PlanHost
-from enclave_launch.plan import Found, InterfaceOrigin, LaunchPlan, LaunchSource, Missing, PlanOptions
+from enclave_launch.plan import (
+    Described,
+    Found,
+    InterfaceOrigin,
+    LaunchPlan,
+    LaunchSource,
+    Missing,
+    PlanOptions,
+)
 from enclave_launch.planner import Planner
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
+from keystore.formats.policy import Operation
 from nodl.node_interface import RANDOM_ENDING, Gap
 from nodl.source_ref import SourceRef
 
@@ -113,12 +122,14 @@ def test_what_is_unknown_of_a_process_is_part_of_the_plan(plan: Plan) -> None:
 
 
 def test_where_interfaces_come_from_and_what_is_doubted_goes_along(plan: Plan) -> None:
-    found = Found((TALKER,), InterfaceOrigin.LIBRARY, "made for 1.0", TALKER.endpoints)
+    names = {(Operation.PUBLISH, "/chatter"): "here:1"}
+    described = Described(InterfaceOrigin.LIBRARY, "a document", names, complete=True, used=True)
+    found = Found((TALKER,), InterfaceOrigin.LIBRARY, "made for 1.0", (described,))
     made = plan(BOX.format("box", "", COMPONENT.format("c")) + NODE.format(""), {
         "talker": found, "pk::Talker": found,
     })  # fmt: skip
     for item in (made.processes[1], made.components[0]):
-        assert (item.origin, item.doubt, item.lacks) == found[1:]
+        assert (item.origin, item.doubt, item.descriptions) == found[1:]
 
 
 def test_an_enclave_of_which_no_node_is_known_stands_in_the_policy(plan: Plan) -> None:

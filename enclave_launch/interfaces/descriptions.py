@@ -1,0 +1,178 @@
+"""Where the descriptions of a program meet: one rule says what the plan takes from which.
+
+1. Each description is applied to this start (parameters, arguments, remap rules); one that leaves nothing open there is
+   complete.
+2. A manifest that a person wrote decides, else what was recorded, else the first complete one of source and library.
+3. If the one that decides leaves something open, the next complete one takes its place, and the names that the first
+   does know are added.
+4. If source and library are both complete and one gives a part of the other's names, that one is used; if each gives
+   names that the other lacks, both are. A library document counts here only if it was written for this version.
+5. A record proves what is there, never what is not: names that another description has beyond it are reported, and
+   granted with ``--also unseen``.
+
+Takes the descriptions of one start, gives ``Found``. Performs no I/O.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple
+
+from enclave_launch.plan import Described, Found, InterfaceOrigin, Named
+from enclave_launch.policy.derivation import PolicyOptions
+from enclave_launch.policy.node_permissions import node_permissions
+from enclave_launch.policy.running_node import (
+    RunningNode,
+    UnknownNodeName,
+    node_of_component,
+    node_of_process,
+)
+from enclave_launch.process import ResolvedComponent, ResolvedProcess
+from nodl.node_interface import Endpoint, NodeInterface
+
+_MANIFESTS = (InterfaceOrigin.NAMED, InterfaceOrigin.PACKAGE)
+
+
+class ProgramStart(NamedTuple):
+    """One process, or one component with its container if that is known, under the rules of ``distro``."""
+
+    started: ResolvedProcess | ResolvedComponent
+    container: ResolvedProcess | None
+    distro: str
+
+    def node(self, interface: NodeInterface) -> RunningNode:
+        """Return the node as it will run; its enclave does not matter here.
+
+        Raises ``LaunchFileError`` for a remap rule at which the process would end, and ``UnknownNodeName``.
+        """
+        if isinstance(self.started, ResolvedProcess):
+            return node_of_process(self.started, interface, "/", "node")
+        return node_of_component(self.started, self.container, interface, "/")
+
+
+class ProgramDescription(NamedTuple):
+    """The nodes of a program as one source of knowledge has them under one start.
+
+    ``doubt``: it was written for another version. ``of_this_version``: it names the version that is installed.
+    """
+
+    origin: InterfaceOrigin
+    interfaces: tuple[NodeInterface, ...]
+    doubt: str = ""
+    of_this_version: bool = True
+
+
+def meeting(
+    descriptions: Sequence[ProgramDescription], start: ProgramStart, *, also_unseen: bool = False
+) -> Found:
+    """Return what the plan takes from ``descriptions``, of which there is one at least, in the order of their origins.
+
+    Raises ``LaunchFileError`` for a remap rule at which the process would end.
+    """
+    if len(descriptions) == 1:
+        only = descriptions[0]
+        return Found(only.interfaces, only.origin, only.doubt)
+    judged = [_Judged(each, *_names(each, start)) for each in descriptions]
+    base, others = _chosen(judged, also_unseen)
+    interfaces, names = base.description.interfaces, base.names
+    for other in others:
+        interfaces = _united(interfaces, other.description.interfaces, names.keys(), start)
+        names = {**other.names, **names}
+    used = (base, *others)
+    return Found(
+        interfaces,
+        base.description.origin,
+        base.description.doubt,
+        tuple(
+            Described(
+                each.description.origin,
+                str(each.description.interfaces[0].source),
+                each.names,
+                each.complete,
+                any(each is one for one in used),
+                each.description.doubt,
+            )
+            for each in judged
+        ),
+    )
+
+
+class _Judged(NamedTuple):
+    description: ProgramDescription
+    names: dict[Named, str]
+    complete: bool
+
+
+def _chosen(judged: Sequence[_Judged], also_unseen: bool) -> tuple[_Judged, tuple[_Judged, ...]]:
+    """Return the description whose nodes the plan has, and those whose names are added to them."""
+    first, others = judged[0], tuple(each for each in judged[1:] if not each.description.doubt)
+    recorded = first.description.origin is InterfaceOrigin.RECORDED
+    if recorded or first.description.origin in _MANIFESTS:
+        if not first.complete:
+            instead = next((each for each in judged[1:] if each.complete), None)
+            return (instead, (first,)) if instead else (first, ())
+        return first, others if recorded and also_unseen else ()
+    library = judged[-1]
+    if not first.complete:
+        return library, ()
+    if not (library.complete and library.description.of_this_version):
+        return first, ()
+    if first.names.keys() <= library.names.keys():
+        return first, ()
+    if library.names.keys() <= first.names.keys():
+        return library, ()
+    return first, (library,)
+
+
+def _names(description: ProgramDescription, start: ProgramStart) -> tuple[dict[Named, str], bool]:
+    """Return the final names with the places that say them, and True if nothing is left open."""
+    names: dict[Named, str] = {}
+    complete = bool(description.interfaces)
+    for interface in description.interfaces:
+        try:
+            node = start.node(interface)
+        except UnknownNodeName:
+            complete = False
+            continue
+        found, is_all = names_of(node, start.distro)
+        names.update(found)
+        complete = complete and is_all
+    return names, complete
+
+
+def names_of(node: RunningNode, distro: str) -> tuple[dict[Named, str], bool]:
+    """Return the names that ``node`` is described to need, and True if its description leaves nothing open."""
+    found = node_permissions(node, distro=distro, options=PolicyOptions())
+    declared = (each for each in found.permissions if each.reason.origin == "declared")
+    return {(each.operation, each.name): each.reason.place for each in declared}, not found.unresolved
+
+
+def _united(
+    interfaces: Iterable[NodeInterface],
+    others: Iterable[NodeInterface],
+    known: Iterable[Named],
+    start: ProgramStart,
+) -> tuple[NodeInterface, ...]:
+    """Return ``interfaces`` with the endpoints of ``others`` that give a name beyond ``known``."""
+    known = frozenset(known)
+    united = {start.node(each).fqn: each for each in interfaces}
+    for other in others:
+        beyond = other._replace(endpoints=tuple(_beyond(other, known, start)), gaps=())
+        if beyond.endpoints:
+            fqn = start.node(other).fqn
+            same = united.get(fqn)
+            united[fqn] = same._replace(endpoints=same.endpoints + beyond.endpoints) if same else beyond
+    return tuple(united.values())
+
+
+def _beyond(interface: NodeInterface, known: frozenset[Named], start: ProgramStart) -> Iterator[Endpoint]:
+    try:
+        node = start.node(interface)
+    except UnknownNodeName:
+        return
+    for endpoint in interface.endpoints:
+        names, is_known = names_of(
+            node._replace(interface=interface._replace(endpoints=(endpoint,), gaps=())), start.distro
+        )
+        if is_known and not names.keys() <= known:
+            yield endpoint
