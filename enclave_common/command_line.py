@@ -25,7 +25,9 @@ for."""
 
 
 def given_path(text: str) -> Path:
-    """:raises argparse.ArgumentTypeError: no text, which is what a shell gives for a variable that is not set."""
+    """Return ``text`` as a path.
+
+    :raises argparse.ArgumentTypeError: it is empty, as a shell variable that is not set."""
     if not text:
         raise argparse.ArgumentTypeError("an empty path; is a variable of the shell not set?")
     return Path(text)
@@ -79,7 +81,7 @@ class CommandParser(argparse.ArgumentParser):
 
 
 def parsers(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
-    """``parser`` and those of its verbs, of any depth, each once."""
+    """Yield ``parser`` and those of its verbs, of any depth, each once."""
     yield parser
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
@@ -88,7 +90,7 @@ def parsers(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser
 
 
 def add_version(parser: argparse.ArgumentParser) -> None:
-    """``--version``, the same for all commands."""
+    """Add ``--version``, the same for all commands."""
     parser.add_argument("--version", action="version", version=f"{parser.prog} {VERSION}")
 
 
@@ -123,7 +125,7 @@ def complete(
 
 
 def add_verbosity(parser: argparse.ArgumentParser) -> None:
-    """``-q`` and ``-v`` for a command, or for each of its verbs."""
+    """Add ``-q`` and ``-v`` to a command, or to each of its verbs."""
     verbs = [each for each in parsers(parser) if each is not parser]
     for each in verbs or [parser]:
         if each.prefix_chars != "-":  # an absent verb, which takes no options
@@ -193,5 +195,5 @@ def guarded(program: str, work: Callable[[], int], *mistakes: type[Exception]) -
 
 
 def _drop_output() -> None:
-    """What is still buffered goes nowhere; else the interpreter would report it once more at its end."""
+    """Discard what is still buffered; otherwise the interpreter reports the error again at exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

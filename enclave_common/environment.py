@@ -10,7 +10,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def environment_with(variables: Mapping[str, str]) -> Iterator[None]:
-    """``variables`` are set within the block; afterwards they are as before. Others are left alone."""
+    """Set ``variables`` within the block and restore them afterwards."""
     before = {name: os.environ.get(name) for name in variables}
     os.environ.update(variables)
     try:

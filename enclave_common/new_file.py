@@ -9,7 +9,9 @@ from pathlib import Path
 
 
 def write_text(path: Path, text: str) -> None:
-    """``text`` as UTF-8 in the place of ``path``; a file that was there keeps its mode. Raises ``OSError``."""
+    """Replace ``path`` by ``text`` as UTF-8; an existing file keeps its mode.
+
+    :raises OSError: it cannot be written."""
     write_bytes(path, text.encode("utf-8", "backslashreplace"))
 
 

@@ -23,18 +23,18 @@ _PERHAPS_UNSAFE = re.compile(r"[^ -~\n\t]")
 
 
 def printable(text: str) -> str:
-    """``text`` for use within a line: everything that is not printable escaped, line ends too."""
+    """Escape everything in ``text`` that is not printable, line ends too."""
     return text if text.isprintable() else "".join(map(_escaped, text))
 
 
 def printable_lines(text: str) -> str:
-    """``text`` of several lines: line ends and tabs stay, everything else that is not printable is escaped."""
+    """Escape everything in ``text`` that is not printable, except line ends and tabs."""
     return _PERHAPS_UNSAFE.sub(lambda match: _escaped(match[0]), text)
 
 
 def message(text: object) -> str:
-    """What a person is told in one or more lines: as ``printable_lines``, later lines indented, so that no name in it
-    can begin a line that looks like one of ours."""
+    """Escape a message and indent its later lines, so that no name in it can begin a line that looks like one of
+    ours."""
     return printable_lines(str(text)).replace("\n", "\n    ")
 
 
@@ -45,13 +45,13 @@ def warn(*texts: object) -> None:
 
 
 def quoted(text: str | PathLike[str]) -> str:
-    """``text`` in quotes, as it is or as a Python literal where it holds a quote or is not printable."""
+    """Quote ``text``, as a Python literal if it has a quote or is not printable."""
     plain = str(text)
     return f"'{plain}'" if plain.isprintable() and "'" not in plain else repr(plain)
 
 
 def json_text(content: object, **options: Any) -> str:
-    """``json.dumps``; readable characters as they are, all others (DEL and C1 too) as JSON's escapes."""
+    """Return ``json.dumps`` with readable characters as they are and all others (DEL and C1 too) as JSON's escapes."""
     return _PERHAPS_UNSAFE.sub(_escaped_in_json, json.dumps(content, ensure_ascii=False, **options))
 
 
@@ -149,10 +149,10 @@ _REST = r"/([^\s:,;'\"()<>]+)"
 
 
 def short_paths(text: str, folder: str) -> str:
-    """``text`` without ``folder`` before the paths of files that are there.
+    """Strip ``folder`` from the paths of existing files in ``text``.
 
-    Only of files: a ROS name can begin like a folder (``/robot/cmd_vel`` seen from ``/robot``) and must stay whole.
-    """
+    Only of files: a ROS name can begin like a folder (``/robot/cmd_vel`` seen from ``/robot``) and must stay
+    whole."""
     root = folder.rstrip("/")
     if not root or root not in text:
         return text

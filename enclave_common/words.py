@@ -7,7 +7,7 @@ from collections.abc import Iterable
 
 
 def counted(number: int, what: str) -> str:
-    """``1 node``, ``2 nodes``."""
+    """Return ``1 node``, ``2 nodes``."""
     return f"{number} {what}{'' if number == 1 else 's'}"
 
 
@@ -22,11 +22,10 @@ _ALIKE = 0.6  # of difflib's ratio: what Python's own "Did you mean" and git tak
 
 
 def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """``"; did you mean 'talker'?"``: the known word that a mistyped one was probably meant to be; or nothing.
+    """Return ``"; did you mean 'talker'?"`` for a mistyped word, or an empty text.
 
-    A word that goes on where ``word`` ends comes first: who writes ``--form`` has begun ``--format`` and not mistyped
-    ``--for``.
-    """
+    A word that continues ``word`` comes first: ``--form`` is the beginning of ``--format`` rather than a slip for
+    ``--for``."""
     by_letters = {each.lower(): each for each in known if each != word}
     begun = [each for each in by_letters if each.startswith(word.lower())]
     close = difflib.get_close_matches(word.lower(), begun, n=1, cutoff=_ALIKE)

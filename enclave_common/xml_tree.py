@@ -90,5 +90,5 @@ def collect_elements(
 
 
 def _clark(name: str) -> str:
-    """``uri}name`` -> ``{uri}name``, ElementTree's way to write a name in a namespace."""
+    """Write ``uri}name`` as ElementTree does: ``{uri}name``."""
     return "{" + name if "}" in name else name

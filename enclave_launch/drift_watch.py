@@ -68,7 +68,9 @@ class DriftWatch(LaunchCompanion):
         return of_launch or (1 if self.alarms else _CANNOT_TELL if self.blind else 0)
 
     def opened(self, launch: LaunchControl) -> None:
-        """:raises RuntimeFailure: the domain cannot be observed, so nothing is started."""
+        """Start observing.
+
+        :raises RuntimeFailure: the domain cannot be observed, so nothing is started."""
         self._launch = launch
         try:
             for domain in self._domains:
@@ -162,7 +164,7 @@ class _Observer:
             raise RuntimeFailure(f"--watch: domain {domain} cannot be observed: {self.why or 'no answer'}")
 
     def end(self) -> None:
-        """It ends when its input does."""
+        """Close the observer's input, which ends it; kill it after five seconds."""
         with contextlib.suppress(OSError):
             if self._process.stdin is not None:
                 self._process.stdin.close()
@@ -205,7 +207,7 @@ def _strangers(graph: Graph, started: set[int]) -> frozenset[int]:
 
 
 def _lineage(pid: int) -> Iterator[int]:
-    """The process, its session and its parents (``/proc/<pid>/stat``, proc(5))."""
+    """Yield the process, its session and its parents (``/proc/<pid>/stat``, proc(5))."""
     for _ in range(_MOST_PARENTS):
         try:
             fields = Path(f"/proc/{pid}/stat").read_bytes().rpartition(b")")[2].split()

@@ -35,7 +35,8 @@ class Notice(NamedTuple):
 
 
 def notices(ends: Iterable[Expiry], keystore: str, after: datetime) -> list[Notice]:
-    """In their order: for what ends together one notice at each of ``MARGINS`` that is not over yet."""
+    """Return the notices in their order: for everything that expires together one at each of ``MARGINS`` still
+    ahead."""
     together: dict[datetime, list[str]] = {}
     for one in ends:
         together.setdefault(one.not_after, []).append(one.subject)
@@ -98,7 +99,8 @@ def _watch(
 
 
 def renewal_deadline(launch: ProvisionedLaunch, now: datetime) -> Deadline | None:
-    """When to end ``launch`` so that it can be provisioned and started anew before anything of its enclaves ends."""
+    """Return when to end ``launch`` so that it is provisioned and started again before anything of its enclaves
+    expires."""
     return deadline_before(_ends(launch), now)
 
 

@@ -66,10 +66,10 @@ def resolve(
         problems=(*plan.problems, *_launcher_refusals(plan)),
         warnings=(*plan.warnings, *_missing_programs(evaluated.evaluation)),
     )
-    return _told_of_middlewares(plan) if on_zenoh(plan, os.environ) else plan
+    return _with_middleware_notes(plan) if on_zenoh(plan, os.environ) else plan
 
 
-def _told_of_middlewares(plan: LaunchPlan) -> LaunchPlan:
+def _with_middleware_notes(plan: LaunchPlan) -> LaunchPlan:
     return plan._replace(
         problems=(*plan.problems, *middleware_problems(plan, os.environ)),
         warnings=(*plan.warnings, *middleware_notes(plan)),
@@ -94,10 +94,9 @@ def evaluate_launch(
     *,
     options: ResolveOptions | None = None,
 ) -> EvaluatedLaunch:
-    """The first half of ``resolve``: what would start, without enclaves; all that an unsecured ``run`` needs.
+    """Evaluate a launch file: what would start, without enclaves; all that an unsecured ``run`` needs.
 
-    Raises ``LaunchFileError`` as ``resolve``.
-    """
+    :raises LaunchFileError: as ``resolve``."""
     source = launch_source(launch_file, arguments, options=options)._replace(
         user_code_results=RecordedResults()
     )
@@ -117,7 +116,7 @@ def launch_source(
     *,
     options: ResolveOptions | None = None,
 ) -> LaunchSource:
-    """What is to be launched, not looked at yet: ``run`` evaluates it once, unsecured, as launch does."""
+    """Describe what to launch without reading it: ``run`` evaluates it once, unsecured, as launch does."""
     chosen = options or ResolveOptions()
     seed = int.from_bytes(os.urandom(8), "big")
     return LaunchSource(
@@ -130,7 +129,8 @@ def launch_source(
 
 
 def _missing_programs(evaluation: Evaluation) -> list[Diagnostic]:
-    """``run`` would refuse them. Placeholders of packages that are not installed have their own warning."""
+    """Report programs that ``run`` would refuse; placeholders of packages that are not installed have their own
+    warning."""
     placeholders = f"{MISSING_PREFIX}/"
     real = [item for item in evaluation.processes if not "".join(item.cmd[:1]).startswith(placeholders)]
     return [
@@ -193,7 +193,9 @@ def start(launch: Launch, *, options: RunSettings | None = None) -> RunningLaunc
 
 
 async def run_async(launch: Launch, *, options: RunSettings | None = None) -> int:
-    """The same inside a running event loop; signals stay the caller's, cancelling ends every process first."""
+    """Run inside a running event loop.
+
+    Signals remain the caller's; cancelling ends every process first."""
     from enclave_launch.running import run_launched_async  # asyncio
 
     return await run_launched_async(launch, options or RunSettings())

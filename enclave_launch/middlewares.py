@@ -47,7 +47,7 @@ def middleware_problems(plan: LaunchPlan, environment: Mapping[str, str]) -> Ite
 
 
 def _serving(service: str, by_node: Mapping[str, PlannedProcess]) -> PlannedProcess | None:
-    """The process of the node whose service this is: ``/box/_container/load_node`` is one of ``/box``."""
+    """Return the process of the node that serves ``service``: ``/box/_container/load_node`` is one of ``/box``."""
     name = service if service.startswith("/") else f"/{service}"
     while name := name.rpartition("/")[0]:
         if name in by_node:
@@ -56,7 +56,7 @@ def _serving(service: str, by_node: Mapping[str, PlannedProcess]) -> PlannedProc
 
 
 def middleware_notes(plan: LaunchPlan) -> Iterator[Diagnostic]:
-    """What a reader should know of processes on Zenoh, and of those that are apart; nothing where all are on DDS."""
+    """Report what matters about processes on Zenoh, and names split between the two; nothing if all are on DDS."""
     secured = [item for item in plan.processes if item.enclave is not None]
     zenoh = [item for item in secured if item.middleware == ZENOH]
     if not zenoh:
@@ -81,7 +81,7 @@ class _End(NamedTuple):
 def _apart(
     plan: LaunchPlan, zenoh: Iterable[PlannedProcess], others: Iterable[PlannedProcess]
 ) -> Iterator[Diagnostic]:
-    """Names with one end on DDS only and the other on Zenoh only; of what every node has nothing is said."""
+    """Report names with one end on DDS only and the other on Zenoh only, except those that every node has."""
     here, there = _ends(plan, zenoh), _ends(plan, others)
     for what, giving, taking in _ENDS:
         for operation, other in ((giving, taking), (taking, giving)):

@@ -57,7 +57,7 @@ class ResolveOptions(_ResolveOptions):
     if not TYPE_CHECKING:  # who checks types sees the fields
 
         def __new__(cls, *args: Any, **given: Any) -> ResolveOptions:
-            """One path or name may be given where several can be: text is not taken letter by letter."""
+            """Accept a single path or name where several are possible: text is not split into letters."""
             options = super().__new__(cls, *args, **given)
             paths = ("prefixes", "manifests", "library_folders", "source_folders")
             names = ("also", "accept_prefixes", "accept_middlewares")
@@ -69,7 +69,7 @@ class ResolveOptions(_ResolveOptions):
             )
 
     def host_options(self) -> HostOptions:
-        """What the evaluation's host is told, in a dry run and live alike."""
+        """Return the options of the evaluation's host, the same in a dry run and live."""
         return HostOptions(self.distro, self.allow_missing_packages, self.no_python)
 
     def plan_options(self) -> PlanOptions:

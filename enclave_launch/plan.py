@@ -122,7 +122,7 @@ class PlannedProcess(NamedTuple):
 
     @property
     def program(self) -> str:
-        """``package/executable``, or the executable alone."""
+        """Return ``package/executable``, or the executable alone."""
         return self.process.program
 
     @property
@@ -140,14 +140,14 @@ class PlannedProcess(NamedTuple):
 
     @property
     def name(self) -> str | None:
-        """The node name: launch's, else the manifest's, else launch's placeholder."""
+        """Return the node name: launch's, else the manifest's, else launch's placeholder."""
         if self.process.name == UNSPECIFIED_NODE_NAME and self.nodes:
             return self.nodes[0].original_name
         return self.process.name
 
     @property
     def fqn(self) -> str | None:
-        """The fully qualified name as launch shows it, a placeholder for the name filled where known."""
+        """Return the fully qualified name as launch shows it, with the placeholder replaced by a known name."""
         if self.process.fqn is None or self.name is None:
             return self.process.fqn
         return self.process.fqn.replace(UNSPECIFIED_NODE_NAME, self.name)
@@ -174,7 +174,7 @@ class PlannedComponent(NamedTuple):
 
     @property
     def program(self) -> str:
-        """``package/plugin``."""
+        """Return ``package/plugin``."""
         return self.component.program
 
     @property
@@ -221,7 +221,7 @@ class LaunchPlan(NamedTuple):
 
     @property
     def nodes(self) -> tuple[RunningNode, ...]:
-        """Every node of the launch, the launcher's own last."""
+        """Return every node of the launch, the launcher's own last."""
         return nodes_of(self.processes, self.components, self.launcher)
 
 
@@ -286,7 +286,7 @@ def on_zenoh(plan: LaunchPlan, environment: Mapping[str, str]) -> frozenset[str]
 def nodes_of(
     processes: Iterable[PlannedProcess], components: Iterable[PlannedComponent], launcher: RunningNode | None
 ) -> tuple[RunningNode, ...]:
-    """Every node of what is planned, the launcher's own last."""
+    """Return every node that is planned, the launcher's own last."""
     planned: Iterable[PlannedProcess | PlannedComponent] = (*processes, *components)
     own = (launcher,) if launcher else ()
     return (*(node for item in planned for node in item.nodes), *own)

@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
-import enclave_launch.plan_remarks as plan_remarks
-from enclave_launch.admission import prefix_refusals, refusals, remarks
+import enclave_launch.plan_diagnostics as plan_diagnostics
+from enclave_launch.admission import notes, prefix_refusals, refusals
 from enclave_launch.admission.middleware import middleware_of
 from enclave_launch.admission.variables import domain_of
 from enclave_launch.diagnostics import Code
@@ -64,15 +64,15 @@ class Planner(NamedTuple):
             components=components,
             launcher=launcher,
             derived=derived,
-            problems=(*plan_remarks.problems(processes, components), *derived.problems),
+            problems=(*plan_diagnostics.problems(processes, components), *derived.problems),
             warnings=(
                 *evaluation.warnings,
                 *(not_foreseeable(action.what, action.location) for action in evaluation.unforeseeable),
-                *plan_remarks.notes(processes, components, launcher),
-                *(note for item in processes for note in remarks(item.process, evaluation.distro)),
-                *plan_remarks.shared_domains(processes),
-                *plan_remarks.ungranted_enclaves(processes, derived),
-                *plan_remarks.failing_handshakes(processes),
+                *plan_diagnostics.notes(processes, components, launcher),
+                *(note for item in processes for note in notes(item.process, evaluation.distro)),
+                *plan_diagnostics.shared_domains(processes),
+                *plan_diagnostics.ungranted_enclaves(processes, derived),
+                *plan_diagnostics.failing_handshakes(processes),
                 *derived.warnings,
             ),
         )

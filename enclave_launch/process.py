@@ -81,7 +81,7 @@ class ResolvedProcess(NamedTuple):
 
     @property
     def program(self) -> str:
-        """``package/executable``, or the executable alone."""
+        """Return ``package/executable``, or the executable alone."""
         return f"{self.package}/{self.executable}" if self.package else self.executable
 
 
@@ -101,7 +101,7 @@ class ResolvedComponent(NamedTuple):
 
     @property
     def program(self) -> str:
-        """``package/plugin``."""
+        """Return ``package/plugin``."""
         return f"{self.package}/{self.plugin}"
 
     @property

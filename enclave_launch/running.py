@@ -42,7 +42,7 @@ def run_launched(launch: Launch, settings: RunSettings) -> int:
 
 
 async def run_launched_async(launch: Launch, settings: RunSettings) -> int:
-    """The same inside a running event loop."""
+    """Run inside a running event loop."""
     live = _live(launch, settings)
     with _expiry_watch(launch):
         _check_programs(launch)
@@ -51,7 +51,9 @@ async def run_launched_async(launch: Launch, settings: RunSettings) -> int:
 
 
 def start_launched(launch: Launch, settings: RunSettings) -> RunningLaunch:
-    """In a thread of its own. Raises as ``run_launched``, before anything was started."""
+    """Start in a thread of its own.
+
+    :raises EnclaveLaunchError: as ``run_launched``, before anything was started."""
     live = _live(launch, settings)
     _check_programs(launch)
 
@@ -65,7 +67,7 @@ def start_launched(launch: Launch, settings: RunSettings) -> RunningLaunch:
 
 
 def _live(launch: Launch, settings: RunSettings) -> partial[LiveLaunch]:
-    """What is to run, but for who watches it and its warden."""
+    """Prepare the launch, except for its observer and its warden."""
     own = frozenset[str]() if isinstance(launch, _UNSECURED) else launch.secret_variables
     needed = None if isinstance(launch, LaunchSource) else bool(_evaluated(launch).evaluation.launcher_calls)
     return partial(
@@ -94,7 +96,8 @@ def _zenoh_router(launch: Launch) -> AbstractContextManager[object]:
 
 
 def _check_programs(launch: Launch) -> None:
-    """Secured, all starts or nothing; unsecured, what can be executed is started, as launch does."""
+    """Check that all programs of a secured launch can be executed; unsecured, those that can are started, as
+    launch does."""
     if not isinstance(launch, _UNSECURED):
         check_programs(launch.plan.evaluation.processes)
 
@@ -110,7 +113,7 @@ def _evaluated(launch: EvaluatedLaunch | LaunchPlan | ProvisionedLaunch) -> Eval
 
 
 def _gate(launch: Launch, settings: RunSettings) -> EnclaveGate | None:
-    """What stands before each process; ``None`` for a launch that was asked to run unsecured."""
+    """Return the gate before each process, None for a launch that is to run unsecured."""
     if isinstance(launch, _UNSECURED):
         return None
 

@@ -67,8 +67,8 @@ class ProvisionedLaunch(NamedTuple):
 
     @property
     def handshakes(self) -> tuple[Diagnostic, ...]:
-        """Of processes on two DDS implementations, those that cannot authenticate each other with the certificates
-        they have now."""
+        """Report processes on two DDS implementations that cannot authenticate each other with their present
+        certificates."""
         pairs = mixed_enclaves(self.plan.processes)
         view = KeystoreView(Path(self.settings.keystore))
         subjects = {path: view.common_name(path) for pair in pairs for path in pair}
@@ -85,8 +85,10 @@ class ProvisionedLaunch(NamedTuple):
 def provision_policies(
     settings: SecuritySettings, plan: LaunchPlan, options: ProvisionOptions, only: EnclavePolicy | None = None
 ) -> ProvisionReport:
-    """All enclaves of ``plan``, or one. Raises ``ProvisionError`` with the keystore's own message, and where the plan
-    asks for what it cannot give."""
+    """Provision all enclaves of ``plan``, or one.
+
+    :raises ProvisionError: the keystore refuses (the message is its own), or the plan requests what it cannot
+        give."""
     policies = plan.derived.policy.enclaves if only is None else (only,)
     with keystore_errors():
         try:
@@ -98,7 +100,8 @@ def provision_policies(
 def provision_with_zenoh(
     settings: SecuritySettings, plan: LaunchPlan, options: ProvisionOptions
 ) -> tuple[ProvisionOptions, ProvisionReport, ZenohReport]:
-    """As ``provision_policies``, and the configuration of what is on Zenoh. Gives the options that were used, too."""
+    """Provision as ``provision_policies`` does and write the configuration of what is on Zenoh; return the options
+    used, too."""
     wanted = zenoh_enclaves(plan, os.environ)
     options = options._replace(types={path: types_text(types) for path, types in wanted.items()})
     report = provision_policies(settings, plan, options)
@@ -107,23 +110,22 @@ def provision_with_zenoh(
 
 
 def launch_owner(plan: LaunchPlan) -> str:
-    """Whose share of an enclave this launch's permissions are: the launch file, whatever its arguments, or the program
-    that made the launch description itself."""
+    """Return the owner of this launch's share of an enclave: the launch file, whatever its arguments, or the
+    program that made the launch description."""
     return os.path.realpath(sys.argv[0] if plan.launch_file.startswith("<") else plan.launch_file)
 
 
-def told_of_shares(plan: LaunchPlan, keystore: str) -> LaunchPlan:
-    """The plan with a warning for each enclave that other launches on ``keystore`` have shares of. Reads only.
+def with_shares_reported(plan: LaunchPlan, keystore: str) -> LaunchPlan:
+    """Return the plan with a warning for each enclave that other launches on ``keystore`` share; only reads.
 
-    Raises ``ProvisionError`` for shares that cannot be read.
-    """
+    :raises ProvisionError: shares cannot be read."""
     with keystore_errors():
         found = list(shared_enclaves(keystore, launch_owner(plan), plan.derived.policy.enclaves))
     return plan._replace(warnings=(*plan.warnings, *(enclave_of_several_launches(*one) for one in found)))
 
 
 def zenoh_router(launch: ProvisionedLaunch, say: Callable[[str], None]) -> ZenohRouter:
-    """The router of a launch with processes on Zenoh; entering it starts or finds one."""
+    """Return the router of a launch with processes on Zenoh; entering it starts or finds one."""
     zenoh = launch.zenoh
     assert zenoh is not None, "asked only where processes are on Zenoh"
 
@@ -188,7 +190,7 @@ class PlanProvider:
 
     @property
     def plan(self) -> LaunchPlan:
-        """The launch's, with what came late."""
+        """Return the plan, with what was added late."""
         return self._plan
 
     def _follow(self, plan: LaunchPlan) -> None:
@@ -200,7 +202,7 @@ class PlanProvider:
         self._on_zenoh = on_zenoh(plan, os.environ)
 
     def granted(self, process: ResolvedProcess) -> StartAdditions | None:
-        """The grant, if the plan has the process and its enclave is the one provisioned (a few file reads)."""
+        """Return the grant if the plan has the process and its enclave is the one provisioned (a few file reads)."""
         if self._find(process) is None:
             return None
         try:
@@ -249,7 +251,7 @@ class PlanProvider:
         return self.ensure(process)
 
     def _extend_zenoh(self, process: ResolvedProcess) -> None:
-        """The router has to know of it before it starts."""
+        """Configure the router for the process, which must happen before it starts."""
         if self._launch.zenoh is None:
             raise ProvisionError(
                 f"{process.process_name} is the first process on Zenoh, and no router was started: the plan had none"
@@ -267,7 +269,8 @@ class PlanProvider:
         return StartAdditions(("--enclave", launcher.enclave), variables)
 
     def _check(self, policy: EnclavePolicy) -> None:
-        """Nothing is repaired here: what changed since it was signed was changed by somebody else."""
+        """Refuse an enclave that changed since it was signed; nothing is repaired here, since somebody else
+        changed it."""
         enclave, keystore = policy.path, self._launch.settings.keystore
         try:
             wrong = differences(keystore, policy, options=self._options)

@@ -33,7 +33,7 @@ class SecuritySettings(NamedTuple):
 
 
 def enclave_arguments(planned: PlannedProcess) -> tuple[str, ...]:
-    """What to append to the command line of a node; empty for executables and where the user already chose."""
+    """Return what to append to the command line of a node; empty for executables and if the user already chose."""
     if planned.enclave is None or planned.process.kind == "executable":
         return ()
     if planned.enclave.reason is AssignmentReason.ARGUMENT:
@@ -42,15 +42,17 @@ def enclave_arguments(planned: PlannedProcess) -> tuple[str, ...]:
 
 
 def secured_command(planned: PlannedProcess, settings: SecuritySettings | None) -> tuple[str, ...]:
-    """The command line; node commands end inside their ``--ros-args`` block, so the arguments simply follow."""
+    """Return the command line; node commands end inside their ``--ros-args`` block, so the arguments simply follow."""
     if settings is None:
         return planned.process.cmd
     return (*planned.process.cmd, *enclave_arguments(planned))
 
 
 def secured_environment(planned: PlannedProcess, settings: SecuritySettings | None) -> Mapping[str, str]:
-    """The security variables of one process. Every process gets them; for an executable without an enclave they lead
-    nowhere, so that a ROS program in it ends with rcl's message instead of joining as ``/`` or unsecured."""
+    """Return the security variables of one process.
+
+    Every process gets them. Those of an executable without an enclave point nowhere, so that a ROS program in it
+    exits with rcl's message instead of joining as ``/`` or unsecured."""
     if settings is None:
         return {}
     if planned.enclave is None:
@@ -62,8 +64,8 @@ def secured_environment(planned: PlannedProcess, settings: SecuritySettings | No
 
 
 def enclave_environment(enclave: str, middleware: str, settings: SecuritySettings) -> Mapping[str, str]:
-    """The security variables of a process in ``enclave``. On Zenoh they lead it to the configuration of its enclave,
-    and to no other."""
+    """Return the security variables of a process in ``enclave``; on Zenoh they select the configuration of that
+    enclave only."""
     if middleware != ZENOH:
         return launcher_environment(settings)
     file = f"{settings.keystore}/{layout.enclave_directory(enclave)}/{layout.ENCLAVE_ZENOH}"
@@ -71,5 +73,5 @@ def enclave_environment(enclave: str, middleware: str, settings: SecuritySetting
 
 
 def launcher_environment(settings: SecuritySettings) -> Mapping[str, str]:
-    """The security variables of the launcher's own node, and of every process whatever its enclave."""
+    """Return the security variables of the launcher's own node, which every process has."""
     return {ENABLE: "true", KEYSTORE: settings.keystore, STRATEGY: settings.strategy}

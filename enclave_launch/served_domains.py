@@ -19,10 +19,10 @@ from keystore.steps.options import ProvisionOptions
 def with_domains(
     plan: LaunchPlan, options: ProvisionOptions, environment: Mapping[str, str]
 ) -> ProvisionOptions:
-    """``options`` with the domains of ``plan``, unless somebody chose them.
+    """Return ``options`` with the domains of ``plan``, unless the user chose them.
 
-    ``environment``: the launcher's own. Raises ``ManifestError`` for processes in a domain that was not chosen.
-    """
+    :param environment: the launcher's own
+    :raises ManifestError: a process is in a domain that was not chosen."""
     if options.domains is not None:
         refused = list(not_served(plan, options.domains))
         if refused:
@@ -38,7 +38,7 @@ def with_domains(
 
 
 def not_served(plan: LaunchPlan, domains: Domains) -> Iterator[Diagnostic]:
-    """Each process with an enclave whose domain is not among ``domains``."""
+    """Report each process with an enclave whose domain is not among ``domains``."""
     for item in plan.processes:
         if item.enclave is not None and not domains.covers(Domains.single(item.domain)):
             process = item.process
@@ -46,7 +46,7 @@ def not_served(plan: LaunchPlan, domains: Domains) -> Iterator[Diagnostic]:
 
 
 def places(plan: LaunchPlan, domains: Domains) -> str:
-    """Where ``domains`` come from, for a reader."""
+    """Describe for a reader where ``domains`` come from."""
     asking = (
         f"{item.process.process_name} at {item.process.location} is in domain {item.domain}"
         for item in plan.processes

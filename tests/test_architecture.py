@@ -38,7 +38,7 @@ FLOORS: dict[str, tuple[set[str], ...]] = {
         {"evaluation"},
         {"enclave", "policy", "admission"},
         {"plan"},
-        {"plan_remarks"},
+        {"plan_diagnostics"},
         {"planner"},
         {"options", "prefixes", "security_environment", "served_domains", "middlewares"},
         {"interfaces"},

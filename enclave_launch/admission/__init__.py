@@ -4,6 +4,6 @@
 ``variables``: nothing in its environment turns security off; its DDS domain. The plan asks before anything is signed.
 """
 
-from enclave_launch.admission.admission import AdmissionOptions, prefix_refusals, refusals, remarks
+from enclave_launch.admission.admission import AdmissionOptions, notes, prefix_refusals, refusals
 
-__all__ = ["AdmissionOptions", "prefix_refusals", "refusals", "remarks"]
+__all__ = ["AdmissionOptions", "notes", "prefix_refusals", "refusals"]

@@ -1,4 +1,4 @@
-"""All that is asked of one process before it may start secured: refusals, and remarks for the reader."""
+"""All that is asked of one process before it may start secured: refusals, and notes for the reader."""
 
 from __future__ import annotations
 
@@ -22,8 +22,9 @@ class AdmissionOptions(NamedTuple):
 
 
 def prefix_refusals(process: ResolvedProcess, options: AdmissionOptions) -> Iterator[Diagnostic]:
-    """What may change the environment that we give it. Without enclave it matters as much: what is there then keeps
-    ROS programs from starting unsecured."""
+    """Report what may change the environment of a process.
+
+    It matters as much without an enclave: then the environment keeps ROS programs from starting unsecured."""
     for obstacle in obstacles(process, options.prefixes):
         yield diagnostics.prefix_refused(
             process.process_name, obstacle.wrapper, obstacle.why, process.location
@@ -31,7 +32,7 @@ def prefix_refusals(process: ResolvedProcess, options: AdmissionOptions) -> Iter
 
 
 def refusals(process: ResolvedProcess, distro: str, options: AdmissionOptions) -> Iterator[Diagnostic]:
-    """Why a process must not start in its enclave."""
+    """Report why a process must not start in its enclave."""
     name, place = process.process_name, process.location
     yield from prefix_refusals(process, options)
     middleware = middleware_of(process.final_environment, distro)
@@ -46,8 +47,8 @@ def refusals(process: ResolvedProcess, distro: str, options: AdmissionOptions) -
         yield diagnostics.security_configured(name, setting.variable, setting.value, place)
 
 
-def remarks(process: ResolvedProcess, distro: str) -> Iterator[Diagnostic]:
-    """What a reader should know of a process that may start."""
+def notes(process: ResolvedProcess, distro: str) -> Iterator[Diagnostic]:
+    """Report what matters about a process that may start."""
     name, place = process.process_name, process.location
     middleware = middleware_of(process.final_environment, distro)
     for setting in overridden(process.environment, on_zenoh=middleware == ZENOH):

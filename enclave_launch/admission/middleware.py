@@ -48,18 +48,18 @@ _NO_ENCLAVES = {
 
 
 def middleware_of(environment: Mapping[str, str], distro: str) -> str:
-    """The name of the middleware that a process with this environment loads (rmw_implementation functions.cpp:
-    an empty variable counts as none)."""
+    """Return the middleware that a process with this environment loads (rmw_implementation functions.cpp: an empty
+    variable counts as unset)."""
     return environment.get(VARIABLE) or _DEFAULT_OF.get(distro, DEFAULT)
 
 
 def vendor_of(middleware: str) -> Vendor | None:
-    """Whose DDS is behind an ``RMW_IMPLEMENTATION`` that honours enclaves; ``None`` for any other middleware."""
+    """Return the DDS vendor of an ``RMW_IMPLEMENTATION`` that honours enclaves, None for any other."""
     return HONOURS_ENCLAVES.get(middleware)
 
 
 def why_not(middleware: str, accepted: Collection[str] = ()) -> str | None:
-    """Why a process with ``middleware`` must not start in an enclave; None when it may."""
+    """Return why a process with ``middleware`` must not start in an enclave, None if it may."""
     if middleware in HONOURS_ENCLAVES or middleware == ZENOH:
         return None
     if middleware in _NO_ENCLAVES:
@@ -83,7 +83,7 @@ class Pair(NamedTuple):
 
 
 def mixed_pairs(members: Iterable[EnclaveProcess]) -> tuple[Pair, ...]:
-    """Every pair of enclaves with a Fast and a Cyclone process in one domain, sorted."""
+    """Return every pair of enclaves with a Fast and a Cyclone process in one domain, sorted."""
     everybody = tuple(members)
     pairs = {
         Pair(one.enclave, other.enclave)
@@ -96,8 +96,9 @@ def mixed_pairs(members: Iterable[EnclaveProcess]) -> tuple[Pair, ...]:
 
 
 def failing(pairs: Iterable[Pair], subjects: Mapping[str, str]) -> Iterator[Pair]:
-    """Those that never authenticate, or only by chance. ``subjects``: common name by enclave; a pair of which one is
-    not known counts as good."""
+    """Yield the pairs that never authenticate, or only by chance.
+
+    :param subjects: common name by enclave; a pair with an unknown one is assumed to work"""
     for pair in pairs:
         fast, cyclone = subjects.get(pair.fast), subjects.get(pair.cyclone)
         if pair.fast == pair.cyclone or (fast and cyclone and guid_prefix(fast) <= guid_prefix(cyclone)):
@@ -105,7 +106,7 @@ def failing(pairs: Iterable[Pair], subjects: Mapping[str, str]) -> Iterator[Pair
 
 
 def halves(pairs: Iterable[Pair]) -> dict[str, Half]:
-    """Where each enclave should sort so that Cyclone begins every handshake; none for enclaves of both."""
+    """Return where each enclave should sort so that Cyclone begins every handshake; none for enclaves of both."""
     found = tuple(pair for pair in pairs if pair.fast != pair.cyclone)
     fast, cyclone = {pair.fast for pair in found}, {pair.cyclone for pair in found}
     return {**dict.fromkeys(fast - cyclone, Half.HIGH), **dict.fromkeys(cyclone - fast, Half.LOW)}

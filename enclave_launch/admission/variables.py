@@ -51,7 +51,9 @@ class Setting(NamedTuple):
 
 
 def overridden(environment: Mapping[str, str], *, on_zenoh: bool = False) -> Iterator[Setting]:
-    """What a launch file sets (``environment``: its own changes) and a secured start sets otherwise."""
+    """Yield the variables that a launch file sets and a secured start overrides.
+
+    :param environment: the launch file's own changes"""
     for name in (*OURS, *((ZENOH_SESSION, *ZENOH_CLEARED) if on_zenoh else ())):
         if name in environment:
             yield Setting(name, environment[name])
@@ -75,7 +77,9 @@ def own_security(environment: Mapping[str, str]) -> Iterator[Setting]:
 
 
 def domain_of(environment: Mapping[str, str]) -> int:
-    """The DDS domain of a process. Raises ``UsageError`` for what rcl, or Cyclone DDS in a governance, would refuse."""
+    """Return the DDS domain of a process.
+
+    :raises UsageError: rcl, or Cyclone DDS in a governance, would refuse it."""
     text = environment.get(DOMAIN, "")
     domain = domain_id(text)
     if domain is None or domain > HIGHEST_ID:

@@ -99,11 +99,11 @@ class Obstacle(NamedTuple):
 
 
 def obstacles(process: ResolvedProcess, accepted: Collection[str] = ()) -> Iterator[Obstacle]:
-    """What stands between us and the program of ``process`` and may take its enclave away.
+    """Yield what stands between the launcher and the program of ``process`` and may take its enclave away.
 
-    ``accepted``: names of wrappers that somebody vouches for. An ``executable`` is a program of its own, a shell
-    included; one that is there to start another with other variables is not.
-    """
+    An ``executable`` is a program of its own, a shell included, unless it only starts another with other variables.
+
+    :param accepted: names of wrappers that the user vouches for"""
     prefix = list(process.prefix)
     if process.kind == "executable":
         words = shell_words(process.cmd) if process.shell else list(process.cmd)
@@ -125,13 +125,13 @@ def _is_wrapper(words: Sequence[str]) -> bool:
 
 
 def _name(word: str) -> str:
-    """``/usr/bin/python3.11`` -> ``python3``."""
+    """Return ``python3`` for ``/usr/bin/python3.11``."""
     name = word.rpartition("/")[2]
     return re.sub(r"^(python3?)\.[0-9.]+$", r"\1", name)
 
 
 def _of_prefix(words: Sequence[str], *, program_follows: bool) -> Iterator[Obstacle]:
-    """Each program of a prefix in turn; the last one is the program itself unless one ``program_follows``."""
+    """Yield the obstacle of each program of a prefix; the last one is the program itself unless ``program_follows``."""
     rest = list(words)
     while rest:
         name, keeper = _name(rest[0]), KEEPERS.get(_name(rest[0]))
@@ -147,7 +147,7 @@ def _of_prefix(words: Sequence[str], *, program_follows: bool) -> Iterator[Obsta
 
 
 def _own_words(keeper: Keeper, words: Sequence[str]) -> tuple[list[str], list[str]]:
-    """The words that a wrapper takes itself, and those of what it starts."""
+    """Split words into those that a wrapper takes itself and those of what it starts."""
     left, at = keeper.words, 0
     while at < len(words):
         word = words[at]
@@ -165,7 +165,7 @@ _LONGEST = 50_000  # characters of a shell's command line; the reader of shlex i
 
 
 def _shell_operator(text: str) -> str | None:
-    """The first thing in ``text`` that makes it more than one program with its words."""
+    """Return the first part of ``text`` that makes it more than one program with its words."""
     if len(text) > _LONGEST:
         return f"more than {_LONGEST} characters"
 

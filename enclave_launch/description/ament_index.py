@@ -28,7 +28,9 @@ def get_search_paths() -> list[str]:
 
 
 def get_resource(resource_type: str, resource_name: str) -> tuple[str, str]:
-    """Text and prefix. Raises ``LookupError``."""
+    """Return the text and the prefix of a resource.
+
+    :raises LookupError: no prefix has it."""
     resource = ament_index.read_resource(resource_type, resource_name, get_search_paths())
     return resource.text, resource.prefix
 

@@ -108,10 +108,9 @@ def _role(entity: object) -> ScanRole | None:
 
 
 def _walk(entities: Iterable[Any], conditional: bool) -> Iterator[tuple[Any, bool]]:
-    """Every entity that the scan meets, and whether it stands in a conditional offer.
+    """Yield every entity that the scan meets, with True if it stands in a conditional offer.
 
-    Includes are not entered: what is below one is the business of its own summary.
-    """
+    Includes are not entered: each has a summary of its own."""
     for entity in entities:
         if _role(entity) is ScanRole.RESET:
             return

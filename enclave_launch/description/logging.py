@@ -57,7 +57,7 @@ class LaunchConfig:
 
     @property
     def log_dir(self) -> str:
-        """``ROS_LOG_DIR``, else ``ROS_HOME/log``, else ``~/.ros/log``, with a folder of this run below."""
+        """Return the folder of this run below ``ROS_LOG_DIR``, else ``ROS_HOME/log``, else ``~/.ros/log``."""
         if self._log_dir is None:
             self._log_dir = os.path.join(_base(), _run_name())
         return self._log_dir
@@ -70,10 +70,10 @@ class LaunchConfig:
         return os.path.join(self.log_dir, file_name)
 
     def set_screen_format(self, *_: Any, **__: Any) -> None:
-        """Accepted for compatibility."""
+        """Ignore the format; the name exists for compatibility."""
 
     def set_log_format(self, *_: Any, **__: Any) -> None:
-        """Accepted for compatibility."""
+        """Ignore the format; the name exists for compatibility."""
 
 
 launch_config = LaunchConfig()

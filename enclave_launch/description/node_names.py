@@ -144,7 +144,7 @@ class PlacedRule(tuple[Any, Any]):
 
 
 def performed_remaps(rules: Iterable[Sequence[Any]], context: LaunchContext) -> list[PlacedRule]:
-    """Normalized rules as pairs of text."""
+    """Return normalized rules as pairs of text."""
     return [
         PlacedRule.at(
             getattr(rule, "location", None),

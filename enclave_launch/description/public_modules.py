@@ -28,7 +28,7 @@ class UpstreamModule(NamedTuple):
     own: tuple[str, ...]
 
     def names(self) -> tuple[str, ...]:
-        """``*`` stands for all public names that our module has."""
+        """Return the names of the row; ``*`` stands for all public names of our module."""
         if self.own != ("*",):
             return (*self.shared, *self.own)
         public = (name for name in dir(import_module(_OURS + self.module)) if not name.startswith("_"))
@@ -111,8 +111,10 @@ def _names_of(name: str) -> dict[str, str]:
 
 @cache
 def _unambiguous_names() -> dict[str, str]:
-    """What packages have, where only one module of ours has the name: a module of upstream's has imported names as
-    well, and launch files take them from there (``launch.actions.execute_process.ExecuteLocal``)."""
+    """Return the names of packages that only one of our modules has.
+
+    Upstream's modules export imported names as well, and launch files import them from there
+    (``launch.actions.execute_process.ExecuteLocal``)."""
     found: dict[str, set[str]] = {}
     for package in PATHS:
         for name, module in _names_of(package).items():
@@ -137,7 +139,8 @@ def _available(names: Iterable[str]) -> list[str]:
 
 
 def _is_available(name: str, module: str) -> bool:
-    """Gated names are missing from a package of older releases; the module below it has them always."""
+    """Return False for a name that the package of an older release lacks; the module below the package always has
+    it."""
     gate = GATES.get(name)
     if gate is None or (module and module not in PATHS):
         return True
@@ -146,7 +149,7 @@ def _is_available(name: str, module: str) -> bool:
 
 
 def upstream_name(module: str, name: str) -> str:
-    """Upstream's dotted name of ``name`` in our ``module``; our own where upstream has none."""
+    """Return upstream's dotted name of ``name`` in our ``module``, our own if upstream has none."""
     for package, rows in PATHS.items():
         for leaf, text in rows.items():
             row = _row(text)

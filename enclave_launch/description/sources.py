@@ -149,10 +149,9 @@ def get_launch_description_from_frontend_launch_file(
 def get_launch_description_from_any_launch_file(
     launch_file_path: str, *, parser: type[Parser] = Parser
 ) -> LaunchDescription:
-    """``.py``: Python, then the front ends; anything else: the front ends, then Python.
+    """Load a launch file: ``.py`` as Python, then by the front ends; any other by the front ends, then as Python.
 
-    Raises ``InvalidLaunchFileError``, with one line for each attempt, when all fail.
-    """
+    :raises InvalidLaunchFileError: all attempts failed; it has one line for each."""
     name = os.path.basename(launch_file_path)
     extension = os.path.splitext(name)[1][1:]
     loaders: list[Callable[[str], LaunchDescription]] = [

@@ -83,10 +83,9 @@ def perform_substitutions(context: LaunchContext, subs: Iterable[Substitution], 
 
 
 def normalize_to_list_of_substitutions(subs: SomeSubstitutionsType | pathlib.Path) -> list[Substitution]:
-    """Text becomes a ``TextSubstitution``, one substitution a list, an iterable item by item.
+    """Return text as a ``TextSubstitution``, one substitution as a list, an iterable item by item.
 
-    Raises ``TypeError`` for anything else.
-    """
+    :raises TypeError: ``subs`` is anything else."""
     if isinstance(subs, str):
         return [TextSubstitution(text=subs)]
     if type(subs) is list:

@@ -74,7 +74,8 @@ def kept(default: Any = _REQUIRED, *, keyword_only: bool = True) -> Any:
 
 
 def _private(name: str) -> str:
-    """Where an instance keeps it: launch files cannot set it, and a subclass of theirs may have its own ``name``."""
+    """Return the attribute that stores a template: launch files cannot set it by accident, and a subclass of
+    theirs may have its own ``name``."""
     return f"_Template__{name}"
 
 

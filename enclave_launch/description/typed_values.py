@@ -42,7 +42,9 @@ def is_valid_scalar_type(data_type: Any) -> bool:
 
 
 def extract_type(data_type: Any) -> tuple[Any, bool]:
-    """``List[int]`` -> ``(int, True)``, ``bool`` -> ``(bool, False)``; ``ValueError`` for any other type."""
+    """Split ``List[int]`` into ``(int, True)`` and ``bool`` into ``(bool, False)``.
+
+    :raises ValueError: it is another type."""
     if is_valid_scalar_type(data_type):
         return data_type, False
     items = getattr(data_type, "__args__", None)
@@ -79,11 +81,11 @@ def is_instance_of(value: Any, data_type: Any = None, *, can_be_str: bool = Fals
 
 
 def coerce_to_type(value: str, data_type: Any = None, *, can_be_str: bool = False) -> Any:
-    """Text -> ``data_type`` (``None``: whatever YAML 1.1 makes of it).
+    """Convert text to ``data_type``; None stands for whatever YAML 1.1 makes of it.
 
-    With ``can_be_str`` text that does not convert is returned unchanged. Raises ``ValueError`` for text that
-    does not convert or an invalid ``data_type``, ``TypeError`` when ``value`` is not text.
-    """
+    :param can_be_str: return text that does not convert unchanged
+    :raises ValueError: the text does not convert, or ``data_type`` is invalid.
+    :raises TypeError: ``value`` is not text."""
     ensure_argument_type(value, str, "value", "coerce_to_type")
     if data_type is str:
         return value
@@ -146,7 +148,9 @@ def coerce_list(value: list[str], data_type: Any = None, *, can_be_str: bool = F
 
 
 def get_typed_value(value: str | list[str], data_type: Any, *, can_be_str: bool = False) -> Any:
-    """Text or list of texts -> ``data_type``; a list for a scalar type is a ``TypeError``."""
+    """Convert text or a list of texts to ``data_type``.
+
+    :raises TypeError: ``value`` is a list and ``data_type`` a scalar."""
     if not isinstance(value, list):
         return coerce_to_type(value, data_type, can_be_str=can_be_str)
     if data_type is not None:

@@ -110,7 +110,7 @@ def _entities(result: Any) -> Iterable[Any]:
 
 
 def chain(mark: str | None, next_mark: str | None) -> str | None:
-    """``timer 2`` inside ``OnProcessExit a-1`` is ``OnProcessExit a-1, then timer 2``."""
+    """Join two marks: ``timer 2`` inside ``OnProcessExit a-1`` is ``OnProcessExit a-1, then timer 2``."""
     if mark is None or next_mark is None:
         return mark or next_mark
     return f"{mark}{AND_THEN}{next_mark}"

@@ -12,7 +12,9 @@ from enclave_launch.source_location import SourceLocation
 def container_elsewhere(
     component: str, container: str, alike: tuple[str, ...], place: SourceLocation
 ) -> Diagnostic:
-    """``alike``: containers of this launch whose last name is the same."""
+    """Report a component whose container this launch does not start.
+
+    :param alike: containers of this launch with the same last name"""
     text = (
         f"container {container!r} of component {component} is not started by this launch file; its permissions are "
         "not part of this plan"
@@ -25,14 +27,17 @@ def container_elsewhere(
 
 
 def enclave_attribute_unused(process: str, enclave: str, attribute: str, place: SourceLocation) -> Diagnostic:
-    """``--enclave`` among a process's own ROS arguments counts before our attribute."""
+    """Report that ``--enclave`` among a process's own ROS arguments takes precedence over the attribute."""
     own = f"{process} has --enclave {enclave} in its own ROS arguments"
     text = f"{own}; its enclave attribute {attribute!r} is not used"
     return Diagnostic(Code.ENCLAVE_ATTRIBUTE_UNUSED, process, text, place)
 
 
 def enclave_of_several_launches(enclave: str, others: Sequence[str], added: Sequence[str]) -> Diagnostic:
-    """``others``: the launches; ``added``: what their share lets the processes of this one do."""
+    """Report an enclave that several launches share.
+
+    :param others: the other launches
+    :param added: what their share permits the processes of this one"""
     cost = f"; its processes may then also {some_of(added, 4)}" if added else ""
     text = f"enclave {enclave} is shared with {', '.join(others)}{cost}"
     remedy = (
@@ -42,19 +47,21 @@ def enclave_of_several_launches(enclave: str, others: Sequence[str], added: Sequ
 
 
 def enclave_shared_with_launcher(enclave: str) -> Diagnostic:
-    """Its processes may then do what launch itself does, such as loading components."""
+    """Report that the processes of an enclave may do what launch itself does, such as load components."""
     return Diagnostic(
         Code.ENCLAVE_SHARED_WITH_LAUNCHER, enclave, f"enclave {enclave} is shared with the launcher itself"
     )
 
 
 def enclave_too_deep(process: str, why: str, place: SourceLocation) -> Diagnostic:
-    """``why`` says why no certificate can be made for it."""
+    """Report an enclave that no certificate can be made for.
+
+    :param why: the reason"""
     return Diagnostic(Code.ENCLAVE_TOO_DEEP, process, f"{process}: {why}", place, "give it a shorter one")
 
 
 def enclave_ungranted(enclave: str, processes: tuple[str, ...], place: SourceLocation) -> Diagnostic:
-    """An ``executable`` with an enclave of its own has no manifest and is not a node of the plan."""
+    """Report an ``executable`` with an enclave of its own: it has no manifest and is not a node of the plan."""
     text = (
         f"{enclave}, the enclave of {', '.join(processes)}, has no permissions: nothing is known of what an executable "
         "says in ROS, and a node in it could not start"
@@ -65,7 +72,7 @@ def enclave_ungranted(enclave: str, processes: tuple[str, ...], place: SourceLoc
 
 
 def executable_without_enclave(process: str, place: SourceLocation) -> Diagnostic:
-    """It is started with a keystore in which its enclave cannot be found."""
+    """Report an ``executable`` that is started with a keystore in which its enclave cannot be found."""
     text = (
         f"{process} runs without an enclave: an executable gets one only through its enclave attribute or --enclave; "
         "a ROS program in it could not start"
@@ -74,7 +81,8 @@ def executable_without_enclave(process: str, place: SourceLocation) -> Diagnosti
 
 
 def machine_elsewhere(process: str, machine: str, place: SourceLocation) -> Diagnostic:
-    """``machine`` is a hint for ``secure-plan hosts`` and ``secure-plan export``."""
+    """Report that ``machine``, a hint for ``secure-plan hosts`` and ``secure-plan export``, has no effect on a
+    launch."""
     text = f"{process} is meant for machine {machine!r}, but a launch starts everything on this host"
     return Diagnostic(
         Code.MACHINE_ELSEWHERE,
@@ -86,7 +94,8 @@ def machine_elsewhere(process: str, machine: str, place: SourceLocation) -> Diag
 
 
 def connext(process: str, place: SourceLocation) -> Diagnostic:
-    """No refusal: the source of rmw_connextdds was read, the middleware was not run."""
+    """Report a process on RTI Connext; it is not refused: the source of rmw_connextdds was read, the middleware
+    was not run."""
     text = (
         f"{process} runs on RTI Connext: rmw_connextdds reads enclaves (its source says so), but nothing here was "
         "tried on it; permissions name topics as ROS does (rt/chatter), topic aliases of plain Connext need both names"
@@ -95,8 +104,10 @@ def connext(process: str, place: SourceLocation) -> Diagnostic:
 
 
 def handshake_fails(fast: str, cyclone: str, *, planned: bool) -> Diagnostic:
-    """The two DDS choose by certificate subject who begins a handshake; ``planned``: told
-    of a plan, before certificates are looked at."""
+    """Report enclaves that cannot authenticate each other: the two DDS choose by certificate subject which side
+    begins a handshake.
+
+    :param planned: reported for a plan, before certificates exist"""
     if fast == cyclone:
         text = (
             f"enclave {fast} has processes on Fast DDS and on Cyclone DDS: chance decides at each start which of them "
@@ -117,12 +128,14 @@ def handshake_fails(fast: str, cyclone: str, *, planned: bool) -> Diagnostic:
 
 
 def domain_invalid(process: str, why: str, place: SourceLocation) -> Diagnostic:
-    """rcl does not start with such a ``ROS_DOMAIN_ID``."""
+    """Report a ``ROS_DOMAIN_ID`` that rcl refuses."""
     return Diagnostic(Code.DOMAIN_INVALID, process, f"{process}: {why}", place, "it could not start")
 
 
 def domain_not_served(process: str, domain: int, served: str, place: SourceLocation) -> Diagnostic:
-    """``served`` is what ``--domain-id`` asks for."""
+    """Report a process in a domain that the permissions do not cover.
+
+    :param served: the domains of ``--domain-id``"""
     asked = "--domain-id (ProvisionOptions.domains)"
     text = f"{process} is in domain {domain}, but {asked} asks for permissions for {served} only"
     return Diagnostic(
@@ -140,7 +153,7 @@ def domains_shared(enclave: str, domains: str, processes: tuple[str, ...]) -> Di
 
 
 def library_preloaded(process: str, variable: str, value: str, place: SourceLocation) -> Diagnostic:
-    """``variable``: such as ``LD_PRELOAD``."""
+    """Report a variable such as ``LD_PRELOAD``."""
     text = f"{variable} puts {value!r} into {process} before its own libraries: it can do all that the enclave may"
     return Diagnostic(Code.LIBRARY_PRELOADED, process, text, place)
 
@@ -148,7 +161,9 @@ def library_preloaded(process: str, variable: str, value: str, place: SourceLoca
 def middleware_refused(
     process: str, middleware: str, why: str, place: SourceLocation, *, by_launch_file: bool
 ) -> Diagnostic:
-    """``by_launch_file``: it sets the variable itself."""
+    """Report a process whose middleware would not be secured.
+
+    :param by_launch_file: the launch file sets ``RMW_IMPLEMENTATION``, not the environment"""
     origin = "the launch file" if by_launch_file else "the environment"
     text = f"{process} would run on {middleware} (RMW_IMPLEMENTATION of {origin}) and not be secured: {why}"
     known = (
@@ -160,7 +175,9 @@ def middleware_refused(
 
 
 def prefix_refused(process: str, wrapper: str, why: str, place: SourceLocation) -> Diagnostic:
-    """``wrapper`` is the program of the launch prefix that stands between."""
+    """Report a launch prefix that may not keep the security environment.
+
+    :param wrapper: the program between launcher and node"""
     text = f"{process} would be started through {wrapper!r} and might not be secured: {why}"
     return Diagnostic(
         Code.PREFIX_REFUSED, process, text, place, f"if it keeps ROS_SECURITY_*, --accept-prefix {wrapper}"
@@ -168,7 +185,7 @@ def prefix_refused(process: str, wrapper: str, why: str, place: SourceLocation) 
 
 
 def security_configured(process: str, variable: str, value: str, place: SourceLocation) -> Diagnostic:
-    """``variable`` holds a DDS configuration, such as ``CYCLONEDDS_URI``."""
+    """Report DDS security settings in a variable such as ``CYCLONEDDS_URI``."""
     shown = value if len(value) <= 60 else f"{value[:57]}..."
     text = f"{variable} of {process} has security settings of its own, beside those of its enclave: {shown}"
     return Diagnostic(
@@ -177,13 +194,16 @@ def security_configured(process: str, variable: str, value: str, place: SourceLo
 
 
 def variable_overridden(process: str, variable: str, value: str, place: SourceLocation) -> Diagnostic:
-    """``--secure`` sets the variable for every process."""
+    """Report a variable of the launch file that ``--secure`` sets for every process."""
     text = f"{variable}={value} of the launch file has no effect on {process} under --secure"
     return Diagnostic(Code.VARIABLE_OVERRIDDEN, process, text, place)
 
 
 def names_apart(what: str, name: str, on_dds: str, on_zenoh: str) -> Diagnostic:
-    """``on_dds``, ``on_zenoh``: nodes with one end each."""
+    """Report a name with ends on both middlewares.
+
+    :param on_dds: nodes with an end on DDS
+    :param on_zenoh: nodes with an end on Zenoh"""
     text = f"{what} {name}: {on_dds} is on DDS and {on_zenoh} on Zenoh (RMW_IMPLEMENTATION); they never meet"
     remedy = "give both the same middleware, or put a bridge between them and give it an enclave on each"
     return Diagnostic(Code.MIDDLEWARES_APART, name, text, None, remedy)
@@ -203,7 +223,7 @@ def launcher_apart(
 
 
 def enclave_on_both(enclave: str) -> Diagnostic:
-    """One enclave, two middlewares: one key may do the same on both."""
+    """Report an enclave with processes on both middlewares: one key may do the same on both."""
     text = (
         f"enclave {enclave} has processes on DDS and on Zenoh: whoever holds its key may do the same on both, and what "
         "only one of them checks (types and node tokens on Zenoh, permissions by each peer on DDS) the other does not"
@@ -212,13 +232,15 @@ def enclave_on_both(enclave: str) -> Diagnostic:
 
 
 def zenoh_cannot_grant(enclave: str, gap: str) -> Diagnostic:
-    """``gap``: such as a wildcard that Zenoh's key expressions do not have."""
+    """Report a permission that Zenoh cannot express.
+
+    :param gap: such as a wildcard that Zenoh's key expressions do not have"""
     text = f"enclave {enclave} is on Zenoh, where this cannot be granted and is denied: {gap}"
     return Diagnostic(Code.ZENOH_CANNOT_GRANT, enclave, text, None, "name what is meant, one by one")
 
 
 def zenoh_router_trusted(processes: Sequence[str]) -> Diagnostic:
-    """What enforcement by a router means for who must be trusted, told once per plan."""
+    """Report, once per plan, what must be trusted when a router enforces permissions."""
     text = (
         f"{some_of(processes, 3)} on Zenoh: encryption ends at the router, which reads every message and alone "
         "enforces (on DDS every participant does, end to end); who of several publishers of a topic sent a message is "

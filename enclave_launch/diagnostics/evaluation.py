@@ -11,18 +11,22 @@ from enclave_launch.source_location import SourceLocation
 
 
 def argument_unknown(name: str, alike: str) -> Diagnostic:
-    """``alike``: the question after the name that was probably meant, or empty."""
+    """Report an argument that no launch file declares or reads.
+
+    :param alike: the suggestion printed after the name, or empty"""
     text = f"no launch file declares or reads the argument {name!r}{alike}"
     return Diagnostic(Code.ARGUMENT_UNKNOWN, name, text, None, "secure-launch --show-args lists them")
 
 
 def command_stderr(message: str, command: str) -> Diagnostic:
-    """``message``: launch's sentence with what ``$(command ...)`` wrote to stderr; told with ``on_stderr="warn"``."""
+    """Report what ``$(command ...)`` wrote to stderr with ``on_stderr="warn"``.
+
+    :param message: launch's own sentence"""
     return Diagnostic(Code.COMMAND_STDERR, command, message)
 
 
 def function_called_again(function: str, event: str, location: SourceLocation) -> Diagnostic:
-    """What a function of the launch file was called for in vain: ``event`` calls it once more."""
+    """Report a function of the launch file that planning called and ``event`` will call again."""
     text = (
         f"{function} is called for the plan, to know what it starts, and again at {event}: it started nothing"
     )
@@ -38,13 +42,15 @@ def include_left_out(path: str) -> Diagnostic:
 
 
 def launch_file_deprecated(file: str | None, reason: str) -> Diagnostic:
-    """``file`` is ``None`` for a description that comes from no file."""
+    """Report a deprecated launch description.
+
+    :param file: None for a description that comes from no file"""
     what = "deprecated launch description" if file is None else f"launch file [{file}] is deprecated"
     return Diagnostic(Code.LAUNCH_FILE_DEPRECATED, file or "", f"{what}: {reason}")
 
 
 def log_level_missing() -> Diagnostic:
-    """As launch says it since the release in which ``log`` takes a level."""
+    """Report a ``log`` without a level, as launch does since the release that added levels."""
     return Diagnostic(
         Code.LOG_LEVEL_MISSING, "log", "the action log now expects a level; log_info is the one without"
     )
@@ -61,7 +67,9 @@ def ros_timer_on_wall_time(seconds: float, location: SourceLocation | None) -> D
 
 
 def node_name_repeated(node: str, count: int, started_by: str) -> Diagnostic:
-    """In the words of launch_ros; ``count`` nodes have the name by now."""
+    """Report a repeated node name in the words of launch_ros.
+
+    :param count: nodes with this name so far"""
     text = (
         f"{started_by}: there are now at least {count} nodes with the name {node} "
         "created within this launch context"
@@ -70,7 +78,7 @@ def node_name_repeated(node: str, count: int, started_by: str) -> Diagnostic:
 
 
 def not_foreseeable(what: str, location: SourceLocation) -> Diagnostic:
-    """What a callback of the launch file makes when it is called."""
+    """Report what a callback of the launch file starts only when it is called."""
     return Diagnostic(Code.NOT_FORESEEABLE, what, f"not foreseeable: {what}", location)
 
 
@@ -87,12 +95,12 @@ def package_not_installed(package: str, placeholder: str) -> Diagnostic:
 
 
 def parameter_file_missing(path: str) -> Diagnostic:
-    """In the words of launch_ros, which goes on without the file."""
+    """Report a missing parameter file in the words of launch_ros, which continues without it."""
     return Diagnostic(Code.PARAMETER_FILE_MISSING, path, f"Parameter file path is not a file: {path}")
 
 
 def parameters_unknown(process: str, path: str, why: str, place: SourceLocation) -> Diagnostic:
-    """Names that follow from the parameters in ``path`` are then gaps."""
+    """Report an unreadable parameter file; names that depend on its parameters are gaps."""
     text = f"the parameters that {process} would read from {path} are not known: {why}"
     return Diagnostic(
         Code.PARAMETERS_UNKNOWN, process, text, place, "rcl would not start the node with it: mend it"
@@ -106,12 +114,17 @@ def program_not_installed(program: str) -> Diagnostic:
 
 
 def program_not_executable(program: str, text: str, location: SourceLocation | None) -> Diagnostic:
-    """``text`` says what the start of the process would fail with."""
+    """Report a process whose start will fail.
+
+    :param text: the error of that start"""
     return Diagnostic(Code.PROGRAM_NOT_EXECUTABLE, program, text, location)
 
 
 def ros_distro_unknown(name: str, known: Sequence[str], taken: str) -> Diagnostic:
-    """``taken`` is the distribution whose rules are followed instead, one of ``known``."""
+    """Report an unknown ``ROS_DISTRO``.
+
+    :param known: the distributions with rules here
+    :param taken: the one whose rules are used"""
     text = f"ROS_DISTRO={quoted(name)} is not a distribution that is known here: the rules of {taken} are followed"
     remedy = f"set it, or give --distro{did_you_mean(name, known)}"
     return Diagnostic(Code.ROS_DISTRO_UNKNOWN, name, text, None, remedy)

@@ -19,13 +19,17 @@ IN_MANIFEST = (
 
 
 def library_version(program: str, doubt: str, location: SourceLocation) -> Diagnostic:
-    """``doubt`` names the document, its version and the one that is installed."""
+    """Report a library document made for another version of a package.
+
+    :param doubt: names the document, its version and the installed one"""
     remedy = "compare them (secure-nodl library show), and keep a corrected copy in a folder for --library"
     return Diagnostic(Code.LIBRARY_VERSION, program, f"library document {doubt}", location, remedy)
 
 
 def manifest_lacks(program: str, manifest: str, lacks: Sequence[str], place: SourceLocation) -> Diagnostic:
-    """``lacks``: each name with the place that makes it."""
+    """Report names that a manifest lacks.
+
+    :param lacks: each name with the place that makes it"""
     text = (
         f"the manifest of {program} ({manifest}) lacks {counted(len(lacks), 'interface')} that another description "
         f"has, so {_they_are(lacks)} not permitted: {some_of(lacks, _INTERFACES, '; ')}"
@@ -35,7 +39,9 @@ def manifest_lacks(program: str, manifest: str, lacks: Sequence[str], place: Sou
 
 
 def record_lacks(program: str, record: str, lacks: Sequence[str], place: SourceLocation) -> Diagnostic:
-    """``lacks``: each name with the place that says it."""
+    """Report names that a record lacks.
+
+    :param lacks: each name with the place that has it"""
     text = (
         f"the record of {program} ({record}) lacks {counted(len(lacks), 'name')} that another description has, so "
         f"{_they_are(lacks)} not permitted: {some_of(lacks, _INTERFACES, '; ')}"
@@ -50,7 +56,10 @@ def record_lacks(program: str, record: str, lacks: Sequence[str], place: SourceL
 def descriptions_differ(
     program: str, used: str, other: str, differing: Sequence[str], place: SourceLocation
 ) -> Diagnostic:
-    """``used``: what the plan takes; ``differing``: each name that one of the two has, with its place."""
+    """Report that the source of a program and the library's document differ.
+
+    :param used: which of them the plan uses
+    :param differing: each name that only one of the two has, with its place"""
     names = some_of(differing, _INTERFACES, "; ")
     text = f"{program}: its source and the library document ({other}) differ, {used}: {names}"
     remedy = "correct the one that is wrong (secure-nodl library check shows all)"
@@ -62,7 +71,9 @@ def _they_are(names: Sequence[str]) -> str:
 
 
 def recording_incomplete(node: str, why: str, manifest: str, place: SourceLocation) -> Diagnostic:
-    """``manifest`` is what ``--learn`` wrote, with the reason in it."""
+    """Report an incomplete record.
+
+    :param manifest: the file that ``--learn`` wrote, with the reason in it"""
     remedy = "record it once more where it gets so far (--learn); runs are united"
     return Diagnostic(
         Code.RECORDING_INCOMPLETE,
@@ -83,37 +94,45 @@ def action_remap_idle(node: str, rule: str, action: str, distro: str, place: Sou
 
 
 def interface_unknown(node: str, why: str, program: str, place: SourceLocation) -> Diagnostic:
-    """``why`` names the endpoint; ``program`` is what a manifest would describe."""
+    """Report a gap in a node's interfaces.
+
+    :param why: names the endpoint
+    :param program: what a manifest would describe"""
     remedy = f"describe {program} in a NoDL manifest (--nodl), or the node in a policy file (--policy)"
     return Diagnostic(Code.INTERFACE_UNKNOWN, node, f"node {node}: {why}", place, remedy)
 
 
 def policy_answers(unknown: Diagnostic) -> Diagnostic:
-    """A gap of the manifest that the policy file closes is told as a remark."""
+    """Report a gap of the manifest that the policy file closes, as a note."""
     text = f"{unknown.text}; the policy file says what it may do"
     return Diagnostic(Code.POLICY_ANSWERS, unknown.subject, text, unknown.location)
 
 
 def name_unremappable(node: str, name: str, place: SourceLocation) -> Diagnostic:
-    """rcl reads ``__`` in a remap rule as a special name (``__node``, ``__ns``)."""
+    """Report a name with ``__``, which rcl reads in a remap rule as a special name (``__node``, ``__ns``)."""
     text = f"node {node}: '{name}' contains '__', which no remap rule can name"
     return Diagnostic(Code.NAME_UNREMAPPABLE, node, text, place)
 
 
 def no_manifest(subject: str, why: str, place: SourceLocation) -> Diagnostic:
-    """``subject``: ``package/executable``, ``package/plugin`` or a node; ``why``: where it was looked for."""
+    """Report that no description was found.
+
+    :param subject: ``package/executable``, ``package/plugin`` or a node
+    :param why: where it was searched"""
     return Diagnostic(Code.NO_MANIFEST, subject, f"no NoDL manifest for {subject}: {why}", place, IN_MANIFEST)
 
 
 def node_name_unknown(subject: str, why: str, place: SourceLocation) -> Diagnostic:
-    """The plan has no name for the node, so no permission can be derived."""
+    """Report a node without a known name: no permission can be derived for it."""
     return Diagnostic(
         Code.NODE_NAME_UNKNOWN, subject, f"{subject}: {why}", place, "give it a name: set name="
     )
 
 
 def node_name_impossible(node: str, why: str, place: SourceLocation) -> Diagnostic:
-    """rcl refuses the name; ``why`` says which rule it breaks."""
+    """Report a node name that rcl refuses.
+
+    :param why: the rule that it breaks"""
     return Diagnostic(Code.NODE_NAME_IMPOSSIBLE, node, f"node {node}: {why}", place, _OTHER_NAME)
 
 
@@ -123,12 +142,12 @@ def pattern_accepted(node: str, operation: str, name: str, note: str, place: Sou
 
 
 def permissions_large(enclave: str, text: str) -> Diagnostic:
-    """In the words of ``keystore.formats.permissions_size``."""
+    """Report large permissions in the words of ``keystore.formats.permissions_size``."""
     return Diagnostic(Code.PERMISSIONS_LARGE, enclave, text)
 
 
 def policy_enclave_unused(path: str) -> Diagnostic:
-    """The policy file may serve several launches."""
+    """Report an enclave of the policy file that this launch does not use; the file may serve several launches."""
     text = f"enclave {path} of the policy file is not used by this launch and was left out"
     return Diagnostic(Code.POLICY_ENCLAVE_UNUSED, path, text)
 
@@ -136,11 +155,11 @@ def policy_enclave_unused(path: str) -> Diagnostic:
 def policy_denies_need(
     denied: str, enclave: str, node: str, need: str, why: str, place: SourceLocation
 ) -> Diagnostic:
-    """A denial of the policy file counts before what the manifest asks for."""
+    """Report a denial of the policy file, which takes precedence, for a name that a manifest requests."""
     text = f"{denied} is denied in enclave {enclave}, but node {node} needs {need} ({why})"
     return Diagnostic(Code.POLICY_DENIES_NEED, node, text, place)
 
 
 def policy_file(subject: str, text: str) -> Diagnostic:
-    """In the words of the keystore's own reader, which knows the place."""
+    """Report an error of the policy file in the words of its reader, which knows the place."""
     return Diagnostic(Code.POLICY_FILE, subject, text)

@@ -128,8 +128,9 @@ def _default(process: ResolvedProcess, scope: EnclaveScope, default_name: str | 
 
 
 def final_fqn(process: ResolvedProcess, default_name: str | None) -> str:
-    """The node's fully qualified name with launch's placeholders filled: ``default_name`` for an unknown
-    name, ``/`` for an unknown namespace (what rcl does when nothing remaps it)."""
+    """Return the node's fully qualified name with launch's placeholders replaced.
+
+    An unknown name becomes ``default_name``, an unknown namespace ``/``, as in rcl if nothing remaps it."""
     fqn = process.fqn or UNSPECIFIED_NODE_NAME
     fqn = fqn.replace(UNSPECIFIED_NODE_NAMESPACE, "")
     if default_name is not None:

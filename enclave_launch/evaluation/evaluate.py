@@ -115,8 +115,8 @@ def read_description(launch_file: str | os.PathLike[str], host: PlanHost) -> Ite
 
 @contextmanager
 def evaluation_surroundings(host: Host) -> Iterator[None]:
-    """What evaluation needs around it, undone at the end: our packages under their public names, the host in
-    place, the environment as it was."""
+    """Install what evaluation needs and undo it at the end: our packages under their public names, the host, the
+    environment."""
     with ExitStack() as stack:
         stack.enter_context(ENVIRONMENT_SWITCH.restored())
         stack.enter_context(environment_untouched())
@@ -133,10 +133,9 @@ def forget_elements_of_launch_files() -> None:
 
 
 def parse_arguments(words: Sequence[str]) -> list[tuple[str, str]]:
-    """``name:=value`` words; of a repeated name the last value counts.
+    """Parse ``name:=value`` words; of a repeated name the last value is used.
 
-    Raises ``RuntimeError`` in launch's words for anything else.
-    """
+    :raises RuntimeError: a word has another form; the message is launch's."""
     parsed: dict[str, str] = {}
     for word in words:
         name, separator, value = word.partition(":=")
@@ -147,7 +146,7 @@ def parse_arguments(words: Sequence[str]) -> list[tuple[str, str]]:
 
 
 def _unknown_arguments(arguments: Arguments, looked_at: Collection[str]) -> Iterator[Diagnostic]:
-    """``ros2 launch`` passes over a mistyped argument without a word."""
+    """Yield a diagnostic for each argument that nothing read, which ``ros2 launch`` ignores silently."""
     for name, _ in arguments:
         if name not in looked_at:
             yield argument_unknown(name, did_you_mean(name, looked_at))
@@ -172,15 +171,16 @@ def _evaluation_error(error: Exception, path: str, host: PlanHost) -> Evaluation
 
 
 def launch_file_error(error: Exception, path: str) -> EvaluationError:
-    """What the visit of the launch file at ``path`` raised, with its place, its include chain and what to do next."""
+    """Convert an exception of visiting the launch file at ``path`` to an error with its place, include chain and
+    remedy."""
     location, helper = _location(error, path)
     where = f" (in {helper.file}:{helper.line})" if helper else ""
     return EvaluationError(error_text(error_location.likeliest(error)) + where, location, error)
 
 
 def _location(error: Exception, path: str) -> tuple[SourceLocation, SourceLocation | None]:
-    """The innermost place known, with the include chain of the entity that was being visited; and the place in a
-    helper module of that entity, where it came from there."""
+    """Return the innermost known place, with the include chain of the visited entity, and the place in a helper
+    module if the entity comes from one."""
     visited = place_of(error)
     known, frame = error_location.location_of(error), _user_frame(error)
     exact = known or frame

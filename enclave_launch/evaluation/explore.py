@@ -92,7 +92,9 @@ class Explorer:
         self._host.unforeseeable(Unforeseeable(what, location_of(written, self._context)))
 
     def _announce_start(self) -> bool:
-        """``OnProcessStart`` is certain for a process that was started."""
+        """Emit ``OnProcessStart``, which is certain for a process that was started.
+
+        :returns: False if all were announced."""
         if self._announced >= len(self._host.started):
             return False
         action = self._host.started[self._announced]
@@ -126,7 +128,8 @@ class Explorer:
         self._kept.append(handler)
 
     def _note(self, handler: Handler, event: Event | None) -> None:
-        """For those who carry the plan out without launch: an engine knows nothing of the file's reactions."""
+        """Record a reaction, for engines that carry the plan out without launch and know nothing of the file's
+        handlers."""
         is_timer = isinstance(event, TimerEvent)
         if handler.internal and not is_timer:
             return
@@ -185,7 +188,7 @@ class Explorer:
             self._host.loop.restore(clock)
 
     def _note_failure(self, event: Event, error: Exception) -> None:
-        """A handler that fails would end the launch at that moment; before it, nobody can be sure."""
+        """Record a handler that fails here: at a real start it would end the launch at that point."""
         place = place_of(error) or location_of(event, self._context)
         what = f"what {event.name.rpartition('.')[2]} {event.subject()}".rstrip()
         self._host.unforeseeable(Unforeseeable(f"{what} would lead to: {error_text(error)}", place))
@@ -204,7 +207,7 @@ class Explorer:
 
 
 def _label(handler: Handler, event: Event) -> str | None:
-    """``OnProcessExit talker-1``, ``timer 2.5``; ``None`` for what is launch's own working."""
+    """Return ``OnProcessExit talker-1`` or ``timer 2.5``, None for launch's internal handlers."""
     if isinstance(event, TimerEvent):
         return f"timer {event.subject()}" if handler.internal else None
     if handler.internal:

@@ -34,7 +34,7 @@ class LaunchFile:
         self._parsed: dict[Callable[[str], Any], Any] = {}
 
     def parsed_by(self, parse: Callable[[str], Tree]) -> Tree:
-        """``parse(text)``, computed once; a failure is raised again each time."""
+        """Return ``parse(text)``, computed once; a failure is raised again each time."""
         if parse not in self._parsed:
             try:
                 self._parsed[parse] = (parse(self.text), None)

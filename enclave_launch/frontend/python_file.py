@@ -60,7 +60,7 @@ class _Loader(SourceFileLoader):
         return read_bytes(path)
 
     def set_data(self, path: str, data: Any, *, _mode: int = 0) -> None:
-        """Nothing is written."""
+        """Write nothing: no byte code is cached beside launch files."""
 
 
 @lru_cache(maxsize=512)

@@ -108,7 +108,7 @@ def parse_template(text: str) -> Template:
 
 
 def called_names(template: Template) -> Iterator[str]:
-    """Names of all calls, arguments included."""
+    """Yield the names of all calls, those in arguments included."""
     for part in template:
         if isinstance(part, SubstitutionCall):
             yield part.name

@@ -23,10 +23,10 @@ _UNKNOWN = " " * (MAX_ENTITY_LENGTH + 1)
 
 
 def parse_launch_xml(text: str) -> XmlElement:
-    """Text -> root element.
+    """Parse text and return the root element.
 
-    Raises ``xml.etree.ElementTree.ParseError`` with ElementTree's message and position, or ``RefusedXml``.
-    """
+    :raises xml.etree.ElementTree.ParseError: malformed; message and position are ElementTree's.
+    :raises RefusedXml: it declares entities that are not plain text or too long."""
     parser = expat.ParserCreate(namespace_separator="}")
     parser.EntityDeclHandler = partial(_check_entity, parser, dict(_PREDEFINED))
     parser.SkippedEntityHandler = partial(_refuse_skipped_entity, parser)
@@ -47,7 +47,9 @@ def _check_entity(
     value: str | None,
     *_external: str | None,
 ) -> None:
-    """``declared``: the entities so far with their whole text; of two of one name the first counts."""
+    """Refuse entities that are external, nested or too long.
+
+    :param declared: the entities so far with their whole text; of two with one name the first is used"""
     line = parser.CurrentLineNumber
     if value is None:
         raise RefusedXml(f"entity '{name}' is external: nothing outside the file is read", line)

@@ -30,7 +30,9 @@ class PlanHost(BaseHost):
         user_code_results: UserCodeResults | None = None,
         **given: Any,
     ) -> None:
-        """``given``: fields of ``HostOptions``, for callers that have only some."""
+        """Create a host that records instead of acting.
+
+        :param given: fields of ``HostOptions``, for callers that have only some"""
         super().__init__(options or HostOptions(**given), user_code_results)
         self.processes: list[ResolvedProcess] = []
         self.started: list[ExecuteLocal] = []  # action of each process, same order

@@ -124,8 +124,9 @@ class Host(Protocol):
         """Raises ``PackageNotFoundError`` (a ``KeyError``), ``ValueError`` for an impossible name."""
 
     def find_executable(self, package: str, executable: str) -> str:
-        """The file in the package's libexec directory. Raises as ``find_package_prefix``, and
-        ``ament_index.ExecutableNotInstalledError``."""
+        """Return the file in the package's libexec directory.
+
+        :raises ament_index.ExecutableNotInstalledError: it is not there, or as ``find_package_prefix``."""
 
     def is_missing(self, path: str) -> bool:
         """Return True if ``path`` is inside the placeholder of a package that is not installed."""

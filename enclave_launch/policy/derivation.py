@@ -48,7 +48,7 @@ LIST_NAMES: dict[Operation, ListName] = {
 
 
 def allowed_names(enclave: EnclavePolicy) -> dict[str, list[str]]:
-    """What an enclave may do, sorted, by the contract's list names."""
+    """Return what an enclave may do, sorted, by the contract's list names."""
     lists: dict[str, set[str]] = {name: set() for name in LIST_NAMES.values()}
     for profile in enclave.profiles:
         for rule in profile.rules:
@@ -90,7 +90,7 @@ class DerivedPolicy(NamedTuple):
     warnings: tuple[Diagnostic, ...] = ()
 
     def built_in_names(self, enclave: str) -> frozenset[tuple[str, str]]:
-        """What every node has: pairs (list name, name) that no manifest or policy file asks for."""
+        """Return the pairs (list name, name) that every node has and no manifest or policy file requests."""
         return frozenset(
             (LIST_NAMES[rule.operation], rule.expression)
             for rule, reasons in self.reasons.get(enclave, {}).items()
@@ -105,10 +105,10 @@ def derive_policy(
     options: PolicyOptions | None = None,
     also: Iterable[str] = (),
 ) -> DerivedPolicy:
-    """The policy of all ``nodes``; ``also``: enclaves that must exist though no node in them is known.
+    """Derive the policy of all ``nodes``.
 
-    Raises ``ValueError`` for an unknown distribution.
-    """
+    :param also: enclaves that must exist though no node in them is known
+    :raises ValueError: the distribution is unknown."""
     chosen = options or PolicyOptions()
     collection = _Collection({path: {} for path in also}, {}, [], [])
     for node in nodes:
@@ -144,7 +144,7 @@ class _Collection(NamedTuple):
         self.problems.append(sorted(problems, key=lambda each: len(each.text)))
 
     def result(self) -> DerivedPolicy:
-        """What is easiest to close is told first: nodes with few open questions, of these the short ones."""
+        """Return the policy; what is easiest to close comes first: nodes with few gaps, of these the short ones."""
         enclaves = tuple(
             EnclavePolicy(
                 path,
@@ -176,7 +176,7 @@ def _size_warnings(enclaves: Iterable[EnclavePolicy]) -> list[Diagnostic]:
 def _merged_reasons(
     enclave: EnclavePolicy, profiles: Mapping[ProfileKey, Reasons]
 ) -> dict[Rule, tuple[Reason, ...]]:
-    """Of all profiles, in the order of the rules."""
+    """Merge the reasons of all profiles, in the order of the rules."""
     if len(enclave.profiles) == 1:
         (by_rule,) = profiles.values()
         return {rule: _in_order(by_rule[rule]) for rule in enclave.profiles[0].rules}
@@ -195,7 +195,7 @@ def _in_order(reasons: list[Reason]) -> tuple[Reason, ...]:
 
 
 def _answered(document: PolicyDocument | None, node: RunningNode, operation: Operation) -> bool:
-    """Whether the policy file has rules of this operation for exactly this node of this enclave."""
+    """Return True if the policy file has rules of this operation for exactly this node of this enclave."""
     return document is not None and any(
         rule.operation is operation
         for enclave in document.policy.enclaves
@@ -265,7 +265,7 @@ def _union(enclave: EnclavePolicy, added: Added) -> tuple[Profile, ...]:
 
 
 def _denials(path: str, reasons: Mapping[Rule, tuple[Reason, ...]]) -> list[Diagnostic]:
-    """A warning for each derived permission that a denial takes away: the node will miss it."""
+    """Return a warning for each derived permission that a denial takes away: the node will lack it."""
     denials = [(rule, why) for rule, why in reasons.items() if rule.qualifier is Qualifier.DENY]
     return [
         policy_denies_need(

@@ -23,10 +23,9 @@ _TRANSITION_EVENT = "lifecycle_msgs/msg/TransitionEvent"
 
 
 def launcher_node(calls: Sequence[LauncherCall]) -> RunningNode:
-    """The node that makes ``calls`` (at least one).
+    """Return the node that makes ``calls`` (at least one).
 
-    Who asks a node for transitions also follows its ``transition_event`` (launch_ros lifecycle_node.py).
-    """
+    A client of a node's transitions also follows its ``transition_event`` (launch_ros lifecycle_node.py)."""
     endpoints: list[Endpoint] = []
     for call in calls:
         source = SourceRef(call.location.file, call.location.line)

@@ -106,8 +106,9 @@ class NodePermissions(NamedTuple):
 
 
 def node_permissions(node: RunningNode, *, distro: str, options: PolicyOptions) -> NodePermissions:
-    """All that ``node`` needs under its final name, with what ``options`` add. Raises ``ValueError`` for an unknown
-    distribution."""
+    """Return everything that ``node`` needs under its final name, with what ``options`` add.
+
+    :raises ValueError: the distribution is unknown."""
     return _Collector(node, distro, options).collect()
 
 
@@ -193,7 +194,7 @@ class _Collector:
             self._result.permissions.append(event)
 
     def _service_events(self) -> None:
-        """rcl service_event_publisher.c: each service that is introspected has a topic below its own name."""
+        """Add the topic below the name of each introspected service (rcl service_event_publisher.c)."""
         for operation, name, reason in tuple(self._result.permissions):
             if operation in _SERVICES:
                 events = reason._replace(note="service introspection, by --also service-events")
@@ -201,7 +202,7 @@ class _Collector:
                 self._result.permissions.append(event)
 
     def _helper(self, operation: Operation, name: str, place: str) -> Permission:
-        """What a node of this process serves whose name nobody can foresee."""
+        """Return the permission of a node of this process whose name cannot be known in advance."""
         final = join(self._node.process_namespace, name)
         note = "a pattern, because its name is made up at each start"
         told = pattern_accepted(self._fqn, operation.verb, final, f"{note} ({place})", self._node.location)
@@ -209,7 +210,7 @@ class _Collector:
         return Permission(operation, final, Reason(self._fqn, "built-in", place, name, (), note))
 
     def _built_in(self, rows: Iterable[tuple[Operation, str, str]]) -> None:
-        """Every node has them, by the dozen, and their names need no check but of the length."""
+        """Add what every node has: dozens of names whose only check is their length."""
         node, permissions = self._fqn, self._result.permissions
         remapped = self._names.has_rules
         try:
@@ -226,7 +227,7 @@ class _Collector:
             self._impossible(error)
 
     def _resolve(self, operation: Operation, name: str, place: str) -> Iterator[tuple[Operation, Resolved]]:
-        """The final names: one, or five where the parts of an action were remapped one by one."""
+        """Yield the final names: one, or five if the parts of an action were remapped separately."""
         if operation not in _PARTS:
             yield operation, self._plain(operation, name)
             return
@@ -313,8 +314,9 @@ def _expand_pattern(names: NodeNames, text: str) -> str:
 
 
 def conditions_of(node: RunningNode, also: Iterable[str] = ()) -> frozenset[BuiltinCondition]:
-    """Which rows of the built-in interfaces hold for ``node``; ``also``: keys of ``ALSO`` for what else runs
-    in it."""
+    """Return which rows of the built-in interfaces hold for ``node``.
+
+    :param also: keys of ``ALSO`` for what else runs in it"""
     met = {BuiltinCondition.ALWAYS}.union(*(ALSO[name] for name in also))
     if node.interface.parameter_services:
         met.add(BuiltinCondition.PARAMETERS)

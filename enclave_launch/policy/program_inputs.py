@@ -28,7 +28,7 @@ class ProgramInputs(NamedTuple):
     short_flags: bool = False
 
     def doubtful(self, template: NameTemplate) -> NameTemplate:
-        """``template`` with an unknown part for each input whose value the command line may set unseen."""
+        """Return ``template`` with an unknown part for each input that the command line may set unseen."""
         return NameTemplate(tuple(self._doubted(part) for part in template.parts))
 
     def _doubted(self, part: Part) -> Part:
@@ -43,13 +43,15 @@ class ProgramInputs(NamedTuple):
 
 
 def environment_inputs(process: ResolvedProcess) -> ProgramInputs:
-    """What each program in ``process`` finds in its environment, inherited variables included."""
+    """Return what each program in ``process`` finds in its environment, inherited variables included."""
     return ProgramInputs({f"${name}": value for name, value in process.final_environment.items()})
 
 
 def program_inputs(process: ResolvedProcess) -> ProgramInputs:
-    """The inputs of ``process``; an option's value follows ``=`` or is the next word without dash, and where there
-    are not any options each word is also known by its place (``<1>``, as learnt manifests have it)."""
+    """Return the inputs of ``process``.
+
+    The value of an option follows ``=`` or is the next word without a dash. Without any options each word is also
+    known by its place (``<1>``, as learnt manifests have it)."""
     values = dict(environment_inputs(process).values)
     words = own_words(process)
     for word, following in zip(words, (*words[1:], ""), strict=False):
@@ -74,7 +76,7 @@ def _file_name(word: str) -> str:
 
 
 def own_words(process: ResolvedProcess) -> Sequence[str]:
-    """The words after the executable that are no ROS arguments."""
+    """Return the words after the executable that are no ROS arguments."""
     program = _file_name(process.executable)
     start = next((i for i, word in enumerate(process.cmd) if _file_name(word) == program), 0)
     words: list[str] = []

@@ -53,14 +53,16 @@ class RunningNode(NamedTuple):
 
     @property
     def fixed_name(self) -> str:
-        """The name, less what the program makes up at each start, for which ``*`` stands."""
+        """Return the name, with ``*`` for the part that the program makes up at each start."""
         return self.name.removesuffix(RANDOM_ENDING)  # no rule of a launch file can hold a "*"
 
 
 def node_of_process(
     process: ResolvedProcess, interface: NodeInterface, enclave: str, role: Role
 ) -> RunningNode:
-    """One node of ``process``. Raises ``LaunchFileError`` for a remap rule that would make rcl refuse to start."""
+    """Return one node of ``process``.
+
+    :raises LaunchFileError: rcl would refuse to start because of a remap rule."""
     given = _rules_of_command(process)
     inputs = program_inputs(process)
     if interface.global_arguments is False:  # rcl_node_options_t.use_global_arguments
@@ -76,8 +78,10 @@ def node_of_process(
 def node_of_component(
     component: ResolvedComponent, container: ResolvedProcess | None, interface: NodeInterface, enclave: str
 ) -> RunningNode:
-    """A node of ``component``: its main one obeys the load request, a further one (with rules of its own) the
-    container's command line. Raises ``LaunchFileError`` as ``node_of_process``."""
+    """Return a node of ``component``: its main one obeys the load request, a further one (with rules of its own) the
+    container's command line.
+
+    :raises LaunchFileError: rcl would refuse to start because of a remap rule."""
     forwarded: tuple[ParsedRule, ...] = ()
     forwards = component.extra_arguments.get("forward_global_arguments") is True
     if container is not None and (forwards or interface.own_rules):
@@ -90,13 +94,13 @@ def node_of_component(
 
 
 def _namespace(process: ResolvedProcess) -> str:
-    """The first ``__ns`` rule of the command line that is for every node."""
+    """Return the first ``__ns`` rule of the command line that is for every node."""
     rules = parse_ros_arguments(process.cmd).remaps
     return next((rule.partition(":=")[2] for rule in rules if rule.startswith("__ns:=")), "/")
 
 
 def _own_rules(interface: NodeInterface) -> tuple[ParsedRule, ...]:
-    """The rules in the node's own options, of which one may give it a name that ends at random."""
+    """Return the rules in the node's own options; one of them may give it a name that ends at random."""
     rules: list[ParsedRule] = []
     for text in interface.own_rules:
         rule = parse_rule(text.removesuffix(RANDOM_ENDING), str(interface.source))
@@ -129,7 +133,9 @@ def _named(
 
 
 def _rules_of_command(process: ResolvedProcess) -> tuple[ParsedRule, ...]:
-    """What rcl reads there. A rule that no ``remap`` wrote (``args``, the name) counts as written with the process."""
+    """Return the rules that rcl reads there.
+
+    A rule that no ``remap`` wrote (``args``, the name) counts as written with the process."""
     places = {rule.word: rule.location for rule in process.remaps}
     rules = remap_arguments(process.cmd).items()
     return tuple(_parse(text, places.get(word), process.location) for word, text in rules)

@@ -13,7 +13,9 @@ _BUILT_IN = {row.name: row.type for row in TABLE}
 
 
 def enclave_types(derived: DerivedPolicy, enclave: str) -> Types:
-    """Of each name whose types all who ask for it know. A policy file names none: what it grants may have any."""
+    """Return the types of each name, if every node that requests it knows them.
+
+    A policy file gives no types: what it grants may have any."""
     return united_types(
         one
         for rule, reasons in derived.reasons.get(enclave, {}).items()
@@ -24,7 +26,8 @@ def enclave_types(derived: DerivedPolicy, enclave: str) -> Types:
 
 
 def _type(reason: Reason) -> str:
-    """What every node has carries its name in the table; publishing calls (introspection) is another topic."""
+    """Return the type of an interface; one that every node has carries it in the table, except for the topic of
+    introspection."""
     if reason.origin == "built-in" and not reason.note:
         return reason.type or _BUILT_IN.get(reason.written, "")
     return reason.type

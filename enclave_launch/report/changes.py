@@ -10,12 +10,12 @@ _NONE = "no enclave, node, permission or flow differs"
 
 
 def changes_text(changed: Changes) -> str:
-    """Lines with ``+`` and ``-``, as of a diff; ends with a newline."""
+    """Format changes as the lines of a diff, ``+`` and ``-``; ends with a newline."""
     return "\n".join([*_lines(changed)] or [_NONE]) + "\n"
 
 
 def changes_markdown(changed: Changes) -> str:
-    """For the description or a comment of a pull request."""
+    """Format changes for the description or a comment of a pull request."""
     verdict = "**Rights grew.**" if changed.rights_grew else "No enclave may do more than before."
     if changed.is_empty:
         return f"### Security review\n\n{_NONE.capitalize()}.\n"
@@ -24,7 +24,7 @@ def changes_markdown(changed: Changes) -> str:
 
 
 def changes_document(changed: Changes) -> dict[str, object]:
-    """For programs; every list sorted."""
+    """Return changes as plain values for programs; every list is sorted."""
     return {
         "version": 1,
         "rights_grew": changed.rights_grew,

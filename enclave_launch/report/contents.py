@@ -56,12 +56,19 @@ def report_contents(
     root: str = "",
     endings: Iterable[Ending] | None = None,
 ) -> ReportContents:
-    """Of the dry run's JSON ``document`` and what ``check`` found in it; paths without ``root`` before them."""
+    """Collect what a report shows from a plan and its findings.
+
+    :param document: the dry run's JSON
+    :param judged: what ``check`` found in it
+    :param root: prefix to strip from paths"""
     plan = plan_from_document(document)
     return ReportContents(
         title,
         plan_graph(document, root),
-        [(told._replace(file=told.file and short_path(told.file, root)), why) for told, why in judged],
+        [
+            (diagnostic._replace(file=diagnostic.file and short_path(diagnostic.file, root)), why)
+            for diagnostic, why in judged
+        ],
         tuple(_influences(plan)),
         tuple(opened_by_sharing(plan)),
         counts(plan),
@@ -77,8 +84,8 @@ def _influences(plan: PlanDocument) -> Iterator[Influence]:
 
 
 def counts(plan: PlanDocument) -> tuple[Count, ...]:
-    """The columns of table 2 of the paper that a plan can tell; ``ros_discovery_info``, which is the middleware's,
-    is not counted."""
+    """Count what table 2 of the design article counts and a plan knows; ``ros_discovery_info``, which belongs to
+    the middleware, is not counted."""
     return (
         Count("N", "nodes", len(plan.nodes), 0),
         _names(plan, "T", "topics", "publish", "subscribe"),

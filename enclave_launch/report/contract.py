@@ -19,8 +19,8 @@ JsonScalar = Union[StrictBool, StrictInt, StrictFloat, StrictStr]
 JsonParameter = Union[JsonScalar, list[JsonScalar]]
 
 
-def _told(description: str, default: Any = ...) -> Any:
-    """A field with a description; required where there is no ``default``."""
+def _described(description: str, default: Any = ...) -> Any:
+    """Return a field with a description, required if it has no ``default``."""
     return Field(default, description=description)
 
 
@@ -34,8 +34,8 @@ class _Strict(BaseModel, extra="forbid", frozen=True):
 class Respawn(_Strict, frozen=True):
     """When a process that ended is started again."""
 
-    delay: float = _told("seconds")
-    retries: int = _told("how often at most, -1 without a limit")
+    delay: float = _described("seconds")
+    retries: int = _described("how often at most, -1 without a limit")
 
 
 class Reaction(_Strict, frozen=True):
@@ -44,7 +44,9 @@ class Reaction(_Strict, frozen=True):
     what: str
     launch_file: str
     line: int
-    ends_with: Optional[str] = _told("the process at whose end it ends the launch, where that is all it does")
+    ends_with: Optional[str] = _described(
+        "the process at whose end it ends the launch, where that is all it does"
+    )
 
 
 class LauncherCall(_Strict, frozen=True):
@@ -58,29 +60,31 @@ class LauncherCall(_Strict, frozen=True):
 class Process(_Strict, frozen=True):
     """One process, in launch order."""
 
-    package: Optional[str] = _told("null for executable actions and nodes given without a package")
-    executable: str = _told("executable name; the first word of an executable action")
-    namespace: Optional[str] = _told("as launch shows it; null for executable actions")
-    name: Optional[str] = _told("node name, the manifest's where launch gives none; null for executables")
+    package: Optional[str] = _described("null for executable actions and nodes given without a package")
+    executable: str = _described("executable name; the first word of an executable action")
+    namespace: Optional[str] = _described("as launch shows it; null for executable actions")
+    name: Optional[str] = _described(
+        "node name, the manifest's where launch gives none; null for executables"
+    )
     fqn: Optional[str] = Field(...)
-    cmd: list[str] = _told("what would be executed; holds --enclave only under --secure")
-    remaps: list[tuple[str, str]] = _told("from, to; global rules before the node's own")
-    parameters: dict[str, JsonParameter] = _told("as the node will see them")
+    cmd: list[str] = _described("what would be executed; holds --enclave only under --secure")
+    remaps: list[tuple[str, str]] = _described("from, to; global rules before the node's own")
+    parameters: dict[str, JsonParameter] = _described("as the node will see them")
     enclave: Optional[str] = Field(...)
-    interfaces: Optional[str] = _told(_ORIGIN, None)
-    prefix: list[str] = _told("the first words of cmd, which start the program: launch-prefix")
-    domain_id: int = _told("of its own environment")
-    middleware: str = _told("the RMW implementation it would load")
-    environment: dict[str, str] = _told("variables added or changed, values as the process sees them")
+    interfaces: Optional[str] = _described(_ORIGIN, None)
+    prefix: list[str] = _described("the first words of cmd, which start the program: launch-prefix")
+    domain_id: int = _described("of its own environment")
+    middleware: str = _described("the RMW implementation it would load")
+    environment: dict[str, str] = _described("variables added or changed, values as the process sees them")
     launch_file: str
-    line: int = _told("line of the element, 0 when not known")
-    on_event: Optional[str] = _told("the event that would start it; null when the launch itself does")
-    process: Optional[str] = _told("the process name, NAME-N", None)
+    line: int = _described("line of the element, 0 when not known")
+    on_event: Optional[str] = _described("the event that would start it; null when the launch itself does")
+    process: Optional[str] = _described("the process name, NAME-N", None)
     kind: Optional[Literal["node", "lifecycle_node", "container", "executable"]] = Field(default=None)
-    machine: Optional[str] = _told("the host that the launch file means it for", None)
+    machine: Optional[str] = _described("the host that the launch file means it for", None)
     cwd: Optional[str] = Field(default=None)
-    shell: bool = _told("cmd is one text for a shell", False)
-    respawn: Optional[Respawn] = _told("null: not started again when it ends", None)
+    shell: bool = _described("cmd is one text for a shell", False)
+    respawn: Optional[Respawn] = _described("null: not started again when it ends", None)
     parameter_files: dict[str, str] = Field(
         default_factory=dict, description="YAML that launch would write, by its placeholder in cmd"
     )
@@ -95,8 +99,8 @@ class Component(_Strict, frozen=True):
     fqn: str
     remaps: list[tuple[str, str]]
     parameters: dict[str, JsonParameter]
-    enclave: Optional[str] = _told("the container's; null when the container is not part of this launch")
-    interfaces: Optional[str] = _told(_ORIGIN, None)
+    enclave: Optional[str] = _described("the container's; null when the container is not part of this launch")
+    interfaces: Optional[str] = _described(_ORIGIN, None)
     launch_file: str
     line: int
     on_event: Optional[str] = Field(...)
@@ -106,7 +110,7 @@ class Enclave(_Strict, frozen=True):
     """What one enclave may do: final names, sorted."""
 
     nodes: list[str]
-    permissions_unknown: list[str] = _told(
+    permissions_unknown: list[str] = _described(
         "processes and components of it of which nothing is known; then the lists are not all"
     )
     publish: list[str]
@@ -127,14 +131,14 @@ class Interface(_Strict, frozen=True):
     """One permission of a node, with its reason."""
 
     operation: Operation
-    name: str = _told("final; wildcards where a description or an option asks for them")
-    type: str = _told("empty when not known")
-    built_in: bool = _told("every node has it; no description asks for it")
-    place: str = _told("file:line of the description, or the row of the table")
-    written: str = _told("the name as found there")
+    name: str = _described("final; wildcards where a description or an option asks for them")
+    type: str = _described("empty when not known")
+    built_in: bool = _described("every node has it; no description asks for it")
+    place: str = _described("file:line of the description, or the row of the table")
+    written: str = _described("the name as found there")
     remapped_by: list[str]
     note: str
-    qos: dict[str, Union[StrictInt, StrictStr]] = _told(
+    qos: dict[str, Union[StrictInt, StrictStr]] = _described(
         "policies that the description fixes, by the names of NoDL v2", {}
     )
 
@@ -144,21 +148,21 @@ class Node(_Strict, frozen=True):
 
     fqn: str
     enclave: str
-    program: str = _told("package/executable or package/plugin")
-    parameters: Optional[list[str]] = _told("all that it declares; null where that is not known", None)
+    program: str = _described("package/executable or package/plugin")
+    parameters: Optional[list[str]] = _described("all that it declares; null where that is not known", None)
     interfaces: list[Interface]
 
 
 class Diagnostic(_Strict, frozen=True):
     """One thing a person should know; ``code`` is stable (``enclave_launch.diagnostics.Code``)."""
 
-    severity: Literal["error", "warning"] = _told("error: --secure refuses to start")
+    severity: Literal["error", "warning"] = _described("error: --secure refuses to start")
     code: str
     subject: str
     file: Optional[str] = Field(...)
     line: int
     text: str
-    remedy: str = _told("what to do next, empty when nothing needs doing")
+    remedy: str = _described("what to do next, empty when nothing needs doing")
 
 
 class DryRun(_Strict, frozen=True):
@@ -171,5 +175,5 @@ class DryRun(_Strict, frozen=True):
     nodes: list[Node]
     reactions: list[Reaction] = Field(default_factory=list)
     launcher_calls: list[LauncherCall] = Field(default_factory=list)
-    warnings: list[str] = _told("every diagnostic as one message for a person, errors first")
+    warnings: list[str] = _described("every diagnostic as one message for a person, errors first")
     diagnostics: list[Diagnostic]

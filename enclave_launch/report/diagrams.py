@@ -22,7 +22,7 @@ _MERMAID_SHAPES: dict[Kind, tuple[str, str]] = {
 
 
 def dot(graph: EnclaveGraph) -> str:
-    """A digraph with a cluster for each enclave."""
+    """Format the graph as a Graphviz digraph with a cluster for each enclave."""
     lines = ["digraph launch {", "  rankdir=LR; compound=true; node [fontname=sans]; edge [fontname=sans];"]
     for number, (enclave, members) in enumerate(_groups(graph)):
         lines.append(f"  subgraph cluster_{number} {{ label={_dot_text(_label(enclave))};")
@@ -41,7 +41,7 @@ def dot(graph: EnclaveGraph) -> str:
 
 
 def mermaid(graph: EnclaveGraph) -> str:
-    """A flowchart with a subgraph for each enclave."""
+    """Format the graph as a Mermaid flowchart with a subgraph for each enclave."""
     lines = ["flowchart LR"]
     for number, (enclave, members) in enumerate(_groups(graph)):
         lines.append(f"  subgraph g{number} [{_mermaid_text(_label(enclave))}]")
@@ -92,13 +92,13 @@ def _arrows(graph: EnclaveGraph) -> Iterator[tuple[str, str]]:
 
 
 def _dot_text(text: str) -> str:
-    """A quoted ID: only the quote is special there, and the backslash in labels (Graphviz, "The DOT Language")."""
+    """Quote an ID: only the quote is special there, and the backslash in labels (Graphviz, "The DOT Language")."""
     escaped = printable(text).replace("\\", "\\\\").replace('"', '\\"')
     return f'"{escaped}"'
 
 
 def _mermaid_text(text: str) -> str:
-    """Quoted; Mermaid reads HTML in labels and has entity codes with ``#`` (Mermaid, "Flowcharts", entity codes)."""
+    """Quote a label: Mermaid reads HTML there and has entity codes with ``#`` (Mermaid, "Flowcharts", entity codes)."""
     coded = html.escape(printable(text).replace("#", "#35;"), quote=False).replace("&", "#")
     escaped = coded.replace('"', "#quot;").replace("`", "#96;")
     return f'"{escaped}"'

@@ -13,7 +13,9 @@ from enclave_launch.report.unknown import UNKNOWN, is_unknown, label, shown_fqn,
 
 
 def explained(plan: LaunchPlan, subject: str) -> list[str]:
-    """Lines; empty when ``subject`` is nothing of this launch. Processes go by the names that the tree prints."""
+    """Explain the permissions of ``subject`` in lines; none if it is not part of this launch.
+
+    Processes go by the names that the tree prints."""
     lines = explain(plan.derived, subject)
     path = subject if subject.startswith("/") else f"/{subject}"
     lines += [line for item in unknown_by_enclave(plan).get(path, ()) for line in _unknown(item)]
@@ -51,7 +53,7 @@ def _descriptions(item: PlannedProcess | PlannedComponent, name: str | None) -> 
 
 
 def explainable(plan: LaunchPlan) -> set[str]:
-    """What ``explained`` knows an answer to."""
+    """Return every subject that ``explained`` has an answer to."""
     planned: list[PlannedProcess | PlannedComponent] = [*plan.processes, *plan.components]
     names = {enclave.path for enclave in plan.derived.policy.enclaves} | {label(item) for item in planned}
     names |= {node.fqn for item in planned for node in item.nodes}

@@ -74,7 +74,7 @@ class ChannelUse(NamedTuple):
 
     @property
     def built_in(self) -> bool:
-        """Every node has it, and this one has no other reason."""
+        """Return True if the use has no other reason than that every node has it."""
         return bool(self.reasons) and all(reason.built_in for reason in self.reasons)
 
 
@@ -98,7 +98,9 @@ _Key = tuple[str, "int | None", Operation, str]
 
 
 def plan_graph(document: Mapping[str, Any], root: str = "") -> EnclaveGraph:
-    """Of the dry run's JSON; files below ``root`` get the names that a person there would type."""
+    """Build the graph of enclaves, members and channels from the dry run's JSON.
+
+    :param root: prefix to strip from paths, so that they read as a person would type them"""
     members = tuple(sorted(_members(document, root)))
     reasons: dict[_Key, list[UseReason]] = dict(_reasons(document, members, root))
     asked = {(enclave, operation, name) for enclave, _, operation, name in reasons}
@@ -129,7 +131,7 @@ def _order(item: tuple[_Key, list[UseReason]]) -> tuple[str, int, int, str]:
 
 
 def short_path(path: str, root: str) -> str:
-    """``path``, which may end in a line number, without ``root`` before it."""
+    """Strip ``root`` from ``path``, which may end in a line number."""
     return path.removeprefix(os.path.join(root, "")) if root.strip("/") else path
 
 
@@ -204,7 +206,8 @@ def _channels(reasons: Mapping[_Key, list[UseReason]]) -> tuple[Channel, ...]:
 
 
 def evidence_text(reason: UseReason) -> str:
-    """``talker.nodl.xml:4; written chatter; remapped by chatter:=conversation at f.launch.xml:7``."""
+    """Format a reason as ``talker.nodl.xml:4; written chatter; remapped by chatter:=conversation at
+    f.launch.xml:7``."""
     parts = [reason.place]
     if reason.written:
         parts.append(f"written {reason.written}")

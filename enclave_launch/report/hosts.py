@@ -11,7 +11,7 @@ from enclave_launch.review.information_flow import FlowGraph
 
 
 def hosts_text(placement: Placement, graph: FlowGraph) -> str:
-    """For a terminal."""
+    """Format a placement for a terminal."""
     return "\n".join(_lines(placement, graph)) + "\n"
 
 
@@ -36,7 +36,7 @@ def _lines(placement: Placement, graph: FlowGraph) -> Iterator[str]:
 
 
 def hosts_document(placement: Placement, graph: FlowGraph) -> dict[str, object]:
-    """As plain values. ``restart_order``: sources before what they influence."""
+    """Return a placement as plain values; ``restart_order`` lists sources before what they influence."""
     return {
         "version": 1,
         "hosts": {
@@ -57,7 +57,7 @@ def hosts_document(placement: Placement, graph: FlowGraph) -> dict[str, object]:
 
 
 def enclaves_yaml(placement: Placement) -> str:
-    """A hosts file that names enclaves only, for ``secure-keystore export --hosts``."""
+    """Write a hosts file that names enclaves only, for ``secure-keystore export --hosts``."""
     homes = placement.homes()
     return yaml_text({
         "version": 1,

@@ -14,7 +14,7 @@ from enclave_launch.description.launch_description import LaunchDescription
 
 
 def arguments_text(description: LaunchDescription) -> str:
-    """What ``-s`` prints: name, description, default and choices of each argument, in order of declaration."""
+    """Return what ``-s`` prints: name, description, default and choices of each argument, in order of declaration."""
     arguments = description.get_launch_arguments()
     blocks = ["Arguments (pass arguments as '<name>:=<value>'):"]
     blocks += ["\n".join(_argument(argument)) for argument in arguments] or ["  No arguments."]
@@ -34,5 +34,5 @@ def _argument(argument: DeclareLaunchArgument) -> Iterator[str]:
 
 
 def description_text(description: LaunchDescription) -> str:
-    """What ``-p`` prints: the description as a tree."""
+    """Return what ``-p`` prints: the description as a tree."""
     return LaunchIntrospector().format_launch_description(description) + "\n"

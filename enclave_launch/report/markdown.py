@@ -61,13 +61,13 @@ def _findings(contents: ReportContents) -> Iterator[str]:
         return
     rows = (
         (
-            told.severity if accepted is None else "accepted",
-            code(told.code),
-            escaped(f"{told.file}:{told.line}" if told.file else ""),
-            escaped(told.text),
-            escaped(told.remedy if accepted is None else f"accepted: {accepted}"),
+            diagnostic.severity if accepted is None else "accepted",
+            code(diagnostic.code),
+            escaped(f"{diagnostic.file}:{diagnostic.line}" if diagnostic.file else ""),
+            escaped(diagnostic.text),
+            escaped(diagnostic.remedy if accepted is None else f"accepted: {accepted}"),
         )
-        for told, accepted in contents.judged
+        for diagnostic, accepted in contents.judged
     )
     yield from _table(("severity", "rule", "place", "what", "what to do"), rows)
 
@@ -113,12 +113,14 @@ def _table(headings: Iterable[str], rows: Iterable[Iterable[str]]) -> Iterator[s
 
 
 def escaped(text: str) -> str:
-    """Text without a meaning within a line of Markdown (CommonMark 2.4: any ASCII punctuation may be escaped)."""
+    """Escape text so that it has no meaning within a line of Markdown (CommonMark 2.4: any ASCII punctuation may
+    be escaped)."""
     return _SPECIAL.sub(r"\\\1", printable(text))
 
 
 def code(text: str) -> str:
-    """A code span, also for text with backticks (CommonMark 6.1); a bar would end the cell of a table."""
+    """Return a code span, also for text with backticks (CommonMark 6.1); a bar, which would end the cell of a
+    table, is escaped."""
     shown = printable(text).replace("|", "\\|")
     fence = "`" * (max(map(len, re.findall("`+", shown)), default=0) + 1)
     pad = " " if shown.startswith("`") or shown.endswith("`") or not shown else ""

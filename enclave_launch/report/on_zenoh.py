@@ -13,7 +13,10 @@ from keystore.formats.zenoh.key_expressions import data_keys, domain_chunks
 
 
 def zenoh_lines(plan: LaunchPlan, subject: str) -> Iterator[str]:
-    """Of an enclave all of them, of a topic, service or part of an action those that name it; nothing on DDS."""
+    """Explain what ``subject`` means on Zenoh.
+
+    Yields all lines of an enclave, those that name a topic, service or part of an action; nothing for processes on
+    DDS."""
     domains = enclave_domains(item for item in plan.processes if item.middleware == ZENOH)
     for policy in plan.derived.policy.enclaves:
         if policy.path not in domains:

@@ -20,7 +20,9 @@ VERSION = 1
 
 
 def plan_document(plan: LaunchPlan, security: SecuritySettings | None = None) -> dict[str, object]:
-    """The document as plain values. ``security``: as ``--secure`` would start the processes; ``None``: plainly."""
+    """Return the plan as plain values.
+
+    :param security: how ``--secure`` would start the processes; None for an unsecured start"""
     return {
         "version": VERSION,
         "processes": [_process(item, security) for item in plan.processes],
@@ -29,7 +31,7 @@ def plan_document(plan: LaunchPlan, security: SecuritySettings | None = None) ->
         "nodes": _nodes(plan),
         "reactions": [_reaction(item) for item in plan.evaluation.reactions],
         "launcher_calls": [_launcher_call(item) for item in plan.evaluation.launcher_calls],
-        "warnings": [str(told) for told in (*plan.problems, *plan.warnings)],
+        "warnings": [str(diagnostic) for diagnostic in (*plan.problems, *plan.warnings)],
         "diagnostics": [
             *(_diagnostic(problem, "error") for problem in plan.problems),
             *(_diagnostic(warning, "warning") for warning in plan.warnings),
@@ -38,7 +40,7 @@ def plan_document(plan: LaunchPlan, security: SecuritySettings | None = None) ->
 
 
 def plan_json(plan: LaunchPlan, security: SecuritySettings | None = None) -> str:
-    """``plan_document`` as indented JSON text: what ``--dry-run --format json`` writes."""
+    """Return ``plan_document`` as indented JSON, as ``--dry-run --format json`` writes it."""
     return json_text(plan_document(plan, security), indent=2)
 
 
@@ -100,16 +102,16 @@ def _launcher_call(item: LauncherCall) -> dict[str, object]:
     return {"service": item.service, "launch_file": item.location.file, "line": item.location.line}
 
 
-def _diagnostic(told: Diagnostic, severity: str) -> dict[str, object]:
-    place = told.location
+def _diagnostic(diagnostic: Diagnostic, severity: str) -> dict[str, object]:
+    place = diagnostic.location
     return {
         "severity": severity,
-        "code": told.code.value,
-        "subject": told.subject,
+        "code": diagnostic.code.value,
+        "subject": diagnostic.subject,
         "file": place.file if place else None,
         "line": place.line if place else 0,
-        "text": told.text,
-        "remedy": told.remedy,
+        "text": diagnostic.text,
+        "remedy": diagnostic.remedy,
     }
 
 
@@ -129,7 +131,7 @@ def _enclaves(plan: LaunchPlan) -> dict[str, dict[str, list[str]]]:
 
 
 def _nodes(plan: LaunchPlan) -> list[dict[str, object]]:
-    """Every node with what it asks for and what it has as every node, sorted by name."""
+    """List every node, sorted by name, with the interfaces it needs and those that every node has."""
     interfaces = {(node.enclave, node.fqn): node.interface for node in plan.nodes}
     found: dict[tuple[str, str], list[dict[str, object]]] = {key: [] for key in interfaces}
     for enclave, reasons in plan.derived.reasons.items():

@@ -5,15 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from enclave_common.words import counted, some_of
-from enclave_launch.review.document import OPERATIONS, GrantedName, PlanDocument, Told
+from enclave_launch.review.document import OPERATIONS, GrantedName, PlanDocument, PlanFinding
 from enclave_launch.review.information_flow import FlowGraph, FlowStep, opened_by_sharing, reached_from
 from enclave_launch.review.similarity import Merge, Split
 
-Judged = Sequence[tuple[Told, "str | None"]]
+Judged = Sequence[tuple[PlanFinding, "str | None"]]
 
 
 def plan_text(plan: PlanDocument) -> str:
-    """Each enclave with its nodes and what they ask for; what every node has is counted."""
+    """Format each enclave with its nodes and their interfaces; those that every node has are counted."""
     return "\n".join(line for path in sorted(plan.enclaves) for line in _enclave(plan, path)) + "\n"
 
 
@@ -39,19 +39,19 @@ def findings_text(judged: Judged, *, verbose: bool = False) -> str:
     ordered = sorted(judged, key=lambda item: (item[1] is not None, item[0].severity))
     lines: list[str] = []
     summed_up: list[str] = []
-    for told, accepted, others in _folded(ordered, verbose):
-        if told.code in _SUMMED_UP and accepted is None and not verbose:
-            summed_up.append(f"{1 + len(others)} {told.code}")
+    for diagnostic, accepted, others in _folded(ordered, verbose):
+        if diagnostic.code in _SUMMED_UP and accepted is None and not verbose:
+            summed_up.append(f"{1 + len(others)} {diagnostic.code}")
             continue
-        place = f"{told.file}:{told.line}: " if told.file else ""
-        head = f"accepted ({accepted})" if accepted is not None else told.severity
-        text = told.text
+        place = f"{diagnostic.file}:{diagnostic.line}: " if diagnostic.file else ""
+        head = f"accepted ({accepted})" if accepted is not None else diagnostic.severity
+        text = diagnostic.text
         if others:
-            subjects = dict.fromkeys(each.subject for each in (told, *others))
+            subjects = dict.fromkeys(each.subject for each in (diagnostic, *others))
             text = f"{text} (and {len(others)} more of this kind, about {some_of(subjects, _NAMED)})"
-        lines.append(f"{head}: {place}{text} [{told.code}]")
-        if told.remedy and accepted is None:
-            lines.append(f"  {told.remedy}")
+        lines.append(f"{head}: {place}{text} [{diagnostic.code}]")
+        if diagnostic.remedy and accepted is None:
+            lines.append(f"  {diagnostic.remedy}")
     lines.append(_count(judged) + (f" ({', '.join(summed_up)}; -v lists them)" if summed_up else ""))
     return "\n".join(lines) + "\n"
 
@@ -68,31 +68,34 @@ _SUMMED_UP = frozenset({"enclave-shared", "library-version"})
 """Codes of which a plan has many that are as they are meant to be."""
 
 
-def _folded(ordered: Judged, verbose: bool) -> Iterator[tuple[Told, str | None, list[Told]]]:
+def _folded(ordered: Judged, verbose: bool) -> Iterator[tuple[PlanFinding, str | None, list[PlanFinding]]]:
     """Yield each finding with those that are reported together with it."""
-    groups: dict[object, list[tuple[Told, str | None]]] = {}
-    for number, (told, accepted) in enumerate(ordered):
-        alone = verbose or accepted is not None or told.code not in _FOLDED
-        key = number if alone else (told.severity, told.code)
-        groups.setdefault(key, []).append((told, accepted))
-    for (told, accepted), *others in groups.values():
-        yield told, accepted, [other for other, _ in others]
+    groups: dict[object, list[tuple[PlanFinding, str | None]]] = {}
+    for number, (diagnostic, accepted) in enumerate(ordered):
+        alone = verbose or accepted is not None or diagnostic.code not in _FOLDED
+        key = number if alone else (diagnostic.severity, diagnostic.code)
+        groups.setdefault(key, []).append((diagnostic, accepted))
+    for (diagnostic, accepted), *others in groups.values():
+        yield diagnostic, accepted, [other for other, _ in others]
 
 
 def _count(judged: Judged) -> str:
-    open_ones = [told for told, accepted in judged if accepted is None]
-    errors = sum(told.severity == "error" for told in open_ones)
+    open_ones = [diagnostic for diagnostic, accepted in judged if accepted is None]
+    errors = sum(diagnostic.severity == "error" for diagnostic in open_ones)
     accepted_ones = f", {len(judged) - len(open_ones)} accepted" if len(judged) > len(open_ones) else ""
     return f"{counted(errors, 'error')}, {counted(len(open_ones) - errors, 'warning')}{accepted_ones}"
 
 
 def findings_document(judged: Judged) -> dict[str, object]:
-    """The findings for JSON, each with the reason why it was accepted, or ``None``."""
-    return {"version": 1, "findings": [{**told._asdict(), "accepted": accepted} for told, accepted in judged]}
+    """Return the findings for JSON, each with the reason why it was accepted, or None."""
+    return {
+        "version": 1,
+        "findings": [{**diagnostic._asdict(), "accepted": accepted} for diagnostic, accepted in judged],
+    }
 
 
 def suggestions_text(merges: Sequence[Merge], splits: Sequence[Split]) -> str:
-    """The enclaves worth merging and splitting, with what each change costs or saves."""
+    """Format the enclaves worth merging and splitting, with what each change costs or saves."""
     lines = [line for merge in merges for line in _merge(merge)]
     lines += [line for split in splits for line in _split(split)]
     return (
@@ -122,7 +125,7 @@ MOST_WAYS = 3  # named for each step
 
 
 def paths_text(source: str, target: str, paths: Sequence[Sequence[FlowStep]]) -> str:
-    """The shortest ways from one enclave to another, or that there is none."""
+    """Format the shortest paths from one enclave to another, or state that there is none."""
     if not paths:
         return f"nothing flows from {source} to {target}, over any number of enclaves\n"
     count = f"{len(paths)} shortest ways" if len(paths) > 1 else "the shortest way"
@@ -134,14 +137,14 @@ def paths_text(source: str, target: str, paths: Sequence[Sequence[FlowStep]]) ->
 
 
 def step_text(step: FlowStep) -> str:
-    """``/camera -> /planner by topic /image``."""
+    """Format a step as ``/camera -> /planner by topic /image``."""
     ways = [str(hop) for hop in step.hops[:MOST_WAYS]]
     more = len(step.hops) - len(ways)
     return f"{step.source} -> {step.target} by {', '.join(ways)}{f' and {more} more' if more else ''}"
 
 
 def reach_text(plan: PlanDocument, graph: FlowGraph) -> str:
-    """For each enclave what it can influence, then the flows that exist only because nodes share an enclave."""
+    """Format what each enclave can influence, then the flows that exist only because nodes share an enclave."""
     return "\n".join([*_reach(graph), *_opened(plan)]) + "\n"
 
 

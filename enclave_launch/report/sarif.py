@@ -7,16 +7,19 @@ import os
 from collections.abc import Iterable, Mapping
 from urllib.parse import quote
 
-from enclave_launch.review.document import Told
+from enclave_launch.review.document import PlanFinding
 
 SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 
 
 def sarif_document(
-    findings: Iterable[tuple[Told, str | None]], rules: Mapping[str, str], version: str, root: str
+    findings: Iterable[tuple[PlanFinding, str | None]], rules: Mapping[str, str], version: str, root: str
 ) -> dict[str, object]:
-    """``findings``: each with the reason why it was accepted, else ``None``; files below ``root`` become relative."""
-    results = [_result(told, accepted, root) for told, accepted in findings]
+    """Return findings as a SARIF log.
+
+    :param findings: each with the reason why it was accepted, or None
+    :param root: files below it get relative paths"""
+    results = [_result(diagnostic, accepted, root) for diagnostic, accepted in findings]
     used = sorted({str(result["ruleId"]) for result in results})
     driver = {
         "name": "secure-plan",
@@ -28,26 +31,26 @@ def sarif_document(
     return {"$schema": SCHEMA, "version": "2.1.0", "runs": [run]}
 
 
-def _result(told: Told, accepted: str | None, root: str) -> dict[str, object]:
-    text = f"{told.text}: {told.remedy}" if told.remedy else told.text
+def _result(diagnostic: PlanFinding, accepted: str | None, root: str) -> dict[str, object]:
+    text = f"{diagnostic.text}: {diagnostic.remedy}" if diagnostic.remedy else diagnostic.text
     result: dict[str, object] = {
-        "ruleId": told.code,
-        "level": told.severity,
+        "ruleId": diagnostic.code,
+        "level": diagnostic.severity,
         "message": {"text": text},
-        "partialFingerprints": {"codeSubjectAndFile/v1": _fingerprint(told, root)},
+        "partialFingerprints": {"codeSubjectAndFile/v1": _fingerprint(diagnostic, root)},
     }
-    if told.file:
-        result["locations"] = [_location(told.file, told.line, root)]
+    if diagnostic.file:
+        result["locations"] = [_location(diagnostic.file, diagnostic.line, root)]
     if accepted is not None:
         result["suppressions"] = [{"kind": "external", "justification": accepted}]
     return result
 
 
-def _fingerprint(told: Told, root: str) -> str:
-    """The same while a finding stays, wherever its line moves: code hosts tell old findings from new ones by it."""
-    file = os.path.relpath(told.file, root) if told.file else ""
+def _fingerprint(diagnostic: PlanFinding, root: str) -> str:
+    """Return an identifier that is stable while a finding's line moves: code hosts match findings of two runs by it."""
+    file = os.path.relpath(diagnostic.file, root) if diagnostic.file else ""
     return hashlib.sha256(
-        "\0".join((told.code, told.subject, file)).encode("utf-8", "backslashreplace")
+        "\0".join((diagnostic.code, diagnostic.subject, file)).encode("utf-8", "backslashreplace")
     ).hexdigest()
 
 

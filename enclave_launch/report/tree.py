@@ -11,7 +11,7 @@ from enclave_common.words import counted
 from enclave_launch.plan import InterfaceOrigin, LaunchPlan, PlannedComponent, PlannedProcess
 from enclave_launch.policy.derivation import LIST_NAMES, allowed_names
 from enclave_launch.policy.sharing import Gain, gains_by_sharing
-from enclave_launch.report.look import Look
+from enclave_launch.report.terminal_style import TerminalStyle
 from enclave_launch.report.unknown import UNKNOWN, label, shown_fqn, unknown_by_enclave
 from enclave_launch.source_location import SourceLocation
 from keystore.formats.policy import EnclavePolicy
@@ -27,18 +27,21 @@ class Branch(NamedTuple):
     names: bool = False
 
 
-def plan_tree(plan: LaunchPlan, look: Look | None = None) -> str:
-    """Text that ends with a newline. Interfaces that every node has are counted, not listed. ``look``: by default
-    lines of any length without colours, as for a pipe."""
-    look = look or Look()
-    lines = look.wrapped(look.one_line(f"{plan.launch_file} (as {plan.distro})"), "", "    ")
+def plan_tree(plan: LaunchPlan, style: TerminalStyle | None = None) -> str:
+    """Format the plan as a tree; ends with a newline.
+
+    Interfaces that every node has are counted, not listed.
+
+    :param style: by default lines of any length without colours, as for a pipe"""
+    style = style or TerminalStyle()
+    lines = style.wrapped(style.one_line(f"{plan.launch_file} (as {plan.distro})"), "", "    ")
     gains = gains_by_sharing(plan.derived, composed_only=True)
-    lines += _draw([_enclave(plan, enclave, gains) for enclave in plan.derived.policy.enclaves], look)
+    lines += _draw([_enclave(plan, enclave, gains) for enclave in plan.derived.policy.enclaves], style)
     outside = _outside(plan)
     if outside:
-        lines += ["without an enclave", *_draw(outside, look)]
-    lines += look.told("error under --secure", plan.problems)
-    lines += look.told("warning", plan.warnings)
+        lines += ["without an enclave", *_draw(outside, style)]
+    lines += style.listed("error under --secure", plan.problems)
+    lines += style.listed("warning", plan.warnings)
     return "\n".join(lines) + "\n"
 
 
@@ -79,7 +82,7 @@ def _behind(prefix: Sequence[str]) -> str:
 
 
 def _place(location: SourceLocation, launch_file: str) -> str:
-    """Where in the launch file; in another file by the name it has in its package or beside the launch file."""
+    """Return the place in the launch file; another file is named as in its package or beside the launch file."""
     if location.file == launch_file:
         return f"line {location.line}"
     folder = os.path.join(os.path.dirname(launch_file), "")
@@ -88,18 +91,18 @@ def _place(location: SourceLocation, launch_file: str) -> str:
 
 
 def _component(item: PlannedComponent) -> str:
-    told = UNKNOWN if item.missing else origin_text(item) if _is_worth_a_word(item) else ""
+    origin = UNKNOWN if item.missing else origin_text(item) if _is_worth_a_word(item) else ""
     component = f"component {item.component.package} {item.component.plugin} as {item.fqn}"
-    return f"{component}  ({told})" if told else component
+    return f"{component}  ({origin})" if origin else component
 
 
 def _is_worth_a_word(item: PlannedProcess | PlannedComponent) -> bool:
-    """The package's own manifest is what one expects."""
+    """Return False if the interfaces come from the package's own manifest, as one expects."""
     return item.origin not in (None, InterfaceOrigin.PACKAGE)
 
 
 def origin_text(item: PlannedProcess | PlannedComponent) -> str:
-    """Where its interfaces come from, with the document of the library."""
+    """Return the origin of the item's interfaces, with the document of the library."""
     if item.origin is InterfaceOrigin.LIBRARY and item.nodes:
         file = item.nodes[0].interface.source.file
         return f"library {'/'.join(file.split('/')[-2:]).removesuffix('.nodl.yaml')}"
@@ -133,7 +136,7 @@ def _outside(plan: LaunchPlan) -> list[Branch]:
     return without
 
 
-def _draw(branches: Sequence[Branch], look: Look, indent: str = "") -> list[str]:
+def _draw(branches: Sequence[Branch], style: TerminalStyle, indent: str = "") -> list[str]:
     lines: list[str] = []
     for index, branch in enumerate(branches):
         last = index == len(branches) - 1
@@ -142,6 +145,6 @@ def _draw(branches: Sequence[Branch], look: Look, indent: str = "") -> list[str]
             f"{indent}{'└── ' if last else '├── '}",
             f"{below}{'│   ' if branch.below else '    '}",
         )
-        lines += look.wrapped(look.one_line(branch.text), head, further, fold=branch.names)
-        lines += _draw(branch.below, look, below)
+        lines += style.wrapped(style.one_line(branch.text), head, further, fold=branch.names)
+        lines += _draw(branch.below, style, below)
     return lines

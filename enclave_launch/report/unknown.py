@@ -9,8 +9,9 @@ UNKNOWN = "permissions unknown"
 
 
 def unknown_by_enclave(plan: LaunchPlan) -> dict[str, list[PlannedProcess | PlannedComponent]]:
-    """Of each enclave, in launch order, those of which nothing says what they do. An ``executable`` counts among
-    them unless a policy file speaks for its enclave."""
+    """Return the items of each enclave whose interfaces are unknown, in launch order.
+
+    An ``executable`` is one of them unless a policy file lists its enclave."""
     answered = {enclave.path for enclave in plan.derived.policy.enclaves if enclave.profiles}
     unknown: dict[str, list[PlannedProcess | PlannedComponent]] = {}
     for process in plan.processes:
@@ -27,18 +28,19 @@ def unknown_by_enclave(plan: LaunchPlan) -> dict[str, list[PlannedProcess | Plan
 
 
 def is_unknown(item: PlannedProcess | PlannedComponent) -> bool:
-    """Whether no interface was found for it: the plan has no node of it."""
+    """Return True if no interface was found for the item: the plan has no node of it."""
     return not item.nodes
 
 
 def label(item: PlannedProcess | PlannedComponent) -> str:
-    """As the tree names it."""
+    """Return the name that the tree prints."""
     return item.process.process_name if isinstance(item, PlannedProcess) else item.fqn
 
 
 def shown_fqn(item: PlannedProcess | PlannedComponent) -> str:
-    """Its nodes, or what launch knows of the name: without a placeholder for a namespace that nobody gave, and nothing
-    where nobody gave a name."""
+    """Return the names of the item's nodes, or what launch knows of the name.
+
+    Without a placeholder for a namespace that was not given; empty if no name was given."""
     names = " ".join(dict.fromkeys(node.fqn for node in item.nodes))
     known = "" if UNSPECIFIED_NODE_NAME in (item.fqn or "") else item.fqn or ""
     return names or known.replace(UNSPECIFIED_NODE_NAMESPACE, "")

@@ -66,7 +66,7 @@ class Changes(NamedTuple):
 
 
 def changes(before: PlanDocument, after: PlanDocument) -> Changes:
-    """What differs from ``before`` to ``after``: rights of enclaves, nodes, their homes, direct flows."""
+    """Compare two plans: rights of enclaves, nodes, their enclaves, direct flows."""
     homes_before = {node.fqn: node.enclave for node in before.nodes}
     homes_after = {node.fqn: node.enclave for node in after.nodes}
     edges_before, edges_after = _edges(flow_graph(before)), _edges(flow_graph(after))

@@ -1,4 +1,4 @@
-"""A plan as a review sees it: enclaves with their permissions, nodes with theirs, and what was told.
+"""A plan as a review sees it: enclaves with their permissions, nodes with theirs, and the diagnostics of planning.
 
 Made from the dry run's JSON, so that a plan that was saved (or comes from another machine or revision) and one that was
 just resolved are the same thing.
@@ -60,7 +60,7 @@ class NodeView(NamedTuple):
         return self.own | self.built_in
 
 
-class Told(NamedTuple):
+class PlanFinding(NamedTuple):
     """A problem or warning of the plan."""
 
     severity: Literal["error", "warning"]
@@ -78,24 +78,24 @@ class PlanDocument(NamedTuple):
 
     enclaves: Mapping[str, frozenset[GrantedName]]
     nodes: tuple[NodeView, ...]
-    told: tuple[Told, ...]
+    diagnostics: tuple[PlanFinding, ...]
     on_zenoh: frozenset[str] = frozenset()
 
     def nodes_of(self, enclave: str) -> tuple[NodeView, ...]:
         return tuple(node for node in self.nodes if node.enclave == enclave)
 
     def own(self, enclave: str) -> frozenset[GrantedName]:
-        """What its nodes ask for themselves."""
+        """Return what the nodes of the enclave request themselves."""
         return frozenset[GrantedName]().union(*(node.own for node in self.nodes_of(enclave)))
 
     def built_in(self, enclave: str) -> frozenset[GrantedName]:
-        """What its nodes have as every node, and none of them asks for."""
+        """Return what the nodes of the enclave have as every node, and none of them requests."""
         everywhere = (node.built_in for node in self.nodes_of(enclave))
         return frozenset[GrantedName]().union(*everywhere) - self.own(enclave)
 
     def units_of(self, enclave: str) -> dict[str, frozenset[GrantedName]]:
-        """What can have an enclave of its own: each node that the launch file starts, with what it and the helpers in
-        its process ask for."""
+        """Return the requests of each node that the launch file starts, with those of the helpers in its process:
+        the parts that could have an enclave of their own."""
         units: dict[str, frozenset[GrantedName]] = {}
         for node in self.nodes_of(enclave):
             units[node.unit] = units.get(node.unit, frozenset()) | node.own
@@ -103,11 +103,11 @@ class PlanDocument(NamedTuple):
 
 
 def plan_from_document(document: Mapping[str, Any]) -> PlanDocument:
-    """Of a document that ``report.contract.DryRun`` accepts."""
+    """Read a document that ``report.contract.DryRun`` accepts."""
     return PlanDocument(
         {path: grants_of(lists) for path, lists in document["enclaves"].items()},
         tuple(_nodes(document)),
-        tuple(Told(**told) for told in document.get("diagnostics", ())),
+        tuple(PlanFinding(**diagnostic) for diagnostic in document.get("diagnostics", ())),
         frozenset(
             process["enclave"]
             for process in document.get("processes", ())
@@ -117,7 +117,7 @@ def plan_from_document(document: Mapping[str, Any]) -> PlanDocument:
 
 
 def grants_of(lists: Mapping[str, Sequence[str]]) -> frozenset[GrantedName]:
-    """Of the contract's six lists of names; what else the mapping holds is left alone."""
+    """Read the contract's six lists of names; other keys of the mapping are ignored."""
     return frozenset(
         GrantedName(operation, name) for operation in OPERATIONS for name in lists.get(operation, ())
     )

@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 
 from enclave_launch.errors import UsageError
 from enclave_launch.review.checks.rules import finding
-from enclave_launch.review.document import PlanDocument, Told, plan_from_document
+from enclave_launch.review.document import PlanDocument, PlanFinding, plan_from_document
 from enclave_launch.review.information_flow import FlowStep, flow_graph, shortest_paths
 
 _TAKES = ("subscribe", "serve_services", "serve_actions")
@@ -41,8 +41,8 @@ class Accepted(NamedTuple):
     subject: str
     why: str
 
-    def covers(self, told: Told) -> bool:
-        return told.code == self.code and fnmatchcase(told.subject, self.subject)
+    def covers(self, diagnostic: PlanFinding) -> bool:
+        return diagnostic.code == self.code and fnmatchcase(diagnostic.subject, self.subject)
 
 
 class Expectations(NamedTuple):
@@ -51,9 +51,9 @@ class Expectations(NamedTuple):
     never: tuple[Never, ...] = ()
     accept: tuple[Accepted, ...] = ()
 
-    def reason_to_accept(self, told: Told) -> str | None:
-        """Why somebody accepted ``told``; ``None`` when nobody did."""
-        return next((accepted.why for accepted in self.accept if accepted.covers(told)), None)
+    def reason_to_accept(self, diagnostic: PlanFinding) -> str | None:
+        """Return why a finding was accepted, None if it was not."""
+        return next((accepted.why for accepted in self.accept if accepted.covers(diagnostic)), None)
 
 
 class Broken(NamedTuple):
@@ -66,7 +66,9 @@ class Broken(NamedTuple):
 
 
 def read_expectations(content: Any, place: str) -> Expectations:
-    """Of a parsed YAML document. Raises ``UsageError`` for anything that is not as the module head says."""
+    """Read a parsed YAML document.
+
+    :raises UsageError: it is not as the head of this module says."""
     if not isinstance(content, Mapping) or content.keys() - {"never", "accept"}:
         raise UsageError(f"{place}: expected a mapping with 'never' and 'accept'")
     return Expectations(
@@ -82,17 +84,17 @@ def read_expectations(content: Any, place: str) -> Expectations:
     )
 
 
-def rule_findings(document: Mapping[str, Any], rules: Iterable[Never]) -> list[Told]:
-    """A forbidden flow is an error, a rule that names nothing in this plan a warning."""
+def rule_findings(document: Mapping[str, Any], rules: Iterable[Never]) -> list[PlanFinding]:
+    """Return an error for each forbidden flow and a warning for each rule that names nothing in this plan."""
     broken, idle = broken_rules(plan_from_document(document), rules)
-    forbidden = [finding("flow-forbidden", found.source, _told(found)) for found in broken]
-    return [told._replace(severity="error") for told in forbidden] + [
+    forbidden = [finding("flow-forbidden", found.source, _broken_text(found)) for found in broken]
+    return [diagnostic._replace(severity="error") for diagnostic in forbidden] + [
         finding("rule-idle", rule.source, f"no {rule.source} or no {rule.target} in this plan")
         for rule in idle
     ]
 
 
-def _told(found: Broken) -> str:
+def _broken_text(found: Broken) -> str:
     rule = found.rule
     ways = "; ".join(f"{step.source} -> {step.target} by {step.hops[0]}" for step in found.steps)
     how = ways or f"both are in enclave {found.source}"

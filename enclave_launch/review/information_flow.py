@@ -65,7 +65,7 @@ def flow_graph(plan: PlanDocument, *, built_in: bool = False) -> FlowGraph:
 
 
 def shortest_paths(graph: FlowGraph, source: str, target: str) -> list[tuple[FlowStep, ...]]:
-    """All shortest ways from ``source`` to ``target``, sorted; empty when there is none."""
+    """Return all shortest paths from ``source`` to ``target``, sorted; empty if there is none."""
     distances = _distances(graph, source)
     if target not in distances or source == target:
         return []
@@ -76,7 +76,7 @@ def shortest_paths(graph: FlowGraph, source: str, target: str) -> list[tuple[Flo
 
 
 def reached_from(graph: FlowGraph, source: str) -> frozenset[str]:
-    """All that ``source`` can influence, itself left out."""
+    """Return everything that ``source`` can influence, except itself."""
     return frozenset(_distances(graph, source)) - {source}
 
 
@@ -121,7 +121,8 @@ def _graph(grants: Mapping[str, Iterable[GrantedName]]) -> FlowGraph:
 
 
 def _parts(grant: GrantedName) -> list[tuple[GrantedName, GrantedName]]:
-    """What ``grant`` is made of, each part with ``grant`` itself: topics and services stand for themselves."""
+    """Split a grant of an action into its services and topics, each with the grant itself; others are their own
+    part."""
     if grant.operation not in _PARTS_OF_ACTIONS:
         return [(grant, grant)]
     service, topic = _PARTS_OF_ACTIONS[grant.operation]

@@ -17,7 +17,7 @@ _RULES = {listed: operation for operation, listed in LIST_NAMES.items()}
 
 
 def as_signed(grants: Iterable[GrantedName]) -> frozenset[GrantedName]:
-    """``grants`` through DDS topics and back."""
+    """Convert ``grants`` to DDS topics and back."""
     publish: set[str] = set()
     subscribe: set[str] = set()
     for grant in grants:
@@ -31,12 +31,12 @@ def grants_of_rules(rules: Iterable[Rule]) -> frozenset[GrantedName]:
 
 
 def plan_as_signed(plan: PlanDocument) -> PlanDocument:
-    """``plan`` with the permissions that would be read back from its keystore."""
+    """Return ``plan`` with the permissions that would be read back from its keystore."""
     return plan._replace(enclaves={path: as_signed(grants) for path, grants in plan.enclaves.items()})
 
 
 def keystore_as_plan(
     signed: Mapping[str, frozenset[GrantedName]], plan: PlanDocument, on_zenoh: frozenset[str]
 ) -> PlanDocument:
-    """The keystore's enclaves with the nodes that ``plan`` has in them: a keystore knows no nodes."""
+    """Return the keystore's enclaves with the nodes that ``plan`` has in them: a keystore knows no nodes."""
     return PlanDocument(signed, tuple(node for node in plan.nodes if node.enclave in signed), (), on_zenoh)

@@ -58,24 +58,24 @@ class PushRosEnclave(Action):  # type: ignore[misc]  # untyped without ROS
 
 
 def session_of(context: Any) -> EnclaveSession | None:
-    """None in a launch that is not secured by us."""
+    """Return the session of a launch that we secure, None for any other."""
     session: EnclaveSession | None = context.get_locals_as_dict().get(KEY)
     return session
 
 
 def enclave_attribute(action: Any, context: Any) -> str | None:
-    """The performed ``enclave`` of an action; None where the launch file gives none."""
+    """Return the performed ``enclave`` of an action, None if the launch file gives none."""
     enclave = getattr(action, ATTRIBUTE, None)
     return None if enclave is None else perform_substitutions(context, enclave)
 
 
 def scope_in_force(context: Any) -> str | None:
-    """The enclave scope pushed last in ``context`` (absolute); ``None`` when nothing was pushed."""
+    """Return the enclave scope pushed last in ``context`` (absolute), None if nothing was pushed."""
     return enclave_scope(context.launch_configurations)
 
 
 def install() -> None:
-    """Idempotent; afterwards launch files may use the attributes, secured or not."""
+    """Let launch files use the attributes, secured or not; a second call does nothing."""
     if getattr(ExecuteProcess, WRAPPED, False):
         return
     setattr(ExecuteProcess, WRAPPED, True)
@@ -104,8 +104,9 @@ def _accepting_enclave(init: Callable[..., None]) -> Callable[..., None]:
 
 
 def _securing(prepare: Callable[..., None]) -> Callable[..., None]:
-    """What launch is about to execute gets its security variables last: after what the launch file set, and also
-    where it gave a process an environment of its own (``env=``)."""
+    """Wrap ``prepare`` so that a process gets its security variables last.
+
+    That is after what the launch file set, and also if it replaced the environment (``env=``)."""
 
     @functools.wraps(prepare)
     def wrapped(self: Any, context: Any, action: Any) -> None:

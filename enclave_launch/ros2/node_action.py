@@ -18,7 +18,9 @@ class EnclaveNodeActionExtension(NodeActionExtension):  # type: ignore[misc]  # 
     def prepare_for_execute(
         self, context: Any, ros_specific_arguments: dict[str, Any], node_action: Any
     ) -> tuple[list[Any], dict[str, Any]]:
-        """:raises EnclaveLaunchError: the node cannot be secured; launch reports it and shuts down."""
+        """Secure a node about to start.
+
+        :raises EnclaveLaunchError: it cannot be secured; launch reports that and shuts down."""
         session = attributes.session_of(context)
         if session is None:
             return [], ros_specific_arguments

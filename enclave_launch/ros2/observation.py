@@ -31,7 +31,9 @@ from enclave_launch.source_location import SourceLocation
 
 
 def observe_node(action: Any, context: Any, ros_specific_arguments: dict[str, Any]) -> ResolvedProcess:
-    """``action``: a ``launch_ros.actions.Node`` whose substitutions have been performed."""
+    """Describe a node that launch is about to start.
+
+    :param action: a ``launch_ros.actions.Node`` whose substitutions have been performed"""
     context.extend_locals({"ros_specific_arguments": ros_specific_arguments})
     cmd = tuple(perform_substitutions(context, part) for part in action.cmd)
     arguments = parse_ros_arguments(cmd)
@@ -66,7 +68,9 @@ def observe_node(action: Any, context: Any, ros_specific_arguments: dict[str, An
 
 
 def observe_executable(action: Any, context: Any) -> ResolvedProcess:
-    """``action``: an ``ExecuteProcess`` that is not a node, being prepared: its command and name are final."""
+    """Describe a process that launch is about to start.
+
+    :param action: an ``ExecuteProcess`` that is not a node, being prepared: its command and name are final"""
     description = action.process_description
     cmd = tuple(description.final_cmd)
     prefix = cmd[: len(cmd) - len(description.cmd)]
@@ -95,15 +99,15 @@ def observe_executable(action: Any, context: Any) -> ResolvedProcess:
 
 
 def loads_components(action: Any) -> bool:
-    """Whether a ``ComposableNodeContainer`` names composable nodes itself. They are not looked at: what upstream keeps
-    of them may be iterators (``ComposableNode.remappings`` is), and the real load must find them untouched."""
+    """Return True if a ``ComposableNodeContainer`` names composable nodes itself.
+
+    They are not read: upstream may hold them as iterators (``ComposableNode.remappings`` is one), and the load
+    needs them unconsumed."""
     return bool(getattr(action, "_ComposableNodeContainer__composable_node_descriptions", None))
 
 
 def next_process_name(action: Any, context: Any, cmd: tuple[str, ...]) -> tuple[int, str]:
-    """The number and label that launch is about to give: its counter advances when the process is
-    prepared.
-    """
+    """Return the number and label that launch is about to give; its counter advances when the process is prepared."""
     name = action.process_description.name
     label = cmd[0].rpartition("/")[2] if name is None else perform_substitutions(context, name)
     return executable_description._executable_process_counter + 1, label
@@ -117,7 +121,7 @@ def location_in(context: Any, element: str) -> SourceLocation:
 
 
 def _environment(action: Any, context: Any) -> dict[str, str]:
-    """As launch's ``Executable.prepare`` makes it (launch/descriptions/executable.py)."""
+    """Return the environment as launch's ``Executable.prepare`` makes it (launch/descriptions/executable.py)."""
     description = action.process_description
     base = dict(context.environment) if description.env is None else _performed(description.env, context)
     return {**base, **_performed(description.additional_env or (), context)}
@@ -131,7 +135,7 @@ def _performed(variables: Any, context: Any) -> dict[str, str]:
 
 
 def _prefix(action: Any, context: Any, cmd: tuple[str, ...]) -> tuple[str, ...]:
-    """The words that launch will put before the command, where its filter lets it."""
+    """Return the words that launch will put before the command, if its filter permits them."""
     description = action.process_description
     pattern = getattr(description, "_Executable__prefix_filter", None)  # upstream shows the prefix only
     if (

@@ -59,7 +59,9 @@ class EnclaveOption(OptionExtension):  # type: ignore[misc]  # untyped without R
         parser.set_defaults(**{SECURE: False, "secure": None, "create_keystore": True})
 
     def prelaunch(self, launch_description: Any, args: argparse.Namespace) -> tuple[Any, ...]:
-        """:raises RuntimeError: what ros2 shows as a message, without traceback."""
+        """Plan and secure the launch.
+
+        :raises RuntimeError: ros2 shows its message without a traceback."""
         try:
             keystore = getattr(args, SECURE)
             if isinstance(keystore, str):
@@ -96,7 +98,7 @@ def names_keystore(words: Sequence[str]) -> bool:
 
 
 def _looked_at(args: argparse.Namespace) -> int:
-    """As ``secure-launch --dry-run`` and its like: the plan is printed, nothing starts. Gives the exit status."""
+    """Print the plan as ``secure-launch --dry-run`` and similar options do, start nothing, return the exit status."""
     path, arguments = target_of(args)
     keystore = os.path.abspath(args.keystore) if getattr(args, SECURE) and args.keystore else None
     with stdout_is_for_the_plan():
@@ -105,7 +107,7 @@ def _looked_at(args: argparse.Namespace) -> int:
 
 
 def _launched(description: Any, args: argparse.Namespace) -> int:
-    """As ``secure-launch --secure``: planned, signed and run by one engine. Gives the exit status."""
+    """Plan, sign and run as ``secure-launch --secure`` does; return the exit status."""
     if args.keystore is None:
         raise UsageError(
             "--secure needs a keystore: give --keystore DIR or set ROS_SECURITY_KEYSTORE; for one that nobody keeps, "
@@ -117,7 +119,7 @@ def _launched(description: Any, args: argparse.Namespace) -> int:
 
 
 def _check_nothing_was_added(description: Any) -> None:
-    """What another extension of ros2 launch put around the launch file stands in no plan."""
+    """Refuse a description that another extension of ros2 launch extended: that part is in no plan."""
     from launch.actions import IncludeLaunchDescription
 
     added = [

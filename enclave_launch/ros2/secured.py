@@ -44,11 +44,12 @@ def secured(
     resolve_options: ResolveOptions | None = None,
     security_options: SecurityOptions | None = None,
 ) -> LaunchDescription:
-    """``description`` in a new one that secures it. The keystore is created if it does not exist.
+    """Return a description that secures ``description``.
+
+    The keystore is created if it does not exist.
 
     :raises ProvisionError: the keystore cannot be used.
-    :raises UsageError: this package is not installed, so that launch does not find its extension.
-    """
+    :raises UsageError: this package is not installed, so that launch does not find its extension."""
     options = resolve_options or ResolveOptions()
     check_installed()
     release = choose_release(options.distro, os.environ.get("ROS_DISTRO"), search_prefixes())
@@ -62,10 +63,9 @@ def secured(
 def _enclosed(
     description: LaunchDescription, session: EnclaveSession, launch: ProvisionedLaunch
 ) -> LaunchDescription:
-    """``description`` behind the actions that begin ``session`` and point every process at the keystore.
+    """Put ``description`` behind actions that begin ``session`` and point every process at the keystore.
 
-    :raises RuntimeFailure: processes are on Zenoh, and no router answers or can be started.
-    """
+    :raises RuntimeFailure: processes are on Zenoh, and no router answers or can be started."""
     if launch.zenoh is not None:
         router = zenoh_router(launch, lambda text: print(f"enclave-launch: warning: {text}", file=sys.stderr))
         router.__enter__()
@@ -89,7 +89,9 @@ def _read_secrets(launch: ProvisionedLaunch) -> Iterable[str]:
 
 
 def check_installed() -> None:
-    """launch_ros finds node extensions by entry point alone; without ours nodes would start unsecured."""
+    """Check that launch_ros finds our node extension, by entry point alone; without it nodes would start unsecured.
+
+    :raises UsageError: it does not."""
     found = [entry.value for entry in entry_points(group="launch_ros.node_action")]
     if not any(value.startswith(EXTENSION) for value in found):
         raise UsageError(

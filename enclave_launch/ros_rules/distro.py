@@ -185,9 +185,12 @@ def _has(since: Since, distro: Distro, version: Version) -> bool:
 
 
 def choose_release(name: str | None, environment_name: str | None, prefixes: Sequence[str] = ()) -> Release:
-    """``--distro`` decides, else ``ROS_DISTRO``, else the newest; an installed launch of the same series
-    refines the version. An unknown ``ROS_DISTRO`` counts as the newest; an unknown ``name`` is a ``ValueError``.
-    """
+    """Return the release whose rules apply.
+
+    ``--distro`` decides, else ``ROS_DISTRO``, else the newest; an installed launch of the same series refines the
+    version. An unknown ``ROS_DISTRO`` counts as the newest.
+
+    :raises ValueError: ``name`` is unknown."""
     if name:
         distro = Distro(name)
     else:

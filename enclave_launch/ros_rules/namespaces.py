@@ -16,11 +16,10 @@ ENCLAVE_SCOPE = "ros_enclave_scope"
 
 
 def prefix_namespace(base_ns: str | None, ns: str | None) -> str | None:
-    """``ns`` below ``base_ns``; an absolute ``ns`` drops the base, ``None`` stands for "not given".
+    """Join ``ns`` below ``base_ns``; an absolute ``ns`` drops the base, None stands for "not given".
 
-    Trailing slashes go, unless the result is the root itself. A base that is empty does not count, so
-    ``prefix_namespace("", "")`` is empty, which ``make_namespace_absolute`` turns into ``/``.
-    """
+    Trailing slashes are removed, unless the result is the root itself. An empty base does not count, so
+    ``prefix_namespace("", "")`` is empty, which ``make_namespace_absolute`` turns into ``/``."""
     if ns is None:
         joined = base_ns
     elif not base_ns or ns.startswith("/"):

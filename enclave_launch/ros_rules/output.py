@@ -24,7 +24,9 @@ ALIASES: dict[str, dict[Source, set[str]]] = {
 
 
 def output_routes(setting: OutputSetting) -> Routes:
-    """:raises ValueError: an alias, source or destination that launch does not know."""
+    """Return where each stream goes.
+
+    :raises ValueError: an alias, source or destination is unknown to launch."""
     if isinstance(setting, str):
         if setting not in ALIASES:
             raise ValueError(

@@ -54,7 +54,7 @@ def _strtoll(text: str) -> int | None:
 
 
 def _strtod(text: str) -> float | str:
-    """Text stays what does not fit into a double: ``1e999``, ``1e-999``."""
+    """Convert text to a double; text that does not fit into one (``1e999``, ``1e-999``) is returned as it is."""
     if named := _NAMED_DOUBLE.fullmatch(text):
         return float("".join(part for part in named.groups() if part))
     if not _DOUBLE.fullmatch(text):

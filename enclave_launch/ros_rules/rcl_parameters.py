@@ -62,10 +62,11 @@ def resolve_parameters(
     generated: Generated = lambda path: None,
     directory: str | None = None,
 ) -> ResolvedParameters:
-    """``fqn_tokens``: namespace tokens and name; ``None`` for one that launch does not know (only
-    wildcards match it). ``generated`` gives the content of files that launch writes itself; ``directory`` is where
-    the process runs (``None``: here).
-    """
+    """Return the parameters that rcl gives a node.
+
+    :param fqn_tokens: namespace tokens and name; None for one that launch does not know, which only wildcards match
+    :param generated: content of files that launch writes itself
+    :param directory: where the process runs; None for the current directory"""
     sections: dict[str, dict[str, dict[int, ParameterValue]]] = {}
     unread: list[tuple[str, str]] = []
     for source in sources:

@@ -40,7 +40,7 @@ class BackPressure:
         self._tree.hold_output("files")
 
     def on_files_drained(self) -> None:
-        """In the writer's thread, as ``on_screen_drained``."""
+        """Release the output paused for the files; called in the writer's thread."""
         self._loop.call_soon_threadsafe(self._tree.release_output, "files")
 
     def on_screen_full(self) -> None:

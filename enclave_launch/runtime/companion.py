@@ -19,29 +19,33 @@ class LaunchControl(Protocol):
     """What a companion may do to the launch."""
 
     def say(self, level: Level, message: str) -> None:
-        """A line of the launch log."""
+        """Write a line to the launch log."""
 
     def tell(self, event: RunEvent) -> None:
-        """An event for all who watch the launch, the companion included."""
+        """Publish an event to everything that observes the launch, the companion included."""
 
     def shut_down(self, reason: str) -> None: ...
 
 
 class LaunchCompanion(Protocol):
-    """``opened`` comes before the first process, ``closed`` after the last one has ended. It hears of an event before
-    others do: what it tells when ``LaunchOver`` comes is still heard before that. Who inherits from this does nothing
-    where it does not say what."""
+    """Something that accompanies a launch: ``opened`` before the first process, ``closed`` after the last one has
+    exited.
+
+    It sees each event before other observers do: what it publishes on ``LaunchOver`` still reaches them first. A
+    subclass overrides only what it needs."""
 
     @property
     def records(self) -> bool:
-        """Once opened: will it tell endpoints as they are made?"""
+        """Return True if the companion records what the nodes request of rcl."""
         return False
 
     def opened(self, launch: LaunchControl) -> None:
-        """:raises EnclaveLaunchError: it cannot go along, so nothing is started."""
+        """Start accompanying ``launch``, before any process.
+
+        :raises EnclaveLaunchError: it cannot, so nothing is started."""
 
     def prepared(self, process: ResolvedProcess, spec: ProcessSpec) -> ProcessSpec:
-        """What to start, when everything else has been decided; asked before each start."""
+        """Return what to start for ``process``; called last, before each start."""
         return spec
 
     def happened(self, event: RunEvent) -> None: ...
@@ -54,18 +58,20 @@ class LaunchCompanion(Protocol):
 
 
 class Together:
-    """Several companions as one: asked and told in their order."""
+    """Several companions as one, called in their order."""
 
     def __init__(self, *companions: LaunchCompanion) -> None:
         self._companions = companions
 
     @property
     def records(self) -> bool:
-        """Whether one of them does."""
+        """Return True if one of the companions records."""
         return any(each.records for each in self._companions)
 
     def opened(self, launch: LaunchControl) -> None:
-        """:raises EnclaveLaunchError: one of them cannot go along."""
+        """Open all companions.
+
+        :raises EnclaveLaunchError: one of them cannot accompany the launch."""
         for each in self._companions:
             each.opened(launch)
 
@@ -88,7 +94,8 @@ class Together:
 
 
 def companion_first(companion: LaunchCompanion | None, observe: Observer) -> Observer:
-    """The companion first: what it adds to the record is there when others look."""
+    """Return an observer that informs ``companion`` before ``observe``, so that what it records is visible to
+    others."""
     if companion is None:
         return observe
     told = companion

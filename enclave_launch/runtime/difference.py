@@ -21,12 +21,12 @@ _NOT_FORESEEN = (
 
 
 def compared(process: ResolvedProcess, planned: Sequence[ResolvedProcess]) -> str:
-    """How ``process`` differs from what was planned in its place."""
+    """Describe how ``process`` differs from what was planned in its place."""
     return _compared(process, planned, _process_facts, (_same_program, _same_node))
 
 
 def compared_component(component: ResolvedComponent, planned: Sequence[ResolvedComponent]) -> str:
-    """As ``compared``, of a component."""
+    """Describe how ``component`` differs from what was planned in its place."""
     return _compared(component, planned, _component_facts, (_same_plugin,))
 
 
@@ -88,7 +88,7 @@ def _component_facts(component: ResolvedComponent) -> _Facts:
 
 
 def _same_program(process: ResolvedProcess, other: ResolvedProcess) -> bool:
-    """The same program, started at the same place in the launch files."""
+    """Return True if both run the same program, started at the same place in the launch files."""
     return process.program == other.program and process.location == other.location
 
 

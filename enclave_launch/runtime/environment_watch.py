@@ -49,7 +49,9 @@ class Unplanned(NamedTuple):
 
 
 def unplanned(watched: Watched, children: Mapping[int, set[int]]) -> Iterator[Unplanned]:
-    """What of one process and its descendants has other variables. ``children``: by the pid of the parent."""
+    """Yield those of a process and its descendants that run with other variables than planned.
+
+    :param children: pids by the pid of their parent"""
     for pid in (watched.pid, *descendants(watched.pid, children)):
         if pid == watched.pid or _speaks_dds(pid):
             environment = environment_of(pid)
@@ -59,8 +61,10 @@ def unplanned(watched: Watched, children: Mapping[int, set[int]]) -> Iterator[Un
 
 
 def environment_of(pid: int) -> dict[str, str] | None:
-    """As the program was started with it; None where that cannot be told: the process has ended, belongs to somebody
-    else, or has written over it (as those do that change their title); /proc is of another PID namespace."""
+    """Return the environment that ``pid`` was started with.
+
+    None if it cannot be known: the process has exited, belongs to another user, or has overwritten it (as programs
+    do that change their title), or /proc belongs to another PID namespace."""
     if not proc_is_ours():
         return None
     try:

@@ -28,7 +28,7 @@ class EnclaveGate(Protocol):
     """Asked before every start, one call at a time: ``granted`` first, else ``ensure`` in a worker thread."""
 
     def granted(self, process: ResolvedProcess) -> StartAdditions | None:
-        """The answer of ``ensure`` where it takes no work: nobody touched the enclave since it was looked at."""
+        """Return what ``ensure`` would if that needs no work: the enclave is unchanged since the last check."""
 
     def ensure(self, process: ResolvedProcess) -> StartAdditions:
         """Return once the enclave of ``process`` is complete on disk; idempotent.
@@ -37,17 +37,17 @@ class EnclaveGate(Protocol):
         """
 
     def ensure_components(self, components: Sequence[ResolvedComponent]) -> None:
-        """The same for components about to be loaded into a container that runs already."""
+        """Check components about to be loaded into a running container."""
 
     def launcher(self) -> StartAdditions | None:
-        """For our own ROS node, where the plan has calls for it to make."""
+        """Return the additions for the launcher's own ROS node, if the plan has service calls for it."""
 
 
 class Provider(Protocol):
     """What makes enclaves complete: implemented over a plan and a keystore."""
 
     def granted(self, process: ResolvedProcess) -> StartAdditions | None:
-        """What takes no work; None for every process that the plan does not have."""
+        """Return the additions if they need no work, None for every process that is not in the plan."""
 
     def ensure(self, process: ResolvedProcess) -> StartAdditions: ...
 
@@ -62,8 +62,9 @@ class LateProcess(RuntimeFailure):
 
 
 def identity(process: ResolvedProcess) -> tuple[object, ...]:
-    """What decides the permissions of a process. Not its number, its whole command line or its parameter files,
-    which differ between a dry run and a live one."""
+    """Return what decides the permissions of a process.
+
+    Excludes its number, command line and parameter files, which differ between a dry run and a live one."""
     return (
         process.kind,
         process.package,
@@ -78,7 +79,7 @@ def identity(process: ResolvedProcess) -> tuple[object, ...]:
 
 
 def component_identity(component: ResolvedComponent) -> tuple[object, ...]:
-    """What decides the permissions of a component, as ``identity`` does for a process."""
+    """Return what decides the permissions of a component, as ``identity`` does for a process."""
     return (
         component.container,
         component.package,
@@ -128,9 +129,8 @@ class PlannedGate:
         return grant
 
     def ensure_components(self, components: Sequence[ResolvedComponent]) -> None:
-        """A container reads its permissions once, at its start: what comes late cannot be granted any
-        more.
-        """
+        """Refuse components that are not in the plan: a container reads its permissions once, at its start, so
+        nothing can be granted later."""
         for component in components:
             if component_identity(component) not in self._components:
                 what = f"component {component.program} for {component.container} at {component.location}"

@@ -91,7 +91,7 @@ class LaunchLog:
             )
 
     def file(self, name: str) -> FileSink:
-        """The one sink for ``name`` in the log directory. Slashes (a node called by its full name) become ``_``."""
+        """Return the sink for ``name`` in the log directory; slashes (of a fully qualified node name) become ``_``."""
         name = name.replace("/", "_")
         if name not in self._files:
             self._files[name] = self._file_sink(name)
@@ -101,7 +101,7 @@ class LaunchLog:
         return FileSink(self.directory / name, self._tell_on_screen, self._limit)
 
     def _tell_on_screen(self, text: str) -> None:
-        """In the files' thread, of trouble with a file: there is no other place to say it."""
+        """Report trouble with a log file on the screen; called in the files' thread."""
         self._writers.screen.write(self.screen, (self._on_screen("ERROR", "launch", text) + "\n").encode())
 
     def close(self) -> None:
@@ -159,7 +159,8 @@ def _with_time(level: Level, name: str, message: str) -> str:
 
 
 def _format_from(environment: Mapping[str, str], variable: str, default: Format) -> Format:
-    """``{``-style format over the attributes of a ``logging.LogRecord``, or one of launch's two aliases."""
+    """Return the line format that ``variable`` selects: a ``{``-style format over the attributes of a
+    ``logging.LogRecord``, or one of launch's two aliases."""
     override = environment.get(variable)
     if not override or override == "default":
         return default
@@ -186,7 +187,7 @@ def _format_of_records(text: str) -> Format:
 
 
 def log_base_directory(environment: Mapping[str, str]) -> Path:
-    """``$ROS_LOG_DIR``, else ``$ROS_HOME/log``, else ``~/.ros/log``; an empty variable counts as unset."""
+    """Return ``$ROS_LOG_DIR``, else ``$ROS_HOME/log``, else ``~/.ros/log``; an empty variable counts as unset."""
     chosen = environment.get("ROS_LOG_DIR")
     if not chosen:
         chosen = os.path.join(environment.get("ROS_HOME") or os.path.join("~", ".ros"), "log")
@@ -194,10 +195,9 @@ def log_base_directory(environment: Mapping[str, str]) -> Path:
 
 
 def make_log_directory(base: Path, now: datetime, host: str, pid: int) -> Path:
-    """A new ``<date>-<host>-<pid>`` below ``base``, with the link ``latest`` beside it renewed.
+    """Create ``<date>-<host>-<pid>`` below ``base`` and point the link ``latest`` beside it there.
 
-    :raises RuntimeFailure: it cannot be written.
-    """
+    :raises RuntimeFailure: it cannot be written."""
     directory = base / f"{now.strftime('%Y-%m-%d-%H-%M-%S-%f')}-{host}-{pid}"
     try:
         directory.mkdir(parents=True)

@@ -121,7 +121,7 @@ class LiveHost(BaseHost):
         context.add_completion_future(services.load(components))
 
     def launcher_call(self, call: LauncherCall) -> None:
-        """Noted in the plan; made by ``ros_services``."""
+        """Ignore the call: the plan has it, ``ros_services`` makes it."""
 
     def change_state(self, node: LifecycleNode, transition_id: int, context: LaunchContext) -> None:
         services = self._services()
@@ -198,7 +198,7 @@ class LiveHost(BaseHost):
         return self._companion.prepared(process, spec) if self._companion is not None else spec
 
     def _watched(self) -> list[Watched]:
-        """What runs, with the variables that its enclave needs."""
+        """Return the running processes, each with the variables that its enclave needs."""
         running = ((live.process.process_name, live.pid) for live in self.processes)
         return [Watched(name, pid, self._planned.get(name, {})) for name, pid in running if pid is not None]
 

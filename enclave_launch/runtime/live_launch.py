@@ -170,11 +170,11 @@ class LiveLaunch:
         self._enter_shutdown()
 
     def say(self, level: Level, message: str) -> None:
-        """A line of the launch log."""
+        """Write a line to the launch log."""
         self._log.log(level, "launch", message)
 
     def tell(self, event: RunEvent) -> None:
-        """An event that a companion has seen."""
+        """Publish an event that a companion has seen."""
         self._observe(event)
 
     def on_signal(self, number: Signals) -> None:
@@ -221,7 +221,7 @@ class LiveLaunch:
         return status
 
     def _look_at_clock(self) -> None:
-        """Every minute, since a clock can be set; more often near the end."""
+        """Check the deadline every minute, since a clock can be set, and more often shortly before it."""
         deadline = self._settings.deadline
         if deadline is None or self._shutting_down:
             return
@@ -244,7 +244,7 @@ class LiveLaunch:
         self._context.emit_event_sync(IncludeLaunchDescription(self.description()))
 
     def description(self) -> Any:
-        """What is launched: the file, as ``ros2 launch`` includes it."""
+        """Return what is launched: the file, as ``ros2 launch`` includes it."""
         return top_description(self._source.launch_file, self._source.arguments)
 
     async def _turn(self) -> None:
@@ -268,8 +268,10 @@ class LiveLaunch:
         await self._wait_for(pending)
 
     def _end_of_endless_events(self) -> None:
-        """An event that emits itself would hold up the end for ever: when nothing else is left, few more are handled.
-        Raises ``_Over``."""
+        """Limit the events handled after all processes have exited, since an event that emits itself would never let
+        the launch end.
+
+        :raises _Over: the limit is reached."""
         if not self._shutting_down or self._pending():
             return
         self._last_events += 1
@@ -306,7 +308,7 @@ class LiveLaunch:
             self._services.abandon()
 
     def _on_error(self, error: Exception) -> None:
-        """As launch does, with the place in the launch file where evaluation knows it."""
+        """Log the error as launch does, with its place in the launch file if evaluation knows it."""
         self._failed = True
         file = self._source.launch_file
         told = error if isinstance(error, EnclaveLaunchError) else launch_file_error(error, file)
@@ -318,7 +320,7 @@ class LiveLaunch:
         self.shut_down(message)
 
     def _on_failure(self, error: EnclaveLaunchError) -> None:
-        """A process could not be secured: nothing that depends on it is started, the launch ends."""
+        """End the launch: a process could not be secured, so nothing that depends on it is started."""
         self._failed = True
         self.say("CRITICAL", str(error))
         self._observe(LaunchFailed(str(error)))

@@ -86,12 +86,12 @@ class LiveProcess:
 
     @property
     def pid(self) -> int | None:
-        """Of the incarnation that runs."""
+        """Return the pid of the running incarnation, if any."""
         child = self._supervised.child
         return child.pid if child is not None and child.running else None
 
     def interrupt_again(self) -> None:
-        """The user pressed Ctrl-C once more; a terminal would have passed that on."""
+        """Pass on another Ctrl-C, as a terminal would."""
         self._supervised.signal(Signals.SIGINT, quiet=True)
 
     # Watcher
@@ -171,7 +171,7 @@ class CalledAtEvent(EventHandler):
 
 
 def _emulate_tty(action: ExecuteLocal, context: LaunchContext) -> bool:
-    """The launch configuration ``emulate_tty`` overrides what the action says."""
+    """Return the launch configuration ``emulate_tty``, or the action's attribute if it is not set."""
     if "emulate_tty" not in context.launch_configurations:
         return bool(action.emulate_tty)
     text = context.launch_configurations["emulate_tty"]
@@ -179,7 +179,9 @@ def _emulate_tty(action: ExecuteLocal, context: LaunchContext) -> bool:
 
 
 def _line_renderer(action: ExecuteLocal) -> Callable[[str], str] | None:
-    """How a line is shown, ``None`` for launch's default; tried once, so that no output is lost to a format error."""
+    """Return how lines are formatted, None for launch's default.
+
+    The format is tried once here, so that no output is lost to a format error later."""
     output_format = action.output_format
     if output_format == DEFAULT_FORMAT:
         return None

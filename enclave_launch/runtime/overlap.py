@@ -35,7 +35,9 @@ class Overlap:
 
 @contextmanager
 def _raised_limit() -> Iterator[None]:
-    """Each process costs us three. The warden runs already: its children keep the limit we were given."""
+    """Raise the soft limit of open files, since each process takes three.
+
+    The warden runs already: its children keep the limit that the launcher was given."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
     try:

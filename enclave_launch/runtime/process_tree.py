@@ -156,13 +156,13 @@ class Child:
             self._tree.send("signal" if whole_group else "signal_one", self.identifier, int(number))
 
     def write_stdin(self, data: bytes) -> None:
-        """As much as the pipe takes; a process that does not read its stdin must not block the launch."""
+        """Write as much as the pipe takes: a process that does not read its stdin must not block the launch."""
         if self._stdin >= 0:
             with contextlib.suppress(BlockingIOError, BrokenPipeError):
                 os.write(self._stdin, data)
 
     async def wait(self) -> int:
-        """The exit status, after all that the process itself wrote has been received."""
+        """Wait for the process and all output it wrote; return its exit status."""
         status = await asyncio.shield(self.exited)
         for pump in self.pumps:
             pump.drain()
@@ -173,7 +173,8 @@ class Child:
         self._tree.send("sweep", self.identifier, self.pid)
 
     def retire(self) -> None:
-        """It has ended; what it left running may write on until the launch ends."""
+        """Release the streams of an exited process; those that its descendants still write to stay open until the
+        launch ends."""
         if all(pump.closed for pump in self.pumps):
             self.release()
         else:
@@ -299,7 +300,7 @@ class ProcessTree:
             child.exited.set_result(int(str(rest[0])))
 
     def _on_lost(self) -> None:
-        """The warden was killed. Its children died with it; end what they had started."""
+        """Kill what is left after the warden was killed: its children died with it, what they had started did not."""
         for child in list(self._children.values()):
             if child.running:
                 with contextlib.suppress(ProcessLookupError, PermissionError):
@@ -313,7 +314,7 @@ class ProcessTree:
 
 
 def _open_streams(emulate_tty: bool) -> tuple[int, int, list[tuple[int, int]]]:
-    """The child's end of its standard input and ours, and both ends of its two outputs. All or none of them."""
+    """Open the child's end of its standard input and ours, and both ends of its two outputs; all or none."""
     with contextlib.ExitStack() as opened:
         stdin, ours = _kept(opened, os.pipe())
         outputs = [_kept(opened, _open_output(emulate_tty)) for _ in range(2)]

@@ -31,7 +31,7 @@ ALTERNATIVE = (
 
 
 def rclpy_available() -> bool:
-    """Whether ``rclpy`` can be found; it is not imported."""
+    """Return True if ``rclpy`` can be found, without importing it."""
     return importlib.util.find_spec("rclpy") is not None
 
 
@@ -72,19 +72,18 @@ class RosServices:
         self._thread.start()
 
     def load(self, components: Sequence[ResolvedComponent]) -> asyncio.Future[None]:
-        """One after another; a component that cannot be loaded is logged, as launch does, and the rest
-        goes on.
-        """
+        """Load components one after another; one that cannot be loaded is logged, as launch does, and the rest
+        goes on."""
         return self._loop.run_in_executor(None, self._load_all, tuple(components))
 
     def change_state(self, node: str, transition: int) -> asyncio.Future[bool]:
-        """``transition``: a constant of ``lifecycle_msgs/msg/Transition``."""
+        """Request a lifecycle transition.
+
+        :param transition: a constant of ``lifecycle_msgs/msg/Transition``"""
         return self._loop.run_in_executor(None, self._change_state, node, transition)
 
     def watch_state(self, node: str, on_transition: Callable[[Any], None]) -> None:
-        """``on_transition`` gets each ``lifecycle_msgs/msg/TransitionEvent`` of ``node``, in the
-        launch's loop.
-        """
+        """Call ``on_transition`` in the launch's loop for each ``lifecycle_msgs/msg/TransitionEvent`` of ``node``."""
         from lifecycle_msgs.msg import TransitionEvent
 
         self._node.create_subscription(
@@ -95,7 +94,7 @@ class RosServices:
         )
 
     def abandon(self) -> None:
-        """The launch is ending: calls that wait for a service that never comes give up."""
+        """Give up all calls that still wait for a service: the launch is ending."""
         self._closing.set()
 
     def close(self) -> None:
@@ -144,7 +143,7 @@ class RosServices:
         return response is not None and bool(response.success)
 
     def _call(self, kind: Any, service: str, request: Any) -> Any:
-        """The response; None when the launch ended first."""
+        """Call ``service`` and return its response, None if the launch ended first."""
         client = self._node.create_client(kind, service)
         try:
             if not self._wait(lambda: client.wait_for_service(timeout_sec=0.2), f"'{service}' service"):

@@ -28,7 +28,7 @@ class LineBuffer:
         self._length = 0
 
     def feed(self, data: bytes) -> bytes:
-        """The complete lines that ``data`` finishes, each with its line end; empty when there is none yet."""
+        """Return the complete lines that ``data`` finishes, each with its line end; empty if there is none yet."""
         cut = data.rfind(b"\n") + 1
         if not cut and self._length + len(data) < LONGEST_LINE:
             self._rest.append(data)
@@ -40,7 +40,7 @@ class LineBuffer:
         return lines
 
     def flush(self) -> bytes:
-        """What is left, as a line."""
+        """Return the unfinished rest as a line."""
         rest = b"".join(self._rest)
         self._rest, self._length = [], 0
         return rest + b"\n" if rest else b""
@@ -64,7 +64,7 @@ class OutputRouter:
 
     @property
     def waits_for(self) -> Mapping[Stream, frozenset[Hold]]:
-        """What may pause each stream: a full queue of the files, or of the screen."""
+        """Return what may pause each stream: a full queue of the files, or of the screen."""
         return {
             stream: _holds(self._log, [sink for sink, _ in sinks]) for stream, sinks in self._sinks.items()
         }
@@ -94,7 +94,7 @@ class OutputRouter:
 
 
 def prefixed(lines: bytes, prefix: bytes) -> bytes:
-    """``lines``, which ends with a line end, with ``prefix`` before each."""
+    """Put ``prefix`` before each of ``lines``, whose last one ends with a line end."""
     return prefix + lines[:-1].replace(b"\n", b"\n" + prefix) + b"\n"
 
 
@@ -105,7 +105,7 @@ def _holds(log: LaunchLog, sinks: Sequence[Sink]) -> frozenset[Hold]:
 
 
 def _sinks_of(log: LaunchLog, name: str, stream: Stream, routes: Routes) -> Iterable[tuple[Sink, bool]]:
-    """Each sink of a stream with whether its lines carry the time, as only launch.log's do."""
+    """Yield each sink of a stream, with True if its lines carry the time, as only launch.log's do."""
     wanted = routes["both"] | routes[stream]
     if "screen" in wanted:
         yield log.screen, False

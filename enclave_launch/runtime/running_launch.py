@@ -70,12 +70,12 @@ Condition = Callable[["RunningLaunch"], bool]
 
 
 def started(name: str) -> Condition:
-    """The process ``name`` (``talker-1``) was started."""
+    """Return a condition that holds once the process ``name`` (``talker-1``) was started."""
     return lambda launch: name in launch.processes and launch.processes[name].starts > 0
 
 
 def printed(name: str, text: str = "") -> Condition:
-    """The process ``name`` wrote ``text``; without it, anything."""
+    """Return a condition that holds once the process ``name`` wrote ``text``, or anything if it is empty."""
     wanted = text.encode()
 
     def holds(launch: RunningLaunch) -> bool:
@@ -86,8 +86,12 @@ def printed(name: str, text: str = "") -> Condition:
 
 
 def endpoint_seen(name: str, endpoint: str, *, kind: EndpointKind | None = None, node: str = "") -> Condition:
-    """A node of the process ``name`` has ``endpoint`` (its final name, ``/chatter``) now; ``kind`` and ``node``, its
-    full name, narrow it down. Needs a launch that is recorded: else asking raises ``RuntimeFailure``."""
+    """Return a condition that holds while a node of the process ``name`` has ``endpoint``.
+
+    :param endpoint: its final name, ``/chatter``
+    :param kind: consider only endpoints of this kind
+    :param node: consider only the node of this fully qualified name
+    :raises RuntimeFailure: from the condition, if the launch is not recorded."""
 
     def holds(launch: RunningLaunch) -> bool:
         if not launch.is_recorded:
@@ -112,7 +116,9 @@ class RunningLaunch:
     """Made by ``enclave_launch.start``. As a context manager it is stopped at the end of the block."""
 
     def __init__(self, main: Main) -> None:
-        """:raises RuntimeFailure: as ``run``, before anything was started."""
+        """Start the launch.
+
+        :raises RuntimeFailure: as ``run``, before anything was started."""
         self._changed = threading.Condition()
         self._processes: dict[str, RunningProcess] = {}
         self._events: deque[RunEvent] = deque()
@@ -139,7 +145,7 @@ class RunningLaunch:
 
     @property
     def exit_status(self) -> int | None:
-        """As ``run`` gives it; ``None`` while the launch runs."""
+        """Return the exit status as ``run`` does, None while the launch runs."""
         return self._exit_status
 
     @property
@@ -149,7 +155,8 @@ class RunningLaunch:
 
     @property
     def warden_pid(self) -> int | None:
-        """The process that all others of this launch hang on (``runtime.warden``); ``None`` before it is there."""
+        """Return the pid of the process that is the parent of all others of this launch (``runtime.warden``); None
+        before it runs."""
         return self._service.warden_pid if self._service is not None else None
 
     def wait(self, timeout: float | None = None) -> int:
@@ -178,11 +185,10 @@ class RunningLaunch:
             )
 
     def events(self) -> Iterator[RunEvent]:
-        """Every event from the first one on, as they happen; the last is ``LaunchOver``.
+        """Yield every event from the first one on, as they happen; the last is ``LaunchOver``.
 
-        Remembered are the last 10,000 events and 8 MiB of output: who comes late, or reads slower than that, misses
-        the older ones.
-        """
+        The last 10,000 events and 8 MiB of output are remembered: a reader that comes late, or is slower than
+        that, misses the older ones."""
         number = 0
         while True:
             with self._changed:
@@ -235,7 +241,7 @@ class RunningLaunch:
         self._loop, self._service = asyncio.get_running_loop(), service
 
     def _observe(self, event: RunEvent) -> None:
-        """In the launch's thread."""
+        """Remember an event and wake those who wait; called in the launch's thread."""
         with self._changed:
             self._remember(event)
             self._follow(event)
@@ -258,7 +264,8 @@ class RunningLaunch:
             self._processes[event.name] = _after(self._processes[event.name], event)
 
     def _wait_for(self, condition: Callable[[], bool], timeout: float | None, what: str) -> None:
-        """``condition`` is asked without the lock: it may do anything, resolve another launch file for instance."""
+        """Wait for ``condition``, evaluated without the lock: it may do anything, such as resolve another launch
+        file."""
         deadline = None if timeout is None else time.monotonic() + timeout
         while True:
             seen = self._version

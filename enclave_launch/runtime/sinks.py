@@ -90,7 +90,7 @@ class FileSink:
             self._descriptor, self._identity = -1, None
 
     def _write_below(self, limit: int, data: bytes) -> None:
-        """A busy process gives megabytes at once: cut between lines; only a line may be longer than the limit."""
+        """Write ``data`` cut between lines at the size limit; only a single line may exceed it."""
         start = 0
         while start < len(data):
             present = os.fstat(self._descriptor).st_size
@@ -189,7 +189,7 @@ def _merged(batch: list[tuple[Sink, bytes]]) -> list[tuple[Sink, bytes]]:
 
 
 def _descriptor_of(stream: TextIO | None) -> int | None:
-    """None for a stream in memory, as test runners put in place."""
+    """Return the descriptor of ``stream``, None for one in memory, as test runners use."""
     if stream is None:
         return None
     try:

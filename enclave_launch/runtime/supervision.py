@@ -34,7 +34,7 @@ def pause_after(short_lives: int) -> float:
 
 
 def _remedy(error: OSError) -> str:
-    """For what is lacking for one more process, not in it."""
+    """Return what to do if the system, not the program, prevents a start."""
     if error.errno in (EMFILE, ENFILE):
         return "; each process takes three descriptors of the launcher: raise its limit (ulimit -Hn)"
     return ""
@@ -138,7 +138,10 @@ class SupervisedProcess:
             self._begin_escalation(patience, quiet)
 
     def signal(self, number: Signals, *, quiet: bool = False, whole_group: bool = True) -> None:
-        """``whole_group``: to what it started, too; else to the process alone, as a launch file's ``SignalProcess``."""
+        """Send a signal to the process.
+
+        :param whole_group: also to what it started; otherwise to the process alone, as a launch file's
+            ``SignalProcess``"""
         if self._child is None or not self._child.running:
             return
         if not quiet:
@@ -168,7 +171,7 @@ class SupervisedProcess:
         return returncode
 
     def _clear_away(self) -> None:
-        """A successor must not meet what its predecessor left running."""
+        """Kill what the previous incarnation left running, before its successor starts."""
         if self._child is not None:
             self._child.sweep()
             self._child.release()

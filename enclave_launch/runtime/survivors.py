@@ -19,9 +19,9 @@ from pathlib import Path
 from enclave_launch.runtime.overlap import Overlap
 from enclave_launch.runtime.warden import (
     PR_SET_CHILD_SUBREAPER,
-    asked,
     children_by_parent,
     descendants,
+    group_of,
     kill_all,
     load_libc,
 )
@@ -70,7 +70,7 @@ class Survivors:
 
     def _adopted(self) -> set[int]:
         children = children_by_parent().get(os.getpid(), set()) - self._own - _wardens
-        return {pid for pid in children if asked(os.getsid, pid) not in (os.getsid(0), -1)}
+        return {pid for pid in children if group_of(os.getsid, pid) not in (os.getsid(0), -1)}
 
 
 def _has_ended(child: int) -> bool:
@@ -112,7 +112,7 @@ class Cgroup:
 
     @classmethod
     def below_ours(cls) -> Cgroup | None:
-        """A new one below the cgroup of this process; ``None`` unless that was delegated to us."""
+        """Create a cgroup below that of this process; return None if that was not delegated to us."""
         ours = own_cgroup()
         if ours is None or not is_delegated(ours):
             return None
@@ -133,13 +133,13 @@ class Cgroup:
             (self._directory / "cgroup.kill").write_text("1")
 
     def remove(self) -> None:
-        """It is empty, but for processes that the kernel has not finished with."""
+        """Remove the cgroup if it is empty; one that the kernel has not finished with stays."""
         with contextlib.suppress(OSError):
             self._directory.rmdir()
 
 
 def own_cgroup() -> Path | None:
-    """The folder of this process's cgroup in the version 2 hierarchy; ``None`` where there is none."""
+    """Return the folder of this process's cgroup in the version 2 hierarchy, None if there is none."""
     try:
         places = Path("/proc/self/cgroup").read_text().splitlines()
         mounts = Path("/proc/self/mountinfo").read_text().splitlines()
@@ -152,7 +152,7 @@ def own_cgroup() -> Path | None:
 
 
 def is_delegated(cgroup: Path) -> bool:
-    """Whether systemd has handed ``cgroup`` to this user (``Delegate=``), and groups may be made in it."""
+    """Return True if systemd has delegated ``cgroup`` to this user (``Delegate=``) and groups may be made in it."""
     for name in DELEGATED:
         with contextlib.suppress(OSError):
             if os.getxattr(cgroup, name) == b"1":

@@ -71,7 +71,7 @@ def prctl(option: int, value: int) -> None:
 
 
 def load_libc() -> Any:
-    """A ``ctypes.CDLL``, before the first fork; None where there is no prctl."""
+    """Return the C library, loaded before the first fork; None on systems without prctl."""
     if not sys.platform.startswith("linux"):
         return None
 
@@ -197,7 +197,9 @@ class Warden:
             self.connection.sendall(HEADER.pack(len(data)) + data)
 
     def spawn(self, identifier: int, program: list[Any], streams: list[int]) -> None:
-        """``program``: argv, env, cwd."""
+        """Start a program.
+
+        :param program: argv, env, cwd"""
         parent = os.getpid()
         report, report_writer = os.pipe()  # close-on-exec: end of file means that exec succeeded
         with open(report, "rb") as reader:
@@ -235,7 +237,7 @@ class Warden:
         """SIGKILL to what a child left running in its session, or group, when it ended."""
         if leader not in self.identifiers:
             belongs = os.getsid if self.terminal is None else os.getpgid
-            left = {pid for pid in descendants(os.getpid()) if asked(belongs, pid) == leader}
+            left = {pid for pid in descendants(os.getpid()) if group_of(belongs, pid) == leader}
             kill_all(left, signal.SIGKILL)
 
     def reap(self) -> bool:
@@ -260,7 +262,7 @@ class Warden:
                     self.send("interrupted", identifier)
 
     def on_stopped(self, pid: int, number: int) -> None:
-        """It asks for the terminal, or somebody stopped it for reasons of his own."""
+        """Lend the terminal to a child that was stopped for using it; a child stopped for other reasons stays so."""
         if self.terminal is not None and number in (signal.SIGTTIN, signal.SIGTTOU):
             self.terminal.lend(pid)
 
@@ -286,7 +288,7 @@ class Warden:
 
 
 def become(program: list[Any], streams: list[int], report: int, parent: int, *, own_session: bool) -> None:
-    """In the forked child: turn into the program; on failure tell why through ``report`` and end."""
+    """Turn the forked child into the program; on failure write the reason to ``report`` and exit."""
     argv, env, cwd = program
     path = argv[0]
     try:
@@ -324,8 +326,8 @@ def move_above(streams: list[int]) -> list[int]:
     ]
 
 
-def asked(call: Callable[[int], int], pid: int) -> int:
-    """``os.getsid`` or ``os.getpgid`` of ``pid``; -1 when it is gone."""
+def group_of(call: Callable[[int], int], pid: int) -> int:
+    """Return ``os.getsid`` or ``os.getpgid`` of ``pid``, -1 if it is gone."""
     try:
         return call(pid)
     except ProcessLookupError:
@@ -340,7 +342,7 @@ def kill_all(pids: set[int], number: int) -> None:
 
 
 def children_by_parent() -> dict[int, set[int]]:
-    """Every live process of the machine below its parent, from /proc; empty where there is none of ours."""
+    """Return the pids of all live processes of the machine by the pid of their parent, from /proc."""
     children: dict[int, set[int]] = {}
     for entry in os.listdir("/proc") if proc_is_ours() else ():
         if entry.isdigit():
@@ -361,7 +363,9 @@ def proc_is_ours() -> bool:
 
 
 def descendants(root: int, children: Mapping[int, set[int]] | None = None) -> set[int]:
-    """All live processes below ``root``, among ``children_by_parent`` of this moment or a little before."""
+    """Return the pids of all live processes below ``root``.
+
+    :param children: a recent result of ``children_by_parent``"""
     children = children_by_parent() if children is None else children
     found: set[int] = set()
     waiting = [root]
@@ -379,7 +383,7 @@ def set_oom_score(score: str) -> None:
 
 
 def own_oom_score() -> str:
-    """``oom_score_adj`` as this process inherited it; ``0`` where the kernel does not tell."""
+    """Return ``oom_score_adj`` as this process inherited it, ``0`` if it cannot be read."""
     try:
         with open("/proc/self/oom_score_adj", encoding="ascii") as file:
             return file.read().strip()

@@ -40,7 +40,9 @@ class WardenChannel:
         self._loop.add_reader(self._socket, self._receive)
 
     def send(self, *message: Message, descriptors: Sequence[int] = ()) -> None:
-        """In order; ``descriptors`` become the channel's, which closes them once they are sent."""
+        """Queue a message, sent in order.
+
+        :param descriptors: closed by the channel once they are sent"""
         data = marshal.dumps(message)
         self._waiting.append((HEADER.pack(len(data)) + data, descriptors))
         self._flush()

@@ -51,7 +51,7 @@ class WardenProcess:
 
 @contextlib.contextmanager
 def _terminal(interactive: bool) -> Iterator[list[int]]:
-    """A descriptor of our controlling terminal, if we are interactive and in its foreground."""
+    """Yield a descriptor of our controlling terminal if we are interactive and in its foreground."""
     try:
         descriptor = os.open("/dev/tty", os.O_RDWR) if interactive else -1
     except OSError:  # started without one: a service, a test runner
@@ -65,7 +65,8 @@ def _terminal(interactive: bool) -> Iterator[list[int]]:
 
 
 def _occupy_standard_descriptors() -> None:
-    """Where we were started with one of 0, 1, 2 closed: what we open must not end up there, and be printed into."""
+    """Open those of descriptors 0, 1 and 2 that we were started without, so that nothing else gets their numbers
+    and is printed into."""
     while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
         pass
     os.close(descriptor)

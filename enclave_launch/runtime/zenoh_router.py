@@ -55,7 +55,7 @@ class RouterAnswer(Enum):
 
 
 def find_router(prefixes: Sequence[str]) -> str | None:
-    """``rmw_zenohd`` of the first of these ament prefixes that has it."""
+    """Return the path of ``rmw_zenohd`` in the first of these ament prefixes that has it."""
     candidates = (os.path.join(prefix, PROGRAM) for prefix in prefixes)
     return next((path for path in candidates if os.access(path, os.X_OK)), None)
 
@@ -160,7 +160,7 @@ class ZenohRouter:
         self._thread.start()
 
     def _supervise(self) -> None:
-        """The only thread that starts it: with this thread the kernel ends it, too."""
+        """Start and restart the router; all starts are in this thread, since the kernel ends the router with it."""
         while not self._stop.is_set():
             seen = _state(self._place.configuration)
             try:
@@ -214,14 +214,15 @@ class ZenohRouter:
                 print(f"[rmw_zenohd] {text}", file=sys.stderr)
 
     def _is_of_our_look(self, text: str) -> bool:
-        """The router warns of each client without a certificate, with a wrong hint; ``who_answers`` is one."""
+        """Return True for the router's warning about a client without a certificate if ``who_answers`` was that
+        client."""
         ours = self._looks > 0 and "peer sent no certificates" in text
         self._looks -= ours
         return ours
 
 
 def missing_router(address: tuple[str, int], configuration: str) -> str:
-    """The error where no router answers and none can be started: what to install or to start."""
+    """Return the error if no router answers and none can be started: what to install or to start."""
     host, port = address
     return (
         f"processes of this launch are on Zenoh (rmw_zenoh_cpp), no router answers at tls/{host}:{port}, and none can "
@@ -241,7 +242,7 @@ def _state(path: str) -> object:
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
-    """As a terminal ends it; one that does not obey is killed."""
+    """Interrupt the process as a terminal does, kill it after five seconds."""
     with contextlib.suppress(ProcessLookupError):
         process.send_signal(signal.SIGINT)
     try:
@@ -255,6 +256,6 @@ _libc = load_libc()
 
 
 def _die_with_parent() -> None:
-    """In the child: it must not outlive us, however we end."""
+    """Ask the kernel, in the child, to kill it when the launcher exits."""
     if _libc is not None:
         _libc.prctl(PR_SET_PDEATHSIG, signal.SIGKILL)

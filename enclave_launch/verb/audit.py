@@ -16,7 +16,10 @@ from enclave_launch.recording.recording import Recording
 
 
 def audit_launch(plan: LaunchPlan, options: argparse.Namespace, settings: RunSettings) -> int:
-    """The status of the launch; else 1 when the plan would refuse something, or not everything could be seen."""
+    """Run the launch and report what the plan would refuse.
+
+    :returns: the status of the launch; if that is 0, 1 if the plan would refuse something or not everything was
+        visible."""
     warn(*plan.problems)
     audit = Audit(plan)
     recording = Recording(new_run(plan.launch_file, plan.distro, "none"), [audit])

@@ -31,7 +31,9 @@ Start = Callable[["LaunchCompanion"], int]
 
 
 def seconds(text: str | None) -> float | None:
-    """``10s``, ``2m`` as seconds. Raises ``UsageError``."""
+    """Convert ``10s`` or ``2m`` to seconds.
+
+    :raises UsageError: it is no duration."""
     try:
         return None if text is None else parse_duration(text).total_seconds()
     except KeystoreError as error:

@@ -118,7 +118,9 @@ EVALUATION: tuple[Option, ...] = (
 
 
 def size_in_bytes(text: str) -> int:
-    """``100M`` and the like. :raises argparse.ArgumentTypeError: anything else, or less than 4 KiB."""
+    """Convert ``100M`` and the like to bytes.
+
+    :raises argparse.ArgumentTypeError: it is no size, or less than 4 KiB."""
     found = re.fullmatch(r"(\d+)([kKmMgG]?)", text)
     size = int(found[1]) << {"": 0, "k": 10, "m": 20, "g": 30}[found[2].lower()] if found else 0
     if size < 4096:
@@ -161,7 +163,7 @@ DENIALS: tuple[Option, ...] = (
 
 
 def build_parser() -> argparse.ArgumentParser:
-    """All options, grouped by the question they answer."""
+    """Build the parser, its options grouped by the question they answer."""
     parser = CommandParser(
         prog="secure-launch",
         usage="secure-launch [options] PACKAGE LAUNCH_FILE [name:=value ...]\n"
@@ -198,7 +200,7 @@ def add_security_options(group: argparse._ArgumentGroup) -> None:
 
 
 def resolve_options(options: argparse.Namespace) -> ResolveOptions:
-    """What the options say about evaluation and permissions."""
+    """Return what the options say about evaluation and permissions."""
     return ResolveOptions(
         prefixes=tuple(options.prefix),
         manifests=tuple(options.nodl),

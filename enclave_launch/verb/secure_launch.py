@@ -24,9 +24,9 @@ from enclave_launch.plan import LaunchPlan
 from enclave_launch.prefixes import ament_prefixes
 from enclave_launch.report.explained import explainable, explained
 from enclave_launch.report.launch_file import arguments_text, description_text
-from enclave_launch.report.look import look_for
 from enclave_launch.report.params import params_yaml
 from enclave_launch.report.plan_json import plan_document, plan_json
+from enclave_launch.report.terminal_style import terminal_style_of
 from enclave_launch.report.tree import plan_tree
 from enclave_launch.security_environment import SecuritySettings
 from enclave_launch.verb.completion import offer_launches
@@ -79,7 +79,9 @@ def _main(line: CommandLine, parser: argparse.ArgumentParser) -> int:
 
 
 def _keystore(options: argparse.Namespace) -> str | None:
-    """The keystore that ``--secure`` is to use. Raises ``UsageError`` when there is none."""
+    """Return the keystore that ``--secure`` uses, None without it.
+
+    :raises UsageError: ``--secure`` has none."""
     if not options.secure:
         return None
     if options.keystore is None:
@@ -112,7 +114,9 @@ def show_plan(plan: LaunchPlan, options: argparse.Namespace, keystore: str | Non
 
 def _show_tree(plan: LaunchPlan, options: argparse.Namespace) -> int:
     shown = plan._replace(warnings=()) if options.quiet else plan
-    write_coloured(plan_tree(shown, look_for(sys.stdout, os.environ, verbose=options.verbose)), sys.stdout)
+    write_coloured(
+        plan_tree(shown, terminal_style_of(sys.stdout, os.environ, verbose=options.verbose)), sys.stdout
+    )
     return 0
 
 

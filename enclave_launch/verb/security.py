@@ -59,7 +59,7 @@ def _provision_options(options: argparse.Namespace) -> ProvisionOptions:
 
 
 def sign_elsewhere(options: argparse.Namespace, keystore: str) -> None:
-    """Where a passphrase is given, a process of its own signs: launch files run in this one. Called before they do."""
+    """Start a signing process if a passphrase is given; call it before launch files run in this process."""
     if _passphrase(options) is None or vars(options).get("signing") is not None:
         return
 
@@ -76,7 +76,7 @@ def _passphrase(options: argparse.Namespace) -> Secret | None:
 
 
 def created_notices(launch: ProvisionedLaunch) -> Iterator[str]:
-    """What of the keystore is new, in a few lines."""
+    """Yield a few lines about what is new in the keystore."""
     report = launch.report
     if _NEW_KEYSTORE in report.created:
         yield f"keystore {report.keystore} created"
@@ -101,7 +101,7 @@ def sharing_notices(plan: LaunchPlan) -> Iterator[str]:
 
 
 def repair_notices(launch: ProvisionedLaunch) -> Iterator[str]:
-    """What of the keystore was not as it should be and was repaired, one line each; new things are not repairs."""
+    """Yield a line for each part of the keystore that was repaired; new parts are not repairs."""
     report = launch.report
     if _NEW_KEYSTORE not in report.created:
         yield from (f"keystore {report.keystore}: {text}" for text in report.created)
@@ -111,7 +111,7 @@ def repair_notices(launch: ProvisionedLaunch) -> Iterator[str]:
 
 
 def expiry_notices(launch: ProvisionedLaunch, margin: str) -> Iterator[str]:
-    """What of ``launch`` ends within ``margin`` (a duration such as ``30d``), one line each."""
+    """Yield a line for each part of ``launch`` that expires within ``margin``, a duration such as ``30d``."""
     within, ends = parse_duration(margin), launch.report.ends
     if ends is not None and later(utc_now(), within) < ends:
         return

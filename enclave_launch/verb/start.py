@@ -76,7 +76,8 @@ def _launch_plainly(
 def _launch(
     plan: LaunchPlan, options: argparse.Namespace, keystore: str, companion: LaunchCompanion | None = None
 ) -> int | None:
-    """The exit status; ``None`` when it was ended in order to be renewed and started anew (``--restart-expiring``)."""
+    """Provision and run; return the exit status, None if the launch ended to be renewed and started again
+    (``--restart-expiring``)."""
     warn(*(() if options.quiet else plan.warnings))
     if not options.provision_only:
         _check_before_keys_are_made(plan, keystore)
@@ -106,7 +107,9 @@ def _launch(
 
 
 def _check_before_keys_are_made(plan: LaunchPlan, keystore: str) -> None:
-    """What ``run`` would refuse in any case, asked before the keystore is touched. Raises as ``run`` does."""
+    """Check what ``run`` would refuse in any case, before the keystore is touched.
+
+    :raises EnclaveLaunchError: as ``run``."""
     if plan.problems:
         return  # told first, by ``provision``
     check_programs(plan.evaluation.processes)

@@ -42,7 +42,7 @@ def find_target(words: Sequence[str], prefixes: Sequence[str]) -> LaunchTarget:
 
 
 def _beside(path: str) -> str:
-    """The file in the same folder that was probably meant."""
+    """Return a suggestion: the file in the same folder that was probably meant."""
     folder, name = os.path.split(path)
     beside = os.listdir(folder or ".") if os.path.isdir(folder or ".") else []
     return did_you_mean(name, [each for each in beside if each.endswith((".py", ".xml", ".yaml", ".yml"))])
@@ -65,13 +65,15 @@ def _in_package(package: str, file_name: str, prefixes: Sequence[str]) -> str:
 
 
 def _meant(package: str, prefixes: Sequence[str]) -> str:
-    """Of a package that is not installed, in brackets; the sentence goes on."""
+    """Return a suggestion for a package that is not installed, in brackets within the sentence."""
     meant = did_you_mean(package, ament_index.installed_packages(prefixes)).removeprefix("; ")
     return f" ({meant})" if meant else ""
 
 
 def parse_arguments(words: Sequence[str]) -> tuple[tuple[str, str], ...]:
-    """``name:=value`` words. Raises ``UsageError`` with upstream's message for anything else."""
+    """Parse ``name:=value`` words.
+
+    :raises UsageError: a word has another form; the message is upstream's."""
     with translated(RuntimeError, UsageError):
         return tuple(evaluate.parse_arguments(words))
 
@@ -81,9 +83,9 @@ def planned(target: LaunchTarget, options: argparse.Namespace, keystore: str | N
     plan = resolve_target(target, options)
     if keystore is None or not os.path.isdir(keystore):
         return plan
-    from enclave_launch.secured import told_of_shares  # cryptography
+    from enclave_launch.secured import with_shares_reported  # cryptography
 
-    return told_of_shares(plan, keystore)
+    return with_shares_reported(plan, keystore)
 
 
 def resolve_target(target: LaunchTarget, options: argparse.Namespace) -> LaunchPlan:

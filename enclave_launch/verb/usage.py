@@ -31,7 +31,7 @@ _VIEWS = ("explain", "dump_params", "show_args", "print_description")
 
 
 def read_command_line(parser: argparse.ArgumentParser, argv: Sequence[str] | None) -> CommandLine:
-    """As ``parse_intermixed_args``, keeping apart what was given and what is a default."""
+    """Parse as ``parse_intermixed_args`` does, separating given values from defaults."""
     defaults = {action.dest: action.default for action in parser._actions}
     for action in parser._actions:
         action.default = argparse.SUPPRESS
@@ -71,7 +71,9 @@ def check_options(line: CommandLine, parser: argparse.ArgumentParser) -> None:
 
 
 def check_views(line: CommandLine, actions: Sequence[argparse.Action]) -> bool:
-    """Whether the launch is only looked at. Raises ``UsageError`` where two options print or one has no effect."""
+    """Return True if the launch is only shown, not started.
+
+    :raises UsageError: two options print, or one has no effect."""
     views = [name for name in _VIEWS if name in line.given]
     if len(views) > 1:
         raise UsageError(f"{_flags(actions, views)} each print something of their own: give one of them")
@@ -92,7 +94,7 @@ def check_needs_secure(
 
 
 def unsecured_notice(environment: Mapping[str, str]) -> str:
-    """What a launch without ``--secure`` is, in one line."""
+    """Return one line about what a launch without ``--secure`` means."""
     if environment.get("ROS_SECURITY_ENABLE") == "true":
         return "without --secure: no process gets an enclave from here, each follows the ROS_SECURITY_ variables it has"
     return "unsecured: whoever reaches this DDS domain can read and write all that these processes say (no --secure)"
@@ -105,7 +107,7 @@ PERMISSIVE_NOTICE = (
 
 
 def _flags(actions: Iterable[argparse.Action], names: Collection[str]) -> str:
-    """As a person writes them, in the order of the help text."""
+    """List flags as a person writes them, in the order of the help text."""
     return ", ".join(
         next((flag for flag in action.option_strings if flag.startswith("--")), action.dest)
         for action in actions

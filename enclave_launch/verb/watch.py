@@ -21,7 +21,10 @@ from keystore.steps.tool_enclaves import enclaves_by_guid, provide_watcher
 
 
 def watch_plain_launch(plan: LaunchPlan, options: argparse.Namespace, settings: RunSettings) -> int:
-    """Of an unsecured launch. Gives its status; 1 for alarms. Raises ``UsageError`` for processes on Zenoh."""
+    """Run and watch an unsecured launch.
+
+    :returns: its status, 1 if there were alarms
+    :raises UsageError: a process is on Zenoh."""
     watch = DriftWatch(_seen_document(plan), _options(options))
     return watch.status(run(plan, options=settings._replace(watch=watch)))
 
@@ -48,7 +51,9 @@ def _enclaves_now(root: str, security: Security) -> Mapping[int, str]:
 
 
 def _seen_document(plan: LaunchPlan) -> dict[str, object]:
-    """The plan's. Raises ``UsageError`` for processes that no observer sees."""
+    """Return the plan's document.
+
+    :raises UsageError: no observer sees a process of it."""
     document = plan_document(plan)
     zenoh = out_of_sight([document])
     if zenoh:

@@ -8,7 +8,7 @@ import pytest
 
 from enclave_launch.errors import UsageError
 from enclave_launch.review.checks import RULES, check_plan
-from enclave_launch.review.document import Told
+from enclave_launch.review.document import PlanFinding
 from enclave_launch.review.expectations import read_expectations, rule_findings
 from tests.review.conftest import ROBOT, Asked, document
 
@@ -187,7 +187,7 @@ def test_an_accepted_finding_is_the_one_that_was_named() -> None:
     accept = read_expectations(
         {"accept": [{"code": "wildcard", "subject": "/x*", "why": "driver"}]}, "r.yaml"
     )
-    told = Told("warning", "wildcard", "/x*", None, 0, "", "")
+    told = PlanFinding("warning", "wildcard", "/x*", None, 0, "", "")
     assert accept.reason_to_accept(told) == "driver"
     assert accept.reason_to_accept(told._replace(subject="/y*")) is None
     assert accept.reason_to_accept(told._replace(code="no-server")) is None

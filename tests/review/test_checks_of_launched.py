@@ -12,7 +12,7 @@ from enclave_launch.flow import resolve
 from enclave_launch.options import ResolveOptions
 from enclave_launch.report.plan_json import plan_document
 from enclave_launch.review.checks import check_plan
-from enclave_launch.review.document import Told
+from enclave_launch.review.document import PlanFinding
 
 MANIFEST = """\
 nodl_version: 2
@@ -23,7 +23,7 @@ subscriptions:
   - {{name: {subscribes}, type: std_msgs/msg/String, qos: {{history: KEEP_LAST, depth: 1, {asks}}}}}
 """
 RELIABLE, BEST_EFFORT = "reliability: RELIABLE", "reliability: BEST_EFFORT"
-Check = Callable[..., list[Told]]
+Check = Callable[..., list[PlanFinding]]
 
 
 @pytest.fixture
@@ -44,7 +44,7 @@ def check(tmp_path: Path) -> Check:
         parameters: str = "",
         all_parameters: str = "false",
         **given: str,
-    ) -> list[Told]:
+    ) -> list[PlanFinding]:
         manifests = []
         for name, publishes, subscribes in (("one", "x", "y"), ("two", "y", "x")):
             program = bin_folder / name
@@ -78,7 +78,7 @@ def _node_scope() -> Any:
     return EnclaveScope.NODE
 
 
-def codes(found: list[Told]) -> set[str]:
+def codes(found: list[PlanFinding]) -> set[str]:
     return {told.code for told in found}
 
 

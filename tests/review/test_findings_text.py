@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from enclave_launch.report.review_text import findings_text
-from enclave_launch.review.document import Told
+from enclave_launch.review.document import PlanFinding
 
 
-def told(code: str, subject: str, severity: str = "warning") -> tuple[Told, str | None]:
-    return Told(severity, code, subject, None, 0, f"{subject} is odd", "mend it"), None  # type: ignore[arg-type]
+def told(code: str, subject: str, severity: str = "warning") -> tuple[PlanFinding, str | None]:
+    return PlanFinding(severity, code, subject, None, 0, f"{subject} is odd", "mend it"), None  # type: ignore[arg-type]
 
 
 def test_findings_of_one_kind_are_one_paragraph() -> None:

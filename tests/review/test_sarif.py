@@ -15,7 +15,7 @@ from jsonschema import Draft4Validator
 from enclave_common.terminal import json_text
 from enclave_launch.report.sarif import sarif_document
 from enclave_launch.review.checks import RULES, check_plan
-from enclave_launch.review.document import Told
+from enclave_launch.review.document import PlanFinding
 from tests.report.conftest import hostile, robot
 
 SCHEMA = Path(__file__).parent / "sarif" / "sarif-2.1.0-rtm.5.json"
@@ -23,7 +23,7 @@ VALIDATOR = Draft4Validator(json.loads(SCHEMA.read_text(encoding="utf-8")))
 ROOT = "/work/my robot"
 
 
-def errors(findings: list[tuple[Told, str | None]]) -> list[str]:
+def errors(findings: list[tuple[PlanFinding, str | None]]) -> list[str]:
     document = json.loads(json_text(sarif_document(findings, RULES, "0.1.0", ROOT)))
     return [f"{list(error.absolute_path)}: {error.message}" for error in VALIDATOR.iter_errors(document)]
 
@@ -37,7 +37,7 @@ def test_findings_of_plans_are_valid(plan: dict[str, Any]) -> None:
 
 text = st.text(max_size=20)
 told = st.builds(
-    Told,
+    PlanFinding,
     severity=st.sampled_from(["error", "warning"]),
     code=st.sampled_from(sorted(RULES)),
     subject=text,
@@ -52,7 +52,7 @@ told = st.builds(
 
 
 @given(st.lists(st.tuples(told, st.none() | text), max_size=4))
-def test_any_finding_is_valid(findings: list[tuple[Told, str | None]]) -> None:
+def test_any_finding_is_valid(findings: list[tuple[PlanFinding, str | None]]) -> None:
     assert errors(findings) == []
 
 
@@ -64,7 +64,7 @@ def test_the_schema_refuses_what_is_not_sarif() -> None:
 
 
 def test_a_finding_keeps_its_fingerprint_when_its_line_moves() -> None:
-    one = Told("warning", "no-publisher", "/x", f"{ROOT}/a.xml", 3, "text", "")
+    one = PlanFinding("warning", "no-publisher", "/x", f"{ROOT}/a.xml", 3, "text", "")
     prints = [
         sarif_document([(each, None)], RULES, "0.1.0", ROOT)["runs"][0]["results"][0]["partialFingerprints"]  # type: ignore[index]
         for each in (one, one._replace(line=9), one._replace(subject="/y"))

@@ -86,7 +86,7 @@ class ResetLaunchConfigurations(Action):
 
 
 def parse_keeps(keeps: list[Entity], parser: Parser) -> dict[SomeSubstitutionsType, SomeSubstitutionsType]:
-    """``<keep name= value=>`` elements as constructor argument."""
+    """Return ``<keep name= value=>`` elements as a constructor argument."""
     parse = parser.parse_substitution
     parsed: dict[SomeSubstitutionsType, SomeSubstitutionsType] = {
         tuple(parse(keep.get_attr("name"))): parse(keep.get_attr("value")) for keep in keeps

@@ -207,7 +207,9 @@ def _remap_rules(
 
 
 def _global_parameters(context: LaunchContext) -> Iterator[Any]:
-    """Values as normalized dicts, files by their absolute path. ``AssertionError`` for a missing file."""
+    """Yield values as normalized dicts and files by their absolute path.
+
+    :raises AssertionError: a file is missing."""
     for item in context.launch_configurations.get("global_params") or ():
         if isinstance(item, tuple):
             yield normalize_parameter_dict({item[0]: item[1]})

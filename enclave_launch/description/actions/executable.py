@@ -53,8 +53,11 @@ class Executable:
         additional_env: Mapping[SomeSubstitutionsType, SomeSubstitutionsType] | None = None,
         arguments: Iterable[SomeSubstitutionsType] | None = None,
     ) -> None:
-        """``cmd`` and ``arguments``: each item is one argument. ``env`` replaces the environment,
-        ``additional_env`` adds to it. A ``prefix`` given here ignores the prefix filter."""
+        """Describe a program to run.
+
+        :param cmd: each item is one argument, as those of ``arguments``
+        :param prefix: if given, the prefix filter is ignored
+        :param env: replaces the environment, to which ``additional_env`` adds"""
         self.__cmd = [normalize_to_list_of_substitutions(word) for word in cmd]
         self.__cmd += [normalize_to_list_of_substitutions(word) for word in arguments or ()]
         self.__prefix = _DEFAULT_PREFIX if prefix is None else normalize_to_list_of_substitutions(prefix)

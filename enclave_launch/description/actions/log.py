@@ -38,7 +38,7 @@ class LogInfo(TemplateAction):
 
 @expose_action("log")
 def parse_log(entity: Entity, parser: Parser) -> tuple[type[Action], dict[str, Any]]:
-    """``log`` means level INFO; from launch 3.9 on it may name another."""
+    """Return the action for ``log``: level INFO, or from launch 3.9 on the one that it names."""
     if not current_release().has(Feature.LOG_LEVEL_ACTIONS):
         return LogInfo.parse(entity, parser)
 

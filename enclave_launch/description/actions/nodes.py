@@ -249,7 +249,7 @@ def _performed(context: LaunchContext, value: SomeSubstitutionsType) -> str:
 
 
 def parse_remaps(remaps: list[Entity], parser: Parser) -> list[PlacedRule]:
-    """``remap`` children as pairs of templates."""
+    """Return ``remap`` children as pairs of templates."""
     rules = []
     for remap in remaps:
         source = parser.parse_substitution(remap.get_attr("from"))

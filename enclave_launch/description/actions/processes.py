@@ -140,7 +140,8 @@ class ExecuteLocal(Action):
 
     @property
     def process_details(self) -> dict[str, Any] | None:
-        """``action``, ``name``, ``cmd``, ``cwd``, ``env`` and, once started, ``pid``; ``None`` before ``prepare``."""
+        """Return ``action``, ``name``, ``cmd``, ``cwd``, ``env`` and, once started, ``pid``; None before
+        ``prepare``."""
         return self.__event_args
 
     @property
@@ -152,7 +153,7 @@ class ExecuteLocal(Action):
         return self.__captured(0, "stdout")
 
     def get_stderr(self) -> str:
-        """As ``get_stdout``."""
+        """Return the captured standard error, as ``get_stdout``."""
         return self.__captured(1, "stderr")
 
     def __captured(self, stream: int, name: str) -> str:
@@ -308,14 +309,16 @@ class ExecuteProcess(ExecuteLocal):
 
     @classmethod
     def _parse_cmdline(cls, cmd: str, parser: Parser) -> list[SomeSubstitutionsType]:
-        """Text of a command line -> its arguments, each a list of substitutions."""
+        """Split the text of a command line into its arguments, each a list of substitutions."""
         return split_words(parser.parse_substitution(cmd))
 
     @classmethod
     def parse(
         cls, entity: Entity, parser: Parser, ignore: list[str] | None = None
     ) -> tuple[type[Action], dict[str, Any]]:
-        """``ignore``: arguments that a subclass reads itself, or does not have."""
+        """Read the element.
+
+        :param ignore: arguments that a subclass reads itself, or does not have"""
         _, kwargs = super().parse(entity, parser)
         skipped = ignore or ()
         if "cmd" not in skipped:

@@ -118,7 +118,7 @@ class HandlerTable:
         return bool(self._of_name[event_name] or self._of_name[""])
 
     def all(self) -> list[Handler]:
-        """Every registered handler, oldest first."""
+        """Return every registered handler, oldest first."""
         found = [entry for bucket in self._buckets.values() for entry in bucket.items()]
         return [handler for _, handler in sorted(found, key=lambda entry: entry[0])]
 

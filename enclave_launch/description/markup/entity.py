@@ -31,7 +31,7 @@ class Entity:
 
     @property
     def parent(self) -> Entity | None:
-        """Upstream's front ends never fill this in, nor do ours."""
+        """Raise ``NotImplementedError``, since upstream's front ends never know the parent either."""
         raise NotImplementedError()
 
     @property
@@ -46,8 +46,9 @@ class Entity:
 
     @property
     def given(self) -> Container[str]:
-        """Names for which ``get_attr`` may find something (ours): most optional attributes are not there, and
-        to ask for each takes time. By default any name."""
+        """Return the names for which ``get_attr`` may find something; by default any name.
+
+        Not in upstream: most optional attributes are absent, and requesting each takes time."""
         return _EVERYTHING
 
     @overload
@@ -111,7 +112,9 @@ def check_is_list_entity(data_type: Any) -> bool:
 
 
 def get_data_type_from_identifier(type_identifier: str) -> Any:
-    """``'list_of_int'`` -> ``List[int]``; ``'yaml'`` -> ``None``. ``ValueError`` for an unknown one."""
+    """Return the type of ``'list_of_int'``: ``List[int]``; of ``'yaml'``: None.
+
+    :raises ValueError: the identifier is unknown."""
     if type_identifier == "yaml":
         return None
     scalar = _SCALARS.get(type_identifier.removeprefix("list_of_"))

@@ -154,7 +154,7 @@ def _parse_method(exposed: object, name: str, kind: str) -> ParseMethod:
 
 
 def _checking_leftovers(parse: ParseMethod) -> ParseMethod:
-    """``parse``, and afterwards a check that every attribute and child of the entity was read."""
+    """Wrap ``parse`` with a check that it read every attribute and child of the entity."""
 
     @functools.wraps(parse)
     def parse_and_check(entity: Entity, parser: Parser) -> tuple[type, dict[str, Any]]:

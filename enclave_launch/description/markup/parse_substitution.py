@@ -35,11 +35,10 @@ def replace_escaped_characters(data: str) -> str:
 
 
 def parse_substitution(string_value: str) -> list[Substitution]:
-    """Text -> its substitutions, in a new list.
+    """Parse text into a new list of substitutions.
 
-    Raises ``UnexpectedCharacters``, ``UnexpectedEOF``, or ``VisitError`` for an unknown name and for
-    arguments that the substitution refuses.
-    """
+    :raises UnexpectedCharacters, UnexpectedEOF: the grammar does not accept it.
+    :raises VisitError: a name is unknown, or a substitution refuses its arguments."""
     global _shared_for
     if "$(" not in string_value:
         return [TextSubstitution(text=unescape(string_value))]
@@ -54,10 +53,9 @@ def parse_substitution(string_value: str) -> list[Substitution]:
 
 
 def parse_if_substitutions(value: Any) -> Any:
-    """Text without ``$(...)`` -> un-escaped text, other text -> substitutions, lists item by item.
+    """Parse text with ``$(...)`` into substitutions and un-escape other text; lists item by item.
 
-    Raises ``ValueError`` when the plain items of a list differ in type.
-    """
+    :raises ValueError: the plain items of a list differ in type."""
     if not isinstance(value, list):
         return _parse_if(value)
     result = [_parse_if(item) for item in value]

@@ -83,7 +83,7 @@ class Parser:
         return expose.instantiate_action(entity, self)
 
     def parse_substitution(self, value: str) -> list[Substitution]:
-        """Text with ``$(...)`` -> substitutions."""
+        """Parse text with ``$(...)`` into substitutions."""
         return parse_substitution.parse_substitution(value)
 
     def parse_if_substitutions(self, value: Any) -> Any:
@@ -114,12 +114,14 @@ class Parser:
 
     @classmethod
     def get_available_extensions(cls) -> list[str]:
-        """Names of the front ends."""
+        """Return the names of the front ends."""
         return list(cls._implementations())
 
     @classmethod
     def is_extension_valid(cls, extension: str) -> bool:
-        """Deprecated upstream in favour of ``is_filename_valid``."""
+        """Return True if a front end has this name.
+
+        Deprecated upstream in favour of ``is_filename_valid``."""
         warnings.warn(
             "Parser.is_extension_valid is deprecated, use Parser.is_filename_valid instead", stacklevel=2
         )
@@ -127,7 +129,9 @@ class Parser:
 
     @classmethod
     def get_parser_from_extension(cls, extension: str) -> type[Parser]:
-        """Deprecated upstream in favour of ``get_parsers_from_filename``."""
+        """Return the front end of this name.
+
+        Deprecated upstream in favour of ``get_parsers_from_filename``."""
         warnings.warn(
             "Parser.get_parser_from_extension is deprecated, use Parser.get_parsers_from_filename instead",
             stacklevel=2,

@@ -31,7 +31,10 @@ class Entity(BaseEntity):
         lines: Mapping[int, int] = _NO_LINES,
         line: int = 0,
     ) -> None:
-        """``lines``: ``id`` of a mapping or list -> its line; ``line``: that of this entity."""
+        """Wrap a value of a YAML file.
+
+        :param lines: line of each mapping or list, by its ``id``
+        :param line: line of this entity"""
         self._element = element
         self._type_name = type_name
         self._parent = parent

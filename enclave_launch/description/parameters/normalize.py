@@ -52,7 +52,9 @@ def _normalize(item: Any) -> ParameterFile | Parameter | ParametersDict:
 def normalize_parameter_dict(
     parameters: SomeParametersDict, *, _prefix: Sequence[Substitution] = ()
 ) -> ParametersDict:
-    """Nested dicts become dotted names. Raises ``TypeError`` for ``None`` and other objects as values."""
+    """Normalize parameters; nested dicts become dotted names.
+
+    :raises TypeError: a value is None or another object that is no parameter value."""
     if not isinstance(parameters, Mapping):
         raise TypeError("expected dict")
     normalized: ParametersDict = {}

@@ -89,7 +89,9 @@ def _as_written(value: Any) -> ParameterValue:
 
 
 def _global_words(context: LaunchContext) -> Iterator[tuple[str, str]]:
-    """``-p`` with Python's ``str`` of the value, as launch does. ``AssertionError`` for a missing file."""
+    """Yield ``-p`` with Python's ``str`` of the value, as launch does.
+
+    :raises AssertionError: a file is missing."""
     for item in context.launch_configurations.get("global_params") or ():
         if isinstance(item, tuple):
             yield "-p", f"{item[0]}:={item[1]}"

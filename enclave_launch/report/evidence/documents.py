@@ -79,13 +79,15 @@ def _or_not_given(found: Any, name: str, why: str) -> dict[str, Any]:
 
 def _accepted(contents: ReportContents) -> dict[str, Any]:
     accepted = [
-        {**told._asdict(), "reason": reason} for told, reason in contents.judged if reason is not None
+        {**diagnostic._asdict(), "reason": reason}
+        for diagnostic, reason in contents.judged
+        if reason is not None
     ]
     return {"version": 1, "accepted": accepted}
 
 
 def _scope(examined: Examined) -> dict[str, Any]:
-    found = {told.code for told, _ in examined.contents.judged}
+    found = {diagnostic.code for diagnostic, _ in examined.contents.judged}
     members = examined.contents.graph.members
     return {
         "version": 1,
@@ -100,9 +102,9 @@ def _scope(examined: Examined) -> dict[str, Any]:
         "not_checked": _not_checked(examined),
         "gaps": sorted(
             {
-                told.text
-                for told, _ in examined.contents.judged
-                if told.code in ("interface-unknown", "no-manifest")
+                diagnostic.text
+                for diagnostic, _ in examined.contents.judged
+                if diagnostic.code in ("interface-unknown", "no-manifest")
             }
         ),
         "nodes": sum(member.known for member in members),
@@ -126,12 +128,13 @@ def _not_checked(examined: Examined) -> list[str]:
 
 
 def summary(contents: ReportContents, scope: Mapping[str, Any], at: str) -> str:
-    """``README.md`` of the folder: what it is, which part supports which requirement, what was checked and what not."""
+    """Write ``README.md`` of the folder: its contents, which part supports which requirement, what was checked and
+    what was not."""
     return "\n".join(_lines(contents, scope, at)) + "\n"
 
 
 def _lines(contents: ReportContents, scope: Mapping[str, Any], at: str) -> Iterator[str]:
-    open_ones = [told for told, accepted in contents.judged if accepted is None]
+    open_ones = [diagnostic for diagnostic, accepted in contents.judged if accepted is None]
     yield from (f"# Evidence for {escaped(contents.title)}", "", DISCLAIMER, "")
     yield f"Examined {escaped(at)} by {escaped(scope['tool'])}. Findings: {len(open_ones)} open,"
     yield f"{len(contents.judged) - len(open_ones)} accepted. `report.html` shows all of it; it needs no network."
@@ -142,11 +145,12 @@ def _lines(contents: ReportContents, scope: Mapping[str, Any], at: str) -> Itera
     yield from ("", "## Not checked", "", *(f"- {escaped(each)}" for each in scope["not_checked"]))
     if scope["gaps"]:
         yield from ("", "Gaps of the plan:", "", *(f"- {escaped(each)}" for each in scope["gaps"]))
-    accepted = [(told, reason) for told, reason in contents.judged if reason is not None]
+    accepted = [(diagnostic, reason) for diagnostic, reason in contents.judged if reason is not None]
     if accepted:
         yield from ("", "## Accepted exceptions", "")
         yield from (
-            f"- {code(told.code)} {escaped(told.text)}: {escaped(reason)}" for told, reason in accepted
+            f"- {code(diagnostic.code)} {escaped(diagnostic.text)}: {escaped(reason)}"
+            for diagnostic, reason in accepted
         )
     yield from ("", "## Check it", "")
     yield "`statement.json` is an in-toto statement that names every file by its SHA-256; `statement.dsse.json` is the "
@@ -154,7 +158,10 @@ def _lines(contents: ReportContents, scope: Mapping[str, Any], at: str) -> Itera
 
 
 def statement(files: Mapping[str, bytes], judged: Judged, checked: list[str]) -> bytes:
-    """``judged``: the findings; ``checked``: the code of every check that was made."""
+    """Write the in-toto statement about ``files``.
+
+    :param judged: the findings
+    :param checked: the code of every check that was made"""
     failed, warned = _codes(judged, "error"), _codes(judged, "warning")
     content: dict[str, Any] = {
         "_type": STATEMENT,
@@ -172,7 +179,11 @@ def statement(files: Mapping[str, bytes], judged: Judged, checked: list[str]) ->
 
 
 def _codes(judged: Judged, severity: str) -> set[str]:
-    return {told.code for told, accepted in judged if accepted is None and told.severity == severity}
+    return {
+        diagnostic.code
+        for diagnostic, accepted in judged
+        if accepted is None and diagnostic.severity == severity
+    }
 
 
 def _resource(name: str, data: bytes) -> dict[str, Any]:

@@ -26,7 +26,7 @@ class Row(NamedTuple):
 
 
 def rows(graph: EnclaveGraph) -> Iterator[Row]:
-    """In the graph's order."""
+    """Yield the rows in the graph's order."""
     for use in graph.uses:
         channel = graph.channels[use.channel]
         yield Row(

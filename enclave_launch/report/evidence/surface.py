@@ -12,7 +12,7 @@ from keystore.formats.permissions_patterns import can_meet
 
 
 def surface_document(document: Mapping[str, Any]) -> dict[str, Any]:
-    """Of the dry run's JSON; what every node has is left out, as it is the same for all."""
+    """Describe what each enclave exposes, from the dry run's JSON; interfaces that every node has are left out."""
     graph, plan = plan_graph(document), plan_from_document(document)
     flows = flow_graph(plan)
     return {
@@ -45,8 +45,10 @@ def _enclave(graph: EnclaveGraph, enclave: str) -> dict[str, Any]:
 
 
 def _accepted(graph: EnclaveGraph, enclave: str, held: list[ChannelUse]) -> list[dict[str, Any]]:
-    """What comes in: messages of subscriptions, requests to servers. ``sent_by``: enclaves of this launch that may
-    send it; with none, only somebody outside of the launch could."""
+    """List what comes in: messages of subscriptions, requests to servers.
+
+    ``sent_by`` names the enclaves of this launch that may send it; if it is empty, only processes outside of the
+    launch could."""
     coming_in = sorted({(use.operation, use.channel) for use in held if use.operation not in OUTWARD})
     return [
         {

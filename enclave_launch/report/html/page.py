@@ -24,7 +24,7 @@ _UNUSUAL = re.compile(r"[^ -~\n\t]")
 
 
 def html_report(contents: ReportContents) -> str:
-    """The whole page; the same contents give the same bytes."""
+    """Write the whole page; the same contents give the same bytes."""
     scripts = [_script(name) for name in ("cytoscape.min.js", "cytoscape-dagre.min.js", "report.js")]
     style = _asset("report.css")
     # Cytoscape.js adds a style element of this id unless there is one; ours holds its rule.
@@ -52,8 +52,9 @@ def script_data(content: object) -> str:
 
 
 def graph_data(graph: EnclaveGraph) -> dict[str, Any]:
-    """What the script draws, searches and shows on a click: lists of the graph's elements, which refer to each other by
-    number. Names are made printable here, once, so that the script shows what the tables show."""
+    """Return the lists that the script draws, searches and shows on a click; they refer to each other by number.
+
+    Names are made printable here, once, so that the script shows what the tables show."""
     return {
         "enclaves": [printable(path) for path in graph.enclaves],
         "members": [
@@ -98,7 +99,7 @@ def _policy(scripts: list[str], style: str) -> str:
 
 
 def _source(inline: str) -> str:
-    """The hash source of an inline element (CSP level 3, 6.7.3.3)."""
+    """Return the hash source of an inline element (CSP level 3, 6.7.3.3)."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(inline.encode()).digest()).decode()}'"
 
 
@@ -107,8 +108,9 @@ def _asset(name: str) -> str:
 
 
 def _script(name: str) -> str:
-    """In printable ASCII, so that nothing on its way to the browser, our own output included, has a reason to change
-    it, and without the address of a source map, which developer tools would ask for."""
+    """Return a script in printable ASCII without its source map.
+
+    Nothing on the way to the browser then has a reason to change it, and developer tools request nothing."""
     text = _SOURCE_MAP.sub("", _asset(name))
     return _UNUSUAL.sub(lambda match: f"\\u{ord(match[0]):04x}", text)
 
@@ -139,7 +141,7 @@ def _body(contents: ReportContents) -> str:
 
 def _summary(contents: ReportContents) -> str:
     graph = contents.graph
-    open_ones = [told.severity for told, accepted in contents.judged if accepted is None]
+    open_ones = [diagnostic.severity for diagnostic, accepted in contents.judged if accepted is None]
     figures = (
         (len(graph.enclaves), "enclave"),
         (sum(member.known for member in graph.members), "node"),

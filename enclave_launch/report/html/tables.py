@@ -14,32 +14,37 @@ from enclave_launch.report.contents import Influence, ReportContents
 from enclave_launch.report.graph import ChannelUse, EnclaveGraph, evidence_text
 from enclave_launch.report.review_text import step_text
 from enclave_launch.review.checks.keystore import Ending
-from enclave_launch.review.document import Told
+from enclave_launch.review.document import PlanFinding
 
 SOON = 30
 """Days within which an end is marked."""
 
 
 def text(value: object) -> str:
-    """``value`` as text of an element or of a quoted attribute; what is not printable is shown as an escape."""
+    """Escape ``value`` as text of an element or of a quoted attribute; unprintable characters become visible
+    escapes."""
     return html.escape(printable(str(value)))
 
 
 def row(cells: Iterable[str], *, attributes: str = "") -> str:
-    """A table row of cells that are HTML already."""
+    """Return a table row of cells that are HTML already."""
     return f"<tr{attributes}>{''.join(f'<td>{cell}</td>' for cell in cells)}</tr>"
 
 
 def table(caption: str, headings: Iterable[str], rows: Iterable[str]) -> str:
-    """``caption`` and ``headings`` are our own words."""
+    """Return a table.
+
+    :param caption: trusted text, as ``headings``"""
     head = "".join(f'<th scope="col">{heading}</th>' for heading in headings)
     body = "\n".join(rows)
     return f"<table><caption>{caption}</caption><thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody></table>\n"
 
 
 def permissions(contents: ReportContents) -> str:
-    """A folded table for each enclave; the first stands open. What every node has is counted, and added by the
-    page's script when somebody asks for it: it is most of all rows, and the same everywhere."""
+    """Return a folded table for each enclave, the first one open.
+
+    Interfaces that every node has are only counted: they are most of all rows and the same everywhere. The page's
+    script adds them on request."""
     parts = []
     for number, (enclave, uses) in enumerate(contents.uses_of().items()):
         own = [use for use in uses if not use.built_in]
@@ -76,33 +81,33 @@ def _permission(graph: EnclaveGraph, use: ChannelUse) -> str:
 
 
 def findings(contents: ReportContents) -> str:
-    """What ``check`` found, the most severe first and what was accepted last."""
+    """Return what ``check`` found, the most severe first and accepted findings last."""
     if not contents.judged:
         return "<p>Nothing was found.</p>"
     ordered = sorted(contents.judged, key=lambda item: (item[1] is not None, item[0].severity))
     return table(
         "What check finds in this plan",
         ("severity", "rule", "place", "what", "what to do"),
-        (_finding(told, accepted) for told, accepted in ordered),
+        (_finding(diagnostic, accepted) for diagnostic, accepted in ordered),
     )
 
 
-def _finding(told: Told, accepted: str | None) -> str:
-    severity = told.severity if accepted is None else "accepted"
-    remedy = told.remedy if accepted is None else f"accepted: {accepted}"
+def _finding(diagnostic: PlanFinding, accepted: str | None) -> str:
+    severity = diagnostic.severity if accepted is None else "accepted"
+    remedy = diagnostic.remedy if accepted is None else f"accepted: {accepted}"
     return row(
         (
             f'<strong class="{severity}">{severity}</strong>',
-            f"<code>{text(told.code)}</code>",
-            text(f"{told.file}:{told.line}" if told.file else ""),
-            text(told.text),
+            f"<code>{text(diagnostic.code)}</code>",
+            text(f"{diagnostic.file}:{diagnostic.line}" if diagnostic.file else ""),
+            text(diagnostic.text),
             text(remedy),
         )
     )
 
 
 def flows(contents: ReportContents) -> str:
-    """Who influences whom, and which ways exist only because nodes share an enclave."""
+    """Return which enclave influences which, and which ways exist only because nodes share an enclave."""
     parts = [
         table(
             "Which enclave can influence which",
@@ -140,7 +145,7 @@ def statistics(contents: ReportContents) -> str:
 
 
 def expiry(endings: Iterable[Ending] | None) -> str:
-    """When the certificates and documents of the keystore end; a hint where no keystore was given."""
+    """Return when the certificates and documents of the keystore expire, a hint if no keystore was given."""
     if endings is None:
         return "<p>No keystore was given (<code>--keystore DIR</code>).</p>"
     return table("What of the keystore ends when", ("ends", "days left", "what"), _endings(endings))

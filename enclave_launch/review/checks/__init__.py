@@ -16,18 +16,21 @@ from typing import Any
 
 from enclave_launch.review.checks import enclaves, launched, meetings
 from enclave_launch.review.checks.rules import MEANINGS, RULES
-from enclave_launch.review.document import Told, plan_from_document
+from enclave_launch.review.document import PlanFinding, plan_from_document
 
 __all__ = ["MEANINGS", "RULES", "check_plan"]
 
 
-def check_plan(document: Mapping[str, Any]) -> list[Told]:
-    """All findings of the dry run's JSON ``document``: what planning told first, then each check's, sorted."""
+def check_plan(document: Mapping[str, Any]) -> list[PlanFinding]:
+    """Return all findings of the dry run's JSON: those of planning first, then those of each check, sorted."""
     plan = plan_from_document(document)
     own = (
-        told
+        diagnostic
         for room in (meetings, enclaves, launched)
         for check in room.CHECKS
-        for told in check(plan, document)
+        for diagnostic in check(plan, document)
     )
-    return [*plan.told, *sorted(own, key=lambda told: told._replace(file=told.file or "")[:5])]
+    return [
+        *plan.diagnostics,
+        *sorted(own, key=lambda diagnostic: diagnostic._replace(file=diagnostic.file or "")[:5]),
+    ]

@@ -8,30 +8,30 @@ from typing import Any
 
 from enclave_common.words import some_of
 from enclave_launch.review.checks.rules import finding
-from enclave_launch.review.document import GrantedName, PlanDocument, Told
+from enclave_launch.review.document import GrantedName, PlanDocument, PlanFinding
 from enclave_launch.review.similarity import splits
 from keystore.formats.permissions_patterns import has_wildcard
 
 _NAMED = 3  # permissions that a node gains, by name; the rest is counted
 
 
-def names_twice(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[Told]:
-    """Nodes with the same fully qualified name: ROS cannot tell them apart."""
+def names_twice(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[PlanFinding]:
+    """Yield nodes with the same fully qualified name, which ROS cannot distinguish."""
     for name, count in sorted(Counter(node.fqn for node in plan.nodes).items()):
         if count > 1:
             yield finding("node-name-twice", name, f"{count} nodes are called {name}")
 
 
-def wildcards(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[Told]:
-    """Permissions whose name is a pattern, less those that planning has told of already."""
-    told = " ".join(each.text for each in plan.told if each.code == "pattern-accepted")
+def wildcards(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[PlanFinding]:
+    """Yield permissions whose name is a pattern, except those that planning reported already."""
+    explained = " ".join(each.text for each in plan.diagnostics if each.code == "pattern-accepted")
     for enclave, grants in sorted(plan.enclaves.items()):
         for grant in sorted(grants):
-            if has_wildcard(grant.name) and f" {grant.name}:" not in told:
+            if has_wildcard(grant.name) and f" {grant.name}:" not in explained:
                 yield finding("wildcard", grant.name, f"enclave {enclave} may {grant}")
 
 
-def shared(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[Told]:
+def shared(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[PlanFinding]:
     """Enclaves in which nodes gain permissions of others."""
     for split in splits(plan):
         gains = "; ".join(f"{node} gains {some_of(grants, _NAMED)}" for node, grants in split.saved)
@@ -41,8 +41,10 @@ def shared(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[Told]:
         )
 
 
-def unasked(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[Told]:
-    """Of enclaves whose every program is known: a policy file may speak for what nobody else describes."""
+def unasked(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[PlanFinding]:
+    """Yield permissions that no node of an enclave requests.
+
+    Only of enclaves whose every program is known: a policy file may list what nothing else describes."""
     for enclave, grants in sorted(plan.enclaves.items()):
         nodes = plan.nodes_of(enclave)
         if not nodes or document["enclaves"][enclave].get("permissions_unknown"):

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from enclave_common.words import some_of
 from enclave_launch.review.checks.rules import finding
-from enclave_launch.review.document import GrantedName, PlanDocument, Told
+from enclave_launch.review.document import GrantedName, PlanDocument, PlanFinding
 from enclave_launch.review.signed import as_signed
 from keystore.verification.finding import Finding
 
@@ -26,31 +26,40 @@ class Ending(NamedTuple):
 
 def against_keystore(
     plan: PlanDocument, signed: Mapping[str, frozenset[GrantedName]], endings: Iterable[Ending]
-) -> list[Told]:
-    """``endings``: what is due, of the whole keystore; what belongs to enclaves of other plans is left out."""
-    found = [told for path in sorted(plan.enclaves) for told in _enclave(plan, path, signed, "keystore")]
+) -> list[PlanFinding]:
+    """Compare the plan with a keystore.
+
+    :param endings: what expires soon in the whole keystore; enclaves of other plans are ignored"""
+    found = [
+        diagnostic
+        for path in sorted(plan.enclaves)
+        for diagnostic in _enclave(plan, path, signed, "keystore")
+    ]
     return [*found, *_expiring(plan, endings)]
 
 
 def against_router(
     plan: PlanDocument, enforced: Mapping[str, frozenset[GrantedName]], findings: Iterable[Finding]
-) -> list[Told]:
-    """The same for enclaves on Zenoh and the configuration of the keystore's router; ``findings``: of the files for
-    Zenoh, which all that are on Zenoh share."""
+) -> list[PlanFinding]:
+    """Compare the enclaves on Zenoh with the configuration of the keystore's router.
+
+    :param findings: of the files for Zenoh, which all enclaves on Zenoh share"""
     found = [
-        told
+        diagnostic
         for enclave in sorted(plan.on_zenoh & plan.enclaves.keys())
-        for told in _enclave(plan, enclave, enforced, "keystore's Zenoh router")
+        for diagnostic in _enclave(plan, enclave, enforced, "keystore's Zenoh router")
     ]
     for one in findings:
-        told = finding("keystore-zenoh", one.place, f"{one.place}: {one.message}")
-        found.append(told._replace(remedy=one.repair, severity="error" if one.severity.fails else "warning"))
+        diagnostic = finding("keystore-zenoh", one.place, f"{one.place}: {one.message}")
+        found.append(
+            diagnostic._replace(remedy=one.repair, severity="error" if one.severity.fails else "warning")
+        )
     return found
 
 
 def _enclave(
     plan: PlanDocument, enclave: str, signed: Mapping[str, frozenset[GrantedName]], who: str
-) -> Iterator[Told]:
+) -> Iterator[PlanFinding]:
     if enclave not in signed:
         text = f"the {who} has no permissions for enclave {enclave}"
         yield finding("keystore-enclave-missing", enclave, text)
@@ -65,10 +74,10 @@ def _enclave(
             yield finding(code, enclave, text)
 
 
-def _expiring(plan: PlanDocument, endings: Iterable[Ending]) -> Iterator[Told]:
+def _expiring(plan: PlanDocument, endings: Iterable[Ending]) -> Iterator[PlanFinding]:
     for one in endings:
         if one.enclave is None or one.enclave in plan.enclaves:
             over = one.days_left < 0
             when = f"ended on {one.ends}" if over else f"ends on {one.ends}, in {one.days_left} days"
-            told = finding("keystore-expires", one.enclave or one.subject, f"{one.subject} {when}")
-            yield told._replace(severity="error") if over else told
+            diagnostic = finding("keystore-expires", one.enclave or one.subject, f"{one.subject} {when}")
+            yield diagnostic._replace(severity="error") if over else diagnostic

@@ -8,7 +8,7 @@ from typing import Any
 
 from enclave_launch.process import UNSPECIFIED_NODE_NAMESPACE
 from enclave_launch.review.checks.rules import finding
-from enclave_launch.review.document import PlanDocument, Told
+from enclave_launch.review.document import PlanDocument, PlanFinding
 
 Document = Mapping[str, Any]
 Item = Mapping[str, Any]
@@ -27,9 +27,11 @@ _OF_EVERY_NODE = re.compile(
 """Parameters that client libraries declare themselves (rclcpp TimeSource, node_type_descriptions, qos_overriding)."""
 
 
-def remaps(plan: PlanDocument, document: Document) -> Iterator[Told]:
-    """A rule counts as used when any node that gets it has a name that it changes. Where it goes to a program of which
-    something is not known it may be of use there."""
+def remaps(plan: PlanDocument, document: Document) -> Iterator[PlanFinding]:
+    """Yield remap rules that change no name.
+
+    A rule is used if any node that gets it has a name that it changes. It may be used by a program that is not
+    wholly known."""
     used, unknown = _used_rules(document), _not_wholly_known(document)
     dead: dict[tuple[str, str], Item] = {}
     alive: set[tuple[str, str]] = set()
@@ -62,13 +64,17 @@ def _used_rules(document: Document) -> dict[tuple[str, str | None], set[str]]:
 def _not_wholly_known(document: Document) -> set[tuple[str, str | None]]:
     """Programs of which nothing is known, and those of nodes with gaps."""
     described = {(node["program"], node["enclave"]) for node in document["nodes"]}
-    gaps = {told["subject"] for told in document["diagnostics"] if told["code"] == "interface-unknown"}
+    gaps = {
+        diagnostic["subject"]
+        for diagnostic in document["diagnostics"]
+        if diagnostic["code"] == "interface-unknown"
+    }
     doubtful = {(node["program"], node["enclave"]) for node in document["nodes"] if node["fqn"] in gaps}
     return doubtful | {_key(item) for item in launched(document)} - described
 
 
-def parameters(plan: PlanDocument, document: Document) -> Iterator[Told]:
-    """Where the description of every node of the program says what it declares."""
+def parameters(plan: PlanDocument, document: Document) -> Iterator[PlanFinding]:
+    """Yield parameters that no node of the program declares, if the description of each says what it declares."""
     declared: dict[tuple[str, str | None], list[list[str] | None]] = {}
     for node in document["nodes"]:
         declared.setdefault((node["program"], node["enclave"]), []).append(node.get("parameters"))
@@ -83,15 +89,15 @@ def parameters(plan: PlanDocument, document: Document) -> Iterator[Told]:
                 yield _about(item, "parameter-unknown", text)
 
 
-def security_variables(plan: PlanDocument, document: Document) -> Iterator[Told]:
-    """``ROS_SECURITY_*`` variables that the launch file sets itself."""
+def security_variables(plan: PlanDocument, document: Document) -> Iterator[PlanFinding]:
+    """Yield ``ROS_SECURITY_*`` variables that the launch file sets itself."""
     for process in document["processes"]:
         for name, value in sorted(process["environment"].items()):
             if name.startswith("ROS_SECURITY_"):
                 yield _about(process, "security-variable-set", f"the launch file sets {name}={value}")
 
 
-def secrets(plan: PlanDocument, document: Document) -> Iterator[Told]:
+def secrets(plan: PlanDocument, document: Document) -> Iterator[PlanFinding]:
     """Parameters with a text value whose name says that it is a secret; the value is not repeated."""
     for item in launched(document):
         for name, value in sorted(item["parameters"].items()):
@@ -112,7 +118,7 @@ def _subject(item: Item) -> str:
     return str(item["fqn"] or item.get("executable", "")).replace(UNSPECIFIED_NODE_NAMESPACE, "")
 
 
-def _about(item: Item, code: str, text: str) -> Told:
+def _about(item: Item, code: str, text: str) -> PlanFinding:
     return finding(code, _subject(item), text, (item["launch_file"], item["line"]))
 
 

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 from enclave_common.words import some_of
 from enclave_launch.review.checks.rules import finding
-from enclave_launch.review.document import KIND_OF, GrantedName, Operation, PlanDocument, Told
+from enclave_launch.review.document import KIND_OF, GrantedName, Operation, PlanDocument, PlanFinding
 from keystore.formats.permissions_patterns import can_meet, has_wildcard
 from nodl.graph.quality import INFINITE, Quality, unmet
 
@@ -38,15 +38,15 @@ class _User(NamedTuple):
 _Users = Mapping[tuple[str, str], list[_User]]
 
 
-def missing_ends(plan: PlanDocument, document: Document) -> Iterator[Told]:
+def missing_ends(plan: PlanDocument, document: Document) -> Iterator[PlanFinding]:
     """Only what nodes ask for themselves; what runs outside of this launch is not known here. Where something of the
     launch itself is not known, the other end may be there: then one finding says so."""
     found = list(_missing_ends(plan, document))
-    gaps = sorted({told.subject for told in plan.told if told.code in _GAPS})
+    gaps = sorted({diagnostic.subject for diagnostic in plan.diagnostics if diagnostic.code in _GAPS})
     if not found or not gaps:
         yield from found
         return
-    names = sorted({told.subject for told in found})
+    names = sorted({diagnostic.subject for diagnostic in found})
     lonely, open_ones = some_of(names, _NAMED), some_of(gaps, _NAMED)
     text = f"{lonely} have one end only among what is known, but not all is known of {open_ones}"
     yield finding("ends-not-judged", names[0], text)
@@ -60,7 +60,7 @@ _GAPS = frozenset({
 """What planning tells when something of the launch is not known: another end of a name may be there."""
 
 
-def _missing_ends(plan: PlanDocument, document: Document) -> Iterator[Told]:
+def _missing_ends(plan: PlanDocument, document: Document) -> Iterator[PlanFinding]:
     asked, users = _asked_for(plan), _users(document)
     everywhere: dict[Operation, set[str]] = {}
     for grant in frozenset[GrantedName]().union(*plan.enclaves.values()):
@@ -77,8 +77,8 @@ def _missing_ends(plan: PlanDocument, document: Document) -> Iterator[Told]:
                 yield finding(code, name, text, _first_place(users.get((here, name), ())))
 
 
-def near_names(plan: PlanDocument, document: Document) -> Iterator[Told]:
-    """Two names of opposite ends that never meet and differ by a slip."""
+def near_names(plan: PlanDocument, document: Document) -> Iterator[PlanFinding]:
+    """Yield pairs of names with opposite ends that never meet and differ by a typing error."""
     asked, users = _asked_for(plan), _users(document)
     for here, there in _PAIRS:
         lonely_here = asked.get(here, set()) - asked.get(there, set())
@@ -92,7 +92,8 @@ def near_names(plan: PlanDocument, document: Document) -> Iterator[Told]:
 
 
 def _nearly(one: str, two: str) -> bool:
-    """One edit apart, or the same but for slashes and capitals; digits count as different on purpose."""
+    """Return True for names one edit apart, or equal but for slashes and capitals; digits count as different on
+    purpose."""
     plain_one, plain_two = (name.replace("/", "").replace("_", "").lower() for name in (one, two))
     if plain_one == plain_two:
         return True
@@ -114,8 +115,8 @@ def _one_edit(one: str, two: str) -> bool:
     return len(long) - len(short) <= 1
 
 
-def types(plan: PlanDocument, document: Document) -> Iterator[Told]:
-    """One name under different interface types: those endpoints never match."""
+def types(plan: PlanDocument, document: Document) -> Iterator[PlanFinding]:
+    """Yield names with different interface types: those endpoints never match."""
     found: dict[tuple[str, str], dict[str, list[_User]]] = {}
     for (operation, name), users in _users(document).items():
         for user in users:
@@ -129,8 +130,8 @@ def types(plan: PlanDocument, document: Document) -> Iterator[Told]:
             yield finding("types-differ", name, text, _first_place(by_type[two]))
 
 
-def qos(plan: PlanDocument, document: Document) -> Iterator[Told]:
-    """Where both descriptions say what they offer and ask for; what they leave open is not judged."""
+def qos(plan: PlanDocument, document: Document) -> Iterator[PlanFinding]:
+    """Yield pairs of incompatible QoS, if both descriptions give theirs; what they leave open is not judged."""
     users = _users(document)
     for (operation, name), publishers in sorted(users.items(), key=lambda item: item[0]):
         if operation != "publish":

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from enclave_launch.diagnostics import Code
-from enclave_launch.review.document import Told
+from enclave_launch.review.document import PlanFinding
 
 _OTHER_END = "look for a slip in the name, or accept it if the other end runs elsewhere"
 _PROVISION = "secure-launch --secure, or secure-keystore apply-policy, brings it to the plan"
@@ -55,6 +55,6 @@ MEANINGS: Mapping[str, str] = {**{code.value: code.meaning for code in Code}, **
 """Of every code that planning or a check can give."""
 
 
-def finding(code: str, subject: str, text: str, place: tuple[str | None, int] = (None, 0)) -> Told:
-    """A warning of a check."""
-    return Told("warning", code, subject, *place, text, _TABLE[code][1])
+def finding(code: str, subject: str, text: str, place: tuple[str | None, int] = (None, 0)) -> PlanFinding:
+    """Return a finding of a check, as a warning."""
+    return PlanFinding("warning", code, subject, *place, text, _TABLE[code][1])

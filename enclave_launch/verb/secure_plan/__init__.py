@@ -35,7 +35,7 @@ A plan is a launch file, given as to secure-launch, or the JSON that secure-laun
 
 
 def build_parser() -> argparse.ArgumentParser:
-    """One subparser for each verb, described by the head of its file."""
+    """Build the parser: a subparser for each verb, described by the head of its file."""
     raw = argparse.RawDescriptionHelpFormatter
     parser = CommandParser(prog="secure-plan", description=DESCRIPTION, formatter_class=raw)
     add_version(parser)

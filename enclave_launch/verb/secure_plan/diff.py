@@ -71,7 +71,8 @@ def _keystore_and(plan: PlanDocument, keystore: str) -> tuple[PlanDocument, Plan
 def _enforced(
     signed: Mapping[str, frozenset[GrantedName]], wanted: PlanDocument, keystore: str
 ) -> Iterator[tuple[str, frozenset[GrantedName]]]:
-    """Of enclaves on Zenoh: what is signed and what the router's file says have to be as planned, both."""
+    """Yield the grants of enclaves on Zenoh: those that both the signed permissions and the router's file have,
+    and those that only one has but the plan does not."""
     enforced = enforced_grants(keystore)
     for path in wanted.on_zenoh & signed.keys():
         one, other = signed[path], enforced.get(path, frozenset())
@@ -87,7 +88,8 @@ def _keystore(keystore: str) -> PlanDocument:
 
 
 def _files(options: argparse.Namespace) -> tuple[FileChange, ...]:
-    """Of two keystores: the files for Zenoh, which hold more than names (types, domains, protections)."""
+    """Return changes of the files for Zenoh of two keystores, which hold more than names (types, domains,
+    protections)."""
     if not _two_keystores(options):
         return ()
 

@@ -100,7 +100,7 @@ def _examine(options: argparse.Namespace) -> Examined:
 
 
 def _moment(text: str | None) -> datetime:
-    """``--at``, else ``SOURCE_DATE_EPOCH`` (reproducible-builds.org), else now."""
+    """Return ``--at``, else ``SOURCE_DATE_EPOCH`` (reproducible-builds.org), else now."""
     epoch = os.environ.get("SOURCE_DATE_EPOCH", "")
     try:
         if text is not None:
@@ -136,7 +136,9 @@ def _defaults(keystore: Path, now: datetime) -> dict[str, Any]:
 
 
 def _bill_of_materials(file: Path) -> dict[str, Any]:
-    """Its BOM-Link (CycloneDX specification, "BOM-Link") and hash. Raises ``UsageError`` for anything else."""
+    """Return the BOM-Link (CycloneDX specification, "BOM-Link") and the hash of ``file``.
+
+    :raises UsageError: it is not a CycloneDX document."""
     with translated(OSError, UsageError, f"--sbom {file}: "):
         data = read_bytes(file)
     with translated(ValueError, UsageError, f"--sbom {file} is not JSON: "):

@@ -16,7 +16,7 @@ from enclave_common.yaml_reader import load_yaml
 from enclave_launch.errors import UsageError, translated
 from enclave_launch.review.checks import check_plan
 from enclave_launch.review.checks.keystore import against_keystore, against_router
-from enclave_launch.review.document import Told, plan_from_document
+from enclave_launch.review.document import PlanFinding, plan_from_document
 from enclave_launch.review.expectations import Expectations, read_expectations, rule_findings
 from enclave_launch.verb.secure_plan.keystores import (
     DEFAULT_MARGIN,
@@ -37,7 +37,7 @@ def judged(
     keystore: Path | str | None = None,
     within: str = DEFAULT_MARGIN,
     now: datetime | None = None,
-) -> list[tuple[Told, str | None]]:
+) -> list[tuple[PlanFinding, str | None]]:
     """Findings of the dry run's JSON ``document``, of the rules in ``expect`` (default: ``EXPECTATIONS`` in the
     working directory, if it is there), and of ``keystore``, where one is given; what ends ``within`` that time is one.
 
@@ -52,7 +52,7 @@ def judged(
 
 def _of_keystore(
     document: Mapping[str, Any], keystore: Path | str, within: str, now: datetime | None
-) -> list[Told]:
+) -> list[PlanFinding]:
     plan = plan_from_document(document)
     found = against_keystore(plan, signed_grants(keystore), endings(keystore, within, now))
     if plan.on_zenoh:

@@ -32,7 +32,7 @@ def enforced_grants(keystore: Path | str) -> Mapping[str, frozenset[GrantedName]
 
 
 def zenoh_findings(keystore: Path | str, now: datetime | None = None) -> tuple[Finding, ...]:
-    """What ``secure-keystore verify`` finds in the files for Zenoh."""
+    """Return what ``secure-keystore verify`` finds in the files for Zenoh."""
     with keystore_errors():
         return check_zenoh_files(keystore, now or utc_now())
 
@@ -40,7 +40,9 @@ def zenoh_findings(keystore: Path | str, now: datetime | None = None) -> tuple[F
 def endings(
     keystore: Path | str, within: str | None = None, now: datetime | None = None
 ) -> tuple[Ending, ...]:
-    """All that ends, or what ends ``within`` a time such as ``30d``; the earliest first."""
+    """Return everything that expires, the earliest first.
+
+    :param within: only what expires within a duration such as ``30d``"""
     with keystore_errors():
         report = status(keystore, now=now)
         chosen = report.expiries if within is None else report.due(parse_duration(within))

@@ -27,10 +27,9 @@ FORM: Option = ("--format", one_of("text", "json"), "")
 
 
 def read_plan(words: Sequence[str], options: argparse.Namespace) -> Mapping[str, Any]:
-    """The dry run's JSON document of the plan that ``words`` name.
+    """Return the dry run's JSON document of the plan that ``words`` name.
 
-    Raises ``UsageError`` (no such file, not a plan) and what ``resolve`` raises.
-    """
+    :raises UsageError: the file does not exist or is not a plan, or as ``resolve``."""
     if is_saved_plan(words):
         return read_saved(Path(words[0]))
     return plan_of(words, options)
@@ -42,7 +41,9 @@ def is_saved_plan(words: Sequence[str]) -> bool:
 
 
 def plan_of(words: Sequence[str], options: argparse.Namespace) -> Mapping[str, Any]:
-    """The same for a launch file. Raises ``UsageError`` and what ``resolve`` raises."""
+    """Return the dry run's JSON document of a launch file.
+
+    :raises UsageError: it does not exist, or as ``resolve``."""
     target = find_target(words, search_prefixes(options.prefix))
     with stdout_is_for_the_plan():
         plan = resolve(target.launch_file, target.arguments, options=resolve_options(options))

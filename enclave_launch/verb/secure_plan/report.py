@@ -59,8 +59,11 @@ def report_text(
     keystore: Path | str | None = None,
     expect: Path | None = None,
 ) -> str:
-    """``document``: the dry run's JSON. Raises ``UsageError`` for rules, and a ``ProvisionError`` for a keystore, that
-    cannot be read."""
+    """Return the report in the given form.
+
+    :param document: the dry run's JSON
+    :raises UsageError: the rules of ``expect`` cannot be read.
+    :raises ProvisionError: the keystore cannot be read."""
     if form in ("dot", "mermaid"):
         return (dot if form == "dot" else mermaid)(plan_graph(document))
 

@@ -34,7 +34,7 @@ class Checkout(NamedTuple):
     folder: Path
 
     def then(self, path: str | os.PathLike[str]) -> Path:
-        """``path`` in the old revision; one outside of the repository is itself."""
+        """Return ``path`` in the old revision, or itself if it lies outside of the repository."""
         real = Path(os.path.realpath(path))
         return self.folder / real.relative_to(self.top) if real.is_relative_to(self.top) else Path(path)
 
@@ -45,10 +45,9 @@ def names_revision(word: str) -> bool:
 
 
 def plan_before(word: str, words: Sequence[str], options: argparse.Namespace) -> Mapping[str, Any]:
-    """The plan that ``word`` names: of a file of that revision, or for ``REVISION:`` of what ``words`` were there.
+    """Return the plan that ``word`` names: of a file of that revision, or for ``REVISION:`` of ``words`` there.
 
-    Raises ``UsageError`` in git's words, or for a file that the revision lacks, and what ``resolve`` raises.
-    """
+    :raises UsageError: git refuses, the revision lacks the file, or as ``resolve``."""
     found = _REVISION_AND_PATH.fullmatch(word)
     assert found, "asked by names_revision"
     if not found["path"]:
@@ -94,7 +93,9 @@ def _moved(value: Any, old: Checkout) -> Any:
 
 @contextmanager
 def checkout(revision: str, inside: Path) -> Iterator[Checkout]:
-    """All files of ``revision`` of the repository that ``inside`` is in. Raises ``UsageError`` in git's words."""
+    """Check out all files of ``revision`` of the repository that contains ``inside``, in a temporary folder.
+
+    :raises UsageError: git refuses; the words are its own."""
     top = Path(_git(inside, "rev-parse", "--show-toplevel"))
     commit = _git(top, "rev-parse", "--verify", "--quiet", "--end-of-options", f"{revision}^{{commit}}")
     with tempfile.TemporaryDirectory(prefix="secure-plan-") as scratch:

@@ -18,7 +18,7 @@ from enclave_launch.diagnostics import Code, Diagnostic
 from enclave_launch.flow import resolve
 from enclave_launch.options import ResolveOptions
 from enclave_launch.plan import LaunchPlan
-from enclave_launch.report.look import Look, look_for
+from enclave_launch.report.terminal_style import TerminalStyle, terminal_style_of
 from enclave_launch.report.tree import plan_tree
 
 DEMO = Path(__file__).parents[2] / "fixtures" / "demo_ws"
@@ -42,7 +42,7 @@ def bare(text: str) -> str:
 
 
 def test_on_a_terminal_no_line_is_wider(plan: LaunchPlan) -> None:
-    told = plan_tree(plan, Look(80, True))
+    told = plan_tree(plan, TerminalStyle(80, True))
     assert (
         max(map(len, bare(told).splitlines()[1:])) <= 80
     )  # the first is the path of the file: words stay whole
@@ -50,14 +50,14 @@ def test_on_a_terminal_no_line_is_wider(plan: LaunchPlan) -> None:
 
 
 def test_long_lists_are_folded_and_counted(plan: LaunchPlan) -> None:
-    folded = plan_tree(plan, Look(80))
+    folded = plan_tree(plan, TerminalStyle(80))
     shown = sum(name in folded for name in MANY)
     assert shown < len(MANY) and f"… and {len(MANY) - shown} more (-v shows them)" in folded
 
 
-@pytest.mark.parametrize("look", [Look(), Look(80, full=True)])
-def test_nothing_is_folded_in_a_pipe_or_with_v(plan: LaunchPlan, look: Look) -> None:
-    told = plan_tree(plan, look)
+@pytest.mark.parametrize("style", [TerminalStyle(), TerminalStyle(80, full=True)])
+def test_nothing_is_folded_in_a_pipe_or_with_v(plan: LaunchPlan, style: TerminalStyle) -> None:
+    told = plan_tree(plan, style)
     assert all(name in told for name in MANY) and "more (-v" not in told
 
 
@@ -66,22 +66,22 @@ def diagnostics(count: int, remedy: str = "write a manifest") -> list[Diagnostic
 
 
 def test_what_to_do_is_said_once() -> None:
-    lines = Look().told("warning", diagnostics(3))
+    lines = TerminalStyle().listed("warning", diagnostics(3))
     assert lines == [
         *(f"warning: node n{n} unknown" for n in range(3)),
         "    what to do: write a manifest",
     ]
-    assert Look().told("warning", diagnostics(1)) == ["warning: node n0 unknown; write a manifest"]
+    assert TerminalStyle().listed("warning", diagnostics(1)) == ["warning: node n0 unknown; write a manifest"]
 
 
 def test_many_of_a_kind_are_counted_unless_all_are_wanted() -> None:
-    lines = Look().told("warning", diagnostics(9))
+    lines = TerminalStyle().listed("warning", diagnostics(9))
     assert "warning: 5 more like these (no-manifest; -v shows them)" in lines and len(lines) == 6
-    assert len(Look(full=True).told("warning", diagnostics(9))) == 10
+    assert len(TerminalStyle(full=True).listed("warning", diagnostics(9))) == 10
 
 
 def test_names_cannot_bring_control_characters_of_their_own() -> None:
-    told = Look(80, True).told("warning", [Diagnostic(Code.NO_MANIFEST, "n", "node \033[2Jn")])
+    told = TerminalStyle(80, True).listed("warning", [Diagnostic(Code.NO_MANIFEST, "n", "node \033[2Jn")])
     assert "\033[2J" not in "".join(told) and "\\x1b[2Jn" in "".join(told)
 
 
@@ -91,10 +91,10 @@ class Terminal(io.StringIO):
 
 
 def test_colours_are_for_terminals_that_want_them() -> None:
-    assert look_for(Terminal(), {"TERM": "xterm"}).colour
-    assert not look_for(Terminal(), {"NO_COLOR": "1", "TERM": "xterm"}).colour
-    assert not look_for(Terminal(), {"TERM": "dumb"}).colour
-    assert look_for(io.StringIO(), {"TERM": "xterm"})[:2] == (None, False)
+    assert terminal_style_of(Terminal(), {"TERM": "xterm"}).colour
+    assert not terminal_style_of(Terminal(), {"NO_COLOR": "1", "TERM": "xterm"}).colour
+    assert not terminal_style_of(Terminal(), {"TERM": "dumb"}).colour
+    assert terminal_style_of(io.StringIO(), {"TERM": "xterm"})[:2] == (None, False)
 
 
 def in_a_terminal(tmp_path: Path, command: str, *capture: str, keys: tuple[str, ...] = ()) -> str:

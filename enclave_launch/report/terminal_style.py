@@ -30,7 +30,7 @@ _COLOURS = (
 )
 
 
-class Look(NamedTuple):
+class TerminalStyle(NamedTuple):
     """``width``: columns, ``None`` for lines of any length; ``full``: nothing is folded or counted; ``folder``: a
     path that is left out where it begins one."""
 
@@ -40,12 +40,13 @@ class Look(NamedTuple):
     folder: str = ""
 
     def one_line(self, text: str) -> str:
-        """``text`` escaped, files below ``folder`` by the name that a person would type."""
+        """Escape ``text`` and shorten the paths of files below ``folder`` to those that a person would type."""
         return printable(self._shortened(text))
 
     def wrapped(self, text: str, first: str, further: str, *, fold: bool = False) -> list[str]:
-        """Lines of ``text`` behind ``first``, the later ones behind ``further``; words stay whole. ``fold``: after some
-        lines the other words are counted."""
+        """Wrap ``text`` into lines, the first one behind ``first``, later ones behind ``further``; words stay whole.
+
+        :param fold: after some lines, count the remaining words instead of showing them"""
         if self.width is None:
             return [self.painted(first + text)]
         room = max(self.width, len(first) + _NARROWEST)
@@ -60,15 +61,17 @@ class Look(NamedTuple):
         return [self.painted(line) for line in lines]
 
     def painted(self, line: str) -> str:
-        """``line`` with the colours of its parts, where colours are wanted."""
+        """Colour the parts of ``line``, if colours are requested."""
         if self.colour:
             for pattern, colour in _COLOURS:
                 line = pattern.sub(rf"{colour}\g<0>{_RESET}", line)
         return line
 
-    def told(self, kind: str, diagnostics: Sequence[Diagnostic]) -> list[str]:
-        """``kind: text`` of each. Of many with the same code some are shown and the others counted; what to do is said
-        once where it is the same for several."""
+    def listed(self, kind: str, diagnostics: Sequence[Diagnostic]) -> list[str]:
+        """Format ``diagnostics``, each as ``kind: text``.
+
+        Of many with the same code some are shown and the others counted; a remedy that several share is printed
+        once."""
         lines: list[str] = []
         for group in _by_code(diagnostics):
             remedies = {each.remedy for each in group}
@@ -98,11 +101,14 @@ def _by_code(diagnostics: Iterable[Diagnostic]) -> list[list[Diagnostic]]:
     return list(groups.values())
 
 
-def look_for(stream: TextIO, environment: Mapping[str, str], *, verbose: bool = False) -> Look:
-    """As ``stream`` can show it: a terminal has a width, and colours unless ``NO_COLOR`` (no-color.org) is set."""
+def terminal_style_of(
+    stream: TextIO, environment: Mapping[str, str], *, verbose: bool = False
+) -> TerminalStyle:
+    """Return the style that ``stream`` can show: a terminal has a width, and colours unless ``NO_COLOR``
+    (no-color.org) is set."""
     folder = os.path.join(os.getcwd(), "")
     if not stream.isatty():
-        return Look(full=verbose, folder=folder)
+        return TerminalStyle(full=verbose, folder=folder)
 
     plain = bool(environment.get("NO_COLOR")) or environment.get("TERM") == "dumb"
-    return Look(shutil.get_terminal_size().columns, not plain, verbose, folder)
+    return TerminalStyle(shutil.get_terminal_size().columns, not plain, verbose, folder)

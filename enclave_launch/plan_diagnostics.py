@@ -48,7 +48,7 @@ from keystore.formats.subject import common_name
 def problems(
     processes: Sequence[PlannedProcess], components: Sequence[PlannedComponent]
 ) -> Iterator[Diagnostic]:
-    """What ``--secure`` stops at, of each process and then of each component."""
+    """Report what ``--secure`` stops at, of each process and then of each component."""
     for item in processes:
         name, place = item.process.process_name, item.location
         if item.missing:
@@ -71,7 +71,7 @@ def _missing(missing: Missing, place: SourceLocation) -> Diagnostic:
 def notes(
     processes: Sequence[PlannedProcess], components: Sequence[PlannedComponent], launcher: RunningNode | None
 ) -> Iterator[Diagnostic]:
-    """What a reader should know of single processes and components."""
+    """Report what matters about single processes and components."""
     for item in processes:
         process = item.process
         if item.enclave is None and process.kind == "executable":
@@ -131,14 +131,14 @@ def _places(names: Mapping[Named, str]) -> list[str]:
 
 
 def _incomplete(nodes: Iterable[RunningNode]) -> Iterator[Diagnostic]:
-    """What was learnt from runs that cannot have shown all of a node."""
+    """Report nodes whose records cannot have shown all of their interfaces."""
     for node in nodes:
         for why in node.interface.incomplete:
             yield recording_incomplete(node.fqn, why, str(node.interface.source), node.location)
 
 
 def _alike(container: str, processes: Iterable[PlannedProcess]) -> tuple[str, ...]:
-    """Nodes of this launch whose last name is that of ``container``."""
+    """Return nodes of this launch whose last name is that of ``container``."""
     last = "/" + container.rpartition("/")[2]
     return tuple(
         dict.fromkeys(node.fqn for planned in processes for node in planned.nodes if node.fqn.endswith(last))
