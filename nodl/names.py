@@ -71,6 +71,15 @@ def is_full_name(name: str) -> bool:
     return len(name) <= MAX_NAME_LENGTH and _ABSOLUTE.match(name) is not None
 
 
+def is_name(name: str) -> bool:
+    """Return True if code may write ``name``, as ``validate_name`` has it."""
+    try:
+        validate_name(name)
+    except InvalidNameError:
+        return False
+    return True
+
+
 def validate_name(name: str, what: str = "name") -> None:
     """A name as code writes it: absolute, relative or private, with ``{node}``, ``{ns}``, ``{namespace}``.
 

@@ -84,6 +84,7 @@ class Endpoint(NamedTuple):
     introspected: bool = False  # a service whose calls are published below its name (service introspection)
     note: str = ""  # what else a reader should know: the parameter or plugin that the name comes from
     qos: QosPolicies = ()  # what the description fixes
+    readings: tuple[NameTemplate, ...] = ()  # what a recorded name may be as well, until another run decides
 
 
 class Gap(NamedTuple):

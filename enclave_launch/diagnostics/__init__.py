@@ -58,6 +58,7 @@ class Code(str, Enum):
         "manifest-lacks",
         "The source of a program makes interfaces that its manifest does not have",
     )
+    RECORD_UNDECIDED = "record-undecided", "A recorded name may be fixed, or the value of a parameter"
     RECORD_LACKS = "record-lacks", "Other descriptions of a node have names that were never recorded"
     RECORDING_INCOMPLETE = "recording-incomplete", "What was learnt of a node may not be all of it"
     NAME_UNREMAPPABLE = "name-unremappable", "A name with two underscores, which no remap rule can name"

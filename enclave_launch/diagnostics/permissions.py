@@ -53,6 +53,18 @@ def record_lacks(program: str, record: str, lacks: Sequence[str], place: SourceL
     return Diagnostic(Code.RECORD_LACKS, program, text, place, remedy)
 
 
+def record_undecided(
+    node: str, names: Sequence[str], parameters: Sequence[str], place: SourceLocation
+) -> Diagnostic:
+    """``names``: what is granted; ``parameters``: whose value the recorded name had."""
+    text = (
+        f"node {node}: the recorded name may be fixed, or the value of {' or '.join(parameters)}; what is granted, as "
+        f"no run decides: {', '.join(names)}"
+    )
+    remedy = "record it once more with another value (--learn-parameters does that)"
+    return Diagnostic(Code.RECORD_UNDECIDED, node, text, place, remedy)
+
+
 def descriptions_differ(
     program: str, used: str, other: str, differing: Sequence[str], place: SourceLocation
 ) -> Diagnostic:

@@ -18,6 +18,7 @@ from enclave_launch.diagnostics.permissions import (
     name_unremappable,
     node_name_impossible,
     pattern_accepted,
+    record_undecided,
 )
 from enclave_launch.policy.running_node import RunningNode
 from enclave_launch.ros_rules.distro import REMAPS_WHOLE_ACTIONS
@@ -25,7 +26,14 @@ from enclave_launch.source_location import SourceLocation
 from keystore.formats.policy import Operation
 from nodl.builtin_interfaces import BuiltinCondition, built_in_interfaces
 from nodl.name_template import NameTemplate, ParameterPart, UnknownPart
-from nodl.names import MAX_NAME_LENGTH, InvalidNameError, join, validate_namespace, validate_node_name
+from nodl.names import (
+    MAX_NAME_LENGTH,
+    InvalidNameError,
+    is_name,
+    join,
+    validate_namespace,
+    validate_node_name,
+)
 from nodl.node_interface import Certainty, ClientLibrary, Endpoint, EndpointKind, NodeInterface
 from nodl.remap import ACTION_SERVICES, NodeNames, ParsedRule, Resolved
 
@@ -130,7 +138,10 @@ class _Collector:
             self._impossible(error)
             return self._result
         for endpoint in self._node.interface.endpoints:
-            self._endpoint(endpoint)
+            if endpoint.readings:
+                self._recorded(endpoint)
+            else:
+                self._endpoint(endpoint)
         if "service-events" in self._options.also:
             self._service_events()
         conditions = conditions_of(self._node, self._options.also)
@@ -151,12 +162,41 @@ class _Collector:
             return
         learnt = endpoint.note if self._node.interface.runs else ""
         note = "; ".join(filter(None, (_parameter_note(template, self._node), learnt)))
-        inputs = self._node.inputs
-        for filled in inputs.doubtful(template).fill_each({**inputs.values, **self._node.parameters}):
+        for filled in self._filled(template):
             if filled.is_literal:
                 self._name(endpoint, filled, note)
             else:
                 self._pattern(endpoint, filled)
+
+    def _recorded(self, endpoint: Endpoint) -> None:
+        """Grant each reading of a recorded name, and warn if they are different names in this launch.
+
+        A value that cannot be a name is no reading of it.
+        """
+        granted: dict[str, str] = {}
+        sets: set[frozenset[str]] = set()
+        for reading in (endpoint.name, *endpoint.readings):
+            filled = self._filled(reading)
+            if reading is endpoint.name:
+                for unknown in (each for each in filled if not each.is_literal):
+                    self._pattern(endpoint, unknown)
+            names = frozenset(each.text for each in filled if each.is_literal and is_name(each.text))
+            note = "; ".join(filter(None, (_parameter_note(reading, self._node), endpoint.note)))
+            granted = {**dict.fromkeys(sorted(names), note), **granted}
+            if not reading.is_literal:
+                sets.add(names)
+        sets.add(frozenset(each.text for each in (endpoint.name, *endpoint.readings) if each.is_literal))
+        for name, note in granted.items():
+            self._name(endpoint, NameTemplate.literal(name), note)
+        if len(sets) > 1:
+            parameters = {each for each in (endpoint.name, *endpoint.readings) if not each.is_literal}
+            where = SourceLocation.read(str(endpoint.source))
+            told = record_undecided(self._fqn, sorted(granted), sorted(map(str, parameters)), where)
+            self._result.warnings.append(told)
+
+    def _filled(self, template: NameTemplate) -> tuple[NameTemplate, ...]:
+        inputs = self._node.inputs
+        return inputs.doubtful(template).fill_each({**inputs.values, **self._node.parameters})
 
     def _name(self, endpoint: Endpoint, template: NameTemplate, note: str) -> None:
         operation, place = OPERATIONS[endpoint.kind], str(endpoint.source)

@@ -8,10 +8,12 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from enclave_common.words import counted
-from enclave_launch.errors import UsageError
+from enclave_common.dependencies import installed
+from enclave_common.words import counted, some_of
+from enclave_launch.errors import ManifestError, UsageError, translated
 from enclave_launch.recording.isolation import DEVICES_STAY_REAL, isolate
 from enclave_launch.recording.learning import (
+    RECORDS,
     LearntFolder,
     QuietWatch,
     keep_record,
@@ -25,6 +27,9 @@ from enclave_launch.runtime.companion import LaunchCompanion
 from enclave_launch.verb.target import LaunchTarget
 from keystore.errors import KeystoreError
 from keystore.formats.validity import parse_duration
+from nodl.errors import NoDLError
+
+_NAMES = 6  # named in a message
 
 Start = Callable[["LaunchCompanion"], int]
 """Run the launch with a companion; gives the exit status."""
@@ -64,7 +69,24 @@ def learn_launch(target: LaunchTarget, options: argparse.Namespace, start: Start
         _say(f"a second run, with marker values for {asked.shown}")
         status = max(status, record(patience or 5.0, MarkerRun(asked)))
     _report(write_manifests(folder), folder)
+    if installed("nodl.infer") and options.missing_nodl == "infer":
+        _report_unseen(folder, options)
     return status
+
+
+def _report_unseen(folder: Path, options: argparse.Namespace) -> None:
+    """Report what other descriptions of the recorded nodes have: some names exist only while somebody reads another."""
+    from nodl.verb.check_record import never_seen  # an add-on: inference
+
+    with translated(NoDLError, ManifestError):
+        found = never_seen([folder / RECORDS], options.prefix, options.source)
+    for about, names in found.items():
+        _say(f"warning: {about}: never seen: {some_of(names, _NAMES, '; ')}")
+    if found:
+        _say(
+            "record again while somebody uses what was never seen, or grant it with --also unseen (--explain shows who "
+            "has it)"
+        )
 
 
 def _report(learnt: LearntFolder, folder: Path) -> None:

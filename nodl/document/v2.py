@@ -132,7 +132,14 @@ def _endpoints(
             full_type = _full_type(type_name, kind)
             introspected, qos = about.introspected, tuple(sorted(_qos(entry)))
             yield Endpoint(
-                kind, about.template, full_type, source, introspected=introspected, qos=qos, note=about.note
+                kind,
+                about.template,
+                full_type,
+                source,
+                introspected=introspected,
+                qos=qos,
+                note=about.note,
+                readings=about.readings,
             )
 
 

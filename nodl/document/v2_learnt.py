@@ -9,8 +9,12 @@
 ``name`` is that of the standard entry, the name that was seen. ``parameter`` gives the node's parameter (or ``<1>``,
 a word of its command line) whose value the name is, ``each`` says that it is a list, ``suffix`` what the program
 appends to the value, ``default`` the name where nothing is set. ``written`` is the source's name where NoDL v2 cannot
-hold it, ``introspection`` says that the calls of a service are published. ``proof``, ``undecided`` and ``runs`` are
-for the reader: plans show them.
+hold it, ``introspection`` says that the calls of a service are published. ``undecided`` and ``runs`` are for the
+reader: plans show them.
+
+A coincidence of values is not a rule: with ``proof: one run`` the name may as well be fixed, and ``seen`` lists further
+names that came from the same parameter. Where several parameters had the value, ``candidates`` lists them beside the
+fixed name. Until another run decides all readings hold.
 """
 
 from __future__ import annotations
@@ -27,13 +31,19 @@ from nodl.names import InvalidNameError, validate_name
 from nodl.node_interface import Endpoint, EndpointKind
 from nodl.yaml_text import YamlList, YamlMap, YamlScalar, YamlValue
 
+ONE_RUN = "one run"
+"""``proof`` of a name that had its parameter's value in the only run that gave it one."""
+
+_Fields = dict[str, "str | int | float | bool | None"]
+
 
 class LearntName(NamedTuple):
-    """``note``: how it was learnt, for the reader of a plan."""
+    """``readings``: what the name may be as well; ``note``: how it was learnt, for the reader of a plan."""
 
     template: NameTemplate
     introspected: bool = False
     note: str = ""
+    readings: tuple[NameTemplate, ...] = ()
 
 
 class LearntFrom(NamedTuple):
@@ -56,10 +66,12 @@ def learnt_names(root: YamlMap) -> dict[tuple[str, str], LearntName]:
     found: dict[tuple[str, str], LearntName] = {}
     for row in rows.items if isinstance(rows, YamlList) else ():
         if isinstance(row, YamlMap):
-            fields = {key: value.value for key, value in row.items.items() if isinstance(value, YamlScalar)}
-            template = _template(fields, row)
+            fields = _scalars(row)
             found[str(fields["in"]), str(fields["name"])] = LearntName(
-                template, fields.get("introspection") is True, _note(row)
+                _template(fields, row),
+                fields.get("introspection") is True,
+                _note(row),
+                tuple(_readings(fields, row)),
             )
     return found
 
@@ -70,11 +82,9 @@ def _note(row: YamlMap) -> str:
     proof = row.items.get("proof")
     texts = [f"recorded in {counted(len(runs), 'run')}"] if runs else []
     if undecided:
-        texts.append(
-            f"undecided whether it is fixed or comes from {' or '.join(undecided)}: only this name is granted"
-        )
+        texts.append(f"undecided whether it is fixed or comes from {' or '.join(undecided)}")
     if isinstance(proof, YamlScalar):
-        source_is_known = proof.value != "one run"
+        source_is_known = proof.value != ONE_RUN
         texts.append(str(proof.value) if source_is_known else "from the parameter as far as one run tells")
     return "; ".join(texts)
 
@@ -98,14 +108,33 @@ def _section(root: YamlMap) -> dict[str, YamlValue]:
     return section.items if section else {}
 
 
-def _template(fields: dict[str, str | int | float | bool | None], row: YamlMap) -> NameTemplate:
+def _template(fields: _Fields, row: YamlMap) -> NameTemplate:
     parameter, default = fields.get("parameter"), fields.get("default")
     if parameter:
         item = "each" if fields.get("each") is True else None
         given = str(default) if default is not None else None
         part, suffix = ParameterPart(str(parameter), given, item), str(fields.get("suffix") or "")
         return NameTemplate((part, suffix) if suffix else (part,))
-    name = str(fields.get("written") or fields["name"])
+    return _fixed(str(fields.get("written") or fields["name"]), row)
+
+
+def _readings(fields: _Fields, row: YamlMap) -> Iterator[NameTemplate]:
+    """What else the recorded name may be: fixed, or the value of one of several parameters."""
+    if fields.get("parameter") and fields.get("proof") == ONE_RUN:
+        yield _fixed(str(fields.get("written") or fields["name"]), row)
+        for name in _texts(row.items.get("seen")):
+            yield _fixed(name, row)
+    candidates = row.items.get("candidates")
+    for each in candidates.items if isinstance(candidates, YamlList) else ():
+        if isinstance(each, YamlMap):
+            yield _template(_scalars(each), row)
+
+
+def _scalars(row: YamlMap) -> _Fields:
+    return {key: value.value for key, value in row.items.items() if isinstance(value, YamlScalar)}
+
+
+def _fixed(name: str, row: YamlMap) -> NameTemplate:
     try:
         validate_name(name)
     except InvalidNameError as error:

@@ -96,6 +96,10 @@ _LEARNT_ENDPOINT = map_of(
         "default": text_of(),
         "proof": text_of(),
         "undecided": _TEXTS,
+        "seen": _TEXTS,
+        "candidates": list_of(
+            map_of({"parameter": text_of(), "each": boolean, "suffix": text_of()}, required=("parameter",))
+        ),
         "introspection": boolean,
         "runs": _TEXTS,
     },

@@ -160,7 +160,8 @@ def _find(asked: Asked, described: Iterable[_Described]) -> _Described | None:
 
 def _described(node: AskedNode, endpoint: Endpoint) -> Iterable[_Described]:
     inputs = {**arguments_as_inputs(node.arguments), **node.parameters}
-    for template in endpoint.name.fill_each(inputs):
+    readings = (endpoint.name, *endpoint.readings)
+    for template in (each for reading in readings for each in reading.fill_each(inputs)):
         for final in _finals(node, endpoint.kind, template):
             pattern = re.compile(".+".join(re.escape(part) for part in final.split("*")))
             yield _Described(endpoint.kind, pattern, final, endpoint)

@@ -21,6 +21,8 @@ _TF_LISTENER = "transform_listener_impl_*"
 """The node that tf2_ros makes for a ``TransformListener`` that was given none; our section has a word for it."""
 _RANDOM = re.compile(r"(static_transform_publisher)_([A-Za-z0-9]+)\Z")  # tf2_ros, when it is given no name
 
+_UNTIL_DECIDED = "both are granted until a run with another value decides (--learn-parameters)"
+
 OBSERVED = "observed"
 """What ``AskedNode.started_as`` is for a node of the graph, which says nothing of states."""
 
@@ -28,7 +30,7 @@ OBSERVED = "observed"
 class LearntEndpoint(NamedTuple):
     """One name of a node. ``written`` where the manifest cannot hold it as a plain name; ``moved``: rules of the
     program itself made it of what the source writes, so that it is held as the final name; ``spellings``: what else the
-    source may write, as far as the runs can tell."""
+    source may write, as far as the runs can tell; ``seen``: further names from the same parameter."""
 
     kind: EndpointKind
     name: str
@@ -39,6 +41,7 @@ class LearntEndpoint(NamedTuple):
     introspected: bool = False
     moved_from: str = ""
     spellings: tuple[str, ...] = ()
+    seen: tuple[str, ...] = ()
 
 
 class ProgramKey(NamedTuple):
@@ -167,7 +170,9 @@ def _notes(entries: Iterable[LearntEndpoint], seen: Sequence[_Seen]) -> Iterable
     for entry in entries:
         if entry.origin.undecided:
             said = ", ".join(map(str, entry.origin.candidates))
-            yield f"{entry.name}: fixed, or from one of {said}: not decided; only this name is granted"
+            yield f"{entry.name}: fixed, or from one of {said}: {_UNTIL_DECIDED}"
+        elif entry.origin.source and not entry.origin.proven:
+            yield f"{entry.name}: fixed, or the value of {entry.origin.source}: {_UNTIL_DECIDED}"
         if entry.spellings:
             others = ", ".join(entry.spellings)
             yield f"{entry.name}: or {others}: the runs do not tell; one under another namespace and node name does"
@@ -210,6 +215,7 @@ def _entry(name: Name, origin: NameOrigin, names: set[Name], seen: Sequence[_See
         introspected,
         moved_from,
         () if origin.source else first.spellings,
+        tuple(sorted(each.name for each in names if each != name and each[::2] == name[::2])),
     )
 
 

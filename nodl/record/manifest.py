@@ -14,6 +14,7 @@ from typing import Any
 import yaml
 
 from enclave_common.yaml_reader import load_yaml
+from nodl.document.v2_learnt import ONE_RUN
 from nodl.document.v2_schema import NAME_PATTERN
 from nodl.document.v2_section import CATEGORIES, IDENTITY_KEY
 from nodl.node_interface import ClientLibrary
@@ -126,9 +127,13 @@ def _about(entry: LearntEndpoint) -> dict[str, Any]:
         fields["each"] = origin.source.each
         fields["suffix"] = origin.source.suffix or None
         fields["default"] = origin.default
-        fields["proof"] = "another value was followed" if origin.proven else "one run"
+        fields["proof"] = "another value was followed" if origin.proven else ONE_RUN
+        fields["seen"] = [] if origin.proven else list(entry.seen)
     if origin.undecided or entry.spellings:
         fields["undecided"] = [*map(str, origin.candidates), *entry.spellings]
+    fields["candidates"] = [
+        {name: value for name, value in each._asdict().items() if value} for each in origin.candidates
+    ]
     fields["introspection"] = entry.introspected
     fields["runs"] = list(entry.runs)
     return {name: value for name, value in fields.items() if value not in (None, False, [])}

@@ -6,8 +6,7 @@ of which every entry has the same names below it (``node_names`` of nav2's lifec
 ends in ``frame``, ``frame_id`` or ``type`` were never the source of a name.
 
 One observation gives candidates. A second one with another value decides: the name followed the value (proven), or
-it did not (fixed). Several candidates that no observation tells apart stay undecided, and then no more than the name
-that was seen is granted.
+it did not (fixed). Until then both hold: the name that was seen, and the value of each candidate.
 """
 
 from __future__ import annotations

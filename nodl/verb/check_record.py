@@ -22,7 +22,7 @@ from nodl.names import split_fqn
 from nodl.node_interface import NodeInterface
 from nodl.record.asked import AskedNode, all_asked
 from nodl.record.assembly import read_record
-from nodl.record.checking import Comparison, compare
+from nodl.record.checking import Comparison, Verdict, compare
 from nodl.verb import PREFIX, add_verb
 
 _MOST_NODES = 32  # of one program: descriptions may refer to each other
@@ -74,6 +74,31 @@ def run(arguments: argparse.Namespace) -> int:
     sys.stdout.write(_json(judgements) if arguments.format == "json" else _text(judgements))
     fits = all(each.comparison is not None and each.comparison.fits for each in _counted(judgements))
     return 0 if fits else 1
+
+
+def never_seen(
+    records: Iterable[Path], prefixes: Iterable[Path], sources: Iterable[Path]
+) -> dict[str, tuple[str, ...]]:
+    """Return, by node and program, the names that its source or the library has and no record of ``records`` shows.
+
+    Raises ``NoDLError`` for a broken document of the library.
+    """
+    nodes, _ = _recorded(_files(records))
+    known = _Known(ManifestLookup((), ()), search_prefixes(map(str, prefixes)), tuple(map(str, sources)))
+    unseen: dict[str, dict[tuple[object, ...], str]] = {}
+    for node in nodes:
+        here: dict[tuple[object, ...], str] = {}
+        for each in _judge(node, known, ("inference", "library")):
+            who = "its source makes it" if each.described_by == "inference" else "the library has it"
+            for difference in each.comparison.differences if each.comparison else ():
+                if difference.verdict is Verdict.NEVER_SEEN and difference.kind:
+                    kind = difference.kind.value.replace("_", " ")
+                    said = f"{kind} {difference.name} ({who}: {difference.detail})"
+                    here.setdefault((difference.kind, difference.detail), said)
+        about = f"{node.program}, node {node.name}"
+        before = unseen.get(about)  # what another run showed was seen
+        unseen[about] = here if before is None else {key: before[key] for key in before if key in here}
+    return {about: tuple(names.values()) for about, names in unseen.items() if names}
 
 
 def _files(paths: Iterable[Path]) -> list[Path]:

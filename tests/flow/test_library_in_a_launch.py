@@ -381,3 +381,37 @@ def test_explain_says_of_one_name_which_descriptions_have_it(
     lines = explained(launch(NODE, library_folders=own), "/a")
     assert "    publish /a: inferred, library" in lines
     assert not explained(launch(NODE, library_folders=own), "/other")
+
+
+ROWS = "{{runs: [{{id: a}}], endpoints: [{{in: publishers, name: status, {}, runs: [a]}}]}}"
+AFTER_ONE_RUN = ROWS.format("parameter: label, default: status, proof: one run")
+PROVEN = ROWS.format("parameter: label, default: status, proof: another value was followed")
+SEVERAL = ROWS.format("undecided: [a, b], candidates: [{parameter: a}, {parameter: b, each: true}]")
+
+
+@pytest.mark.parametrize(
+    ("section", "parameter", "value", "granted", "told"),
+    [
+        (AFTER_ONE_RUN, "other", "warehouse", ["/status"], False),
+        (AFTER_ONE_RUN, "label", "status", ["/status"], False),
+        (AFTER_ONE_RUN, "label", "warehouse", ["/status", "/warehouse"], True),
+        (AFTER_ONE_RUN, "label", "robot 7 ok", ["/status"], True),
+        (PROVEN, "label", "warehouse", ["/warehouse"], False),
+        (SEVERAL, "a", "front", ["/front", "/status"], True),
+        (SEVERAL, "b", "[left, right]", ["/left", "/right", "/status"], True),
+    ],
+)
+def test_a_coincidence_of_values_is_not_a_rule(
+    launch: Launch,
+    document: Callable[..., Path],
+    section: str,
+    parameter: str,
+    value: str,
+    granted: list[str],
+    told: bool,
+) -> None:
+    """After one run the name may be fixed or the parameter's value; a text that cannot be a name is neither."""
+    node = f'<node pkg="pkg" exec="prog" name="n"><param name="{parameter}" value="{value}"/></node>'
+    plan = launch(node, library_folders=(document("pkg/prog", "status", section),))
+    assert allowed(plan, "publish") == granted and not plan.problems
+    assert ("record-undecided" in codes(plan)) is told

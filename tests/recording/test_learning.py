@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import random
+import shutil
 import signal
 import subprocess
 import sys
@@ -14,8 +15,10 @@ from typing import NamedTuple
 
 import pytest
 
+from enclave_launch.diagnostics import Code
 from enclave_launch.flow import resolve
 from enclave_launch.options import ResolveOptions
+from enclave_launch.plan import LaunchPlan
 from enclave_launch.policy.derivation import LIST_NAMES
 from nodl.document import read_document
 from nodl.name_template import NameTemplate, ParameterPart
@@ -164,12 +167,14 @@ def test_a_manifest_that_lacks_a_name_fails_against_the_record(
     assert "never seen: /speaker: publisher /gibberish" in output
 
 
-def planned(launch_file: str, learnt: Learnt) -> Graph:
-    options = ResolveOptions(
-        prefixes=(WORKSPACE,), manifests=(learnt.folder,), distro=learnt.release, infer=False
-    )
+def resolved(launch_file: str, release: str, folder: Path) -> LaunchPlan:
+    options = ResolveOptions(prefixes=(WORKSPACE,), manifests=(folder,), distro=release, infer=False)
     plan = resolve(LAUNCH_FILES / launch_file, options=options)
     assert plan.problems == ()
+    return plan
+
+
+def graph_of(plan: LaunchPlan) -> Graph:
     graph: Graph = {}
     for enclave in plan.derived.policy.enclaves:
         for profile in enclave.profiles:
@@ -203,8 +208,77 @@ def live_graph(learnt: Learnt, tmp_path: Path) -> Iterator[Graph]:
         launch.wait(30)
 
 
-def test_the_plan_of_another_launch_is_its_live_graph(learnt: Learnt, live_graph: Graph) -> None:
-    plan = planned("other.launch.xml", learnt)
-    assert sorted(plan) == sorted(live_graph)
+def test_after_one_run_another_launch_has_all_it_needs_and_what_is_beyond_is_told(
+    learnt: Learnt, live_graph: Graph
+) -> None:
+    """A name that had a parameter's value may be fixed as well: both readings are granted."""
+    plan = resolved("other.launch.xml", learnt.release, learnt.folder)
+    graph = graph_of(plan)
+    assert sorted(graph) == sorted(live_graph)
+    told = " ".join(each.text for each in plan.warnings if each.code is Code.RECORD_UNDECIDED)
     for node, kinds in live_graph.items():
-        assert plan[node] == kinds, node
+        for kind, names in kinds.items():
+            assert names <= graph[node][kind], node
+            for beyond in graph[node][kind] - names:
+                assert beyond.rpartition("/")[2] in told, (node, beyond)
+
+
+def test_with_marker_values_the_plan_of_another_launch_is_its_live_graph(
+    learnt: Learnt, live_graph: Graph, tmp_path: Path
+) -> None:
+    folder = tmp_path / "learnt"
+    shutil.copytree(learnt.folder, folder)
+    ran = secure_launch(
+        *("--learn", str(folder), "--learn-for", "3s", "--learn-isolation", "local", "--learn-parameters"),
+        *("rclpy_nodes", "learn.launch.xml"),
+        variables=environment(learnt.release, tmp_path),
+    )
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    plan = resolved("other.launch.xml", learnt.release, folder)
+    assert graph_of(plan) == live_graph
+    assert all(each.code is not Code.RECORD_UNDECIDED for each in plan.warnings)
+
+
+LAZY = """#!{python}
+import rclpy
+from rclpy.node import Node
+from std_msgs.msg import String
+
+
+class Lazy(Node):
+    def __init__(self):
+        super().__init__("lazy")
+        self.output = self.create_publisher(String, "scan", 1)
+        self.input = None
+        self.create_timer(0.05, self.look)
+
+    def look(self):
+        if self.input is None and self.output.get_subscription_count():
+            self.input = self.create_subscription(String, "cloud_in", self.output.publish, 1)
+
+
+rclpy.init()
+rclpy.spin(Lazy())
+"""
+
+
+def test_what_was_never_seen_and_the_source_makes_is_told_when_learning_ends(tmp_path: Path) -> None:
+    """A subscription that exists only while somebody reads the node's output."""
+    program = tmp_path / "ws/lib/lazy_nodes/lazy"
+    marker = tmp_path / "ws/share/ament_index/resource_index/packages/lazy_nodes"
+    for file in (program, marker):
+        file.parent.mkdir(parents=True)
+    marker.touch()
+    program.write_text(LAZY.format(python=rclpy_python("jazzy")))
+    program.chmod(0o755)
+    launch_file = tmp_path / "lazy.launch.xml"
+    launch_file.write_text('<launch><node pkg="lazy_nodes" exec="lazy"/></launch>')
+    ran = secure_launch(
+        *("--prefix", str(tmp_path / "ws"), "--learn", str(tmp_path / "learnt"), "--learn-for", "2s"),
+        *("--learn-isolation", "local", str(launch_file)),
+        variables=environment("jazzy", tmp_path),
+    )
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+    assert "node lazy: never seen: subscription /cloud_in (its source makes it" in ran.stderr, ran.stderr
+    assert "publisher /scan (" not in ran.stderr
+    assert "--also unseen" in ran.stderr
