@@ -7,19 +7,19 @@ the manifest that it would patch.
 
 from __future__ import annotations
 
-import re
 import time
 from collections import deque
 from typing import NamedTuple
 
-from enclave_common.files import read_text
 from enclave_common.terminal import printable
+from enclave_common.words import some_of
 from enclave_launch.admission.middleware import ZENOH
 from enclave_launch.plan import LaunchPlan
 from enclave_launch.recording.grants import WORDS, Description, Need, PlannedGrants
 from enclave_launch.recording.listeners import Listener
-from enclave_launch.recording.patches import Patch, manifest_patch, policy_patch
+from enclave_launch.recording.patches import Patch
 from enclave_launch.recording.reasons import MIXED_MIDDLEWARES, NOT_AS_PLANNED, Cause, cause_of
+from enclave_launch.recording.remedies import Remedies
 from enclave_launch.runtime.run_events import ProcessOutput, RunEvent
 from nodl.record.asked import REFUSED, Asked, EndpointRole, role_of
 from nodl.record.assembly import RecordedNode, RecordedProcess
@@ -28,7 +28,7 @@ from nodl.record.lines import EndpointMade, Initialised, Line, NodeMade
 _PATIENCE = 0.3
 """Seconds to wait for what a middleware prints about a participant that was not made: it goes another way."""
 _LINES_KEPT = 40
-_MANIFEST = re.compile(r"\.nodl\.(xml|ya?ml)\Z|/resource_index/nodl/")
+_NAMES = 12  # named in an explanation
 
 
 class Denial(NamedTuple):
@@ -43,6 +43,10 @@ class Denial(NamedTuple):
     cause: Cause | None = None
     silent: bool = False
     """On Zenoh: the node was not told, its messages are dropped."""
+    unseen: tuple[str, ...] = ()
+    """All that ``--also unseen`` grants, this endpoint among it."""
+    denied: bool = False
+    """The policy file forbids it."""
 
     @property
     def text(self) -> str:
@@ -63,7 +67,17 @@ class Denial(NamedTuple):
         if self.silent:
             lines.append("  on Zenoh nothing fails: the router drops all of it without an error")
         lines.append(f"  the node is described by {self.described.text}; that does not ask for it")
-        if self.patch is not None:
+        if self.unseen:
+            lines.append(
+                f"  other descriptions of the node have it; --also unseen grants {some_of(self.unseen, _NAMES)}"
+            )
+        if self.denied:
+            lines.append(
+                "  a DENY of the policy file takes it away; nothing grants it while that stands there"
+            )
+        elif self.patch is None:
+            lines.append("  no single change was found that allows it; describe it in a manifest of the node")
+        else:
             lines.append(f"  this allows it, and nothing else; {self.patch.use}:")
             lines += [f"    {line}" for line in self.patch.diff.splitlines()]
         return lines
@@ -95,6 +109,7 @@ class Explainer(Listener):
         self.denials: list[Denial] = []
         self.not_joined: list[NotJoined] = []
         self._grants = PlannedGrants(plan)
+        self._remedies = Remedies(plan, self._grants)
         self._on_zenoh = {item.process.process_name for item in plan.processes if item.middleware == ZENOH}
         self._printed: dict[str, deque[str]] = {}
         self._waiting: list[tuple[float, RecordedProcess, str, tuple[str, ...]]] = []
@@ -148,9 +163,11 @@ class Explainer(Listener):
         if silent and granted:
             return
         self._told.add(need)
-        patch = None if granted else _patch(need, asked, described)
+        patch = None if granted else self._remedies.patch(need, asked, described)
         cause = cause_of((*asked.error, *self._printed.get(name, ()))) if granted else None
-        self._tell(Denial(name, need, asked, described, granted, patch, cause, silent))
+        unseen = () if granted else self._remedies.unseen(need, described)
+        denied = self._grants.denied(need)
+        self._tell(Denial(name, need, asked, described, granted, patch, cause, silent, unseen, denied))
 
     def _tell_waiting(self, now: float) -> None:
         due = [each for each in self._waiting if each[0] <= now]
@@ -170,17 +187,3 @@ class Explainer(Listener):
 
 def _name(process: RecordedProcess) -> str:
     return process.started.process if process.started else f"process {process.pid}"
-
-
-def _patch(need: Need, asked: Asked, described: Description) -> Patch:
-    """In the node's manifest where it is a file that can be read, else in a policy file."""
-    source = described.node.interface.source if described.node is not None else None
-    if source is not None and _MANIFEST.search(source.file):
-        try:
-            text = read_text(source.file)
-        except (OSError, UnicodeDecodeError):
-            text = ""
-        found = manifest_patch(source.file, text, source.line, asked) if text else None
-        if found is not None:
-            return found
-    return policy_patch(need.enclave, need.node, asked)

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
-from enclave_launch.plan import InterfaceOrigin, LaunchPlan, Missing, PlannedComponent, PlannedProcess
+from enclave_launch.plan import (
+    Described,
+    InterfaceOrigin,
+    LaunchPlan,
+    Missing,
+    PlannedComponent,
+    PlannedProcess,
+)
 from enclave_launch.policy import RunningNode
 from enclave_launch.policy.derivation import LIST_NAMES
 from enclave_launch.policy.node_permissions import OPERATIONS
 from keystore.formats.permissions import DdsRules, dds_rules
-from keystore.formats.permissions_names import dds_topics
+from keystore.formats.permissions_names import dds_topics, full_name
 from keystore.formats.permissions_patterns import covers, has_wildcard
 from keystore.formats.policy import Operation, Qualifier, Rule
 from nodl.record.asked import Asked, asked_endpoint
@@ -45,6 +52,7 @@ class Description(NamedTuple):
     node: RunningNode | None
     origin: InterfaceOrigin | None = None
     missing: Missing | None = None
+    descriptions: tuple[Described, ...] = ()
 
     @property
     def text(self) -> str:
@@ -88,11 +96,21 @@ class PlannedGrants:
         return Need(enclave, node.fqn, OPERATIONS[asked.kind], asked.final), asked
 
     def permits(self, need: Need) -> bool:
+        """Return True if the plan grants ``need``."""
         rules = self._rules.get(need.enclave)
-        if rules is None:
-            return False
-        topics = dict(zip(("publish", "subscribe"), dds_topics(need.operation, need.name), strict=True))
-        return all(_allowed(rules, topic, direction) for direction in topics for topic in topics[direction])
+        return rules is not None and permits(rules, need)
+
+    def denied(self, need: Need) -> bool:
+        """Return True if a DENY of the policy file takes ``need`` away, whatever else grants it."""
+        enclaves = (each for each in self._plan.derived.policy.enclaves if each.path == need.enclave)
+        return any(
+            rule.qualifier is Qualifier.DENY
+            and rule.operation is need.operation
+            and covers(full_name(rule.expression, profile), need.name)
+            for enclave in enclaves
+            for profile in enclave.profiles
+            for rule in profile.rules
+        )
 
     def described(self, process: RecordedProcess, node: RecordedNode) -> Description:
         """Who describes this node in the plan."""
@@ -102,7 +120,7 @@ class PlannedGrants:
         found = [each for each in planned.nodes if each.fqn == node.fqn]
         own = node.made.name if node.made else ""
         named = [each for each in found if each.original_name == own] or found
-        return Description(named[0] if named else None, planned.origin, planned.missing)
+        return Description(named[0] if named else None, planned.origin, planned.missing, planned.descriptions)
 
     def rules_of(self, enclave: str) -> Iterable[Rule]:
         """What the plan allows in ``enclave``, without what every node has; nothing of the launcher's own, which is not
@@ -124,6 +142,18 @@ class PlannedGrants:
                 if same and any(each.fqn == node.fqn for each in item.nodes):
                     return item
         return self._processes.get(process.started.process) if process.started else None
+
+
+def permits(rules: DdsRules, need: Need) -> bool:
+    """Return True if ``rules`` allow all DDS topics of ``need``."""
+    return all(_allowed(rules, topic, direction) for topic, direction in _topics(need))
+
+
+def _topics(need: Need) -> Iterator[tuple[str, str]]:
+    """Yield each DDS topic with its direction."""
+    published, subscribed = dds_topics(need.operation, need.name)
+    yield from ((topic, "publish") for topic in published)
+    yield from ((topic, "subscribe") for topic in subscribed)
 
 
 def _allowed(rules: DdsRules, topic: str, direction: str) -> bool:

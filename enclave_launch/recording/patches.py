@@ -20,15 +20,15 @@ from nodl.node_interface import EndpointKind
 from nodl.record.asked import Asked
 
 _HISTORY = {1: "KEEP_LAST", 2: "KEEP_ALL"}
-POLICY_FILE = "allow.policy.xml"
 
 
 class Patch(NamedTuple):
-    """``file`` is what it changes or makes; ``use`` how it takes effect."""
+    """``file`` is what it changes or makes, ``text`` what stands there then; ``use``: how it takes effect."""
 
     file: str
     diff: str
     use: str
+    text: str
 
 
 def manifest_patch(file: str, text: str, line: int, asked: Asked) -> Patch | None:
@@ -39,32 +39,38 @@ def manifest_patch(file: str, text: str, line: int, asked: Asked) -> Patch | Non
     added = _into_v1(text, line, asked) if text.lstrip()[:1] == "<" else _into_v2(text, asked)
     if added is None:
         return None
-    return Patch(file, _diff(file, text, added), "start the launch again")
+    return Patch(file, _diff(file, text, added), "start the launch again", added)
 
 
-def policy_patch(enclave: str, node: str, asked: Asked) -> Patch:
-    """A policy file that adds the one permission to what is derived."""
+def policy_patch(enclave: str, node: str, asked: Asked, file: str, text: str = "") -> Patch | None:
+    """Return the change of a policy file that adds the one permission to what is derived.
+
+    ``text`` is what stands in ``file``; ``None`` if its shape does not let an enclave be added safely.
+    """
     operation = OPERATIONS[asked.kind]
     element = KIND_OF[LIST_NAMES[operation]]
     namespace, name = split_fqn(node)
-    text = (
-        '<policy version="0.2.0">\n'
-        "  <enclaves>\n"
-        f"    <enclave path={quoteattr(enclave)}>\n"
-        "      <profiles>\n"
+    profile = (
         f"        <profile ns={quoteattr(namespace)} node={quoteattr(name)}>\n"
         f'          <{element}s {operation.value}="ALLOW">\n'
         f"            <{element}>{asked.final}</{element}>\n"
         f"          </{element}s>\n"
         "        </profile>\n"
-        "      </profiles>\n"
-        "    </enclave>\n"
-        "  </enclaves>\n"
-        "</policy>\n"
     )
-    return Patch(
-        POLICY_FILE, _diff(POLICY_FILE, "", text), f"start the launch again with --policy {POLICY_FILE}"
+    begin, end = (
+        f"    <enclave path={quoteattr(enclave)}>\n      <profiles>\n",
+        "      </profiles>\n    </enclave>\n",
     )
+    before = text or '<policy version="0.2.0">\n  <enclaves>\n  </enclaves>\n</policy>\n'
+    head, same, rest = before.partition(begin)
+    if same:
+        after = f"{head}{begin}{profile}{rest}"
+    else:
+        head, last, rest = before.rpartition("  </enclaves>\n")
+        if not last:
+            return None
+        after = f"{head}{begin}{profile}{end}{last}{rest}"
+    return Patch(file, _diff(file, text, after), f"start the launch again with --policy {file}", after)
 
 
 def _diff(file: str, before: str, after: str) -> str:

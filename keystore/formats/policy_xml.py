@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -49,13 +49,14 @@ class PolicyDocument:
     """A policy that was read. ``places``: (enclave, profile ns, profile node, rule) to ``file:line``.
 
     ``warnings``: what is valid but surely not meant. ``notes``: every wildcard and every DENY, which
-    only a policy file can bring in and a person should look at.
+    only a policy file can bring in and a person should look at. ``file``: where it was read.
     """
 
     policy: Policy
     places: Mapping[tuple[str, str, str, Rule], str]
     warnings: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    file: str = ""
 
 
 def read_policy(path: str | Path) -> PolicyDocument:
@@ -68,7 +69,7 @@ def read_policy(path: str | Path) -> PolicyDocument:
         document = read_bytes(file)
     except OSError as error:
         raise PolicyError(f"cannot read policy {printable(file)}: {error.strerror}") from None
-    return parse_policy(document, str(file), folder=file.parent)
+    return replace(parse_policy(document, str(file), folder=file.parent), file=str(file))
 
 
 def parse_policy(document: bytes, where: str = "policy.xml", folder: Path | None = None) -> PolicyDocument:

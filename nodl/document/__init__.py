@@ -21,6 +21,7 @@ __all__ = [
     "V1_SUFFIX",
     "V2_SUFFIXES",
     "ManifestNode",
+    "parse_document",
     "read_document",
     "read_root",
     "resource_key",
@@ -40,7 +41,18 @@ def read_document(
     ``InvalidNoDLError`` with file:line, also for a file that cannot be read.
     """
     file = str(path)
-    text = _read(file)
+    return parse_document(_read(file), file, package=package, name=name, prefixes=prefixes)
+
+
+def parse_document(
+    text: bytes,
+    file: str,
+    *,
+    package: str | None = None,
+    name: str | None = None,
+    prefixes: Sequence[str] = (),
+) -> tuple[ManifestNode, ...]:
+    """Return the nodes of the text of ``file``. Arguments and errors are those of ``read_document``."""
     if text.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] == b"<":
         return parse_v1(text, file, package)
 

@@ -99,15 +99,23 @@ def told(output: str) -> set[tuple[str, str, str]]:
     return {(node, words, name) for node, words, name in re.findall(pattern, output)}
 
 
-def patches(output: str) -> list[tuple[str, str, str]]:
-    """File, line before and line added of each patch in the output."""
-    found = []
-    for hunk in re.findall(r"^    --- .*?(?=^    --- |^\[|\Z)", output, re.MULTILINE | re.DOTALL):
-        lines = [line[4:] for line in hunk.splitlines() if line.startswith("    ")]
-        file = lines[1].removeprefix("+++ ")
-        at = next(i for i, line in enumerate(lines) if line.startswith("+") and not line.startswith("+++"))
-        found.append((file, lines[at - 1][1:], lines[at][1:]))
-    return found
+def apply_patches(output: str) -> int:
+    """Apply each patch in the output in turn, as ``patch --fuzz=0`` does; gives how many there are."""
+    found = re.findall(r"^    --- (\S+)\n    \+\+\+ (\S+)\n((?:    .*\n)+)", output, re.MULTILINE)
+    for before, after, hunks in found:
+        old = "" if before == "/dev/null" else Path(after).read_text()
+        lines = old.splitlines()
+        shift = 0
+        for start, hunk in re.findall(r"^    @@ -(\d+).*@@\n((?:    [-+ \\].*\n)+)", hunks, re.MULTILINE):
+            changes = [line[4:] for line in hunk.splitlines()]
+            gone = [line[1:] for line in changes if line[0] in " -"]
+            come = [line[1:] for line in changes if line[0] in " +"]
+            at = max(int(start) - 1, 0) + shift
+            assert lines[at : at + len(gone)] == gone, (after, hunk)
+            lines[at : at + len(gone)] = come
+            shift += len(come) - len(gone)
+        Path(after).write_text("\n".join([*lines, ""]))
+    return len(found)
 
 
 def test_two_hundred_denials_are_explained_and_their_patches_cure(stand_in: Path, tmp_path: Path) -> None:
@@ -136,11 +144,7 @@ def all_explained_and_cured(
     assert len(wanted) > 200
     assert told(output) == wanted
     assert "could not join DDS" not in output
-    found = patches(output)
-    assert len(found) == len(wanted)
-    for file, before, added in found:
-        text = Path(file).read_text()
-        Path(file).write_text(text.replace(f"{before}\n", f"{before}\n{added}\n", 1))
+    assert apply_patches(output) == len(wanted)
     assert told(secured(workspace, **variables)) == set()
 
 
@@ -155,9 +159,7 @@ def test_what_a_zenoh_router_drops_without_a_word_is_explained_and_cured_too(
     output = secured(workspace, **variables)
     assert told(output) == {each for number in range(6) for each in expected(number)}
     assert output.count("the router drops all of it without an error") == len(told(output))
-    for file, before, added in patches(output):
-        text = Path(file).read_text()
-        Path(file).write_text(text.replace(f"{before}\n", f"{before}\n{added}\n", 1))
+    assert apply_patches(output) == len(told(output))
     assert told(secured(workspace, **variables)) == set()
 
 
@@ -351,10 +353,117 @@ def test_a_manifest_of_another_shape_is_left_alone(text: str) -> None:
 def test_a_node_without_manifest_gets_exactly_the_refused_name_in_a_policy_file(tmp_path: Path) -> None:
     from keystore.formats.policy_xml import read_policy
 
-    patch = policy_patch("/e", "/ns/me", asked("action_client", "go", "/ns/go"))
+    patch = policy_patch("/e", "/ns/me", asked("action_client", "go", "/ns/go"), "p.xml")
+    assert patch is not None
     text = "".join(line[1:] + "\n" for line in patch.diff.splitlines()[3:])
+    assert text == patch.text
     (tmp_path / "p.xml").write_text(text)
     (enclave,) = read_policy(tmp_path / "p.xml").policy.enclaves
     (profile,) = enclave.profiles
     assert (enclave.path, profile.ns, profile.node) == ("/e", "/ns", "me")
     assert [(rule.operation.value, rule.expression) for rule in profile.rules] == [("call", "/ns/go")]
+
+
+TWO_SECRETS = """node bad
+publisher granted std_msgs/msg/String
+publisher one std_msgs/msg/String
+subscription two std_msgs/msg/String
+"""
+SECRETS = {("/bad", "publish topic", "/one"), ("/bad", "subscribe to topic", "/two")}
+
+
+def as_json(workspace: Workspace) -> None:
+    """A manifest in JSON, into which no line can be put safely."""
+    import json
+
+    import yaml
+
+    file = workspace.manifest("bad")
+    file.write_text(json.dumps(yaml.safe_load(file.read_text())))
+
+
+def test_a_manifest_of_another_shape_is_cured_by_one_policy_file_that_grows(
+    stand_in: Path, tmp_path: Path
+) -> None:
+    program = Program("bad", TWO_SECRETS, (("publisher", "granted"),))
+    workspace = make_workspace(tmp_path, stand_in, [program])
+    as_json(workspace)
+    output = secured(workspace)
+    assert told(output) == SECRETS
+    policy = tmp_path / "allow.policy.xml"
+    assert apply_patches(output.replace("allow.policy.xml", str(policy))) == 2
+    assert told(secured(workspace, "--policy", str(policy))) == set()
+
+
+def test_the_policy_file_in_use_is_the_one_that_is_changed(stand_in: Path, tmp_path: Path) -> None:
+    program = Program("bad", TWO_SECRETS, (("publisher", "granted"),))
+    workspace = make_workspace(tmp_path, stand_in, [program])
+    as_json(workspace)
+    policy = tmp_path / "mine.policy.xml"
+    patch = policy_patch("/bad", "/bad", asked("publisher", "one", "/one"), str(policy))
+    assert patch is not None
+    policy.write_text(patch.text)
+    output = secured(workspace, "--policy", str(policy))
+    assert told(output) == SECRETS - {("/bad", "publish topic", "/one")}
+    assert apply_patches(output) == 1
+    assert told(secured(workspace, "--policy", str(policy))) == set()
+
+
+def test_what_the_policy_file_denies_has_no_patch(stand_in: Path, tmp_path: Path) -> None:
+    program = Program("bad", TWO_SECRETS, (("publisher", "one"), ("publisher", "granted")))
+    workspace = make_workspace(tmp_path, stand_in, [program])
+    policy = tmp_path / "mine.policy.xml"
+    patch = policy_patch("/bad", "/bad", asked("publisher", "one", "/one"), str(policy))
+    assert patch is not None
+    policy.write_text(patch.text.replace("ALLOW", "DENY"))
+    output = secured(workspace, "--policy", str(policy))
+    assert told(output) == SECRETS
+    assert output.count("a DENY of the policy file takes it away") == 1
+    assert apply_patches(output) == 1, "the other one"
+    assert told(secured(workspace, "--policy", str(policy))) == {("/bad", "publish topic", "/one")}
+
+
+LEARNT = (
+    "library: rclcpp, runs: [{id: a}], endpoints: [{in: publishers, name: status, parameter: label, ROW}]"
+)
+
+
+@pytest.mark.parametrize("row", ["proof: another value was followed", "default: status, proof: one run"])
+def test_a_name_that_a_record_takes_for_a_parameter_is_granted_or_cured(
+    row: str, stand_in: Path, tmp_path: Path
+) -> None:
+    """The entry is in the manifest already, under a parameter: listed twice the manifest would be broken."""
+    program = Program(
+        "bad",
+        "node bad\npublisher status std_msgs/msg/String\n",
+        (("publisher", "status"),),
+        inside='<param name="label" value="warehouse"/>',
+        codegen=LEARNT.replace("ROW", row),
+    )
+    workspace = make_workspace(tmp_path, stand_in, [program])
+    output = secured(workspace)
+    if "one run" in row:
+        assert told(output) == set()
+        return
+    assert told(output) == {("/bad", "publish topic", "/status")}
+    policy = tmp_path / "allow.policy.xml"
+    assert apply_patches(output.replace("allow.policy.xml", str(policy))) == 1
+    assert told(secured(workspace, "--policy", str(policy))) == set()
+
+
+def test_what_other_descriptions_of_a_recorded_node_have_is_named_at_once(
+    stand_in: Path, tmp_path: Path
+) -> None:
+    """Not one name at each restart."""
+    program = Program(
+        "bad", TWO_SECRETS, (("publisher", "granted"),), codegen="library: rclcpp, runs: [{id: a}]"
+    )
+    workspace = make_workspace(tmp_path, stand_in, [program])
+    library = tmp_path / "library" / PACKAGE / "bad.nodl.yaml"
+    library.parent.mkdir(parents=True)
+    library.write_text(manifest_text((("publisher", "one"), ("subscription", "two")), "library: rclcpp"))
+    given = ("--library", str(tmp_path / "library"))
+    output = secured(workspace, *given)
+    assert told(output) == SECRETS
+    assert output.count("--also unseen grants publish /one, subscribe /two") == 2
+    assert told(secured(workspace, *given, "--also", "unseen")) == set()
