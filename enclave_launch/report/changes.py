@@ -11,16 +11,17 @@ _NONE = "no enclave, node, permission or flow differs"
 
 def changes_text(changed: Changes) -> str:
     """Format changes as the lines of a diff, ``+`` and ``-``; ends with a newline."""
-    return "\n".join([*_lines(changed)] or [_NONE]) + "\n"
+    return "\n".join([*([*_lines(changed)] or [_NONE]), *_not_compared(changed)]) + "\n"
 
 
 def changes_markdown(changed: Changes) -> str:
     """Format changes for the description or a comment of a pull request."""
     verdict = "**Rights grew.**" if changed.rights_grew else "No enclave may do more than before."
+    note = "".join(f"\n{line}.\n" for line in _not_compared(changed))
     if changed.is_empty:
-        return f"### Security review\n\n{_NONE.capitalize()}.\n"
+        return f"### Security review\n\n{_NONE.capitalize()}.\n{note}"
     body = "\n".join(_lines(changed))
-    return f"### Security review\n\n{verdict}\n\n```diff\n{body}\n```\n"
+    return f"### Security review\n\n{verdict}\n\n```diff\n{body}\n```\n{note}"
 
 
 def changes_document(changed: Changes) -> dict[str, object]:
@@ -47,7 +48,16 @@ def changes_document(changed: Changes) -> dict[str, object]:
             {"enclave": move.node, "before": move.before, "after": move.after} for move in changed.middlewares
         ],
         "files": [each._asdict() for each in changed.files],
+        "as_installed": list(changed.as_installed),
+        "unknown": list(changed.unknown),
     }
+
+
+def _not_compared(changed: Changes) -> Iterator[str]:
+    if changed.as_installed:
+        yield f"Not compared, taken as installed now on both sides: {', '.join(changed.as_installed)}"
+    if changed.unknown:
+        yield f"Not compared, interfaces not wholly known: {', '.join(changed.unknown)}"
 
 
 def _lines(changed: Changes) -> Iterator[str]:

@@ -44,7 +44,9 @@ class FileChange(NamedTuple):
 
 class Changes(NamedTuple):
     """Everything sorted. ``flows_*``: pairs of enclaves of which the first can influence the second directly;
-    ``middlewares``: enclaves that moved from DDS to Zenoh or back; ``files``: of two keystores, for Zenoh."""
+    ``middlewares``: enclaves that moved from DDS to Zenoh or back; ``files``: of two keystores, for Zenoh;
+    ``as_installed``: packages that were not compared, since both plans took them as they are installed;
+    ``unknown``: programs and nodes whose interfaces one of the plans does not wholly know."""
 
     enclaves: tuple[EnclaveChange, ...]
     nodes_added: tuple[str, ...]
@@ -54,6 +56,8 @@ class Changes(NamedTuple):
     flows_removed: tuple[tuple[str, str], ...]
     middlewares: tuple[Move, ...] = ()
     files: tuple[FileChange, ...] = ()
+    as_installed: tuple[str, ...] = ()
+    unknown: tuple[str, ...] = ()
 
     @property
     def rights_grew(self) -> bool:
@@ -62,7 +66,7 @@ class Changes(NamedTuple):
 
     @property
     def is_empty(self) -> bool:
-        return not any(self)
+        return not any(self._replace(as_installed=(), unknown=()))
 
 
 def changes(before: PlanDocument, after: PlanDocument) -> Changes:
@@ -86,6 +90,7 @@ def changes(before: PlanDocument, after: PlanDocument) -> Changes:
             for path in sorted(before.on_zenoh ^ after.on_zenoh)
             if path in before.enclaves and path in after.enclaves
         ),
+        unknown=tuple(sorted(before.gaps | after.gaps)),
     )
 
 

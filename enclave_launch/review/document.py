@@ -72,6 +72,12 @@ class PlanFinding(NamedTuple):
     remedy: str
 
 
+_GAPS = frozenset({
+    "no-manifest", "interface-unknown", "node-name-unknown", "parameters-unknown", "parameter-file-missing",
+    "include-left-out", "not-foreseeable", "container-elsewhere",
+})  # fmt: skip
+
+
 class PlanDocument(NamedTuple):
     """``enclaves``: path -> all that its middleware lets it do, the union of its nodes; ``on_zenoh``: those of which a
     process is on Zenoh."""
@@ -80,6 +86,11 @@ class PlanDocument(NamedTuple):
     nodes: tuple[NodeView, ...]
     diagnostics: tuple[PlanFinding, ...]
     on_zenoh: frozenset[str] = frozenset()
+
+    @property
+    def gaps(self) -> frozenset[str]:
+        """Return the programs, nodes and files of which something is not known: any name may be missing there."""
+        return frozenset(each.subject for each in self.diagnostics if each.code in _GAPS)
 
     def nodes_of(self, enclave: str) -> tuple[NodeView, ...]:
         return tuple(node for node in self.nodes if node.enclave == enclave)

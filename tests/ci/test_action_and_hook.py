@@ -117,6 +117,17 @@ def test_arguments_of_the_launch_reach_it(repository: Path) -> None:
     ]
 
 
+def test_a_path_with_a_blank_is_given_on_lines(repository: Path) -> None:
+    (repository / "robot.launch.xml").rename(repository / "my robot.launch.xml")
+    node = NODE.format("talker", "$(var who)")
+    (repository / "my robot.launch.xml").write_text(f'<launch><arg name="who"/>{node}</launch>')
+    ran = step(
+        "check", repository, launch="my robot.launch.xml\nwho:=someone\n", options=f"--prefix\n{PREFIX}"
+    )
+    assert ran.status == 0, ran.said
+    assert step("check", repository, launch="my robot.launch.xml who:=someone").status == 2
+
+
 @pytest.mark.parametrize(
     "hostile", ["$(touch broken)", "`touch broken`", "; touch broken", "* ${IFS}touch", "a & b"]
 )
@@ -141,7 +152,7 @@ def test_inputs_stand_in_no_script() -> None:
 
 
 def test_the_action_installs_this_project() -> None:
-    assert '"$GITHUB_ACTION_PATH"' in STEPS["install"]["run"]
+    assert '"${GITHUB_ACTION_PATH}[cpp]"' in STEPS["install"]["run"]
     assert (ROOT / "pyproject.toml").is_file(), "the path of the action is the folder of action.yml"
 
 

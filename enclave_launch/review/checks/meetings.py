@@ -42,7 +42,7 @@ def missing_ends(plan: PlanDocument, document: Document) -> Iterator[PlanFinding
     """Only what nodes ask for themselves; what runs outside of this launch is not known here. Where something of the
     launch itself is not known, the other end may be there: then one finding says so."""
     found = list(_missing_ends(plan, document))
-    gaps = sorted({diagnostic.subject for diagnostic in plan.diagnostics if diagnostic.code in _GAPS})
+    gaps = sorted(plan.gaps)
     if not found or not gaps:
         yield from found
         return
@@ -53,11 +53,6 @@ def missing_ends(plan: PlanDocument, document: Document) -> Iterator[PlanFinding
 
 
 _NAMED = 5
-_GAPS = frozenset({
-    "no-manifest", "interface-unknown", "node-name-unknown", "parameters-unknown", "parameter-file-missing",
-    "include-left-out", "not-foreseeable", "container-elsewhere",
-})  # fmt: skip
-"""What planning tells when something of the launch is not known: another end of a name may be there."""
 
 
 def _missing_ends(plan: PlanDocument, document: Document) -> Iterator[PlanFinding]:

@@ -7,7 +7,9 @@
   secure-plan diff KEYSTORE PACKAGE LAUNCH_FILE              what a keystore has signed, and what the plan asks for
   secure-plan diff KEYSTORE OTHER_KEYSTORE                   what two keystores let each enclave do
 
-Of another revision everything is taken that git has; packages that are installed elsewhere are taken as they are now.
+With a revision, the packages of the repository are taken from their sources, there and in the work tree (or --build
+COMMAND builds the revision, and what is installed is compared with it). Other packages are taken as they are installed
+now; the answer names them.
 
 exit status: 0 no enclave may do more than before, 1 rights grew, 2 wrong usage
 """
@@ -21,7 +23,7 @@ from collections.abc import Iterator, Mapping
 
 from enclave_common.command_line import TEXT, Option, one_of
 from enclave_common.terminal import json_text
-from enclave_launch.errors import keystore_errors
+from enclave_launch.errors import UsageError, keystore_errors
 from enclave_launch.report.changes import changes_document, changes_markdown, changes_text
 from enclave_launch.review.changes import FileChange, changes
 from enclave_launch.review.document import GrantedName, PlanDocument, plan_from_document
@@ -35,12 +37,18 @@ WORDS: tuple[Option, ...] = (
     ("before BEFORE", TEXT, "PLAN.json | PATH | REVISION: | REVISION:PATH | KEYSTORE"),
     ("words", {"nargs": "+", "metavar": plans.WORDS}, "what it is compared with"),
 )
-OPTIONS = {"": (("--format", one_of("text", "json", "markdown"), ""),)}
+OPTIONS = {
+    "": (
+        ("--format", one_of("text", "json", "markdown"), ""),
+        ("--build COMMAND", TEXT, "build the revision with it, in a copy; leaves install/"),
+    )
+}
 
 
 def run(options: argparse.Namespace) -> int:
     """Print the difference. Returns 1 when rights grew."""
-    changed = changes(*_both(options))._replace(files=_files(options))
+    before, after, as_installed = _both(options)
+    changed = changes(before, after)._replace(files=_files(options), as_installed=as_installed)
     if options.format == "json":
         sys.stdout.write(json_text(changes_document(changed), indent=2) + "\n")
     else:
@@ -48,15 +56,18 @@ def run(options: argparse.Namespace) -> int:
     return 1 if changed.rights_grew else 0
 
 
-def _both(options: argparse.Namespace) -> tuple[PlanDocument, PlanDocument]:
+def _both(options: argparse.Namespace) -> tuple[PlanDocument, PlanDocument, tuple[str, ...]]:
     if _two_keystores(options):
-        return _keystore(options.before), _keystore(options.words[0])
+        return _keystore(options.before), _keystore(options.words[0]), ()
+    if not os.path.isdir(options.before) and revisions.names_revision(options.before):
+        both = revisions.plans_of(options.before, options.words, options)
+        return plan_from_document(both.before), plan_from_document(both.after), both.as_installed
+    if options.build:
+        raise UsageError("--build has no effect: it is for comparing with REVISION: or REVISION:PATH")
     after = plan_from_document(read_plan(options.words, options))
     if os.path.isdir(options.before):
-        return _keystore_and(after, options.before)
-    if revisions.names_revision(options.before):
-        return plan_from_document(revisions.plan_before(options.before, options.words, options)), after
-    return plan_from_document(read_plan([options.before], options)), after
+        return (*_keystore_and(after, options.before), ())
+    return plan_from_document(read_plan([options.before], options)), after, ()
 
 
 def _keystore_and(plan: PlanDocument, keystore: str) -> tuple[PlanDocument, PlanDocument]:

@@ -58,11 +58,13 @@ def read_build(folder: str | None) -> Build:
     """The build of a package folder; an empty one without ``CMakeLists.txt``."""
     build = Build()
     if folder is not None:
-        _Reader(build).read(folder, {})
+        BuildReader(build).read(folder, {})
     return build
 
 
-class _Reader:
+class BuildReader:
+    """Runs the commands of a build; a command NAME that matters has a method ``_do_NAME``."""
+
     def __init__(self, build: Build):
         self.build = build
         self.functions: dict[str, tuple[bool, list[str], list[Command]]] = {}
