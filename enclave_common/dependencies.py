@@ -7,10 +7,12 @@ needs one imports it where it is requested; ``installed`` says whether it is the
 
 from __future__ import annotations
 
+import sys
 from importlib import import_module
 from importlib.util import find_spec
 
 _OURS = ("enclave_launch", "nodl", "keystore")
+_OF_A_NODE = ("rclpy", "rcl_interfaces.srv", "service_msgs.msg", "unique_identifier_msgs.msg")
 _APT_AND_PIP = {
     "asn1crypto": ("python3-asn1crypto", "asn1crypto"),
     "cryptography": ("python3-cryptography", "cryptography"),
@@ -35,6 +37,24 @@ def missing_dependency(error: ImportError) -> str | None:
         return None
     apt, pip = _APT_AND_PIP[name]
     return f"the Python package {name} is not installed: apt install {apt}, or pip install {pip}"
+
+
+def ros_import_failure() -> str:
+    """Return why this Python cannot make a node of rclpy, and what to do; empty if it can.
+
+    rclpy is imported without numpy, and its first node fails: messages with arrays of fixed length need it.
+    """
+    for module in _OF_A_NODE:
+        if find_spec(module.partition(".")[0]) is None:
+            continue
+        try:
+            import_module(module)
+        except ImportError as error:
+            return (
+                f"{sys.executable} cannot import {module}: {error}; use the Python that ROS was built for with its "
+                "packages: pipx install --system-site-packages, or python3 -m venv --system-site-packages"
+            )
+    return ""
 
 
 def installed(module: str) -> bool:

@@ -256,6 +256,10 @@ class _Comparison:
                 text = f"{node.fqn}: {grant} is not planned"
                 found = self._about(Kind.UNPLANNED_ENDPOINT, process, text, node.fqn, name=interface.name)
                 remedy = f"add it to the description of {planned.program}"
+                if planned.open:
+                    found = found._replace(
+                        level=Level.NOTE, text=f"{text}, and the plan does not know all of it"
+                    )
                 yield found._replace(enclave=planned.enclave, remedy=remedy)
             elif grant in types and interface.type and types[grant] != interface.type:
                 text = f"{node.fqn}: {grant} has the type {interface.type}, planned is {types[grant]}"

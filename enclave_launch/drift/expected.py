@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from enclave_launch.admission.middleware import ZENOH
+from enclave_launch.diagnostics import Code
 from enclave_launch.process import UNSPECIFIED_NODE_NAME, UNSPECIFIED_NODE_NAMESPACE
 from enclave_launch.review.document import GrantedName
 from keystore.formats.permissions_patterns import has_wildcard
@@ -27,8 +28,8 @@ class ExpectedInterface(NamedTuple):
 
 
 class ExpectedNode(NamedTuple):
-    """``described``: its interfaces are known; ``always``: it starts with the launch, not on an event; ``times``: how
-    many of this name."""
+    """``described``: its interfaces are known; ``open``: not all of them; ``always``: it starts with the launch, not on
+    an event; ``times``: how many of this name."""
 
     fqn: str
     enclave: str
@@ -37,6 +38,7 @@ class ExpectedNode(NamedTuple):
     described: bool = True
     always: bool = True
     times: int = 1
+    open: bool = False
 
 
 class Expected(NamedTuple):
@@ -72,7 +74,7 @@ def expected_in(documents: Iterable[Mapping[str, Any]], domain: int) -> Expected
     started = [*here, *components]
     nodes = {
         node.fqn: node
-        for node in _described(document["nodes"], started)
+        for node in _described(document["nodes"], started, _open(plans))
         if node.enclave in enclaves or node.enclave not in elsewhere
     }
     for fqn, count in Counter(_fqn(each) for each in started if each["fqn"]).items():
@@ -102,8 +104,15 @@ def _enclave(started: Mapping[str, Any]) -> str:
     return started["enclave"] or ""
 
 
+def _open(plans: Iterable[Mapping[str, Any]]) -> frozenset[str]:
+    """Return the nodes of which the plan says that it does not know a name."""
+    unknown = Code.INTERFACE_UNKNOWN.value
+    told = (each for plan in plans for each in plan["diagnostics"])
+    return frozenset(each["subject"] for each in told if each["code"] == unknown)
+
+
 def _described(
-    nodes: Iterable[Mapping[str, Any]], started: Iterable[Mapping[str, Any]]
+    nodes: Iterable[Mapping[str, Any]], started: Iterable[Mapping[str, Any]], unknown: frozenset[str]
 ) -> Iterable[ExpectedNode]:
     origins: dict[str, str] = {}
     on_event: dict[str, bool] = {}
@@ -121,6 +130,7 @@ def _described(
             program,
             tuple(_interface(each, stated) for each in node["interfaces"]),
             always=not on_event.get(program, False),
+            open=node["fqn"] in unknown,
         )
 
 

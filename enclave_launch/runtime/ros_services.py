@@ -15,6 +15,7 @@ import threading
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+from enclave_common.dependencies import ros_import_failure
 from enclave_common.environment import environment_with
 from enclave_launch.errors import RuntimeFailure
 from enclave_launch.policy.launcher import LAUNCHER_NODE
@@ -36,9 +37,14 @@ def rclpy_available() -> bool:
 
 
 def require_rclpy() -> None:
-    """Raises ``RuntimeFailure`` that says what else works."""
+    """Check that the launcher's own node can be made here.
+
+    :raises RuntimeFailure: rclpy is not there, or this Python cannot import it or what its messages need (numpy)."""
     if not rclpy_available():
         raise RuntimeFailure(f"cannot run this launch file: {ALTERNATIVE}")
+    why = ros_import_failure()
+    if why:
+        raise RuntimeFailure(f"cannot run this launch file: the launcher's own node needs rclpy, and {why}")
 
 
 class RosServices:

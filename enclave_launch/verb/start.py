@@ -81,6 +81,10 @@ def _launch(
     warn(*(() if options.quiet else plan.warnings))
     if not options.provision_only:
         _check_before_keys_are_made(plan, keystore)
+        if options.watch and not plan.problems:
+            from enclave_launch.verb.watch import check_watch  # an add-on: observation
+
+            check_watch(plan)
     if options.strategy == "Permissive":
         print(f"secure-launch: {PERMISSIVE_NOTICE}", file=sys.stderr)
     launch = provision(plan, keystore, options=security_options(options))

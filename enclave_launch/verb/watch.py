@@ -18,6 +18,8 @@ from enclave_launch.report.plan_json import plan_document
 from enclave_launch.secured import ProvisionedLaunch
 from keystore.errors import KeystoreError
 from keystore.steps.tool_enclaves import enclaves_by_guid, provide_watcher
+from nodl.errors import NoDLError
+from nodl.graph.observing import chosen_source
 
 
 def watch_plain_launch(plan: LaunchPlan, options: argparse.Namespace, settings: RunSettings) -> int:
@@ -29,13 +31,28 @@ def watch_plain_launch(plan: LaunchPlan, options: argparse.Namespace, settings: 
     return watch.status(run(plan, options=settings._replace(watch=watch)))
 
 
+def check_watch(plan: LaunchPlan) -> None:
+    """Check that the launch can be watched, before its keystore is touched.
+
+    :raises UsageError: a process is on Zenoh, or there is nothing to observe with."""
+    _seen_document(plan)
+    with translated(NoDLError, UsageError, "--watch: "):
+        chosen_source("auto")
+
+
 def watch_of_secured_launch(launch: ProvisionedLaunch, options: argparse.Namespace) -> DriftWatch:
-    """With an enclave of its own in the launch's keystore. Raises ``ProvisionError`` where it cannot be made, and
-    ``UsageError`` for processes on Zenoh."""
+    """Return a watch with an enclave of its own in the launch's keystore, for the observer in use.
+
+    :raises ProvisionError: the enclave cannot be made
+    :raises UsageError: as ``check_watch``."""
     document = _seen_document(launch.plan)
     root = launch.settings.keystore
-    with translated(KeystoreError, ProvisionError, "--watch: "):
-        enclave = provide_watcher(root, launch.options)
+    with (
+        translated(KeystoreError, ProvisionError, "--watch: "),
+        translated(NoDLError, UsageError, "--watch: "),
+    ):
+        as_ros_node = chosen_source("auto") == "rclpy"
+        enclave = provide_watcher(root, launch.options, as_ros_node=as_ros_node)
         security = Security(enclaves_by_guid(root))
     directory = Path(root) / "enclaves" / enclave.lstrip("/")
     watched = _options(options, security, directory)

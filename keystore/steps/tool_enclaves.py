@@ -85,10 +85,12 @@ def create_tool_enclave(
 WATCHER = f"{FOLDER}/watch"
 
 
-def provide_watcher(keystore: Path | str, options: ProvisionOptions) -> str:
-    """The enclave of ``secure-launch --watch``, which lives as long as those of the launch: made once for a keystore,
-    renewed like the others. It reads discovery and nothing else."""
-    policy = tool_policy(TOOLS["observe"], (), WATCHER)
+def provide_watcher(keystore: Path | str, options: ProvisionOptions, *, as_ros_node: bool = False) -> str:
+    """Make the enclave of ``secure-launch --watch``, once for a keystore; it is renewed like the others.
+
+    It reads discovery and nothing else; ``as_ros_node``: for an observer that is a node of rclpy.
+    """
+    policy = tool_policy(TOOLS["list" if as_ros_node else "observe"], (), WATCHER)
     chosen = options._replace(launch=None, enclave_domains={}, guid_halves={WATCHER: Half.LOW}, create=False)
     provision(keystore, [policy], options=chosen)
     return WATCHER

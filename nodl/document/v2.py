@@ -29,6 +29,8 @@ from nodl.source_ref import SourceRef
 from nodl.yaml_text import YamlList, YamlMap, YamlScalar, parse_yaml
 
 VERSION = 2
+ANY_TYPE = "of any type"
+"""The ``description`` of an entry whose type is a placeholder: nodes that pass on whatever they are given."""
 
 
 def parse_v2(
@@ -129,7 +131,7 @@ def _endpoints(
                 )
             seen[name] = source
             about = learnt.get((category, name), LearntName(NameTemplate.literal(name)))
-            full_type = _full_type(type_name, kind)
+            full_type = "" if _is_placeholder(entry, type_name) else _full_type(type_name, kind)
             introspected, qos = about.introspected, tuple(sorted(_qos(entry)))
             yield Endpoint(
                 kind,
@@ -166,6 +168,13 @@ def _qos(entry: YamlMap) -> Iterator[tuple[str, str | int]]:
 def _field(entry: YamlMap, key: str) -> tuple[str, SourceRef]:
     value = entry.items[key]
     return (str(value.value) if isinstance(value, YamlScalar) else ""), value.source
+
+
+def _is_placeholder(entry: YamlMap, type_name: str) -> bool:
+    """Return True if the type stands there only because NoDL v2 demands one."""
+    description = entry.items.get("description")
+    said = description.value if isinstance(description, YamlScalar) else ""
+    return said == ANY_TYPE or type_name.startswith("unknown/")
 
 
 def _full_type(type_name: str, kind: EndpointKind) -> str:

@@ -157,6 +157,10 @@ def _v1_interfaces(endpoints: Iterable[Endpoint]) -> Iterable[str]:
     for element in ("topic", "service", "action"):
         roles: dict[tuple[str, str], list[str]] = {}
         for endpoint in listed:
+            if endpoint.kind.family == element and not endpoint.type:
+                raise InvalidNoDLDocumentError.at(
+                    endpoint.source, f"{endpoint.name} is of any type, which NoDL v1 cannot say"
+                )
             if endpoint.kind.family == element:
                 key = (endpoint.written or endpoint.name.text, endpoint.type)
                 roles.setdefault(key, []).append(endpoint.kind.role)

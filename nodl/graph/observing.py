@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple, Protocol
 
+from enclave_common.dependencies import ros_import_failure
 from enclave_common.environment import environment_with
 from nodl.graph.cyclone import CycloneObserver, ObserverError
 from nodl.graph.model import Graph
@@ -46,10 +47,15 @@ class Where(NamedTuple):
 
 
 def chosen_source(wanted: str) -> str:
-    """``auto``: Cyclone DDS's binding, which sees more (processes, what is not ROS), else rclpy. Raises
-    ``ObserverError`` where that is not installed."""
+    """Return what to observe with: for ``auto`` Cyclone DDS's binding, which sees more, else rclpy.
+
+    Raises ``ObserverError`` if that is not installed, or if this Python cannot make a node of rclpy.
+    """
     for package in (wanted,) if wanted != "auto" else SOURCES[1:]:
         if importlib.util.find_spec(package) is not None:
+            why = ros_import_failure() if package == "rclpy" else ""
+            if why:
+                raise ObserverError(f"nothing to observe with ({wanted}): {why}")
             return package
     raise ObserverError(
         f"nothing to observe with ({wanted}): install the Python binding of Cyclone DDS (pip install "

@@ -160,6 +160,23 @@ def test_what_is_put_into_a_running_system_is_found(inject: Inject, expected: se
     assert all(each.level is Level.ALARM for each in findings)
 
 
+def test_what_a_plan_does_not_know_is_not_compared() -> None:
+    """A type that is only a placeholder is no type; beside a name that is not known others may be there."""
+    document, made = copy.deepcopy(TALKER), Made()
+    running(document, made)
+    for node in document["nodes"]:
+        for interface in node["interfaces"]:
+            interface["type"] = "" if interface["name"] == "/chatter" else interface["type"]
+    assert not found(document, made.graph())
+    (talker,) = (node for node in document["nodes"] if node["fqn"] == "/talker")
+    talker["interfaces"] = [each for each in talker["interfaces"] if each["name"] != "/chatter"]
+    (alarm,) = found(document, made.graph())
+    assert (alarm.kind, alarm.level) == (Kind.UNPLANNED_ENDPOINT, Level.ALARM)
+    gap = {"code": "interface-unknown", "subject": "/talker"}
+    (note,) = found({**document, "diagnostics": [gap]}, made.graph())
+    assert (note.kind, note.level) == (Kind.UNPLANNED_ENDPOINT, Level.NOTE)
+
+
 def test_another_type_than_planned_is_found() -> None:
     changed, made = copy.deepcopy(TALKER), Made()
     for node in changed["nodes"]:

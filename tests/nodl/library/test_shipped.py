@@ -54,7 +54,8 @@ def test_a_document_is_small_sorted_and_says_how_it_is_known() -> None:
         for kind in EndpointKind:
             names = [endpoint.name.text for endpoint in endpoints if endpoint.kind is kind]
             assert names == sorted(names), file
-        assert all(endpoint.type for endpoint in endpoints), file
+        untyped = [endpoint for endpoint in endpoints if not endpoint.type]
+        assert len(untyped) == Path(document.file).read_text().count("description: of any type"), file
 
 
 def test_what_varies_is_listed() -> None:
