@@ -117,7 +117,7 @@ def deadline_before(ends: Iterable[Expiry], now: datetime) -> Deadline | None:
     if at < now + _SHORTEST_RUN:
         return None
     return Deadline(
-        at, f"{first.subject} ends at {first.not_after:%Y-%m-%d %H:%M:%S} UTC: renewing, starting anew"
+        at, f"{first.subject} ends at {first.not_after:%Y-%m-%d %H:%M:%S} UTC: renewing, starting again"
     )
 
 

@@ -137,7 +137,7 @@ def _of_prefix(words: Sequence[str], *, program_follows: bool) -> Iterator[Obsta
         name, keeper = _name(rest[0]), KEEPERS.get(_name(rest[0]))
         if keeper is None:
             if program_follows or (name in _CHANGES_FOR_A_PROGRAM and len(rest) > 1):
-                yield Obstacle(name, CHANGERS.get(name, "it is not known to keep the environment"))
+                yield Obstacle(name, CHANGERS.get(name, "it is not known to pass the environment on"))
             return
         own, rest = _own_words(keeper, rest[1:])
         changes = [word for word in own if keeper.changes is not None and keeper.changes.match(word)]

@@ -21,7 +21,7 @@ class Code(str, Enum):
     meaning: str
 
     # of the evaluation
-    ARGUMENT_UNKNOWN = "argument-unknown", "A launch argument was given that no launch file looks at"
+    ARGUMENT_UNKNOWN = "argument-unknown", "A launch argument was given that no launch file reads"
     COMMAND_STDERR = "command-stderr", "A command of the launch file wrote to stderr"
     EXECUTABLE_NOT_BUILT = (
         "executable-not-built",
@@ -29,12 +29,12 @@ class Code(str, Enum):
     )
     FUNCTION_CALLED_AGAIN = (
         "function-called-again",
-        "Code that an event calls is called for the plan and again when that happens",
+        "A function that planning called is called again by an event",
     )
     INCLUDE_LEFT_OUT = "include-left-out", "An included file belongs to a package that is not installed"
-    LAUNCH_FILE_DEPRECATED = "launch-file-deprecated", "A launch description calls itself deprecated"
+    LAUNCH_FILE_DEPRECATED = "launch-file-deprecated", "A launch description is marked as deprecated"
     ROS_TIMER_ON_WALL_TIME = "ros-timer-on-wall-time", "A timer on simulated time fires on wall time"
-    LOG_LEVEL_MISSING = "log-level-missing", "The action log needs a level since this distribution"
+    LOG_LEVEL_MISSING = "log-level-missing", "The action log requires a level since this distribution"
     NODE_NAME_REPEATED = "node-name-repeated", "Several nodes have the same fully qualified name"
     NOT_FORESEEABLE = "not-foreseeable", "An action only exists once a callback has run"
     PACKAGE_NOT_INSTALLED = "package-not-installed", "A placeholder stands for a package"
@@ -42,15 +42,15 @@ class Code(str, Enum):
         "parameters-unknown",
         "A parameter file cannot be read, so names made from it are not known",
     )
-    PARAMETER_FILE_MISSING = "parameter-file-missing", "A parameter file is not there"
-    ROS_DISTRO_UNKNOWN = "ros-distro-unknown", "ROS_DISTRO names no distribution that is known here"
-    PROGRAM_NOT_INSTALLED = "program-not-installed", "A placeholder stands for what a program would write"
-    PROGRAM_NOT_EXECUTABLE = "program-not-executable", "A program that launch would start is not there"
+    PARAMETER_FILE_MISSING = "parameter-file-missing", "A parameter file does not exist"
+    ROS_DISTRO_UNKNOWN = "ros-distro-unknown", "ROS_DISTRO names an unknown distribution"
+    PROGRAM_NOT_INSTALLED = "program-not-installed", "A placeholder stands for the output of a program"
+    PROGRAM_NOT_EXECUTABLE = "program-not-executable", "A program that launch would start does not exist"
     # of interfaces and permissions
     ACTION_REMAP_IDLE = "action-remap-idle", "A remap rule for an action has no effect in this distribution"
     DESCRIPTIONS_DIFFER = (
         "descriptions-differ",
-        "The source of a program and the library say different things",
+        "The source of a program and the library differ",
     )
     INTERFACE_UNKNOWN = "interface-unknown", "The name of an interface is not (wholly) known"
     LIBRARY_VERSION = "library-version", "A document of the library was written for another version"
@@ -60,21 +60,24 @@ class Code(str, Enum):
     )
     RECORD_UNDECIDED = "record-undecided", "A recorded name may be fixed, or the value of a parameter"
     RECORD_LACKS = "record-lacks", "Other descriptions of a node have names that were never recorded"
-    RECORDING_INCOMPLETE = "recording-incomplete", "What was learnt of a node may not be all of it"
+    RECORDING_INCOMPLETE = "recording-incomplete", "The record of a node may be incomplete"
     NAME_UNREMAPPABLE = "name-unremappable", "A name with two underscores, which no remap rule can name"
-    NO_MANIFEST = "no-manifest", "Nothing says what a node or component does"
-    NODE_NAME_IMPOSSIBLE = "node-name-impossible", "No node can run under the name it is given"
-    NODE_NAME_UNKNOWN = "node-name-unknown", "A node names itself in a way that nobody can foresee"
+    NO_MANIFEST = "no-manifest", "The interfaces of a node or component are unknown"
+    NODE_NAME_IMPOSSIBLE = "node-name-impossible", "A node has a name that rcl refuses"
+    NODE_NAME_UNKNOWN = "node-name-unknown", "A node chooses its name at run time"
     PATTERN_ACCEPTED = "pattern-accepted", "A partly known name became a wildcard"
     PERMISSIONS_LARGE = "permissions-large", "The permissions of an enclave come near what DDS can carry"
-    POLICY_ANSWERS = "policy-answers", "The policy file says what the manifest leaves open"
+    POLICY_ANSWERS = "policy-answers", "The policy file closes a gap of the manifest"
     POLICY_DENIES_NEED = "policy-denies-need", "The policy file takes away what a node needs"
-    POLICY_ENCLAVE_UNUSED = "policy-enclave-unused", "The policy file has an enclave that this launch has not"
-    POLICY_FILE = "policy-file", "A remark about the policy file itself"
+    POLICY_ENCLAVE_UNUSED = (
+        "policy-enclave-unused",
+        "The policy file has an enclave that this launch does not use",
+    )
+    POLICY_FILE = "policy-file", "A warning about the policy file itself"
     # of processes and enclaves
     CONTAINER_ELSEWHERE = (
         "container-elsewhere",
-        "A component goes into a container that is not of this launch",
+        "A component is loaded into a container of another launch",
     )
     ENCLAVE_ATTRIBUTE_UNUSED = "enclave-attribute-unused", "The process names another enclave itself"
     ENCLAVE_OF_SEVERAL_LAUNCHES = (
@@ -83,11 +86,11 @@ class Code(str, Enum):
     )
     ENCLAVE_SHARED_WITH_LAUNCHER = "enclave-shared-with-launcher", "A process has the launcher's enclave"
     ENCLAVE_TOO_DEEP = "enclave-too-deep", "No certificate can be made for an enclave"
-    ENCLAVE_UNGRANTED = "enclave-ungranted", "An enclave of an executable may do nothing"
-    MACHINE_ELSEWHERE = "machine-elsewhere", "The launch file means a process for another host"
+    ENCLAVE_UNGRANTED = "enclave-ungranted", "The enclave of an executable has no permissions"
+    MACHINE_ELSEWHERE = "machine-elsewhere", "The launch file assigns a process to another host"
     EXECUTABLE_WITHOUT_ENCLAVE = "executable-without-enclave", "An executable gets no enclave"
     # of what could take an enclave away
-    CONNEXT_UNTRIED = "connext-untried", "A process runs on RTI Connext, on which nothing here was tried"
+    CONNEXT_UNTRIED = "connext-untried", "A process runs on RTI Connext, which was not tested"
     HANDSHAKE_FAILS = "handshake-fails", "Processes on two DDS implementations cannot authenticate each other"
     DOMAIN_INVALID = "domain-invalid", "A process has an impossible ROS_DOMAIN_ID"
     DOMAIN_NOT_SERVED = "domain-not-served", "A process is in a domain that the permissions leave out"

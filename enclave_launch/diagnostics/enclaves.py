@@ -63,8 +63,8 @@ def enclave_too_deep(process: str, why: str, place: SourceLocation) -> Diagnosti
 def enclave_ungranted(enclave: str, processes: tuple[str, ...], place: SourceLocation) -> Diagnostic:
     """Report an ``executable`` with an enclave of its own: it has no manifest and is not a node of the plan."""
     text = (
-        f"{enclave}, the enclave of {', '.join(processes)}, has no permissions: nothing is known of what an executable "
-        "says in ROS, and a node in it could not start"
+        f"{enclave}, the enclave of {', '.join(processes)}, has no permissions: the interfaces of an executable are "
+        "unknown, and a node in it could not start"
     )
     return Diagnostic(
         Code.ENCLAVE_UNGRANTED, enclave, text, place, "grant what it needs in a policy file (--policy)"
@@ -83,7 +83,7 @@ def executable_without_enclave(process: str, place: SourceLocation) -> Diagnosti
 def machine_elsewhere(process: str, machine: str, place: SourceLocation) -> Diagnostic:
     """Report that ``machine``, a hint for ``secure-plan hosts`` and ``secure-plan export``, has no effect on a
     launch."""
-    text = f"{process} is meant for machine {machine!r}, but a launch starts everything on this host"
+    text = f"{process} is assigned to machine {machine!r}, but a launch starts everything on this host"
     return Diagnostic(
         Code.MACHINE_ELSEWHERE,
         process,
@@ -97,8 +97,8 @@ def connext(process: str, place: SourceLocation) -> Diagnostic:
     """Report a process on RTI Connext; it is not refused: the source of rmw_connextdds was read, the middleware
     was not run."""
     text = (
-        f"{process} runs on RTI Connext: rmw_connextdds reads enclaves (its source says so), but nothing here was "
-        "tried on it; permissions name topics as ROS does (rt/chatter), topic aliases of plain Connext need both names"
+        f"{process} runs on RTI Connext: rmw_connextdds reads enclaves (its source says so), but it was not "
+        "tested; permissions name topics as ROS does (rt/chatter), topic aliases of plain Connext need both names"
     )
     return Diagnostic(Code.CONNEXT_UNTRIED, process, text, place)
 
@@ -122,7 +122,8 @@ def handshake_fails(fast: str, cyclone: str, *, planned: bool) -> Diagnostic:
     )
     new = "certificates that are made now get subjects that avoid it" if planned else ""
     remedy = (
-        new or "run both on one DDS, or remove one of the enclaves from the keystore so that it is made anew"
+        new
+        or "run both on one DDS, or remove one of the enclaves from the keystore so that it is created again"
     )
     return Diagnostic(Code.HANDSHAKE_FAILS, fast, text, None, remedy)
 
@@ -137,7 +138,7 @@ def domain_not_served(process: str, domain: int, served: str, place: SourceLocat
 
     :param served: the domains of ``--domain-id``"""
     asked = "--domain-id (ProvisionOptions.domains)"
-    text = f"{process} is in domain {domain}, but {asked} asks for permissions for {served} only"
+    text = f"{process} is in domain {domain}, but {asked} permits {served} only"
     return Diagnostic(
         Code.DOMAIN_NOT_SERVED, process, text, place, "add the domain there, or leave it out here"
     )
@@ -154,7 +155,10 @@ def domains_shared(enclave: str, domains: str, processes: tuple[str, ...]) -> Di
 
 def library_preloaded(process: str, variable: str, value: str, place: SourceLocation) -> Diagnostic:
     """Report a variable such as ``LD_PRELOAD``."""
-    text = f"{variable} puts {value!r} into {process} before its own libraries: it can do all that the enclave may"
+    text = (
+        f"{variable} puts {value!r} into {process} before its own libraries: that code has all permissions of the "
+        "enclave"
+    )
     return Diagnostic(Code.LIBRARY_PRELOADED, process, text, place)
 
 
@@ -204,7 +208,7 @@ def names_apart(what: str, name: str, on_dds: str, on_zenoh: str) -> Diagnostic:
 
     :param on_dds: nodes with an end on DDS
     :param on_zenoh: nodes with an end on Zenoh"""
-    text = f"{what} {name}: {on_dds} is on DDS and {on_zenoh} on Zenoh (RMW_IMPLEMENTATION); they never meet"
+    text = f"{what} {name}: {on_dds} is on DDS and {on_zenoh} on Zenoh (RMW_IMPLEMENTATION); they cannot communicate"
     remedy = "give both the same middleware, or put a bridge between them and give it an enclave on each"
     return Diagnostic(Code.MIDDLEWARES_APART, name, text, None, remedy)
 
@@ -216,9 +220,7 @@ def launcher_apart(
     text = (
         f"launch itself runs on {launcher} and must call {service} of {process}, which runs on {middleware}"
     )
-    remedy = (
-        f"they never meet: start launch with RMW_IMPLEMENTATION={middleware}, or give {process} the other"
-    )
+    remedy = f"they cannot communicate: start launch with RMW_IMPLEMENTATION={middleware}, or give {process} the other"
     return Diagnostic(Code.MIDDLEWARES_APART, service, text, place, remedy)
 
 

@@ -30,7 +30,7 @@ def function_called_again(function: str, event: str, location: SourceLocation) -
     text = (
         f"{function} is called for the plan, to know what it starts, and again at {event}: it started nothing"
     )
-    remedy = "what it does must do no harm when it is done before"
+    remedy = "make sure that calling it earlier does no harm"
     return Diagnostic(Code.FUNCTION_CALLED_AGAIN, function, text, location, remedy)
 
 
@@ -59,7 +59,7 @@ def log_level_missing() -> Diagnostic:
 def ros_timer_on_wall_time(seconds: float, location: SourceLocation | None) -> Diagnostic:
     """Report that launch's own clock was set to simulated time, which a timer does not follow here."""
     text = (
-        f"set_use_sim_time was asked for: real launch waits {seconds:g} s of the simulated time on /clock, "
+        f"set_use_sim_time is in effect: real launch waits {seconds:g} s of the simulated time on /clock, "
         f"here the timer fires after {seconds:g} s of wall time"
     )
     remedy = "use an event instead (on_exit, on_output), or a period that is right on wall time"
@@ -103,7 +103,11 @@ def parameters_unknown(process: str, path: str, why: str, place: SourceLocation)
     """Report an unreadable parameter file; names that depend on its parameters are gaps."""
     text = f"the parameters that {process} would read from {path} are not known: {why}"
     return Diagnostic(
-        Code.PARAMETERS_UNKNOWN, process, text, place, "rcl would not start the node with it: mend it"
+        Code.PARAMETERS_UNKNOWN,
+        process,
+        text,
+        place,
+        "rcl would not start the node with it: correct the file",
     )
 
 
@@ -125,6 +129,6 @@ def ros_distro_unknown(name: str, known: Sequence[str], taken: str) -> Diagnosti
 
     :param known: the distributions with rules here
     :param taken: the one whose rules are used"""
-    text = f"ROS_DISTRO={quoted(name)} is not a distribution that is known here: the rules of {taken} are followed"
+    text = f"ROS_DISTRO={quoted(name)} is not a known distribution: the rules of {taken} are followed"
     remedy = f"set it, or give --distro{did_you_mean(name, known)}"
     return Diagnostic(Code.ROS_DISTRO_UNKNOWN, name, text, None, remedy)

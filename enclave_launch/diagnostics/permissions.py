@@ -12,9 +12,9 @@ _INTERFACES = 6  # named in a message
 _OTHER_NAME = "it could not start: give it another name or namespace"
 
 
-IN_MANIFEST = (
-    "describe it in a manifest (secure-nodl infer makes a first one from the source), installed with the package or "
-    "named with --nodl"
+_LEARN = (
+    "let it run once with --learn, or name the folder of its source with --source; else describe it in a NoDL manifest "
+    "(secure-nodl infer writes a first one), named with --nodl"
 )
 
 
@@ -110,7 +110,10 @@ def interface_unknown(node: str, why: str, program: str, place: SourceLocation) 
 
     :param why: names the endpoint
     :param program: what a manifest would describe"""
-    remedy = f"describe {program} in a NoDL manifest (--nodl), or the node in a policy file (--policy)"
+    remedy = (
+        "let it run once with --learn; grant what is known of the name as a wildcard with --accept-patterns; or "
+        f"describe {program} in a NoDL manifest (--nodl), or the node in a policy file (--policy)"
+    )
     return Diagnostic(Code.INTERFACE_UNKNOWN, node, f"node {node}: {why}", place, remedy)
 
 
@@ -131,7 +134,7 @@ def no_manifest(subject: str, why: str, place: SourceLocation) -> Diagnostic:
 
     :param subject: ``package/executable``, ``package/plugin`` or a node
     :param why: where it was searched"""
-    return Diagnostic(Code.NO_MANIFEST, subject, f"no NoDL manifest for {subject}: {why}", place, IN_MANIFEST)
+    return Diagnostic(Code.NO_MANIFEST, subject, f"no NoDL manifest for {subject}: {why}", place, _LEARN)
 
 
 def node_name_unknown(subject: str, why: str, place: SourceLocation) -> Diagnostic:

@@ -162,7 +162,7 @@ class _Comparison:
                 f"it claims the subject of enclave {enclave}, and shows nothing to this observer: its certificate is "
                 "of another CA or revoked, its governance differs, or two DDS implementations fail to shake hands"
             )
-            remedy = "look once more with secure-plan drift, which shakes hands anew; else stop it"
+            remedy = "check again with secure-plan drift, which repeats the handshake; otherwise stop it"
             yield self._about(Kind.NOT_AUTHENTICATED, process, text, enclave=enclave, remedy=remedy)
 
     def _enclave(self, process: GraphProcess) -> str:

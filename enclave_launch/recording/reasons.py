@@ -18,7 +18,7 @@ class Cause(NamedTuple):
     said: str
 
 
-_PROVISION = "start the launch with --secure again, which provisions it anew"
+_PROVISION = "start the launch with --secure again, which provisions it again"
 _CAUSES: tuple[tuple[str, str, str], ...] = (
     (
         r"SECURITY ERROR: directory '([^']*)' does not exist",

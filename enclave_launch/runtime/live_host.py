@@ -126,7 +126,7 @@ class LiveHost(BaseHost):
     def change_state(self, node: LifecycleNode, transition_id: int, context: LaunchContext) -> None:
         services = self._services()
         if services is None:
-            self._log.log("ERROR", "launch", f"no state change of '{node.node_name}': {ALTERNATIVE}")
+            self._log.log("ERROR", "launch", f"no lifecycle transition of '{node.node_name}': {ALTERNATIVE}")
             return
         context.add_completion_future(services.change_state(node.node_name, transition_id))
 

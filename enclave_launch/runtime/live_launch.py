@@ -328,7 +328,7 @@ class LiveLaunch:
 
     def _exit_status(self) -> int:
         if self._host.failed:
-            self.say("ERROR", f"ended badly on their own: {', '.join(self._host.failed)}")
+            self.say("ERROR", f"failed on their own: {', '.join(self._host.failed)}")
         return 1 if self._failed or self._host.failed else 0
 
     def services(self) -> RosServices | None:

@@ -96,7 +96,7 @@ def endpoint_seen(name: str, endpoint: str, *, kind: EndpointKind | None = None,
     def holds(launch: RunningLaunch) -> bool:
         if not launch.is_recorded:
             raise RuntimeFailure(
-                f"nobody sees whether {name} has {endpoint}: this launch is not recorded; start it with "
+                f"cannot know whether {name} has {endpoint}: this launch is not recorded; start it with "
                 "RunSettings(record=True)"
             )
         process = launch.processes.get(name)

@@ -76,12 +76,12 @@ class FileSink:
                 self._write_below(self._limit, data)
         except OSError as error:  # a full disk must not end the launch
             if not self._broken:
-                lost = "what belongs there is lost until it can be"
+                lost = "output for it is lost until it can be written"
                 self._tell(f"cannot write {self.path}: {error.strerror}; {lost}")
             self._broken = True
             return
         if self._broken:
-            self._tell(f"{self.path} can be written again; it lacks what came in between")
+            self._tell(f"{self.path} can be written again; output in between is missing")
         self._broken = False
 
     def close(self) -> None:

@@ -60,7 +60,7 @@ SECURITY: tuple[Option, ...] = (
      "DDS domains of the permissions: N, N-M, or a list (default: for each enclave those of its processes)"),
     ("--valid-for TIME", TEXT, "validity of new certificates and permissions, such as 90d"),
     ("--no-revoke", FLAG,
-     "where rights are taken away: do not revoke the certificate of before (it can be used until it ends)"),
+     "if rights are removed: do not revoke the previous certificate (it is usable until it expires)"),
     ("--warn-expiry TIME", {"default": "30d"}, "warn when an enclave expires within this time (default: 30d)"),
     ("--compatible-subjects", FLAG,
      "certificate subjects as SROS2 writes them; see secure-keystore verify for the exposure"),
@@ -85,7 +85,7 @@ POLICY: tuple[Option, ...] = (
     ("--accept-patterns", FLAG,
      "accept names of which inference knows only a part, as wildcards; each is reported"),
     ("--enclave-scope", one_of("namespace", "node", "process", "launch"),
-     "enclave of a process that names none (default: namespace)"),
+     "which processes share an enclave (default: those of a namespace)"),
     ("--also WHAT", {**TEXTS, "choices": tuple(ALSO)},
      "grant every node also: clock (use_sim_time set at run time), logger-services, service-events "
      "(service introspection), unseen (names that a record lacks and another description has) (repeatable)"),
@@ -132,30 +132,30 @@ RUNNING: tuple[Option, ...] = (
     ("-n --noninteractive", FLAG, "the launch has no terminal"),
     ("-d --debug", FLAG, "more output from the launcher itself"),
     ("--restart-expiring", FLAG,
-     "shortly before a certificate or permissions end: end the launch in order, renew them, start it anew"),
-    ("--watch", FLAG, "observe the DDS domain beside the launch, and tell what runs otherwise than planned"),
-    ("--watch-report FILE", PATH, "what --watch tells, as JSON lines, beside the text"),
+     "shortly before a certificate or permissions end: stop the launch, renew them, start it again"),
+    ("--watch", FLAG, "observe the DDS domain during the launch and report what differs from the plan"),
+    ("--watch-report FILE", PATH, "write the findings of --watch as JSON lines, too"),
     ("--watch-accept NODE", TEXTS,
      "with --watch: may run beside the plan, such as '/_ros2cli*' (repeatable)"),
     ("--log-limit SIZE", {"type": size_in_bytes},
-     "begin a log file anew at this size (such as 100M; the one before stays as <name>.1); default: no limit"),
+     "start a new log file at this size (such as 100M; the previous one becomes <name>.1); default: no limit"),
     ("-a --show-all-subprocesses-output", FLAG,
-     "all output of the processes on the screen, by setting OVERRIDE_LAUNCH_PROCESS_OUTPUT"),
+     "show all output of the processes on the screen (sets OVERRIDE_LAUNCH_PROCESS_OUTPUT)"),
     ("--launch-prefix COMMAND", TEXT, "put this before the commands of all processes"),
     ("--launch-prefix-filter REGEX", TEXT, "only where the executable's name matches"),
 )  # fmt: skip
 RECORDING: tuple[Option, ...] = (
     ("--learn DIR", PATH,
-     "run the launch, record what its nodes ask for, and write their manifests into DIR"),
+     "run the launch, record what its nodes request, and write their manifests into DIR"),
     ("--learn-for TIME", TEXT,
-     "end the learning run when nothing new was asked for during TIME, such as 10s (default: at Ctrl-C)"),
+     "end the learning run when nothing new was recorded for TIME, such as 10s (default: at Ctrl-C)"),
     ("--learn-isolation", one_of("auto", "local", "none"),
-     "keep the learning run in a network namespace, else on this machine (auto), only the latter, or not"),
+     "isolate the learning run in a network namespace, else on this machine (auto), only the latter, or not"),
     ("--learn-parameters", FLAG,
      "a second run with marker values decides which names come from which parameters"),
     ("--audit", FLAG,
-     "run unsecured, and tell what the plan would refuse and what it grants that nobody asks for"),
-    ("--audit-report FILE", PATH, "the audit as JSON, beside the text"),
+     "run unsecured, and report what the plan would refuse and what it grants that nobody requests"),
+    ("--audit-report FILE", PATH, "write the audit as JSON, too"),
 )  # fmt: skip
 DENIALS: tuple[Option, ...] = (
     ("--no-explain-denials", FLAG, "do not record secured processes to explain what DDS refuses them"),
@@ -178,11 +178,11 @@ def build_parser() -> argparse.ArgumentParser:
     add_verbosity(parser)
     add_security_options(parser.add_argument_group("security"))
     for title, options in (
-        ("what each node may do", POLICY),
+        ("permissions", POLICY),
         ("looking without starting", (*LOOKING, *WRITTEN)),
         ("evaluating the launch file", EVALUATION),
         ("running", RUNNING),
-        ("recording what nodes ask for", (*RECORDING, *DENIALS)),
+        ("recording what nodes request", (*RECORDING, *DENIALS)),
     ):
         add_options(parser.add_argument_group(title), options)
     return parser

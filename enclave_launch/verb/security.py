@@ -86,7 +86,7 @@ def created_notices(launch: ProvisionedLaunch) -> Iterator[str]:
 
 
 def sharing_notices(plan: LaunchPlan) -> Iterator[str]:
-    """Yield, for each enclave that several processes share, what each node may do only because of that."""
+    """Yield, for each enclave that several processes share, permissions only because of that."""
     processes = Counter(process.enclave.path for process in plan.processes if process.enclave is not None)
     gains: dict[str, list[str]] = {}
     for gain in gains_by_sharing(plan.derived):

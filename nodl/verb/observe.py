@@ -95,7 +95,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         formatter_class=argparse.RawDescriptionHelpFormatter,
         epilog="exit status: 0 something was seen, 1 nothing was, or the domain cannot be observed, 2 wrong usage",
     )
-    add_options(parser.add_argument_group("what to look at"), LOOKING)
+    add_options(parser.add_argument_group("what to observe"), LOOKING)
     add_options(parser.add_argument_group("a secured system"), SECURITY)
     add_options(parser.add_argument_group("what to write"), WRITING)
 

@@ -361,7 +361,7 @@ def test_gaps_of_inference_are_problems(node: NodeMaker) -> None:
     gap = Gap(SourceRef("talker.py", 30), "eval() cannot be followed")
     (problem,) = derive(node(gaps=(gap,))).problems
     assert str(problem).startswith(
-        "talker.py:30: node /talker: eval() cannot be followed; describe demo/talker"
+        "talker.py:30: node /talker: eval() cannot be followed; let it run once with --learn"
     )
 
 

@@ -97,7 +97,7 @@ def test_with_restart_expiring_a_launch_is_renewed_and_started_anew_before_the_e
                     launch.send_signal(signal.SIGINT)
         assert launch.wait() == 0, shown
     assert len(set(certificates)) == 2, shown
-    assert any("renewing, starting anew" in line for line in shown)
+    assert any("renewing, starting again" in line for line in shown)
 
 
 def test_a_new_start_is_planned_only_where_it_helps() -> None:

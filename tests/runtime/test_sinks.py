@@ -76,7 +76,7 @@ def test_a_full_disk_costs_the_log_and_is_said_once() -> None:
     sink.write(b"lost too")
     sink.close()
     assert said == [
-        "cannot write /dev/full: No space left on device; what belongs there is lost until it can be"
+        "cannot write /dev/full: No space left on device; output for it is lost until it can be written"
     ]
 
 

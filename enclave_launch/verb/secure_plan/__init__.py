@@ -23,7 +23,7 @@ from enclave_launch.verb.options import EVALUATION, POLICY
 from enclave_launch.verb.secure_plan.plans import WORDS
 
 PLAN: tuple[Option, ...] = (("words", {"nargs": "+", "metavar": WORDS}, ""),)
-RESOLVING = (("what each node may do", POLICY), ("evaluating the launch file", EVALUATION))
+RESOLVING = (("permissions", POLICY), ("evaluating the launch file", EVALUATION))
 """As of ``secure-launch``; without effect on a saved plan."""
 VERBS = ("show", "check", "diff", "drift", "flow", "hosts", "export", "suggest", "report", "evidence")
 DESCRIPTION = """\

@@ -46,15 +46,15 @@ class CannotObserve(EnclaveLaunchError):
 
 
 OPTIONS = {
-    "what to look at": (
+    "what to observe": (
         ("--domain-id N", {"type": int}, "default: the domain that the plan is for"),
         ("--keystore DIR", PATH, "of a secured system"),
         ("--enclave NAME", TEXT, "the observer's own"),
         ("--for SECONDS", {"type": float, "dest": "longest", "default": 30.0},
-         "how long what is planned may take to appear (30)"),
-        ("--settle SECONDS", {"type": float, "default": 5.0}, "compare when nothing changed so long (5)"),
+         "how long to wait for planned nodes (30)"),
+        ("--settle SECONDS", {"type": float, "default": 5.0}, "compare when nothing changed for this time (5)"),
         ("--with", {**one_of("auto", "cyclonedds", "rclpy"), "dest": "observer"}, ""),
-        ("--graph RUN.json", PATH, "what secure-nodl observe --save kept, in place of looking"),
+        ("--graph RUN.json", PATH, "a file of secure-nodl observe --save, instead of observing"),
     ),
     "": (
         ("--accept NODE", TEXTS, "may run beside the plan; wildcards (repeatable)"),
@@ -150,7 +150,7 @@ def _domain(options: argparse.Namespace, document: Any) -> int:
     if len(domains) > 1:
         listed = ", ".join(map(str, domains))
         raise UsageError(
-            f"drift: the plan has processes in the domains {listed}: say with --domain-id which to look at"
+            f"drift: the plan has processes in the domains {listed}: choose one with --domain-id"
         )
     return domains[0] if domains else domain_of(os.environ)
 

@@ -124,7 +124,7 @@ def _defaults(keystore: Path, now: datetime) -> dict[str, Any]:
     return {
         "governance": facts.rules,
         "weaker_than_default": list(facts.weaknesses),
-        "strategy": "Enforce, unless secure-launch is told otherwise (--strategy)",
+        "strategy": "Enforce, unless --strategy says otherwise",
         "verify": {
             "good": report.is_good,
             "findings": [

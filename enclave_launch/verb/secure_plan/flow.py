@@ -21,8 +21,8 @@ from enclave_launch.verb.secure_plan.plans import read_plan
 
 OPTIONS = {
     "": (
-        ("--from ENCLAVE|NODE", {"dest": "influence_from"}, "where the influence begins"),
-        ("--to ENCLAVE|NODE", {"dest": "influence_to"}, "where it would arrive"),
+        ("--from ENCLAVE|NODE", {"dest": "influence_from"}, "source: an enclave, node or name"),
+        ("--to ENCLAVE|NODE", {"dest": "influence_to"}, "target: an enclave, node or name"),
         ("--built-in", FLAG, "count what every node has, too"),
     )
 }

@@ -24,7 +24,7 @@ from enclave_launch.verb.secure_plan.plans import FORM, read_plan
 from keystore.errors import InvalidInputError
 from keystore.formats.hosts import Hosts, load_hosts
 
-HOSTS: Option = ("--hosts FILE", PATH, "which nodes or enclaves belong to which host")
+HOSTS: Option = ("--hosts FILE", PATH, "file that assigns nodes or enclaves to hosts")
 OPTIONS = {
     "": (
         HOSTS,

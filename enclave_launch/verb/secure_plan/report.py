@@ -32,7 +32,7 @@ OPTIONS = {
     "": (
         ("--format", one_of("html", "markdown", "dot", "mermaid"), ""),
         ("-o --output FILE", PATH, "default: standard output"),
-        ("--keystore DIR", PATH, "tell what of it differs, and ends when"),
+        ("--keystore DIR", PATH, "report how it differs, and what expires"),
         EXPECT,
     )
 }

@@ -100,7 +100,11 @@ def _planned_before(
     try:
         return _plan(launch.words(old), options, old, prefixes)
     except EnclaveLaunchError as error:
-        hint = "" if options.build else "\nthe sources alone do not place everything? --build 'colcon build'"
+        hint = (
+            ""
+            if options.build
+            else "\nif a build places more than CMakeLists.txt and setup.py say: --build 'colcon build'"
+        )
         raise UsageError(f"in revision {revision}: {error}{hint}") from error
 
 

@@ -164,7 +164,7 @@ def test_a_compiled_node_without_a_manifest_says_how_to_write_one(launch: Launch
     (problem,) = launch('<launch><node pkg="demo" exec="compiled"/></launch>').problems
     assert "compiled program" in problem.text
     assert f"{prefix}/share/demo/*.nodl.xml" in problem.text
-    assert "describe it in a manifest" in problem.remedy
+    assert "--learn" in problem.remedy
 
 
 COMPUTED = """
