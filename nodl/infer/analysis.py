@@ -14,8 +14,8 @@ from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 
-from nodl.infer.callbacks import call_from_outside, expect_methods, settle, settle_meanwhile
-from nodl.infer.interpreter.define import linearized
+from nodl.infer.callbacks import call_from_outside, settle, settle_meanwhile
+from nodl.infer.interpreter.define import expect_methods, linearized
 from nodl.infer.interpreter.frames import Arguments, Frame
 from nodl.infer.interpreter.imports import execute_module
 from nodl.infer.interpreter.run import BudgetExceeded, Run
@@ -168,7 +168,7 @@ def _guarded(run: Run, body: Callable[[], None]) -> None:
         body()
     except BudgetExceeded as error:
         run.gave_up = True
-        why = f"the analysis was given up: {error}{_busiest(run)}; any interface beside those listed is possible"
+        why = f"the analysis was given up: {error}; any interface beside those listed is possible"
         run.findings.gap(SourceRef(run.main.path), why)
     except RecursionError:
         run.gave_up = True
@@ -191,13 +191,3 @@ def failure(error: Exception) -> str:
         f"the analysis failed ({type(error).__name__} at {place}); any interface is possible: "
         "give the node a manifest, and please report this line with the program"
     )
-
-
-def _busiest(run: Run) -> str:
-    """Where most of the steps went: the innermost function that took at least half, with what it calls."""
-    half = [(steps, function) for function, steps in run.cost.items() if 2 * steps >= run.steps]
-    if not half:
-        return ""
-    _, function = min(half, key=lambda each: each[0])
-    place = SourceRef(function.module.source.path.rpartition("/")[2], function.node.lineno)
-    return f", most of them in {function.name} ({place}) and what it calls"

@@ -1,18 +1,17 @@
 """Callbacks: what the world outside may call, called until nothing changes.
 
 Subscriptions, timers, threads and hooks of foreign classes run in any order and any number of times: the state after
-each call is joined with the one before, to a fixpoint. One that read nothing of what has changed is not called again.
+each call is joined with the one before, to a fixpoint. One is not called again while nothing has changed since.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 
-from nodl.infer.interpreter.define import methods_in, program_classes
+from nodl.infer.interpreter.define import expect_methods
 from nodl.infer.interpreter.frames import Arguments, Call, Frame
 from nodl.infer.interpreter.run import Run
-from nodl.infer.state import WhatWasRead
-from nodl.infer.values import ClassValue, GeneratorValue, Instance, ModuleValue, unknown
+from nodl.infer.values import ClassValue, ModuleValue, unknown
 from nodl.source_ref import SourceRef
 
 MAX_ROUNDS = 12
@@ -29,7 +28,7 @@ def settle(run: Run, at_end: bool = True) -> None:
         _expect_escaped(run, expected)
         before = run.state.version(), dict(run.callbacks)
         for callback, arity in before[1].items():
-            if not _is_settled(run, callback, arity):
+            if run.called_back.get((callback, arity)) != run.state.version():
                 if at_end:
                     run.state.forget()
                 _call_back(run, callback, arity, turn >= WIDEN_TEXTS_FROM)
@@ -50,29 +49,13 @@ def _no_settling(run: Run) -> None:
     """Callbacks are running already."""
 
 
-def _is_settled(run: Run, callback: object, arity: int | None) -> bool:
-    """Whether the callback would do again what it did: nothing that it read has changed since."""
-    before = run.called_back.get((callback, arity))
-    return before is not None and not run.state.touched(before)
-
-
 def _call_back(run: Run, callback: object, arity: int | None, widen_texts: bool) -> None:
-    """Call it once, and note what it read. What it made stands for what each of its calls makes."""
-    _begin_period(run)
-    around, reads = run.state.reads, WhatWasRead(run.state)
-    run.state.reads = reads
+    """Call it once. What it made stands for what each of its calls makes."""
+    run.born = []
+    run.called_back[callback, arity] = run.state.version()
     run.state.repeatedly(_called_from_outside(run, callback, arity), widen_texts)
-    run.called_back[callback, arity] = reads
-    run.state.reads = around
-    around.attributes |= reads.attributes
     for made in run.born:
         made.summary = True
-    _begin_period(run)
-
-
-def _begin_period(run: Run) -> None:
-    run.state.period += 1
-    run.born = []
 
 
 def _expect_escaped(run: Run, expected: set[object]) -> None:
@@ -87,21 +70,6 @@ def _expect_escaped(run: Run, expected: set[object]) -> None:
             expect_methods(run, (atom,))
 
 
-def expect_methods(run: Run, value: Iterable[object]) -> None:
-    """Register the methods of the program's objects in ``value``: others may call them."""
-    for instance in value:
-        if not isinstance(instance, Instance) or not isinstance(instance.cls, ClassValue):
-            continue
-        for base in program_classes(instance.cls):
-            for name in list(base.cells):
-                if isinstance(name, str) and name not in _NOT_CALLED and not name.startswith("["):
-                    bound = methods_in(base.cells.get(name, ()), instance, instance.cls)
-                    run.register_callback(bound, None)
-
-
-_NOT_CALLED = frozenset({"__init__", "__new__", "__init_subclass__", "__class_getitem__", "__set_name__"})
-
-
 def _called_from_outside(run: Run, callback: object, arity: int | None) -> Callable[[], bool]:
     made = unknown("an argument given by code that is not analysed")
     args = Arguments(more=made) if arity is None else Arguments([made] * arity)
@@ -109,8 +77,8 @@ def _called_from_outside(run: Run, callback: object, arity: int | None) -> Calla
 
     def call() -> bool:
         made = call_from_outside(run, module, callback, args)
-        is_made = isinstance(callback, ClassValue | GeneratorValue)
-        run.escape_value(tuple(atom for atom in made if is_made or isinstance(atom, GeneratorValue)))
+        if isinstance(callback, ClassValue):
+            run.escape_value(made)
         return True
 
     return call

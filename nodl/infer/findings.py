@@ -82,10 +82,6 @@ class Findings:
         self.homeless: NodeRecord | None = None
         self.global_arguments: Value = BOTTOM  # a list handed to rclpy.init(args=...)
 
-    def count(self) -> int:
-        """How much was found; it never shrinks."""
-        return len(self.nodes) + len(self.gaps) + sum(len(r.endpoints) + len(r.gaps) for r in self.nodes)
-
     @property
     def is_open(self) -> bool:
         """Whether there is a gap already, or a name of which nothing is known."""

@@ -406,8 +406,6 @@ class _Net:
     # --- one function, entered by one call ------------------------------------------------------------------
 
     def _entered(self, scope: FunctionText, entry: ast.AST | None, places: list[CallPlace]) -> None:
-        if (scope.node, entry) in self._run.joined:
-            return  # a recursion: one run of the body stands for all of its calls
         constants = self._constants(scope, entry) if places else {}
         for place in places:
             if (place.node, entry) in self._run.evaluated:

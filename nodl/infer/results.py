@@ -10,9 +10,7 @@ from nodl.infer.start import LaunchKey
 from nodl.infer.text import Hole, Input, NodePart, Piece, Text
 from nodl.infer.values import Sequence, Unknown, Value
 from nodl.name_template import NameTemplate, ParameterPart, Part, UnknownPart, melted
-from nodl.names import InvalidNameError, expand_name
 from nodl.node_interface import Certainty, ClientLibrary, Endpoint, Gap, NodeInterface
-from nodl.remap import InvalidRemapRuleError, RemapKind, RemapRules, parse_rule
 from nodl.ros_arguments import ros_arguments
 
 MAX_ALTERNATIVES = 16
@@ -45,7 +43,7 @@ def _united(interfaces: list[NodeInterface]) -> list[NodeInterface]:
 
 
 def _interfaces_of_node(record: NodeRecord, findings: Findings, origin: LaunchKey) -> list[NodeInterface]:
-    rules, gaps = _rules(record, findings)
+    gaps = _arguments_in_code(record, findings)
     endpoints = tuple(dict.fromkeys(e for found in record.endpoints for e in _endpoints(found)))
     gaps.extend(Gap(source, why) for source, why in record.gaps)
     names: list[str | None] = [*_plain_texts(record.names)] or [None]
@@ -73,7 +71,6 @@ def _interfaces_of_node(record: NodeRecord, findings: Findings, origin: LaunchKe
             lifecycle=record.lifecycle and record.communication_interface,
             parameters=tuple(sorted({*record.parameters, *record.assigned})),
             gaps=tuple(dict.fromkeys(gaps)),
-            own_rules=rules,
             global_arguments=_hears_launch(record, findings),
         )
         for name in names
@@ -202,91 +199,24 @@ def _default_items(atom: object, item: int | str) -> list[str | None]:
     return [text for element in chosen for text in _default_texts(element, None)]
 
 
-# --- remapping in code --------------------------------------------------------------------------------------
+# --- arguments in code --------------------------------------------------------------------------------------
 
 
-def _rules(record: NodeRecord, findings: Findings) -> tuple[tuple[str, ...], list[Gap]]:
-    """Remap rules that the program itself gives to the node, then those for all nodes with ``rclpy.init(args=...)``.
-
-    They come before what launch gives: the first rule that matches wins, and nothing is applied to its result
-    (ros2/rcl, ``remap.c``).
-    """
-    gaps: list[Gap] = []
-    rules = _rules_in(record.arguments, record, gaps)
+def _arguments_in_code(record: NodeRecord, findings: Findings) -> list[Gap]:
+    """Return a gap for remap rules and parameters that the program itself gives: they are not followed."""
+    given = [*record.arguments]
     if record.use_global_arguments != (False,):
-        rules += _rules_in(findings.global_arguments, record, gaps)
-    return tuple(rules), gaps
+        given.extend(findings.global_arguments)
+    for words in given:
+        found = ros_arguments(words) if isinstance(words, tuple) else None
+        if found is None or found.rules or found.parameters or found.files:
+            return [Gap(record.source, "remap rules or parameters given in code are not followed")]
+    return []
 
 
 def _hears_launch(record: NodeRecord, findings: Findings) -> bool | None:
-    """Whether the launch's arguments reach the node: not with ``use_global_arguments=False``, nor where the program
-    hands arguments of its own to ``rclpy.init``, which then does not look at the command line. ``None``: undecided."""
+    """Return whether the launch's arguments reach the node: not with ``use_global_arguments=False``, nor if the program
+    hands arguments of its own to ``rclpy.init``, which then ignores the command line. ``None``: undecided."""
     if record.use_global_arguments == (False,) or findings.global_arguments:
         return False
     return True if record.use_global_arguments == (True,) else None
-
-
-def _rules_in(value: Value, record: NodeRecord, gaps: list[Gap]) -> list[str]:
-    if len(value) > 1:
-        gaps.append(Gap(record.source, "remap rules given in code depend on what the program computes"))
-    rules: list[str] = []
-    for atom in value:
-        if not isinstance(atom, tuple):
-            gaps.append(Gap(record.source, "remap rules given in code are not known"))
-            continue
-        for text in ros_arguments(atom).rules:
-            try:
-                rules.append(parse_rule(text).text)
-            except InvalidRemapRuleError as error:
-                gaps.append(Gap(record.source, str(error)))
-    return rules
-
-
-def _perhaps_remapped(endpoint: Endpoint) -> Endpoint:
-    unknown = NameTemplate((UnknownPart("remap rules given in code may apply to it"),))
-    return endpoint._replace(name=unknown, certainty=Certainty.UNKNOWN)
-
-
-def _remapped_later(endpoint: Endpoint, rules: RemapRules, name: str, namespace: str) -> Endpoint:
-    """The rules as one more edit of a name that is an input as a whole; what is made of parts is not known."""
-    parts = endpoint.name.parts
-    part = parts[0]
-    if len(parts) > 1 or not isinstance(part, ParameterPart):
-        return _perhaps_remapped(endpoint)
-    ours = (rule for rule in rules.names if rule.node in (None, name))
-    pairs = [text for rule in ours for text in (rule.match, rule.replacement)]
-    edit = ("remapped", (namespace, name, *pairs))
-    return endpoint._replace(name=NameTemplate((part._replace(edits=(*part.edits, edit)),)))
-
-
-def remapped(interface: NodeInterface, rules: RemapRules) -> NodeInterface:
-    """The interface under the rules that the program gives itself, as it is where launch gives none."""
-    name, namespace = interface.name, interface.namespace
-    if name is not None:
-        name = rules.node_name(name).name
-        if namespace is not None:
-            namespace = rules.namespace(namespace, name).name
-    endpoints = tuple(_remapped_endpoint(e, rules, name, namespace) for e in interface.endpoints)
-    return interface._replace(name=name, namespace=namespace, endpoints=endpoints)
-
-
-def _remapped_endpoint(
-    endpoint: Endpoint, rules: RemapRules, name: str | None, namespace: str | None
-) -> Endpoint:
-    if not rules.names:
-        return endpoint
-    if name is None or namespace is None:
-        return _perhaps_remapped(endpoint)
-    if not endpoint.name.is_literal:
-        return _remapped_later(endpoint, rules, name, namespace)
-    not_meant = RemapKind.SERVICE if endpoint.kind.family == "topic" else RemapKind.TOPIC
-    try:
-        full = expand_name(endpoint.name.text, namespace=namespace, node=name)
-        for rule in rules.names:
-            if rule.kind is not_meant or rule.node not in (None, name):
-                continue
-            if expand_name(rule.match, namespace=namespace, node=name) == full:
-                return endpoint._replace(name=NameTemplate.literal(rule.replacement))
-    except InvalidNameError:
-        return endpoint
-    return endpoint

@@ -8,17 +8,16 @@ may meet. ``stamp`` names the state: equal stamps, equal contents.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterable, Sequence
 
 from nodl.infer.values import (
     ABSENT,
     BOTTOM,
-    AttributeCells,
     Cells,
     FieldCells,
     HeapObject,
     LocalCells,
-    ObjectCells,
     Value,
     contains,
     join,
@@ -27,33 +26,6 @@ from nodl.infer.values import (
 
 Alternative = Callable[[], bool]  # runs one branch; tells whether its end can be reached
 Written = dict[tuple[int, object], tuple[Cells, object, Value]]  # by cell: its value at the end of a branch
-MAX_CHANGES = 500  # looked through for one that matters
-
-
-FRESH = object()
-ELSEWHERE = object()
-
-
-class StateChange:
-    """A write that others can see, with the one before. ``name``: the attribute of an object of the program that was
-    set, ``FRESH`` for the contents of what was made since the running callback began, or ``ELSEWHERE``."""
-
-    __slots__ = ("before", "name")
-
-    def __init__(self, before: StateChange | None, name: object) -> None:
-        self.before = before
-        self.name = name
-
-
-class WhatWasRead:
-    """What was read after a point of the history: attributes of the program's objects, and perhaps anything else."""
-
-    __slots__ = ("attributes", "opened", "start")
-
-    def __init__(self, state: ProgramState) -> None:
-        self.start = state.stamp
-        self.opened = state.opened
-        self.attributes: set[object] = set()
 
 
 class ProgramState:
@@ -61,17 +33,12 @@ class ProgramState:
 
     def __init__(self) -> None:
         self._trail: list[tuple[Cells, object, Value | None]] = []
-        self.stamp: StateChange | None = None  # the latest; a branch that is undone takes its changes along
-        self.reflected = False  # attributes are also read in other ways than by a known name
-        self.period = 0  # a callback, or what runs between two of them
+        self.stamp = 0  # of the latest write; a branch that is undone takes it back
+        self._stamps = itertools.count(1)
         self.learned = 0  # containers opened to foreign code, which no branch takes back
-        self.opened = 0  # those of them that are older than the running callback
-        self.reads = WhatWasRead(self)
         self.work = 0  # trail entries looked at
         self.depth = 0  # how many branches or loops surround the current point
         self.forks = 0  # how many of them are undecided: what happens there may not happen
-        self.found: Callable[[], int] = lambda: 0  # counts what the run found; set by who knows it
-        self.stakes = 0  # undecided branches that found something, or that left before their end
 
     def write(self, cells: Cells, key: object, value: Value, local: bool = False) -> None:
         """Strong update. ``local``: only the running function can see the cell (no new stamp)."""
@@ -81,7 +48,7 @@ class ProgramState:
         self._trail.append((cells, key, old))
         cells[key] = value
         if not local:
-            self.stamp = StateChange(self.stamp, self._changed(cells, key))
+            self.stamp = next(self._stamps)
 
     def store(self, obj: HeapObject, key: object, value: Value) -> None:
         """Write to an object: strong if it is one concrete object, else weak."""
@@ -93,29 +60,9 @@ class ProgramState:
         """Drop the trail; only between top-level steps, when nobody holds a mark."""
         self._trail.clear()
 
-    def _changed(self, cells: Cells, key: object) -> object:
-        if isinstance(cells, ObjectCells) and cells.born == self.period:
-            return FRESH
-        return key if type(cells) is AttributeCells else ELSEWHERE
-
-    def version(self) -> tuple[StateChange | None, int]:
+    def version(self) -> tuple[int, int]:
         """Equal versions, equal state."""
         return self.stamp, self.learned
-
-    def touched(self, reads: WhatWasRead) -> bool:
-        """Whether something of what was read may have changed since."""
-        if reads.opened != self.opened:
-            return True
-        change = self.stamp
-        if self.reflected:
-            return change is not reads.start
-        for _ in range(MAX_CHANGES):
-            if change is reads.start:
-                return False
-            if change is None or change.name is ELSEWHERE or change.name in reads.attributes:
-                return True
-            change = change.before
-        return True
 
     def mark(self) -> int:
         return len(self._trail)
@@ -169,7 +116,6 @@ class ProgramState:
     def _run_each(self, alternatives: Sequence[Alternative]) -> list[Written]:
         stamp = self.stamp
         outcomes: list[Written] = []
-        found = 0 if self.forks else self.found()
         self.depth += 1
         self.forks += 1
         for alternative in alternatives:
@@ -180,8 +126,6 @@ class ProgramState:
             self.stamp = stamp
         self.depth -= 1
         self.forks -= 1
-        if not self.forks and self.found() != found:
-            self.stakes += 1
         return outcomes
 
     def join_seen(self, mark: int, own: Cells | None = None) -> None:

@@ -68,18 +68,8 @@ class Absent:
 ABSENT: Value = (Absent(),)
 
 
-class ObjectCells(dict[object, Value]):
-    """The contents of an object. ``born``: in which period of the run it was made, 0 where that is not known."""
-
-    born = 0
-
-
-class FieldCells(ObjectCells):
+class FieldCells(dict[object, Value]):
     """The cells of an instance; the state notes when one may be absent."""
-
-
-class AttributeCells(FieldCells):
-    """Those of an object of the program, which are read by their names; the state notes which were set."""
 
 
 class External:
@@ -133,7 +123,7 @@ class HeapObject:
     __slots__ = ("cells", "escaped", "summary")
 
     def __init__(self) -> None:
-        self.cells = ObjectCells()
+        self.cells: Cells = {}
         self.summary = False
         self.escaped = False
 
@@ -266,26 +256,14 @@ class Instance(HeapObject):
 
     def __init__(self, cls: ClassValue | External):
         super().__init__()
-        self.cells = AttributeCells() if isinstance(cls, ClassValue) else FieldCells()
+        self.cells = FieldCells()
         self.cls = cls
         self.node: NodeRecord | None = None
-
-
-class GeneratorValue(HeapObject):
-    """A call of a generator of the program: its cells are the arguments, its body runs when it is iterated over."""
-
-    __slots__ = ("function", "node")
-
-    def __init__(self, function: FunctionValue, node: ast.AST):
-        super().__init__()
-        self.function = function
-        self.node = node  # the call
 
 
 # Equal only to themselves, or strings: ``in`` then says the same as comparing one by one, and faster.
 _COMPARED_IN_C = frozenset({
     str, Text, External, Instance, Sequence, Dictionary, FunctionValue, ClassValue, ModuleValue,
-    GeneratorValue,
 })  # fmt: skip
 
 

@@ -24,7 +24,7 @@ class Allocations:
         self._tuples: dict[object, Value] = {}
         self.captured_cells: dict[tuple[object, ...], LocalCells] = {}
         self._allocated: dict[tuple[object, ...], Any] = {}
-        self.born: list[HeapObject] = []  # in this period
+        self.born: list[HeapObject] = []  # since the running callback began
 
     def enter(self, key: object) -> int:
         """Go into the calling context ``key``; returns the context to go back to."""
@@ -42,7 +42,6 @@ class Allocations:
         found: Made | None = self._allocated.get(key)
         if found is None:
             found = self._allocated[key] = make()
-            found.cells.born = self.state.period
             self.born.append(found)
         else:
             found.summary = True  # what was stored before is still there: weak updates only add to it

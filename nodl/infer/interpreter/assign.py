@@ -8,7 +8,6 @@ from nodl.infer.interpreter.define import is_key, program_classes
 from nodl.infer.interpreter.frames import Arguments, Frame
 from nodl.infer.interpreter.iterate import elements
 from nodl.infer.interpreter.run import Run
-from nodl.infer.interpreter.subscripts import slice_of
 from nodl.infer.methods import PropertyValue
 from nodl.infer.values import (
     ABSENT,
@@ -28,8 +27,12 @@ from nodl.infer.values import (
     Sequence,
     Value,
     join,
+    join_all,
     present,
+    unknown,
 )
+
+EDITED = unknown("an element of a list that is edited")
 
 
 def assign(run: Run, target: ast.expr, value: Value, frame: Frame) -> None:
@@ -125,8 +128,12 @@ def copy_dictionary(run: Run, target: Dictionary, source: Value) -> None:
 def _store_subscript(run: Run, target: ast.Subscript, value: Value, frame: Frame) -> None:
     owners = run.evaluate(target.value, frame)
     if isinstance(target.slice, ast.Slice):
+        added = elements(run, value, target.slice, frame).any_element()
         for owner in owners:
-            _store_slice(run, owner, target.slice, value, len(owners) == 1, frame)
+            if isinstance(owner, Sequence):
+                _edited(run, owner, added)
+            else:
+                run.escape_value(value)
         return
     key = run.evaluate(target.slice, frame)
     for owner in owners:
@@ -142,22 +149,6 @@ def _store_subscript(run: Run, target: ast.Subscript, value: Value, frame: Frame
             run.escape_value(value)  # what its class does with it is called from outside
         else:
             run.escape_value(value)
-
-
-def _store_slice(
-    run: Run, owner: object, bounds: ast.Slice, value: Value, certain: bool, frame: Frame
-) -> None:
-    if not isinstance(owner, Sequence):
-        run.escape_value(value)
-        return
-    added = elements(run, value, bounds, frame)
-    exact, known = owner.items.exact, slice_of(run, bounds, frame)
-    if certain and exact is not None and added.exact is not None and known is not None and known.step is None:
-        changed = list(exact)
-        changed[known] = added.exact
-        run.state.store(owner, ITEMS, (Items(tuple(changed)),))
-        return
-    run.state.store(owner, ITEMS, (Items(None, join(owner.items.any_element(), added.any_element())),))
 
 
 def _set_environment(run: Run, key: Value, value: Value, node: ast.AST, frame: Frame) -> None:
@@ -190,32 +181,19 @@ def _store_element(run: Run, owner: Sequence, key: Value, value: Value) -> None:
 def _unpack(run: Run, targets: list[ast.expr], value: Value, frame: Frame) -> None:
     items = elements(run, value, targets[0] if targets else ast.Pass(), frame)
     exact = items.exact
-    star = next((i for i, target in enumerate(targets) if isinstance(target, ast.Starred)), None)
-    if exact is not None and star is None and len(exact) == len(targets):
+    starred = any(isinstance(target, ast.Starred) for target in targets)
+    if exact is not None and not starred and len(exact) == len(targets):
         for target, element in zip(targets, exact, strict=True):
             assign(run, target, element, frame)
         return
-    if exact is not None and star is not None and len(exact) >= len(targets) - 1:
-        _unpack_star(run, targets, star, exact, frame)
-        return
     element = items.any_element() or ANY
+    if exact is not None and len(element) > 1:
+        element = join(element, ANY)  # which of them is not known
     for target in targets:
         if isinstance(target, ast.Starred):
             assign(run, target, run.sequence(target, "list", Items(None, element)), frame)
         else:
             assign(run, target, element, frame)
-
-
-def _unpack_star(
-    run: Run, targets: list[ast.expr], star: int, exact: tuple[Value, ...], frame: Frame
-) -> None:
-    after = len(targets) - star - 1
-    middle = exact[star : len(exact) - after]
-    for target, element in zip(targets[:star], exact[:star], strict=True):
-        assign(run, target, element, frame)
-    assign(run, targets[star], run.sequence(targets[star], "list", Items(middle)), frame)
-    for target, element in zip(targets[star + 1 :], exact[len(exact) - after :], strict=True):
-        assign(run, target, element, frame)
 
 
 def delete(run: Run, target: ast.expr, frame: Frame) -> None:
@@ -226,37 +204,13 @@ def delete(run: Run, target: ast.expr, frame: Frame) -> None:
             _delete_attribute(run, owner, target.attr, len(owners) == 1, target, frame)
     elif isinstance(target, ast.Subscript):
         owners = run.evaluate(target.value, frame)
-        part = _deleted_part(run, target, frame)
-        key = part if isinstance(part, tuple) else ANY
+        key = ANY if isinstance(target.slice, ast.Slice) else run.evaluate(target.slice, frame)
         for owner in owners:
-            if isinstance(owner, Sequence) and len(owners) == 1 and _delete_known(run, owner, part):
-                continue
-            _delete_item(run, owner, key, len(owners) == 1, target, frame)
-
-
-def _deleted_part(run: Run, target: ast.Subscript, frame: Frame) -> Value | slice | None:
-    """The key, or the slice if its bounds are known."""
-    if isinstance(target.slice, ast.Slice):
-        return slice_of(run, target.slice, frame)
-    return run.evaluate(target.slice, frame)
-
-
-def _delete_known(run: Run, owner: Sequence, part: Value | slice | None) -> bool:
-    """Whether the elements are known, and which of them go."""
-    which = part[0] if isinstance(part, tuple) and len(part) == 1 else part
-    if owner.items.exact is None or not isinstance(which, int | slice):
-        return False
-    left = list(owner.items.exact)
-    if isinstance(which, int) and not -len(left) <= which < len(left):
-        return False
-    del left[which]
-    run.state.store(owner, ITEMS, (Items(tuple(left)),))
-    return True
+            _delete_item(run, owner, key, len(owners) == 1)
 
 
 def _delete_attribute(run: Run, owner: object, name: str, certain: bool, node: ast.AST, frame: Frame) -> None:
     if isinstance(owner, Instance):
-        run.state.reads.attributes.add(name)
         if name in owner.cells:
             kept = BOTTOM if certain and not owner.summary else owner.cells[name]
             run.state.write(owner.cells, name, join(kept, ABSENT))
@@ -264,10 +218,15 @@ def _delete_attribute(run: Run, owner: object, name: str, certain: bool, node: a
         run.gap(node, frame, f"{name} is deleted; what is found instead is not analysed")
 
 
-def _delete_item(run: Run, owner: object, key: Value, certain: bool, node: ast.AST, frame: Frame) -> None:
+def _delete_item(run: Run, owner: object, key: Value, certain: bool) -> None:
     if isinstance(owner, Sequence):
-        run.state.store(owner, ITEMS, (Items(None, owner.items.any_element()),))
+        _edited(run, owner, BOTTOM)
     elif isinstance(owner, Dictionary):
         strong = certain and len(key) == 1 and not owner.summary
         if strong and isinstance(key[0], str | int | float | bool | type(None)):
             run.state.write(owner.cells, Key(key[0]), ABSENT)
+
+
+def _edited(run: Run, owner: Sequence, added: Value) -> None:
+    """Some elements go, ``added`` come: each may be any."""
+    run.state.store(owner, ITEMS, (Items(None, join_all((owner.items.any_element(), added, EDITED))),))

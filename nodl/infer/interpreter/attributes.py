@@ -45,7 +45,6 @@ def _of_instance(run: Run, obj: Instance, name: str, node: ast.AST, frame: Frame
     held = obj.cells.get(name)
     if isinstance(obj.cls, External):
         return held if held is not None else foreign.instance_attribute(run, obj, obj.cls.path, name)
-    run.state.reads.attributes.add(name)
     if held is not None:
         if not obj.summary and ABSENT[0] not in held:
             return held
@@ -55,7 +54,7 @@ def _of_instance(run: Run, obj: Instance, name: str, node: ast.AST, frame: Frame
     if name == "__class__":
         return (obj.cls,)
     if name == "__dict__":
-        return run.variables_of(obj, node, frame)
+        return run.variables_of(node, frame)
     found = _class_attribute(run, obj, linearized(obj.cls), name, node, frame)
     if found is not None:
         return found
@@ -116,7 +115,7 @@ def _of_class(run: Run, cls: ClassValue, name: str, node: ast.AST, frame: Frame)
     if name in ("__name__", "__qualname__"):
         return (cls.name,) if name == "__name__" or "." not in cls.name else ANY
     if name == "__dict__":
-        return run.variables_of(cls, node, frame)
+        return run.variables_of(node, frame)
     if name == "__module__":
         return cls.module.cells.get("__name__", ANY)
     order = linearized(cls)
@@ -144,8 +143,6 @@ def _of_class(run: Run, cls: ClassValue, name: str, node: ast.AST, frame: Frame)
 def _enum_member(run: Run, cls: ClassValue, name: str, value: Value, node: ast.AST) -> Value:
     if isinstance(value[0], FunctionValue | ClassMethod | PropertyValue) or name.startswith("_"):
         return value
-    if isinstance(value[0], Unknown) and "enum.auto" in value[0].why:
-        value = _automatic(cls, name)
     key = ("enum", id(cls), name)
     member = run.enum_members.get(key)
     if member is None:
@@ -154,31 +151,9 @@ def _enum_member(run: Run, cls: ClassValue, name: str, value: Value, node: ast.A
     return (member,)
 
 
-def _automatic(cls: ClassValue, name: str) -> Value:
-    """``enum.auto()``: one more than the number before, from 1; the name in small letters in a ``StrEnum``."""
-    if any(isinstance(base, External) and base.path == "enum.StrEnum" for base in linearized(cls)):
-        return (name.lower(),)
-    if any(isinstance(base, External) and "Flag" in base.path for base in linearized(cls)):
-        return unknown("a flag")
-    number = 0
-    for statement in cls.node.body:
-        if not isinstance(statement, ast.Assign) or not isinstance(statement.targets[0], ast.Name):
-            continue
-        held = cls.cells.get(statement.targets[0].id, ANY)
-        if len(held) == 1 and type(held[0]) is int:
-            number = held[0]
-        elif isinstance(held[0], Unknown) and "enum.auto" in held[0].why:
-            number += 1
-        else:
-            return unknown("a number of an enumeration")
-        if statement.targets[0].id == name:
-            return (number,)
-    return unknown("a number of an enumeration")
-
-
 def _of_module(run: Run, module: ModuleValue, name: str, node: ast.AST, frame: Frame) -> Value:
     if name == "__dict__":
-        return run.variables_of(module, node, frame)
+        return run.variables_of(node, frame)
     return imports.member(run, (module,), module.source.name, name, frame)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 
-from nodl.infer.interpreter.calls import call_bound, call_function, run_generator
+from nodl.infer.interpreter.calls import call_bound, call_function
 from nodl.infer.interpreter.frames import Call
 from nodl.infer.interpreter.instantiation import instantiate
 from nodl.infer.interpreter.run import Caller, Run
@@ -18,7 +18,6 @@ from nodl.infer.values import (
     ClassValue,
     External,
     FunctionValue,
-    GeneratorValue,
     Instance,
     Unknown,
     Value,
@@ -67,5 +66,4 @@ CALLABLES: dict[type, Caller] = {
     External: foreign.call_external,
     ForeignMethod: foreign.call_foreign_method,
     NativeMethod: foreign.call_native,
-    GeneratorValue: run_generator,
 }

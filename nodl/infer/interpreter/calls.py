@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import ast
 import functools
-from collections.abc import Callable
 
 from nodl.infer.interpreter.frames import Arguments, Call, Frame
+from nodl.infer.interpreter.loops import fixpoint
 from nodl.infer.interpreter.run import MAX_DEPTH, Run
-from nodl.infer.methods import BoundMethod
+from nodl.infer.methods import BoundMethod, Partial
 from nodl.infer.values import (
     ANY,
     BOTTOM,
@@ -16,35 +16,19 @@ from nodl.infer.values import (
     OTHER,
     Dictionary,
     FunctionValue,
-    GeneratorValue,
     Items,
     Key,
     LocalCells,
     Value,
     join,
-    present,
     unknown,
     widen,
 )
 
 MISSING = unknown("an argument that the caller does not give")
 MAX_ROUNDS = 8
-
-
-Body = Callable[[Run, FunctionValue, LocalCells, Call], Value]
-
-
-class Summary:
-    """A function that calls itself: its joined parameters and result, run to a fixpoint.
-
-    ``active``: its body is running; a call of it then adds to the parameters and gets the result so far.
-    """
-
-    def __init__(self) -> None:
-        self.parameters: dict[object, Value] = {}
-        self.result: Value = BOTTOM
-        self.active = False
-        self.widened = 0
+EARLIER = unknown("what a cached function gave before")
+LATER = unknown("what a generator gives later")
 
 
 def call_function(run: Run, function: FunctionValue, call: Call) -> Value:
@@ -56,34 +40,14 @@ def call_function(run: Run, function: FunctionValue, call: Call) -> Value:
     cells = bind(run, function, call)
     run.called.setdefault(node)
     run.understood.add(call.node)
-    if is_generator(function):
-        kind = f"generator {id(function)}"
-        made = run.allocate(call.node, kind, lambda: GeneratorValue(function, call.node))
-        for name, value in cells.items():
-            run.state.store(made, name, value)
-        return (made,)
-    if function.cached and node not in run.stack:
-        return _cached(run, function, cells, call)
-    if node not in run.stack and not (run.repeated and node in run.recursive):
-        return _remembered(run, function, cells, call)
-    if node not in run.stack:
-        return _remembered(run, function, cells, call, _summarised)
-    return _summarised(run, function, cells, call)
-
-
-def run_generator(run: Run, made: GeneratorValue, call: Call) -> Value:
-    """Whatever the body yields, now or when it was run before; nobody knows how far others let it run."""
-    if made.function.node in run.stack:
-        return unknown("what a generator yields that calls itself")
-    cells = LocalCells()
-    cells.update((name, present(value)) for name, value in made.cells.items() if name != _YIELDED)
-    found = _run_body(run, made.function, cells, Call(call.args, made.node, call.frame))
-    found = join(present(made.cells.get(_YIELDED, BOTTOM)), found)
-    run.state.write(made.cells, _YIELDED, found)
-    return found
-
-
-_YIELDED = "[yielded]"
+    if node in run.stack:
+        return _recursive(run, function, cells, call)
+    result = _remembered(run, function, cells, call)
+    if is_generator(function):  # its body may run again when somebody asks for the next value
+        later = Partial((function,), tuple(call.args.positional), tuple(call.args.keywords.items()))
+        run.register_callback((later,), 0)
+        result = run.sequence(call.node, "generator", Items(None, join(result, LATER)))
+    return join(result, EARLIER) if function.cached else result
 
 
 def is_generator(function: FunctionValue) -> bool:
@@ -103,52 +67,56 @@ def _is_generator(node: ast.AST) -> bool:
     return False
 
 
-def _cached(run: Run, function: FunctionValue, cells: LocalCells, call: Call) -> Value:
-    """``functools.cache``: the body may run, or the earlier result for these arguments is taken."""
-    key = ("cached", *cells.values())
-    held = function.attributes.get(key, BOTTOM)
-    result = join(held, run.state.perhaps(lambda: _remembered(run, function, cells, call)))
-    if held and result is not held:
-        result = join(result, ANY)
-    run.state.write(function.attributes, key, result)
-    return result
+class Recursion:
+    """What the calls of a function by itself give to it, joined, and what comes back."""
+
+    def __init__(self, parameters: LocalCells) -> None:
+        self.parameters = dict(parameters)
+        self.result: Value = BOTTOM
+        self.grew = True
 
 
-def _summarised(run: Run, function: FunctionValue, cells: LocalCells, call: Call) -> Value:
-    """One of the calls that a function which calls itself gets: all of them together are one."""
-    node = function.node
-    run.recursive.add(node)
-    run.joined.add((node, call.node))
-    summary = run.summaries.setdefault(node, Summary())
-    _widen_parameters(run, summary, cells)
-    if not summary.active:
-        _run_recursive(run, function, summary, call)
-    result: Value = summary.result
-    return result  # nothing yet: this path ends in a call that has not come back so far
+def _recursive(run: Run, function: FunctionValue, cells: LocalCells, call: Call) -> Value:
+    """A call inside of a call of the same function: all of them are one, run until nothing new comes."""
+    outer = run.recursions.get(function.node)
+    if outer is not None:
+        for name, value in cells.items():
+            joined = widen(outer.parameters.get(name, BOTTOM), value, True)
+            outer.grew = outer.grew or joined is not outer.parameters.get(name, BOTTOM)
+            outer.parameters[name] = joined
+        result_so_far: Value = outer.result
+        return result_so_far  # nothing yet: this path ends in a call that has not come back so far
+    recursion = run.recursions[function.node] = Recursion(cells)
+
+    def turn() -> bool:
+        inner = LocalCells()
+        inner.update(recursion.parameters)
+        result = join(recursion.result, _run_body(run, function, inner, call))
+        recursion.grew = recursion.grew or result is not recursion.result
+        recursion.result = result
+        return True
+
+    for _ in range(MAX_ROUNDS):
+        recursion.grew = False
+        fixpoint(run, call.frame, turn)
+        if not recursion.grew:
+            break
+    else:
+        run.gap(call.node, call.frame, f"the recursion of {function.name} does not settle")
+    del run.recursions[function.node]
+    return recursion.result
 
 
-def _remembered(
-    run: Run, function: FunctionValue, cells: LocalCells, call: Call, body: Body | None = None
-) -> Value:
+def _remembered(run: Run, function: FunctionValue, cells: LocalCells, call: Call) -> Value:
     """A call that leaves the state as it found it gives the same again while the state is the same."""
     key = (function, tuple(cells.values()), id(call.node))
+    version = run.state.version()
     known = run.memo.get(key)
-    version = (*run.state.version(), run.rounds)
     if known is not None and known[0] == version:
-        run.state.reads.attributes |= known[2]
         return known[1]
-    reads = run.state.reads
-    around, reads.attributes = reads.attributes, set()
-    before = run.steps if function.node not in run.stack else None  # a call inside itself counts already
-    try:
-        result = (body or _run_body)(run, function, cells, call)
-        if (*run.state.version(), run.rounds) == version:
-            run.memo[key] = (version, result, reads.attributes)
-    finally:
-        around |= reads.attributes
-        reads.attributes = around
-        if before is not None:
-            run.cost[function] = run.cost.get(function, 0) + run.steps - before
+    result = _run_body(run, function, cells, call)
+    if run.state.version() == version:
+        run.memo[key] = (version, result)
     return result
 
 
@@ -188,44 +156,6 @@ def _run_body(run: Run, function: FunctionValue, cells: LocalCells, call: Call) 
     if frame.yielded is not None:
         return frame.yielded or ANY
     return frame.returned  # nothing, if no path comes back
-
-
-def _run_recursive(run: Run, function: FunctionValue, summary: Summary, call: Call) -> None:
-    """Run the body with the joined parameters; the outermost recursion repeats until nothing changes."""
-    outermost = not any(other.active for other in run.summaries.values())
-    summary.active = True
-    run.repeated += 1
-    run.state.forks += 1
-    for _ in range(MAX_ROUNDS if outermost else 1):
-        run.unstable = False if outermost else run.unstable
-        cells = LocalCells()
-        cells.update(summary.parameters)
-        result = join(summary.result, _run_body(run, function, cells, call))
-        if result is not summary.result:
-            run.unstable = True
-            run.rounds += 1
-        summary.result = result
-        if not run.unstable:
-            break
-    else:
-        if outermost:
-            run.gap(call.node, call.frame, f"the recursion of {function.name} does not settle")
-    run.repeated -= 1
-    run.state.forks -= 1
-    summary.active = False
-    if outermost:
-        run.summaries.clear()
-
-
-def _widen_parameters(run: Run, summary: Summary, cells: LocalCells) -> None:
-    for key, value in cells.items():
-        old = summary.parameters.get(key, BOTTOM)
-        new = widen(old, value, summary.widened > 2)
-        if new is not old:
-            summary.parameters[key] = new
-            summary.widened += 1
-            run.unstable = True
-            run.rounds += 1
 
 
 def call_bound(run: Run, method: BoundMethod, call: Call) -> Value:

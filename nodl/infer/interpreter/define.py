@@ -92,7 +92,7 @@ def _decorated(run: Run, value: Value, function: FunctionValue, decorator: ast.e
     if path in _PROPERTIES:
         return (PropertyValue(value, cached=path == "functools.cached_property"),)
     if path == "functools.wraps" and isinstance(decorator, ast.Call):
-        _take_name(run, function, decorator, frame)
+        function.name = ""  # that of the wrapped one
         return value
     if path in ("builtins.staticmethod", "builtins.classmethod"):
         return (ClassMethod(value, path == "builtins.staticmethod"),)
@@ -105,14 +105,6 @@ def _decorated(run: Run, value: Value, function: FunctionValue, decorator: ast.e
         run.register_callback(value, None)
         return value
     return run.call(callee, Arguments([value]), decorator, frame)
-
-
-def _take_name(run: Run, function: FunctionValue, decorator: ast.Call, frame: Frame) -> None:
-    """``@functools.wraps(wrapped)``: the function goes by the name of the wrapped one."""
-    wrapped = sole(run.evaluate(decorator.args[0], frame)) if decorator.args else None
-    name = wrapped.name if isinstance(wrapped, FunctionValue) else ""
-    own = getattr(function.node, "name", "<lambda>")
-    function.name = name if function.name in (own, name) else ""
 
 
 def define_class(run: Run, node: ast.ClassDef, frame: Frame) -> bool:
@@ -261,6 +253,21 @@ def methods_in(held: Value, receiver: object, cls: ClassValue) -> Value:
             functions = [each for each in atom.function if isinstance(each, FunctionValue)]
             bound.extend(functions if atom.static else [BoundMethod(each, cls) for each in functions])
     return tuple(bound)
+
+
+def expect_methods(run: Run, value: Value) -> None:
+    """Register the methods of the program's objects in ``value``: others may call them."""
+    for instance in value:
+        if not isinstance(instance, Instance) or not isinstance(instance.cls, ClassValue):
+            continue
+        for base in program_classes(instance.cls):
+            for name in list(base.cells):
+                if isinstance(name, str) and name not in _NOT_CALLED and not name.startswith("["):
+                    bound = methods_in(base.cells.get(name, ()), instance, instance.cls)
+                    run.register_callback(bound, None)
+
+
+_NOT_CALLED = frozenset({"__init__", "__new__", "__init_subclass__", "__class_getitem__", "__set_name__"})
 
 
 def foreign_bases(cls: ClassValue) -> list[object]:

@@ -13,41 +13,24 @@ from nodl.infer.interpreter.define import (
     program_classes,
 )
 from nodl.infer.interpreter.frames import Arguments, Call
-from nodl.infer.interpreter.iterate import enum_members
 from nodl.infer.interpreter.run import Run
 from nodl.infer.methods import BoundMethod, ForeignMethod
 from nodl.infer.models import foreign
-from nodl.infer.values import BOTTOM, ClassValue, External, FunctionValue, Instance, Value, sole
+from nodl.infer.values import ClassValue, External, FunctionValue, Instance, Value, unknown
 
 
 def instantiate(run: Run, cls: ClassValue, call: Call) -> Value:
     """A new object: its constructor is the first one in the method resolution order."""
     for base in program_classes(cls):
         run.instantiated.setdefault(base.node)
-    found = _member_by_value(run, cls, call)
-    if found:
-        return found
+    if is_enumeration(cls):
+        return unknown("a member of an enumeration that is looked up by its value")
     made = _made_by_new(run, cls, call)
     if made is not None:
         return made
     instance = new_instance(run, cls, call)
     initialise(run, cls, instance, call)
     return (instance,)
-
-
-def _member_by_value(run: Run, cls: ClassValue, call: Call) -> Value:
-    """``Side('l')`` of an enumeration: the member with this value; nothing where that is not known."""
-    if not is_enumeration(cls):
-        return BOTTOM
-    wanted = call.args.at(0)
-    members = enum_members(run, cls, call.node, call.frame).exact
-    if members is None or len(call.args.positional) != 1 or not isinstance(sole(wanted), str | int):
-        return BOTTOM
-    for member in members:
-        atom = member[0]
-        if isinstance(atom, Instance) and atom.cells.get("_value_") == wanted:
-            return member
-    return BOTTOM
 
 
 def _made_by_new(run: Run, cls: ClassValue, call: Call) -> Value | None:

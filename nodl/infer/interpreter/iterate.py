@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 
-from nodl.infer.interpreter.frames import Arguments, Call, Frame
+from nodl.infer.interpreter.frames import Frame
 from nodl.infer.interpreter.run import Run
 from nodl.infer.text import Input, Text, make_text
 from nodl.infer.values import (
@@ -14,7 +14,6 @@ from nodl.infer.values import (
     OTHER_KEYS,
     ClassValue,
     Dictionary,
-    GeneratorValue,
     Items,
     Sequence,
     Unknown,
@@ -47,8 +46,6 @@ def _elements_of(run: Run, atom: object, node: ast.AST, frame: Frame) -> Items:
         return keys_of(atom)
     if isinstance(atom, str):
         return Items(tuple((character,) for character in atom)) if len(atom) <= 256 else Items(None, ANY)
-    if isinstance(atom, GeneratorValue):
-        return Items(None, run.call_atom(atom, Call(Arguments(), node, frame)))
     if isinstance(atom, Text):
         return Items(None, _input_items(atom))
     if isinstance(atom, ClassValue):

@@ -11,7 +11,7 @@ from nodl.infer.interpreter.conditions import decide
 from nodl.infer.interpreter.frames import Frame
 from nodl.infer.interpreter.iterate import elements
 from nodl.infer.interpreter.run import Run
-from nodl.infer.values import GeneratorValue, Value
+from nodl.infer.values import Value
 
 MAX_UNROLLED = 64  # turns, those of the loops around multiplied
 MAX_UNROLLED_AGAIN = 16  # in what is repeated itself
@@ -53,16 +53,10 @@ def _looped(run: Run, node: Loop, frame: Frame, turns: Callable[[], tuple[bool, 
 
 def _for(run: Run, node: For, iterated: Value, frame: Frame) -> tuple[bool, bool]:
     passes = finished = True
-    runs = any(isinstance(atom, GeneratorValue) for atom in iterated)  # between its steps the turns run
-    items = None if runs else elements(run, iterated, node, frame)
-    exact = () if items is None or items.exact is None else items.exact
+    items = elements(run, iterated, node, frame)
+    exact = items.exact or ()
     counts = all(len(each) == 1 and type(each[0]) is int for each in exact) and not _may_name(node)
-    if (
-        items is not None
-        and items.exact is not None
-        and may_unroll(run, len(exact))
-        and not (exact and counts)
-    ):
+    if items.exact is not None and may_unroll(run, len(exact)) and not (exact and counts):
         run.unrolled *= len(exact) or 1
         passes, finished = _unrolled(run, node, exact, frame)
         run.unrolled //= len(exact) or 1
@@ -152,7 +146,6 @@ def fixpoint(run: Run, frame: Frame, turn: Callable[[], bool]) -> None:
     """Run ``turn`` as something that happens any number of times, until it changes nothing."""
     run.repeated += 1
     run.state.depth += 1
-    found = 0 if run.state.forks else run.state.found()
     run.state.forks += 1
     start = run.state.mark()
     jumped = False
@@ -171,7 +164,5 @@ def fixpoint(run: Run, frame: Frame, turn: Callable[[], bool]) -> None:
     run.state.depth -= 1
     run.state.forks -= 1
     run.repeated -= 1
-    if not run.state.forks and run.state.found() != found:
-        run.state.stakes += 1
     if jumped:
         run.state.join_seen(start)

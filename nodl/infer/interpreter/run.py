@@ -17,7 +17,7 @@ from nodl.infer.interpreter.frames import Arguments, Call, Frame
 from nodl.infer.methods import BoundMethod, ClassMethod, ForeignMethod, Partial, SuperProxy
 from nodl.infer.packages import find_package
 from nodl.infer.program import Program, SourceModule
-from nodl.infer.state import ProgramState, WhatWasRead
+from nodl.infer.state import ProgramState
 from nodl.infer.text import Text
 from nodl.infer.values import (
     ANY,
@@ -27,8 +27,6 @@ from nodl.infer.values import (
     External,
     FieldCells,
     FunctionValue,
-    GeneratorValue,
-    HeapObject,
     Instance,
     Items,
     LocalCells,
@@ -95,7 +93,6 @@ class Run(Allocations):
         self._statements = tables.statements
         super().__init__(ProgramState())
         self.findings = Findings()
-        self.state.found = lambda: self.findings.count()
         self.modules: dict[str, ModuleValue] = {}
         self.no_submodules: set[tuple[str, ModuleValue]] = set()  # looked for and not found
         self.foreign_attributes: dict[tuple[str, str], Value] = {}  # of libraries, by path and name
@@ -104,14 +101,12 @@ class Run(Allocations):
         self.handed: dict[Instance, SourceRef] = {}  # objects that code which is not analysed got, and where
         self.callbacks: dict[object, int | None] = {}  # callable -> number of arguments, if known
         self.called: dict[ast.AST, None] = {}  # functions analysed so far
-        self.cost: dict[FunctionValue, int] = {}  # steps in a function and in what it calls
         self.instantiated: dict[ast.AST, None] = {}  # classes of which an object was made
         self.with_metaclass: set[ast.AST] = set()
-        # For the net: calls with the call that entered their function, what entered each function, those of which one
-        # run of the body stands for several, and calls of what is not known.
+        # For the net: calls with the call that entered their function, what entered each function, and calls of
+        # what is not known.
         self.evaluated: set[tuple[ast.AST, ast.AST | None]] = set()
         self.entries: dict[ast.AST, dict[ast.AST, None]] = {}
-        self.joined: set[tuple[ast.AST | None, ast.AST | None]] = set()
         self.doubtful: set[ast.AST] = set()
         # Calls that made an interface, or ran a function of the program.
         self.understood: set[ast.AST] = set()
@@ -119,23 +114,19 @@ class Run(Allocations):
         self.classes: dict[ast.AST, ClassValue] = {}
         self.enum_members: dict[tuple[str, int, str], Instance] = {}
         self.functions: dict[tuple[object, ...], FunctionValue] = {}
-        self.summaries: dict[ast.AST, Any] = {}
-        self.recursive: set[ast.AST] = set()  # functions that call themselves, nobody knows how often
-        self.rounds = 0  # how often a recursion learned something
+        self.recursions: dict[ast.AST, Any] = {}  # functions that are calling themselves
         self.options = OptionDefaults()
         self.settle: Callable[[Run], None] = lambda run: None  # runs the callbacks; set by who drives the run
         self.decisions: Decisions | None = None
         self.environment = FieldCells()  # variables that the program sets itself
-        # Calls that left the state as it was: at which version, with what result, which attributes they read.
-        self.memo: dict[tuple[object, ...], tuple[tuple[object, ...], Value, set[object]]] = {}
-        self.unstable = False  # a recursion learned something new since its outermost call asked
+        # Calls that left the state as it was: at which version, with what result.
+        self.memo: dict[tuple[object, ...], tuple[object, Value]] = {}
         self.unrolled = 1  # turns of the unrolled loops around, multiplied
         self.repeated = 0  # inside a loop or callback: one allocation may stand for many objects
         self.steps = 0
         self.limit = min(MAX_STEPS, MAX_STEPS_IN_VAIN)
         self.gave_up = False
-        # What callbacks read when they last ran.
-        self.called_back: dict[tuple[object, int | None], WhatWasRead] = {}
+        self.called_back: dict[tuple[object, int | None], object] = {}  # the state before the latest call
         self.conditional = False  # an undecided test asks for the value of a parameter
 
     # --- syntax -----------------------------------------------------------------------------------------
@@ -282,8 +273,6 @@ class Run(Allocations):
             elif kind is ForeignMethod or kind is External:
                 if self.tables.creates(atom):
                     self.callbacks.setdefault(atom, None)
-            elif kind is GeneratorValue:
-                self.callbacks.setdefault(atom, 0)
             elif isinstance(atom, SuperProxy) and objects:
                 self.escape_value((atom.receiver,), opened, objects, depth + 1)
 
@@ -308,7 +297,6 @@ class Run(Allocations):
         if opened and not obj.escaped and not (isinstance(obj, Sequence) and obj.kind == "tuple"):
             obj.escaped = True
             self.state.learned += 1
-            self.state.opened += obj.cells.born != self.state.period
         if depth < 3 and len(obj.cells) < 64:
             for value in list(obj.cells.values()):
                 for atom in value:
@@ -318,10 +306,7 @@ class Run(Allocations):
     def gap(self, node: ast.AST, frame: Frame, why: str) -> None:
         self.findings.gap(SourceRef(frame.module.source.path, getattr(node, "lineno", 0)), why)
 
-    def variables_of(self, owner: HeapObject, node: ast.AST, frame: Frame) -> Value:
+    def variables_of(self, node: ast.AST, frame: Frame) -> Value:
         """``vars(x)``, ``x.__dict__``, ``globals()``: a gap, for what is done with this dictionary is not followed."""
         self.gap(node, frame, "variables are used as a dictionary, which is not analysed")
-        self.state.reflected = True
-        for value in list(owner.cells.values()):
-            self.escape_value(value, opened=False, objects=False)
         return unknown("a dictionary of variables")

@@ -12,7 +12,6 @@ from nodl.infer.interpreter.assign import assign, delete
 from nodl.infer.interpreter.conditions import decide, forked, narrowed
 from nodl.infer.interpreter.define import define_class, define_function, program_classes
 from nodl.infer.interpreter.frames import Arguments, Frame
-from nodl.infer.interpreter.iterate import elements
 from nodl.infer.interpreter.operators import binary_operation
 from nodl.infer.interpreter.run import Executor, Run
 from nodl.infer.values import (
@@ -20,7 +19,6 @@ from nodl.infer.values import (
     NONE,
     ClassValue,
     External,
-    GeneratorValue,
     Instance,
     Sequence,
     Value,
@@ -107,7 +105,6 @@ def _leave(run: Run, frame: Frame) -> None:
     frame.jump = ""
     if run.state.forks > frame.forks:
         frame.early = True
-        run.state.stakes += not run.repeated
 
 
 def _raise(run: Run, node: ast.Raise, frame: Frame) -> bool:
@@ -126,7 +123,6 @@ def _jump(run: Run, node: ast.Break | ast.Continue, frame: Frame) -> bool:
         frame.jump = "break" if isinstance(node, ast.Break) else "continue"
     else:
         frame.unsettled = True
-        run.state.stakes += not run.repeated
     return False
 
 
@@ -263,8 +259,8 @@ def _entered(run: Run, manager: Value, node: ast.AST, frame: Frame) -> Value:
         if isinstance(atom, Instance) and _enters(atom):
             enter = run.attribute((atom,), "__enter__", node, frame)
             result = join(result, run.call(enter, Arguments(), node, frame))
-        elif isinstance(atom, GeneratorValue):
-            result = join(result, elements(run, (atom,), node, frame).any_element())
+        elif isinstance(atom, Sequence):  # of what a generator under ``contextmanager`` yields
+            result = join(result, atom.items.any_element())
         else:
             result = join(result, ANY)
     return result or ANY

@@ -6,15 +6,13 @@ from collections.abc import Callable
 
 from nodl.infer.interpreter.assign import copy_dictionary, store_attribute
 from nodl.infer.interpreter.conditions import truth
-from nodl.infer.interpreter.define import is_key, linearized, new_instance, program_classes
-from nodl.infer.interpreter.formatting import as_texts, formatted, text_value
+from nodl.infer.interpreter.define import expect_methods, is_key, linearized, new_instance, program_classes
+from nodl.infer.interpreter.formatting import as_texts, text_value
 from nodl.infer.interpreter.frames import Arguments, Call
 from nodl.infer.interpreter.imports import import_module
 from nodl.infer.interpreter.iterate import elements, keys_of
-from nodl.infer.interpreter.loops import may_unroll
 from nodl.infer.interpreter.run import Model, Run
-from nodl.infer.methods import BoundMethod, PropertyValue
-from nodl.infer.text import Text, input_of, with_edit
+from nodl.infer.text import input_of, with_edit
 from nodl.infer.values import (
     ANY,
     BOOLEAN,
@@ -26,7 +24,6 @@ from nodl.infer.values import (
     ClassValue,
     Dictionary,
     External,
-    FunctionValue,
     HeapObject,
     Instance,
     Items,
@@ -68,11 +65,6 @@ def _int(run: Run, call: Call) -> Value:
     return (atom,) if isinstance(atom, Unknown) else ANY
 
 
-def _float(run: Run, call: Call) -> Value:
-    atom = sole(call.args.at(0))
-    return (float(atom),) if isinstance(atom, int | float) and abs(atom) < 1 << 64 else ANY
-
-
 def _bool(run: Run, call: Call) -> Value:
     return boolean(truth(call.args.at(0) or (False,)))
 
@@ -85,11 +77,6 @@ def _len(run: Run, call: Call) -> Value:
         return (len(atom.items.exact),)
     keys = keys_of(atom).exact if isinstance(atom, Dictionary) else None
     return ANY if keys is None else (len(keys),)
-
-
-def _format(run: Run, call: Call) -> Value:
-    spec = sole(call.args.at(1) or ("",))
-    return text_value(formatted(call.args.at(0) or ANY, spec if isinstance(spec, str) else None))
 
 
 # --- containers ---------------------------------------------------------------------------------------------
@@ -122,27 +109,6 @@ def _made(kind: str) -> Model:
     return lambda run, call: run.sequence(call.node, kind, _items(run, call))
 
 
-def _set(run: Run, call: Call) -> Value:
-    return run.sequence(call.node, "set", Items(None, _items(run, call).any_element()))
-
-
-def _sorted(run: Run, call: Call) -> Value:
-    """Known texts in order; else any of the elements in each place."""
-    items = _items(run, call)
-    if "key" in call.args.keywords:
-        run.call(call.args.keywords["key"], Arguments([items.any_element() or ANY]), call.node, call.frame)
-    exact = items.exact
-    plain = exact is not None and not call.args.keywords and len(call.args.positional) == 1
-    if plain and exact is not None and all(len(item) == 1 and isinstance(item[0], str) for item in exact):
-        return run.sequence(call.node, "list", Items(tuple(sorted(exact, key=lambda item: str(item[0])))))
-    return run.sequence(call.node, "list", Items(None, items.any_element()))
-
-
-def _reversed(run: Run, call: Call) -> Value:
-    items = _items(run, call)
-    return run.sequence(call.node, "list", items if items.exact is None else Items(items.exact[::-1]))
-
-
 def _enumerate(run: Run, call: Call) -> Value:
     """A list of pairs; one pair stands for all if the length or the start is not known."""
     items = _items(run, call)
@@ -166,30 +132,36 @@ def _zip(run: Run, call: Call) -> Value:
     return run.sequence(call.node, "list", Items(None, row))
 
 
+def _some(run: Run, call: Call) -> Value:
+    """``sorted``, ``reversed``, ``set``: a list of any of the elements, in any order."""
+    element = _items(run, call).any_element()
+    run.register_callback(call.args.keywords.get("key", BOTTOM), 1)
+    return run.sequence(call.node, "list", Items(None, element))
+
+
+def _set(run: Run, call: Call) -> Value:
+    return run.sequence(call.node, "set", Items(None, _items(run, call).any_element()))
+
+
 def _map(run: Run, call: Call) -> Value:
-    """The function is called for each element, or for any of them if they are not known one by one."""
-    function, items = call.args.at(0) or ANY, _items(run, call, 1)
-    if len(call.args.positional) != 2 or items.exact is None or not may_unroll(run, len(items.exact)):
-        given = [
-            _items(run, call, index).any_element() or ANY for index in range(1, len(call.args.positional))
-        ]
-        element = run.call(function, Arguments(given, more=call.args.more), call.node, call.frame)
-        return run.sequence(call.node, "list", Items(None, element))
-    results = []
-    for index, each in enumerate(items.exact):
-        previous = run.enter(("map", id(call.node), index))
-        results.append(run.call(function, Arguments([each]), call.node, call.frame))
-        run.context = previous
-    return run.sequence(call.node, "list", Items(tuple(results)))
+    """Call the function for any of the elements."""
+    given = [_items(run, call, index).any_element() or ANY for index in range(1, len(call.args.positional))]
+    arguments = Arguments(given, more=call.args.more)
+    element = run.call(call.args.at(0) or ANY, arguments, call.node, call.frame)
+    return run.sequence(call.node, "list", Items(None, element))
 
 
 def _filter(run: Run, call: Call) -> Value:
-    """Any element may be left; the function is called for any of them."""
+    """Return any of the elements; the function is called for each."""
     element = _items(run, call, 1).any_element()
-    function = call.args.at(0) or NONE
-    if element and function != NONE:
-        run.call(function, Arguments([element]), call.node, call.frame)
+    run.register_callback(call.args.at(0) or NONE, 1)
     return run.sequence(call.node, "list", Items(None, element))
+
+
+def _extreme(run: Run, call: Call) -> Value:
+    """``min``, ``max``: one of the elements, nobody knows which."""
+    run.register_callback(call.args.keywords.get("key", BOTTOM), 1)
+    return join(chosen(run, call), ANY)
 
 
 def _dict(run: Run, call: Call) -> Value:
@@ -226,13 +198,6 @@ def chosen(run: Run, call: Call) -> Value:
     return _items(run, call).any_element() or ANY
 
 
-def _extreme(run: Run, call: Call) -> Value:
-    """``min``, ``max``: what is compared is not known, but where it is one of the program's things."""
-    run.register_callback(call.args.keywords.get("key", BOTTOM), 1)
-    found = chosen(run, call)
-    return found if len(found) == 1 else join(tuple(a for a in found if not isinstance(a, CONSTANTS)), ANY)
-
-
 # --- attributes and classes ---------------------------------------------------------------------------------
 
 
@@ -243,37 +208,25 @@ def _getattr(run: Run, call: Call) -> Value:
     known = constant_strings(names)
     found = join_all(run.attribute(owner, name, call.node, call.frame) for name in known)
     if len(known) < len(names):
-        _any_method(run, owner, names)
+        expect_methods(run, owner)
+        for atom in owner:
+            if isinstance(atom, Instance):
+                for held in list(atom.cells.values()):
+                    run.escape_value(held, opened=False, objects=False)
+        if any(isinstance(atom, ModuleValue | ClassValue) for atom in owner):
+            run.gap(
+                call.node,
+                call.frame,
+                "something of a module or class is looked up by a name made at run time",
+            )
         is_node = any(isinstance(atom, Instance) and atom.node is not None for atom in owner)
         found = join(found, unknown(OF_A_NODE if is_node else "an attribute whose name is made at run time"))
     default = call.args.at(2)
     return found if default is None or there else join(found, default)
 
 
-def _any_method(run: Run, owner: Value, names: Value) -> None:
-    """``getattr(self, 'on_' + x)``: any method whose name fits may be meant."""
-    run.state.reflected = True
-    starts = (text.pieces[0] if isinstance(text, Text) else "" for text in names)
-    prefixes = tuple(start if isinstance(start, str) else "" for start in starts)
-    for atom in owner:
-        if isinstance(atom, ModuleValue | ClassValue):
-            for name, value in list(atom.cells.items()):
-                if isinstance(name, str) and not name.startswith(("__", "[")):
-                    run.escape_value(value, opened=False)
-        if not (isinstance(atom, Instance) and isinstance(atom.cls, ClassValue)):
-            continue
-        for name, value in list(atom.cells.items()):
-            if isinstance(name, str):
-                run.escape_value(value, opened=False, objects=False)
-        for base in program_classes(atom.cls):
-            for name, value in list(base.cells.items()):
-                if isinstance(name, str) and name.startswith(prefixes) and not name.startswith("__"):
-                    functions = [each for each in value if isinstance(each, FunctionValue)]
-                    run.register_callback(tuple(BoundMethod(each, atom) for each in functions), None)
-
-
 def _setattr(run: Run, call: Call) -> Value:
-    """An unknown name may be any attribute of an object; on a class or module it is a gap."""
+    """Set one of the named attributes; one whose name is not known is a gap, unless a library holds the object."""
     owner, names = call.args.at(0) or ANY, call.args.at(1) or ANY
     value = call.args.at(2) or ANY
     known = constant_strings(names)
@@ -283,14 +236,8 @@ def _setattr(run: Run, call: Call) -> Value:
         store_attribute(run, owner, name, value, call.node, call.frame)
     if len(known) < len(names):
         run.escape_value(value)
-        run.state.reflected = True
-        for atom in owner:
-            if isinstance(atom, Instance):
-                for cell, old in list(atom.cells.items()):
-                    run.state.write(atom.cells, cell, join(old, value))
-            of_library = isinstance(atom, External) and "(" not in atom.path
-            if of_library or isinstance(atom, ClassValue | ModuleValue):
-                run.gap(call.node, call.frame, "an attribute whose name is made at run time is set")
+        if any(isinstance(atom, HeapObject) for atom in owner):
+            run.gap(call.node, call.frame, "an attribute whose name is made at run time is set")
     return NONE
 
 
@@ -302,7 +249,6 @@ def _has(run: Run, owner: object, name: object) -> bool:
     """Whether the attribute is certainly there."""
     if not isinstance(name, str) or not isinstance(owner, Instance | ClassValue | ModuleValue):
         return False
-    run.state.reads.attributes.add(name)
     held = owner.cells.get(name)
     if held:
         return present(held) is held and not owner.summary
@@ -372,17 +318,7 @@ def import_dynamic(run: Run, call: Call) -> Value:
 
 def _variables(run: Run, call: Call) -> Value:
     """``vars``, ``globals``, ``locals``."""
-    given = call.args.at(0)
-    owners: list[HeapObject] = [call.frame.module]
-    if given is not None:
-        owners = [atom for atom in given if isinstance(atom, HeapObject)]
-        owners = [
-            each for each in owners if not (isinstance(each, Instance) and isinstance(each.cls, External))
-        ]
-    if given is None and call.frame.function is not None:
-        run.escape_value(join_all(call.frame.cells.values()), opened=False, objects=False)
-    found = [run.variables_of(owner, call.node, call.frame) for owner in owners]
-    return join_all(found) or unknown("a dictionary of variables")
+    return run.variables_of(call.node, call.frame)
 
 
 def _object_new(run: Run, call: Call) -> Value:
@@ -398,29 +334,19 @@ def _object_new(run: Run, call: Call) -> Value:
     return tuple(made)
 
 
-def _property(run: Run, call: Call) -> Value:
-    given = [call.args.at(index, name) for index, name in enumerate(("fget", "fset", "fdel"))]
-    getter, setter, deleter = (tuple(a for a in value or () if a is not None) for value in given)
-    return (PropertyValue(getter, setter, deleter),)
-
-
 FUNCTIONS: dict[str, Callable[[Run, Call], Value]] = {
     f"builtins.{name}": model
     for name, model in {
         "str": _str,
         "int": _int,
-        "float": _float,
         "bool": _bool,
         "len": _len,
-        "format": _format,
         "range": _range,
         "list": _made("list"),
         "tuple": _made("tuple"),
-        "set": _set,
-        "frozenset": _set,
+        **dict.fromkeys(("set", "frozenset"), _set),
         "iter": lambda run, call: call.args.at(0) or ANY,  # walking along it gives the same
-        "sorted": _sorted,
-        "reversed": _reversed,
+        **dict.fromkeys(("sorted", "reversed"), _some),
         "enumerate": _enumerate,
         "zip": _zip,
         "map": _map,
@@ -441,6 +367,5 @@ FUNCTIONS: dict[str, Callable[[Run, Call], Value]] = {
         "object": lambda run, call: ANY,
         "object.__new__": _object_new,
         "object.__init_subclass__": lambda run, call: NONE,
-        "property": _property,
     }.items()
 }

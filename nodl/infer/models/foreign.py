@@ -27,10 +27,8 @@ from nodl.infer.models.signatures import COMMON_CALLBACKS, LIFECYCLE_HOOKS, NODE
 from nodl.infer.values import (
     ANY,
     RESULT,
-    Dictionary,
     External,
     Instance,
-    Sequence,
     Unknown,
     Value,
     external,
@@ -65,7 +63,7 @@ _CHANGING = frozenset({
     "setitem", "delitem", "iadd", "iand", "iconcat", "ifloordiv", "ilshift", "imatmul", "imod", "imul", "ior", "ipow",
     "irshift", "isub", "itruediv", "ixor",
 })  # fmt: skip
-_CHANGEABLE = ("builtins.list", "builtins.dict", "builtins.set")
+_CHANGEABLE = ("builtins.list.", "builtins.dict.", "builtins.set.")
 
 
 # Functions of Python's library that ask an object for nothing but its text, its identity or a number.
@@ -87,9 +85,6 @@ def call_external(run: Run, atom: External, call: Call) -> Value:
         run.escape(call.args, opened=False, objects=False)
         return (atom,)
     owner, _, name = path.rpartition(".")
-    if owner in _CHANGEABLE and name != "fromkeys" and _holds_containers(call):
-        method = run.attribute(call.args.positional[0], name, call.node, call.frame)
-        return run.call(method, call.args.shifted(), call.node, call.frame)
     model = _MODELS.get(path)
     if model is not None:
         return model(run, call)
@@ -121,12 +116,6 @@ def _is_exception(path: str) -> bool:
     """Whether the path names an exception class of Python itself."""
     found = getattr(builtins, path.removeprefix("builtins."), None) if path.startswith("builtins.") else None
     return isinstance(found, type) and issubclass(found, BaseException)
-
-
-def _holds_containers(call: Call) -> bool:
-    """``list.append(names, 'x')``: a method of a container, called through its class."""
-    first = call.args.positional[0] if call.args.positional else ()
-    return bool(first) and all(isinstance(atom, Sequence | Dictionary) for atom in first)
 
 
 def is_asked_of(name: str) -> bool:
@@ -189,7 +178,7 @@ def _hand_over(run: Run, path: str, call: Call) -> None:
     root = path.partition(".")[0]
     trusted = root in _TRUSTED or bool(ros.interface_type(path))
     leaf = path.rpartition(".")[2]
-    opened = not trusted or leaf in _CHANGING
+    opened = not trusted or leaf in _CHANGING or path.startswith(_CHANGEABLE)
     called_back = root in sys.stdlib_module_names and leaf not in _ASKS_FOR_TEXT
     run.escape(call.args, opened=opened, objects=not trusted or root not in _KEEPS_OFF or called_back)
     for keyword in ("cls", "file"):  # json makes an encoder of it, print writes to it
@@ -209,8 +198,6 @@ def call_foreign_method(run: Run, method: ForeignMethod, call: Call) -> Value:
     assert isinstance(receiver, Instance)
     if is_node_class(path):
         return _call_node_method(run, receiver, path, name, call)
-    if path.startswith("image_transport_py.") and receiver.node is not None:
-        return ros.image_transport_method(run, receiver.node, name, call)
     model = stdlib.METHODS.get((path, name))
     if model is not None:
         return model(run, receiver, call)

@@ -77,7 +77,7 @@ _MAKES_NOTHING = frozenset({
     "ros2_numpy", "tf_transformations", "sensor_msgs_py", "image_geometry", "cv_bridge", "rclpy_message_converter",
     "ament_index_python", "ament_copyright", "ament_flake8", "ament_pep257", "rosidl_runtime_py", "rosidl_parser",
     "tf2_geometry_msgs", "tf2_py", "tf2_ros", "launch", "launch_ros", "rclpy", "rospkg", "ros2cli", "rosbags",
-    "diagnostic_updater", "message_filters", "interactive_markers", "image_transport_py",
+    "diagnostic_updater", "message_filters", "interactive_markers",
 })  # fmt: skip
 _MAKERS = {"rosbag2_py": frozenset({"Recorder", "Player"})}  # of a package that else makes nothing
 _ROS_NAME = re.compile(

@@ -155,14 +155,6 @@ def _extend(run: Run, owner: Sequence, call: Call) -> Value:
     )
 
 
-def _insert(run: Run, owner: Sequence, call: Call) -> Value:
-    index, value = sole(call.args.at(0)), call.args.at(1) or ANY
-    exact = _exact(owner) if type(index) is int else None
-    if exact is not None and isinstance(index, int):
-        exact.insert(index, value)
-    return _stored(run, owner, exact, join(owner.items.any_element(), value))
-
-
 def _pop(run: Run, owner: Sequence, call: Call, first: bool = False) -> Value:
     element = owner.items.any_element()
     exact = _exact(owner)
@@ -175,55 +167,26 @@ def _pop(run: Run, owner: Sequence, call: Call, first: bool = False) -> Value:
     return element or ANY
 
 
-def _remove(run: Run, owner: Sequence, call: Call) -> Value:
-    """Of texts that are all known, what goes is known."""
-    value = call.args.at(0) or ANY
-    exact = _exact(owner)
-    known = exact is not None and all(len(each) == 1 and isinstance(each[0], str) for each in (*exact, value))
-    if exact is not None and known and value in exact and owner.kind == "list":
-        exact.remove(value)
-        return _stored(run, owner, exact, BOTTOM)
-    return _stored(run, owner, None, owner.items.any_element(), edited=True)
-
-
-def _clear(run: Run, owner: Sequence, call: Call) -> Value:
-    return _stored(run, owner, [], owner.items.any_element(), edited=True)
-
-
-def _forget_order(run: Run, owner: Sequence, call: Call) -> Value:
-    if "key" in call.args.keywords:
-        run.register_callback(call.args.keywords["key"], 1)
-    return _stored(run, owner, None, owner.items.any_element())
-
-
 def _copy_sequence(run: Run, owner: Sequence, call: Call) -> Value:
     return run.sequence(call.node, owner.kind, owner.items)
 
 
-def _united(run: Run, owner: Sequence, call: Call) -> Value:
-    added = [elements(run, value, call.node, call.frame).any_element() for value in call.args.positional]
-    return run.sequence(call.node, owner.kind, Items(None, join_all((owner.items.any_element(), *added))))
+def _edited(run: Run, owner: Sequence, call: Call) -> Value:
+    """``insert``, ``remove``, ``clear``, ``sort`` ...: what is left, in which order, is not known."""
+    run.register_callback(call.args.keywords.get("key", BOTTOM), 1)
+    return _stored(
+        run, owner, None, join_all((owner.items.any_element(), *call.args.positional)), edited=True
+    )
 
 
 SequenceMethod = Callable[[Run, Sequence, Call], Value]
 _SEQUENCE: dict[str, SequenceMethod] = {
-    "append": _append,
-    "add": _append,
-    "appendleft": _append,
-    "extend": _extend,
-    "update": _extend,
-    "insert": _insert,
+    **dict.fromkeys(("append", "add", "appendleft"), _append),
+    **dict.fromkeys(("extend", "update"), _extend),
+    **dict.fromkeys(("insert", "remove", "discard", "clear", "sort", "reverse"), _edited),
     "pop": _pop,
     "popleft": lambda run, owner, call: _pop(run, owner, call, first=True),
-    "remove": _remove,
-    "discard": _remove,
-    "clear": _clear,
-    "sort": _forget_order,
-    "reverse": _forget_order,
     "copy": _copy_sequence,
-    "union": _united,
-    "intersection": _united,
-    "difference": _united,
 }
 
 
@@ -287,22 +250,6 @@ def _pop_item(run: Run, owner: Dictionary, call: Call) -> Value:
     return found
 
 
-def _clear_dictionary(run: Run, owner: Dictionary, call: Call) -> Value:
-    for cell in list(owner.cells):
-        run.state.store(owner, cell, ABSENT)
-    return NONE
-
-
-def _last_item(run: Run, owner: Dictionary, call: Call) -> Value:
-    entries = owner.entries()
-    if entries and not owner.is_open and entries[-1][2]:
-        key, value, _ = entries[-1]
-        run.state.write(owner.cells, key, ABSENT)
-        return run.tuple_of(((key.constant,), value))
-    run.escape_value((owner,))
-    return run.tuple_of((keys_of(owner).any_element() or ANY, values_of(owner).any_element() or ANY))
-
-
 def _copy_dictionary(run: Run, owner: Dictionary, call: Call) -> Value:
     copied = run.allocate(call.node, "dict", Dictionary)
     copied.default = join(copied.default, owner.default)
@@ -310,7 +257,6 @@ def _copy_dictionary(run: Run, owner: Dictionary, call: Call) -> Value:
     if owner.escaped and not copied.escaped:
         copied.escaped = True
         run.state.learned += 1
-        run.state.opened += copied.cells.born != run.state.period
     return (copied,)
 
 
@@ -323,7 +269,5 @@ _DICTIONARY: dict[str, DictionaryMethod] = {
     "items": _pairs,
     "update": _update,
     "pop": _pop_item,
-    "popitem": _last_item,
-    "clear": _clear_dictionary,
     "copy": _copy_dictionary,
 }

@@ -29,8 +29,6 @@ from nodl.infer.models.signatures import (
     HELPERS,
     NODE_CALLBACKS,
     NODE_ENDPOINTS,
-    PUBLISHER,
-    SUBSCRIPTION,
     Argument,
     CallbackArgument,
     EndpointCall,
@@ -264,11 +262,6 @@ def _interface_by_name(run: Run, path: str, call: Call) -> Value:
     return join_all(external(name.replace("/", ".")) for name in names) or ANY
 
 
-def _image_transport(run: Run, path: str, call: Call) -> Value:
-    """``ImageTransport(node_name, ...)`` of image_transport_py makes a node of its own."""
-    return create_node(run, "image_transport_py.ImageTransport", call)
-
-
 def _buffer_client(run: Run, path: str, call: Call) -> Value:
     names = call.args.at(1, "ns") or ANY
     for record in records_of(run, call.args.at(0, "node"), call):
@@ -289,7 +282,6 @@ _FUNCTIONS: dict[tuple[str, str], Callable[[Run, str, Call], Value]] = {
     ("rclpy", "Parameter"): _parameter,
     ("rclpy", "AsyncParameterClient"): _parameter_client,
     **dict.fromkeys(_BY_NAME, _interface_by_name),
-    ("image_transport_py", "ImageTransport"): _image_transport,
     ("tf2_ros", "BufferClient"): _buffer_client,
 }
 
@@ -298,17 +290,3 @@ _MAKING = frozenset(_FUNCTIONS) - {("rclpy", "init"), ("rclpy", "Parameter"), *_
 
 
 CREATING_NAMES = frozenset(name for _, name in (*ENDPOINT_CALLS, *HELPERS, *_MAKING))
-
-
-def image_transport_method(run: Run, record: NodeRecord, name: str, call: Call) -> Value:
-    """``advertise`` publishes the image and one topic per transport plugin below it."""
-    base = call.args.at(0, "base_topic") or ANY
-    kind = PUBLISHER if name.startswith("advertise") else SUBSCRIPTION
-    for text in names_of(base):
-        record.add_endpoint(kind, text, "sensor_msgs/msg/Image", call.source)
-        if isinstance(text, str):
-            below = concatenate(text, "/compressed")
-            record.add_endpoint(kind, below, "sensor_msgs/msg/CompressedImage", call.source)
-    if name.startswith("subscribe"):
-        run.register_callback(call.args.at(2, "callback") or BOTTOM, 1)
-    return ANY

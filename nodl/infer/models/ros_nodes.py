@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import yaml
-
-from enclave_common.yaml_reader import load_yaml
 from nodl.builtin_interfaces import LOGGER_SERVICES
 from nodl.infer.findings import NodeRecord
 from nodl.infer.interpreter.conditions import truth
@@ -27,7 +24,6 @@ from nodl.infer.values import (
     unknown,
 )
 from nodl.node_interface import EndpointKind
-from nodl.ros_arguments import ros_arguments
 
 NODE_CLASS = "rclpy.node.Node"
 
@@ -62,41 +58,11 @@ def initialise_node(run: Run, instance: Instance, path: str, call: Call) -> None
         enabled = call.args.at(-1, "enable_communication_interface")
         record.communication_interface = enabled is None or truth(enabled) is not False
     overrides = call.args.at(-1, "parameter_overrides")
-    of_all = BOTTOM if use_global == (False,) else run.findings.global_arguments
-    _override_parameters(run, record, join(record.arguments, of_all))
     if overrides:
         assign_parameters(run, record, overrides, call)
     if truth(call.args.at(-1, "enable_logger_service") or (False,)) is not False:
         for service, service_type in LOGGER_SERVICES.items():
             record.add_endpoint(EndpointKind.SERVICE_SERVER, f"~/{service}", service_type, call.source)
-
-
-def _override_parameters(run: Run, record: NodeRecord, arguments: Value) -> None:
-    """``-p name:=value`` among the arguments that the program gives itself: stronger than what launch sets."""
-    for words in arguments:
-        if not isinstance(words, tuple):
-            continue
-        given = ros_arguments(words)
-        names = [rule.removeprefix("__node:=") for rule in given.rules if rule.startswith("__node:=")]
-        for parameter in given.parameters:
-            meant = parameter.node.rpartition("/")[2]
-            if parameter.node in ("", "/**"):
-                run.state.write(record.cells, parameter.name, _yaml_value(parameter.value))
-            elif not names or meant == names[0] or "*" in meant:  # launch decides on the namespace at least
-                why = f"the parameter {parameter.name} is given in code to a node called {parameter.node}"
-                record.gaps.setdefault((record.source, why))
-        if given.files:
-            record.gaps.setdefault((record.source, "a parameter file is named in code"))
-
-
-def _yaml_value(text: str) -> Value:
-    if text in ("y", "Y", "n", "N"):
-        return ANY  # rcl takes them for truth values, YAML 1.2 and PyYAML for texts
-    try:
-        value = load_yaml(text)
-    except yaml.YAMLError:
-        return ANY
-    return (value,) if isinstance(value, str | int | float | bool) else ANY
 
 
 def strings_in(run: Run, value: Value, call: Call) -> Value:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os.path
 from collections.abc import Callable
 
-from nodl.infer.interpreter.define import program_classes
 from nodl.infer.interpreter.formatting import as_texts, text_value
 from nodl.infer.interpreter.frames import Arguments, Call
 from nodl.infer.interpreter.iterate import elements
@@ -19,18 +18,14 @@ from nodl.infer.values import (
     BOTTOM,
     COMMAND_LINE,
     NONE,
-    ClassValue,
     Dictionary,
     External,
-    HeapObject,
     Instance,
     Items,
-    Key,
     Sequence,
     Value,
     constant_strings,
     join,
-    join_all,
     present,
     result_of,
     sole,
@@ -142,27 +137,6 @@ def _default_dict(run: Run, call: Call) -> Value:
     return (obj,)
 
 
-def _simple_namespace(run: Run, call: Call) -> Value:
-    instance = run.library_object(call, "types.SimpleNamespace")
-    for name, value in call.args.keywords.items():
-        run.state.store(instance, name, value)
-    return (instance,)
-
-
-def _deep_copy(run: Run, call: Call) -> Value:
-    """A copy of a container of constants; what else is copied is not followed, but may be called."""
-    given = call.args.at(0) or ANY
-    for atom in given:
-        cells = atom.cells.values() if isinstance(atom, Sequence | Dictionary) else ()
-        parts = join_all(
-            each.any_element() if isinstance(each, Items) else (each,) for v in cells for each in v
-        )
-        if any(isinstance(part, HeapObject) for part in parts):
-            run.escape_value(given, opened=False)
-            return unknown("a deep copy")
-    return _copy(run, call)
-
-
 def _copy(run: Run, call: Call) -> Value:
     """Containers get a copy of their own; what is inside is shared, as if it were ``copy.copy``."""
     result: Value = BOTTOM
@@ -175,47 +149,13 @@ def _copy(run: Run, call: Call) -> Value:
     return result
 
 
-def _field_names(atom: object) -> list[str] | None:
-    """The fields of an object of a dataclass of the program."""
-    if isinstance(atom, Instance) and isinstance(atom.cls, ClassValue):
-        listed = (base.fields for base in program_classes(atom.cls) if base.fields is not None)
-        return next(([name for name, _ in fields] for fields in listed), None)
-    return None
-
-
-def _replaced(run: Run, call: Call) -> Value:
-    """``dataclasses.replace``: the constructor again, with the fields of the object and the given ones."""
-    atom = sole(call.args.at(0))
-    names = _field_names(atom)
-    if names is None or not isinstance(atom, Instance):
-        run.escape(call.args)
-        return ANY
-    held = {name: run.attribute((atom,), name, call.node, call.frame) for name in names}
-    return run.call((atom.cls,), Arguments([], {**held, **call.args.keywords}), call.node, call.frame)
-
-
-def _as_dictionary(run: Run, call: Call) -> Value:
-    """``dataclasses.asdict`` of an object whose fields hold no further dataclasses."""
-    atom = sole(call.args.at(0))
-    names = _field_names(atom)
-    if names is None or not isinstance(atom, Instance):
-        run.escape(call.args)
-        return ANY
-    found = run.allocate(call.node, "asdict", Dictionary)
-    for name in names:
-        value = run.attribute((atom,), name, call.node, call.frame)
-        nested = any(isinstance(each, Instance | Sequence | Dictionary) for each in value)
-        run.state.store(found, Key(name), unknown("a field as a dictionary") if nested else value)
-    return (found,)
-
-
 def _patched(run: Run, call: Call) -> Value:
     run.gap(call.node, call.frame, "unittest.mock replaces something while the program runs")
-    run.escape(call.args)
     return ANY
 
 
 FUNCTIONS: dict[str, Model] = {
+    **{f"unittest.mock.patch{method}": _patched for method in ("", ".object", ".dict", ".multiple")},
     "argparse.ArgumentParser": options.made_parser,
     "os.getenv": _environment,
     "os.environ.get": _environment,
@@ -229,18 +169,13 @@ FUNCTIONS: dict[str, Model] = {
     "threading.Thread": _thread,
     "threading.Timer": _timer,
     "multiprocessing.Process": _thread,
-    "dataclasses.replace": _replaced,
-    "dataclasses.asdict": _as_dictionary,
     "collections.defaultdict": _default_dict,
     "collections.OrderedDict": builtin.FUNCTIONS["builtins.dict"],
     "collections.deque": builtin.FUNCTIONS["builtins.list"],
-    "types.SimpleNamespace": _simple_namespace,
     "copy.copy": _copy,
-    "copy.deepcopy": _deep_copy,
     "random.choice": builtin.FUNCTIONS["builtins.next"],
     "importlib.import_module": builtin.import_dynamic,
     "atexit.register": _registered,
-    **{f"unittest.mock.patch{method}": _patched for method in ("", ".object", ".dict", ".multiple")},
     **dict.fromkeys(
         ("yaml.safe_load", "yaml.load", "json.load", "json.loads"), lambda run, call: unknown(CONTENTS)
     ),
@@ -255,9 +190,6 @@ METHODS: dict[tuple[str, str], Method] = {
 
 OPEN_ATTRIBUTES: dict[str, Callable[[Run, Instance, str], Value]] = {
     options.NAMESPACE: options.namespace_attribute,
-    "types.SimpleNamespace": lambda run, obj, name: unknown(
-        f"the attribute {name}, which nothing analysed sets"
-    ),
 }
 
 # Methods of a subclass that the base class calls.

@@ -9,12 +9,10 @@ from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 from nodl.builtin_interfaces import DISTROS, BuiltinCondition, built_in_interfaces
-from nodl.infer.results import remapped
 from nodl.infer.system import InferredSystem
 from nodl.name_template import NameTemplate, UnknownPart
 from nodl.names import InvalidNameError, expand_name, join
 from nodl.node_interface import Certainty, Endpoint, EndpointKind, Gap, NodeInterface
-from nodl.remap import RemapRules, parse_rule
 from nodl.source_ref import SourceRef
 
 _STAR = "STAR_OF_A_PATTERN"
@@ -59,8 +57,9 @@ def expand(system: InferredSystem) -> ExpandedSystem:
     """Sorted by node and place; equal questions are asked once."""
     unresolved = dict.fromkeys(system.gaps)
     nodes = []
-    for written, programs in _told_once(system.nodes):
-        interface = _under_own_rules(written)
+    for interface, programs in _told_once(system.nodes):
+        for rule in interface.own_rules:
+            unresolved[Gap(interface.source, f"the program gives its node the rule {rule}")] = None
         found: list[ExpandedInterface] = []
         for endpoint in interface.endpoints:
             for expanded, why in _expanded(endpoint, interface):
@@ -86,11 +85,6 @@ def _told_once(nodes: Iterable[NodeInterface]) -> list[tuple[NodeInterface, tupl
         names = [each for each in (node.executable, node.plugin) if each]
         programs.setdefault(key, {}).update(dict.fromkeys(f"{node.package}/{name}" for name in names))
     return [(found[key], tuple(programs[key])) for key in found]
-
-
-def _under_own_rules(node: NodeInterface) -> NodeInterface:
-    """Under the remap rules that the program itself gives to the node."""
-    return remapped(node, RemapRules(tuple(map(parse_rule, node.own_rules)), ())) if node.own_rules else node
 
 
 def _expanded(endpoint: Endpoint, node: NodeInterface) -> Iterator[tuple[ExpandedInterface | None, str]]:

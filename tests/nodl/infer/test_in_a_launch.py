@@ -240,7 +240,7 @@ RENAMED = """<launch><node pkg="demo" exec="repeater" name="other" namespace="r1
         ("args=args", "", "/r1/news", "/r1/other"),
         ("args=sys.argv", "", "/r1/news", "/r1/other"),
         ("args=[]", "", "/chatter", "/talker"),
-        ("args=['--ros-args', '-r', 'chatter:=own']", "", "/own", "/talker"),
+        ("args=['--ros-args', '--log-level', 'debug']", "", "/chatter", "/talker"),
         ("", ", use_global_arguments=False", "/chatter", "/talker"),
         ("", ", use_global_arguments=True", "/r1/news", "/r1/other"),
     ],

@@ -7,7 +7,6 @@ from collections.abc import Callable
 import pytest
 
 from nodl.infer import InferredSystem
-from nodl.infer.report.expanded import expand
 from nodl.node_interface import NodeInterface
 
 Infer = Callable[..., InferredSystem]
@@ -231,27 +230,23 @@ def test_a_list_parameter_gives_one_name_per_element(infer: Infer) -> None:
     assert filled == {"x/cmd", "y/cmd"}
 
 
-def test_remap_rules_in_code(infer: Infer) -> None:
-    system = infer(
-        """
-        import rclpy
-        from std_msgs.msg import String
-        rclpy.init()
-        rules = ['--ros-args', '-r', '__ns:=/m', '-r', '__node:=other', '-r', 'a:=/b']
-        node = rclpy.create_node('n', cli_args=rules, use_global_arguments=False)
-        node.create_publisher(String, 'a', 1)
-        node.create_publisher(String, 'c', 1)
-        """
-    )
+@pytest.mark.parametrize(
+    ("init", "given", "gaps"),
+    [
+        ("", "cli_args=['--ros-args', '-r', 'a:=/b']", 1),
+        ("", "cli_args=['--ros-args', '-p', 'a:=b']", 1),
+        ("", "cli_args=sys.argv[1:]", 1),
+        ("args=['--ros-args', '-r', '__ns:=/m']", "", 1),
+        ("args=['--ros-args', '--log-level', 'debug']", "", 0),
+        ("args=['--ros-args', '-r', '__ns:=/m']", "use_global_arguments=False", 0),
+    ],
+)
+def test_remap_rules_and_parameters_in_code_are_a_gap(init: str, given: str, gaps: int, infer: Infer) -> None:
+    system = infer(f"import rclpy, sys\nrclpy.init({init})\nrclpy.create_node('n', {given})\n")
     (node,) = system.nodes
-    assert node.own_rules == (
-        "__ns:=/m",
-        "__node:=other",
-        "a:=/b",
-    )  # rcl applies them, before those of a launch
-    (shown,) = expand(system).nodes
-    assert (shown.namespace, shown.name) == ("/m", "other")
-    assert [each.name for each in shown.interfaces[:2]] == ["/b", "/m/c"]
+    assert [gap.why for gap in node.gaps] == [
+        "remap rules or parameters given in code are not followed"
+    ] * gaps
 
 
 def test_what_is_unknown_is_said(infer: Infer) -> None:
