@@ -1,4 +1,4 @@
-"""Texts by a format: ``snprintf`` and its kin, ``fmt::format``, ``std::format``."""
+"""Texts by a format: ``snprintf`` and its kin."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from nodl.infer.cpp.running.values import Value, concatenated, literal, plain, u
 from nodl.infer.cpp.syntax import unwrapped
 
 _PERCENT = re.compile(r"%(?P<flags>0?\d*)(?:hh|h|ll|l|z|j|t)?(?P<kind>[diusc%])|%")
-_BRACES = re.compile(r"\{\{|\}\}|\{(?P<index>\d*)\}|[{}]")
 
 
 @library_function("snprintf", "std::snprintf", "sprintf", "std::sprintf")
@@ -56,26 +55,6 @@ def _converted(match: re.Match[str], value: Value) -> Value:
         is_number = isinstance(atom, int) and not isinstance(atom, bool)
         return literal(f"%{match['flags']}d" % atom) if is_number else unknown("a number by a format")
     return value if match["kind"] == "s" and not match["flags"] else unknown("a text by a format")
-
-
-@library_function("fmt::format", "std::format")
-def _formatted(run: Machine, call: Call) -> Value:
-    """(format, ...): ``{}`` and ``{0}`` are filled in; other fields make a part that is not known."""
-    pieces, position = [], 0
-    for piece, match in _pieces(call.value(0), _BRACES):
-        if match is None or match[0] in ("{{", "}}"):
-            pieces.append(literal(piece[:1] if match is not None else piece))
-            continue
-        index = int(match["index"]) if match["index"] else position
-        position += 1
-        known = match["index"] is not None and index + 1 < len(call.values)
-        pieces.append(_shown(call.values[index + 1]) if known else unknown("a field of a format"))
-    return concatenated(*pieces) if pieces else unknown("a text by a format that is not known")
-
-
-def _shown(value: Value) -> Value:
-    is_float = any(isinstance(atom, float | bool) for atom in value)
-    return unknown("a number by a format") if is_float else value
 
 
 def _pieces(form: Value, pattern: re.Pattern[str]) -> Iterator[tuple[str, re.Match[str] | None]]:

@@ -427,16 +427,3 @@ def _fixed(names: Names, cls: Class) -> set[str]:
     found = [*names.methods.get(cls, {}).items(), *cls.declared.items()]
     virtual = {name for name, listed in found if any(each.virtual for each in listed)}
     return {name for name, _ in found if name != cls.name and not name.startswith("~")} - virtual
-
-
-def repeated_base(names: Names, cls: Class) -> Class | None:
-    """A base with members of its own that an object of the class has twice."""
-    if len(cls.bases) < 2:
-        return None
-    listed = Counter(each for _, base in names.bases(cls) if base is not None for each in _parts(names, base))
-    return next((each for each, times in listed.items() if times > 1 and each.fields), None)
-
-
-def _parts(names: Names, cls: Class) -> list[Class]:
-    own = [base for written, base in names.bases(cls) if written not in cls.virtual_bases and base is not cls]
-    return [cls, *(part for base in own if base is not None for part in _parts(names, base))]

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from nodl.infer.cpp.reading.declarations import Class
 from nodl.infer.cpp.running.arithmetic import added, as_type
 from nodl.infer.cpp.running.contents import copied, elements_copied, overwrite
-from nodl.infer.cpp.running.hiding import cell_of, class_of_member, lexical_class, seen_class, seen_type
+from nodl.infer.cpp.running.hiding import seen_class, seen_type
 from nodl.infer.cpp.running.machine import Frame, Machine, expression
 from nodl.infer.cpp.running.references import is_plain, through, told
 from nodl.infer.cpp.running.values import (
@@ -235,13 +235,13 @@ def _assign_name(run: Machine, target: Node, value: Value, frame: Frame) -> None
         run.store.set((owner, name), value)
         return
     this_object = current_object(frame)
-    lexical = lexical_class(run, this_object, frame) if this_object is not None and "::" not in name else None
-    declaring = next((each for each in run.names.ancestry(lexical) if name in each.fields), None)
+    around = this_object.cls if this_object is not None and "::" not in name else None
+    declaring = next((each for each in run.names.ancestry(around) if name in each.fields), None)
     if this_object is not None and declaring is not None and not declaring.fields[name].static:
-        cell = (this_object, cell_of(run, this_object, name, declaring))
+        cell = (this_object, name)
         told(run, cell, value, target, frame)
-        before = run.store.get(cell) or BOTTOM
-        run.store.set(cell, join(before, value) if this_object.several else value)
+        weak = this_object.several or name in run.hidden_names(this_object)
+        run.store.set(cell, join(run.store.get(cell) or BOTTOM, value) if weak else value)
         return
     static = (declaring, name) if declaring is not None else static_by_name(run, name, frame)
     if static is not None:
@@ -266,8 +266,8 @@ def _assign_field(run: Machine, node: Node, value: Value, frame: Frame) -> None:
     if any(not isinstance(atom, Obj) or atom.cls is None for atom in owners) or not owners:
         run.later([value], frame)  # a library keeps it and may call it
     for each in objects:
-        strong = len(owners) == 1 and not each.several
-        cell = (each, cell_of(run, each, name, class_of_member(run, each, name, node, frame)))
+        strong = len(owners) == 1 and not each.several and name not in run.hidden_names(each)
+        cell = (each, name)
         before = run.store.get(cell) or BOTTOM
         run.store.set(cell, value if strong else join(before, value))
 

@@ -61,6 +61,7 @@ class _Rounds:
 def run_callbacks(run: Machine) -> None:
     """A lifecycle node is configured, then activated, before anything else that its transitions have prepared."""
     rounds = _Rounds(run)
+    run.calls_back = True
     for name in HOOKS[:2]:
         _find_overrides(run)
         for key, (atom, frame) in list(run.callbacks.items()):

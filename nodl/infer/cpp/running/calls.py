@@ -13,7 +13,7 @@ from nodl.infer.cpp.reading.names import STANDARD_TYPES
 from nodl.infer.cpp.reading.type_names import NO_TYPE
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.constructors import construct
-from nodl.infer.cpp.running.hiding import class_around, lexical_class
+from nodl.infer.cpp.running.hiding import class_around
 from nodl.infer.cpp.running.invocation import CallSite, call_functions, call_values
 from nodl.infer.cpp.running.machine import Frame, Machine, expression
 from nodl.infer.cpp.running.method_calls import (
@@ -102,7 +102,7 @@ def _own_method(run: Machine, name: str, site: CallSite) -> Value | None:
         methods = of_this(run, this, name, frame) or run.names.find_methods(class_around(run, frame), name)
         if methods:
             return site.call_methods(methods, this)
-        field = member(run, this, name, lexical_class(run, this, frame))
+        field = member(run, this, name)
         if field is not None:
             return site.call_value(field)
     if run.names.find_functions(name, frame.scope, frame.file):

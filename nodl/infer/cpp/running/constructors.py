@@ -9,11 +9,10 @@ from dataclasses import replace
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES, Call, is_harmless_class
 from nodl.infer.cpp.reading.declarations import Class, Field, Function, FunctionParameter
 from nodl.infer.cpp.reading.known_headers import KNOWN_HEADERS, ROS_LIBRARIES
-from nodl.infer.cpp.reading.names import repeated_base
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.contents import copied, handed_over
-from nodl.infer.cpp.running.hiding import cell_of
+from nodl.infer.cpp.running.hiding import check_hidden
 from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
 from nodl.infer.cpp.running.objects import (
     MAPS,
@@ -26,7 +25,7 @@ from nodl.infer.cpp.running.objects import (
     made,
 )
 from nodl.infer.cpp.running.overloads import chosen
-from nodl.infer.cpp.running.values import BOTTOM, Map, Obj, Seq, Text, Unknown, Value, unknown
+from nodl.infer.cpp.running.values import BOTTOM, Map, Obj, Seq, Text, Unknown, Value, join, unknown
 from nodl.infer.cpp.syntax import Node, children
 
 
@@ -52,11 +51,8 @@ def construct(
         if members is None and arguments and is_aggregate(run, cls):
             members = dict(zip(fields_of(cls), arguments, strict=False))
         made_object.data["members"] = members or {}
-        twice = repeated_base(run.names, cls)
-        if twice is not None:
-            why = f"{cls.name} has the members of {twice.name} twice: which are meant is not followed"
-            run.gap(node, frame, why)
-        _check_conversions(run, cls, node, frame)
+        check_hidden(run, cls, node, frame)
+        _check_operators(run, cls, node, frame)
         _start_fields(run, made_object, cls)
         construct_class(run, made_object, cls, kind, arguments, node, frame)
         return (made_object,)
@@ -99,27 +95,30 @@ def _unmodelled(run: Machine, kind: Type, node: Node, frame: Frame, deliberate: 
         run.gap(node, frame, why)
 
 
-def _check_conversions(run: Machine, cls: Class, node: Node, frame: Frame) -> None:
-    """A gap for a class with a conversion operator that changes something: where it runs is not followed."""
+def _check_operators(run: Machine, cls: Class, node: Node, frame: Frame) -> None:
+    """Add a gap for an operator that changes something and whose calls are not followed: conversions, ``,``, and
+    comparisons, from which C++20 derives others."""
     ancestry = run.names.ancestry(cls)
     kept = {name for each in ancestry for name in each.fields} | run.names.globals.keys()
     listed = [
         (name, f) for each in ancestry for name, found in run.names.methods[each].items() for f in found
     ]
     for name, method in listed:
-        is_conversion = name.startswith("operator ") and name not in ("operator new", "operator delete")
-        if is_conversion and (run.makes_interfaces(method) or writes_of(method.node).changed & kept):
-            why = (
-                f"an operator of {cls.name} that converts it changes something: where it runs is not followed"
-            )
+        if _NOT_FOLLOWED.fullmatch(name) and (
+            run.makes_interfaces(method) or writes_of(method.node).changed & kept
+        ):
+            why = f"{name} of {cls.name} changes something: where it runs is not followed"
             run.gap(node, frame, why)
+
+
+_NOT_FOLLOWED = re.compile(r"operator (?!new|delete)\w.*|operator(?:,|&&|\|\||==|<=>)")
 
 
 def _start_fields(run: Machine, made_object: Obj, cls: Class) -> None:
     for each in run.names.ancestry(cls):
         for name, member in each.fields.items():
             if not member.static:
-                run.store.set((made_object, cell_of(run, made_object, name, each)), BOTTOM)
+                run.store.set((made_object, name), BOTTOM)
 
 
 def construct_class(
@@ -283,7 +282,8 @@ def _members(run: Machine, this: Obj, cls: Class, given: dict[str, Node], inner:
             found = _member(
                 run, member, kind, where or member.default, inner if where is not None else of_class
             )
-        run.store.set((this, cell_of(run, this, name, cls)), found)
+        before = run.store.get((this, name)) or BOTTOM  # of a member that this one hides
+        run.store.set((this, name), join(before, found))
 
 
 def _member(run: Machine, member: Field, kind: Type, value: Node | None, frame: Frame) -> Value:

@@ -8,7 +8,6 @@ from collections.abc import Sequence
 
 from nodl.infer.cpp.reading.declarations import Class, Function
 from nodl.infer.cpp.reading.type_names import Type
-from nodl.infer.cpp.running.hiding import cell_of
 from nodl.infer.cpp.running.launch_values import given_by_launch
 from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.values import (
@@ -48,13 +47,15 @@ def handed_over(
     *,
     ignore: Obj | None = None,
 ) -> None:
-    """Somebody who is not known gets these values: a node among them is a gap, closures may be called at any time."""
+    """Note that unknown code gets these values: a node among them is a gap, and callbacks may run from now on."""
     why = f"the node is handed to {whom}, which may make interfaces on it"
     for value in arguments:
         owner = next((obj for obj in nodes_in(value) if obj is not ignore), None)
         if owner is not None:
             run.gap(node, frame, why, owner.node)
     run.later(arguments, frame)
+    if run.callbacks and not run.calls_back:
+        run.store.others_run()
 
 
 def copied(run: Machine, value: Value, node: Node, frame: Frame, cls: Class | None = None) -> Value:
@@ -97,7 +98,7 @@ def _copy(run: Machine, atom: object, node: Node, frame: Frame, cls: Class | Non
     ):
         run.gap(node, frame, f"the constructor of {target.name} that copies or moves it is not followed here")
     cells = {
-        (each, name): run.store.get((atom, cell_of(run, atom, name, each)))
+        (each, name): run.store.get((atom, name))
         for each in run.names.ancestry(target)
         for name in each.fields
     }
@@ -109,7 +110,7 @@ def _copy(run: Machine, atom: object, node: Node, frame: Frame, cls: Class | Non
     for (each, name), value in cells.items():
         if value is not None:
             taken = _member_copied(run, each, name, value, node, frame)
-            run.store.set((twin, cell_of(run, twin, name, each)), taken)
+            run.store.set((twin, name), taken)
     return twin
 
 
@@ -152,8 +153,8 @@ def overwrite(run: Machine, targets: Sequence[Obj], value: Value) -> None:
     for target in targets:
         for each in run.names.ancestry(target.cls):
             for name in each.fields:
-                cell = (target, cell_of(run, target, name, each))
-                read = [run.store.get((o, cell_of(run, o, name, each))) or BOTTOM for o in others]
+                cell = (target, name)
+                read = [run.store.get((o, name)) or BOTTOM for o in others]
                 is_one = len(targets) == 1 and not target.several
                 before = [] if is_one else [run.store.get(cell) or BOTTOM]
                 run.store.set(cell, join(*before, *read))

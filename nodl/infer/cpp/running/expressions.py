@@ -7,11 +7,9 @@ from contextlib import suppress
 
 from nodl.infer.cpp.running.arithmetic import SIZES
 from nodl.infer.cpp.running.constructors import construct
-from nodl.infer.cpp.running.invocation import call_functions
 from nodl.infer.cpp.running.machine import Frame, Machine, expression
 from nodl.infer.cpp.running.objects import as_map, cast, made
 from nodl.infer.cpp.running.operators import has_text
-from nodl.infer.cpp.running.own_operators import by_operator
 from nodl.infer.cpp.running.references import keep_references
 from nodl.infer.cpp.running.values import BOTTOM, Group, Lambda, Seq, Value, concatenated, literal, unknown
 from nodl.infer.cpp.running.variables import variable
@@ -54,15 +52,6 @@ def user_defined(run: Machine, node: Node, frame: Frame) -> Value:
     inner = children(node)
     suffix = text(inner[-1]) if len(inner) > 1 else ""
     plain = suffix in ("s", "sv") and inner[0].type.endswith("string_literal")
-    own = [
-        f
-        for name in (f'operator""{suffix}', f'operator"" {suffix}')
-        for f in run.names.functions_by_name.get(name, ())
-    ]
-    if own:
-        given = run.evaluate(inner[0], frame)
-        counted = [given, unknown("the length of a literal")][: len(own[0].parameters)]
-        return call_functions(run, own, counted, node, frame, ())
     return run.evaluate(inner[0], frame) if plain else unknown(f"a literal with {suffix or 'a suffix'}")
 
 
@@ -121,15 +110,10 @@ def expansion(run: Machine, node: Node, frame: Frame) -> Value:
 
 @expression("comma_expression")
 def comma(run: Machine, node: Node, frame: Frame) -> Value:
-    """Evaluates every operand from the left and gives the last, or what an ``operator,`` of the program's own gives."""
-    operands = children(node)
-    while operands[-1].type == "comma_expression":
-        operands = [*operands[:-1], *children(operands[-1])]
-    found = run.evaluate(operands[0], frame)
-    for child in operands[1:]:
-        right = run.evaluate(child, frame)
-        own = by_operator(run, ",", found, [right], node, frame)
-        found = right if own is None else own
+    """Evaluate every operand from the left; the value is that of the last."""
+    found = BOTTOM
+    for child in children(node):
+        found = run.evaluate(child, frame)
     return found
 
 

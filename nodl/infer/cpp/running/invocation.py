@@ -278,7 +278,7 @@ def invoke(
     run.handle(node, frame)
     run.called.add(function)
     if run.active.count(function) > MAX_RECURSION or frame.depth > MAX_DEPTH:
-        if run.makes_interfaces(function) and (function.parameters or not _stands_still(run, function)):
+        if run.makes_interfaces(function):
             run.gap(node, frame, f"{function} calls itself, deeper than is followed")
         return unknown("a recursion")
     if function.only_computes and not run.makes_interfaces(function):
@@ -299,15 +299,6 @@ def invoke(
     write_back(run, function.parameters, outcome.parameters, node, frame)
     run.left = node.id if outcome.ends else None
     return outcome.returned
-
-
-def _stands_still(run: Machine, function: Function) -> bool:
-    """Whether nothing has changed since the last call of ``function`` began, so that this one does what that does."""
-    begun = run.begun.get(function)
-    mark = begun[-1] if begun else 0
-    before = run.store.before(mark)
-    changed = (cell for cell, value in run.store.changes(mark).items() if set(before[cell]) != set(value))
-    return all(isinstance(cell[0], Frame) for cell in changed)
 
 
 def _outcome(
@@ -331,14 +322,12 @@ def _outcome(
 def _run_body(run: Machine, function: Function, values: Sequence[Value], inner: Frame) -> CallOutcome:
     inner.active, inner.mark = True, run.store.mark()
     run.active.append(function)
-    run.begun.setdefault(function, []).append(inner.mark)
     bind_parameters(run, function, values, inner)
     outcome = run.execute(function.body, inner) if function.body is not None else NEXT
     if function.name in HOOKS:
         inner.exits = _successes(inner)
     run.settle(inner.mark, inner.exits, bool(outcome & NEXT))
     run.active.pop()
-    run.begun[function] = run.begun.get(function, [])[:-1]
     left = {p.name: run.store.get((inner, p.name)) for p in function.parameters if is_written_back(p)}
     ends = not outcome & NEXT and not inner.exits
     inner.active, inner.finished = False, not inner.captured

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, TypeVar
 from nodl.infer.cpp.findings import AllocatedNode, Condition, Follows, PossibleEndpoint
 from nodl.infer.cpp.ledger import CREATES, leads_to_interfaces
 from nodl.infer.cpp.reading.declarations import Class, FileIndex, Function, Scope
-from nodl.infer.cpp.reading.names import Names
+from nodl.infer.cpp.reading.names import Names, hidden
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.memory import AbstractStore, Cell, Changes, Memory
 from nodl.infer.cpp.running.values import (
@@ -99,11 +99,11 @@ class Machine:
         self.dead: dict[tuple[str, int, int], str] = {}
         self.global_arguments: list[tuple[str | None, ...]] = []  # that the program gives to rclcpp::init
         self.active: list[Function] = []
-        self.begun: dict[Function, list[int]] = {}  # where in the store those that are active began
         self.left: object = None  # the last call that certainly threw, or ended the program
         self.steps = 0
         self.repeated = 0  # how many of the elements being made stand for several each
         self.limit = MAX_STEPS
+        self.calls_back = False  # the program has come to its end, callbacks run
         self.consulted: dict[str, object] = {}  # parameters whose value decided what is made
         self.from_default: dict[str, None] = {}  # those of them that no launch was asked for
         self.unset: dict[tuple[str, int], tuple[SourceRef, str, str]] = {}  # calls on pointers to nothing
@@ -167,7 +167,6 @@ class Machine:
                 raise
             self.store.undo(mark)
             del self.active[active:]
-            self.begun.clear()
             return False
         finally:
             self.limit = before
@@ -227,6 +226,10 @@ class Machine:
     def methods_of(self, atom: object, name: str) -> Sequence[Function]:
         """The methods of that name of an object of a class in reach; none for anything else."""
         return self.names.find_methods(atom.cls, name) if isinstance(atom, Obj) else ()
+
+    def hidden_names(self, owner: Obj) -> frozenset[str]:
+        """Return the names that classes of the object hide from each other."""
+        return hidden(self.names, owner.cls) if owner.cls is not None else frozenset()
 
     def obj(self, key: object, kind: Type, **values: object) -> Obj:
         found = self.objects.get(key)

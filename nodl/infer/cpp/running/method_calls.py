@@ -9,7 +9,7 @@ from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.constructors import construct
 from nodl.infer.cpp.running.containers import CONTAINER_METHODS, container_call, is_standard
 from nodl.infer.cpp.running.contents import handed_over
-from nodl.infer.cpp.running.hiding import GIVES_INNER, class_around, class_of_member, lexical_class
+from nodl.infer.cpp.running.hiding import GIVES_INNER, class_around, class_of_member
 from nodl.infer.cpp.running.invocation import CallSite, call_values
 from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.own_operators import pointed_to
@@ -99,11 +99,11 @@ def on_object(run: Machine, atom: Obj, name: str, site: CallSite) -> Value:
     if atom.cls is not None:
         argument = field_of(callee, "argument")
         own = argument is not None and argument.type == "this" and "::" not in text(field_of(callee, "field"))
-        seen = None if own else class_of_member(run, atom, name, callee, frame)
+        seen = None if own else class_of_member(run, atom, callee, frame)
         methods = run.names.find_methods(seen, name) if seen is not None else of_this(run, atom, name, frame)
         if methods:
             return site.call_methods(methods, atom)
-        field = member(run, atom, name, seen or lexical_class(run, atom, frame))
+        field = member(run, atom, name, seen)
         if field is not None and name not in NODE_METHODS:
             return site.call_value(field)
     if atom.cls is None and atom.type.name:

@@ -10,7 +10,7 @@ from nodl.infer.cpp.running.arithmetic import added, arithmetic
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.contents import items_of
 from nodl.infer.cpp.running.hiding import class_of_member, seen_type
-from nodl.infer.cpp.running.launch_values import settled_text, text_of
+from nodl.infer.cpp.running.launch_values import settled_text
 from nodl.infer.cpp.running.machine import NEXT, Frame, Machine, expression
 from nodl.infer.cpp.running.objects import default_value
 from nodl.infer.cpp.running.own_operators import by_operator, pointed_to
@@ -50,7 +50,7 @@ def field(run: Machine, node: Node, frame: Frame) -> Value:
     found: list[Value] = []
     for atom in owners:
         if isinstance(atom, Obj):
-            value = member(run, atom, name, class_of_member(run, atom, name, node, frame))
+            value = member(run, atom, name, class_of_member(run, atom, node, frame))
             if value is None and atom.cls is None and name.endswith(("options", "callbacks")):
                 value = (run.obj(("field", atom, name), Type("")),)  # options in options
                 run.store.set((atom, name), value)
@@ -68,14 +68,16 @@ def binary(run: Machine, node: Node, frame: Frame) -> Value:
     operator = text(field_of(node, "operator"))
     left_node, right_node = field_of(node, "left"), field_of(node, "right")
     left = run.evaluate(left_node, frame)
-    if operator in ("&&", "||", "and", "or") and not _is_own(run, operator, left):
+    if operator in ("&&", "||", "and", "or"):
         return _logical(run, operator in ("||", "or"), left, right_node, frame)
     right = run.evaluate(right_node, frame)
     own = by_operator(run, operator, left, [right], node, frame)
     if own is not None:
         return own
     if operator == ">>" and has_text(left):
-        return _extracted(run, left_node, left, right_node, frame)
+        if right_node is not None:
+            assign(run, right_node, unknown("a word that is read from a stream"), frame)
+        return unknown("a stream")
     if operator == "<<" and not (len(left) == 1 and isinstance(left[0], int)):
         return _streamed(run, left_node, left, right_node, right, frame)
     if operator == "+" and (has_text(left) or has_text(right)):
@@ -85,12 +87,6 @@ def binary(run: Machine, node: Node, frame: Frame) -> Value:
     if len(left) == 1 and len(right) == 1:
         return computed(operator, left[0], right[0])
     return unknown(f"the value of {text(node)[:60]}")
-
-
-def _is_own(run: Machine, operator: str, left: Value) -> bool:
-    """Whether the class of an operand has an ``operator&&`` or ``operator||`` of its own: both sides run then."""
-    sign = {"and": "&&", "or": "||"}.get(operator, operator)
-    return any(run.methods_of(atom, f"operator{sign}") for atom in left)
 
 
 def has_text(value: Value) -> bool:
@@ -178,20 +174,6 @@ def _streamed(
     if inner is not None and inner.type in ("identifier", "field_expression", "field_identifier"):
         assign(run, inner, found, frame)
     return found
-
-
-def _extracted(run: Machine, stream: Node | None, left: Value, right: Node | None, frame: Frame) -> Value:
-    """``stream >> word``: the first word of a text that is known, and the rest stays."""
-    words = [text_of(run, atom) for atom in left]
-    if len(words) != 1 or words[0] is None or stream is None or right is None:
-        if right is not None:
-            assign(run, right, unknown("a word that is read from a stream"), frame)
-        return unknown("a stream")
-    found = words[0].split(None, 1)
-    assign(run, stream, literal(found[1] if len(found) > 1 else ""), frame)
-    if found:
-        assign(run, right, literal(found[0]), frame)
-    return (bool(found),)
 
 
 @expression("unary_expression")
@@ -299,9 +281,11 @@ def _with_new_entries(
     kind = seen_type(run, container, frame)
     inner = kind.arguments[1] if len(kind.arguments) > 1 else None
     written = plain(key[0]) if len(key) == 1 else None
-    if inner is None or (written is None and run.held_class(inner, frame) is None):
-        return held
     after: list[object] = []
+    if inner is None or (written is None and run.held_class(inner, frame) is None):
+        after = [a._replace(open=True) if isinstance(a, Map) and written is None else a for a in held]
+        assign(run, container, tuple(after), frame)
+        return held
     for atom in held:
         known = isinstance(atom, Map) and any(entry[0] == key for entry in atom.entries)
         if isinstance(atom, Map) and not known:

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from nodl.infer.cpp.running.invocation import call_functions, call_methods
 from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.overloads import chosen
-from nodl.infer.cpp.running.values import Obj, Value, join, truth, unknown
+from nodl.infer.cpp.running.values import Obj, Value, join
 from nodl.infer.cpp.syntax import Node
 
 
@@ -33,19 +33,7 @@ def by_operator(
     objects = [a for value in (left, *right) for a in value if isinstance(a, Obj) and a.cls is not None]
     if not objects:
         return None
-    found = _by_own(run, f"operator{sign}", left, right, node, frame)
-    if found is not None or len(right) != 1:
-        return found
-    for derived in _DERIVED.get(sign, ()):  # [over.match.oper]: rewritten and reversed comparisons of C++20
-        for first, second in ((left, right[0]), (right[0], left)):
-            found = _by_own(run, f"operator{derived}", first, [second], node, frame)
-            if found is not None:
-                known = truth(found) if derived == "==" else None
-                return unknown("a comparison") if known is None else (known == (sign == "=="),)
-    return None
-
-
-_DERIVED = {"!=": ("==",), "==": ("==",), "<": ("<=>",), ">": ("<=>",), "<=": ("<=>",), ">=": ("<=>",)}
+    return _by_own(run, f"operator{sign}", left, right, node, frame)
 
 
 def _by_own(

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from nodl.infer.cpp.reading.writes import writes_of
-from nodl.infer.cpp.running.hiding import cell_of, lexical_class
 from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.memory import Cell
 from nodl.infer.cpp.running.values import BOTTOM, Group, Map, Obj, Param, Seq, Text, Value
@@ -99,7 +98,7 @@ def keep_references(run: Machine, made: Value, given: Sequence[Node], frame: Fra
 def _held(run: Machine, obj: Obj) -> list[Cell]:
     """Members that are references or pointers to plain values, but for letters."""
     return [
-        (obj, cell_of(run, obj, name, cls))
+        (obj, name)
         for cls in run.names.ancestry(obj.cls)
         for name, each in cls.fields.items()
         if each.pointer and not each.static and "char" not in each.type
@@ -116,7 +115,7 @@ def cell_of_name(run: Machine, name: str, frame: Frame) -> Cell | None:
         outer = outer.outer
     if outer is None or outer.this is None:
         return None
-    return outer.this, cell_of(run, outer.this, name, lexical_class(run, outer.this, outer))
+    return outer.this, name
 
 
 def told(run: Machine, cell: Cell, value: Value, node: Node, frame: Frame) -> None:

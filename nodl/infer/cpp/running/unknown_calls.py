@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from nodl.infer.cpp.ledger import CREATES
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES, is_harmless_class, is_harmless_function
 from nodl.infer.cpp.running.assignments import assign
-from nodl.infer.cpp.running.contents import copied, handed_over, nodes_in, overwrite
+from nodl.infer.cpp.running.contents import handed_over, nodes_in
 from nodl.infer.cpp.running.hiding import element_type, seen_type
 from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.objects import is_plain_type
@@ -108,7 +108,10 @@ def changed_by_standard(run: Machine, name: str, given: Sequence[Node], frame: F
     of ``std::back_inserter(x)``, may have changed."""
     seen: set[str] = set()
     targets = [target for each in given for target in _variables(each)]
-    if name == "std::swap" and len(targets) == 2 and _swapped(run, targets, frame):
+    if name == "std::swap":
+        either = join(*(run.evaluate(target, frame) for target in targets))
+        for target in targets:
+            assign(run, target, either, frame)
         return
     if name == "std::replace" and _replaced(run, given, targets, frame):
         return
@@ -118,35 +121,7 @@ def changed_by_standard(run: Machine, name: str, given: Sequence[Node], frame: F
         for target in _variables(each):
             if text(target) not in seen:
                 seen.add(text(target))
-                if name != "std::reverse" or not _reversed(run, target, given, frame):
-                    _changed(run, name, target, frame)
-
-
-def _reversed(run: Machine, target: Node, given: Sequence[Node], frame: Frame) -> bool:
-    """``std::reverse(x.begin(), x.end())`` of a list that is known; whether it was one."""
-    whole = [f"{text(target)}.begin()", f"{text(target)}.end()"]
-    value = run.evaluate(target, frame)
-    if [text(each) for each in given] != whole or len(value) != 1 or not isinstance(value[0], Seq):
-        return False
-    if not value[0].open:
-        assign(run, target, (Seq(value[0].items[::-1]),), frame)
-    return not value[0].open
-
-
-def _swapped(run: Machine, targets: Sequence[Node], frame: Frame) -> bool:
-    """``std::swap(a, b)`` of two objects, or of pointers to one each; whether it was one."""
-    first, second = (run.evaluate(target, frame) for target in targets)
-    objects = [a for a in (*first, *second) if isinstance(a, Obj) and a.cls is not None and a.node is None]
-    if len(first) != 1 or len(second) != 1 or len(objects) != 2:
-        return False
-    if objects[0].heap or objects[1].heap:
-        assign(run, targets[0], second, frame)
-        assign(run, targets[1], first, frame)
-        return True
-    kept = copied(run, first, targets[0], frame, objects[0].cls)
-    overwrite(run, objects[:1], second)
-    overwrite(run, objects[1:], kept)
-    return True
+                _changed(run, name, target, frame)
 
 
 def _replaced(run: Machine, given: Sequence[Node], targets: Sequence[Node], frame: Frame) -> bool:

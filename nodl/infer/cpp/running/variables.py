@@ -6,7 +6,6 @@ import re
 
 from nodl.infer.cpp.reading.declarations import Class
 from nodl.infer.cpp.reading.type_names import NO_TYPE, Type
-from nodl.infer.cpp.running.hiding import cell_of, lexical_class
 from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.values import BOTTOM, NPOS, Bound, Const, Obj, Value, unknown
 from nodl.infer.cpp.syntax import Node, children, text
@@ -22,7 +21,7 @@ def variable(run: Machine, name: str, frame: Frame) -> Value:
         return _argument(run, frame.bindings[name].name, frame)
     this_object = current_object(frame)
     if this_object is not None and "::" not in name:
-        found = member(run, this_object, name, lexical_class(run, this_object, frame))
+        found = member(run, this_object, name)
         if found is not None:
             return found
     found = constant(run, name, frame)
@@ -52,9 +51,9 @@ def current_object(frame: Frame | None) -> Obj | None:
     return None
 
 
-def member(run: Machine, owner: Obj, name: str, seen: Class | None) -> Value | None:
-    """The field ``name`` of ``owner``, seen as an object of ``seen``; ``None`` if no class in reach has it."""
-    value = run.store.get((owner, cell_of(run, owner, name, seen)))
+def member(run: Machine, owner: Obj, name: str, seen: Class | None = None) -> Value | None:
+    """Return the field ``name`` of ``owner``, looked up in ``seen``; ``None`` if no class in reach has it."""
+    value = run.store.get((owner, name))
     if value is not None:
         return value
     if owner.cls is None:
