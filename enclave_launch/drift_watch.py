@@ -101,7 +101,7 @@ class DriftWatch(LaunchCompanion):
         if observer.ended:
             del self._observers[domain]
             self._say(
-                f"the observer of domain {domain} has ended, so drift is not seen any more: {observer.why}"
+                f"the observer of domain {domain} has exited, so drift is no longer seen: {observer.why}"
             )
             return
         graph, forged = observer.latest

@@ -127,7 +127,7 @@ def with_shares_reported(plan: LaunchPlan, keystore: str) -> LaunchPlan:
 def zenoh_router(launch: ProvisionedLaunch, say: Callable[[str], None]) -> ZenohRouter:
     """Return the router of a launch with processes on Zenoh; entering it starts or finds one."""
     zenoh = launch.zenoh
-    assert zenoh is not None, "asked only where processes are on Zenoh"
+    assert zenoh is not None, "only called if processes are on Zenoh"
 
     def refusals() -> tuple[str, ...]:
         try:
@@ -278,7 +278,7 @@ class PlanProvider:
                 wrong = (*wrong, *session_differences(keystore, enclave, zenoh.router))
         except KeystoreError as error:
             raise ProvisionError(
-                f"enclave {enclave} cannot be looked at any more, though it was provisioned for this launch: {error}"
+                f"enclave {enclave} can no longer be read, though it was provisioned for this launch: {error}"
             ) from error
         if wrong:
             raise ProvisionError(

@@ -276,7 +276,7 @@ class _Comparison:
         there = {_grant(each) for each in node.interfaces if each.complete}
         for each in planned.interfaces:
             if each.certain and each.grant not in there:
-                text = f"{node.fqn}: {each.grant} is planned and not there"
+                text = f"{node.fqn}: {each.grant} is planned but absent"
                 yield self._about(Kind.MISSING_ENDPOINT, process, text, node.fqn, name=each.grant.name)
 
     # all together
@@ -286,7 +286,7 @@ class _Comparison:
         for fqn, planned in sorted(self._expected.nodes.items()):
             count = sum(times for name, times in running.items() if covers(fqn, name))
             if count == 0 and planned.always:
-                text = f"{fqn} ({planned.program}) is planned and does not run"
+                text = f"{fqn} ({planned.program}) is planned but does not run"
                 yield finding(Kind.MISSING_NODE, fqn, text, enclave=planned.enclave)
             elif count > planned.times and "*" not in fqn:
                 text = f"{fqn} runs {count} times, planned is {planned.times}"

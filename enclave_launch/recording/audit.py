@@ -34,7 +34,7 @@ class Refusal(NamedTuple):
         need = self.need
         return printable(
             f"node {need.node} in enclave {need.enclave} would {WORDS[need.operation]} {need.name} (written "
-            f"{self.written!r}), which is not granted; described by {self.by}"
+            f"{self.written!r}), which is not granted; its interfaces come from {self.by}"
         )
 
 
@@ -120,7 +120,7 @@ def _parts_used(rule: Rule, enclave: str, used: set[tuple[str, Operation, str]])
 
 def audit_text(report: AuditReport) -> str:
     """For a person, by enclave."""
-    lines = [f"audit: {report.checked} endpoints were asked for; {len(report.refusals)} would be refused"]
+    lines = [f"audit: {report.checked} endpoints were requested; {len(report.refusals)} would be refused"]
     enclaves = sorted({refusal.need.enclave for refusal in report.refusals} | set(report.never_asked))
     for enclave in enclaves:
         lines.append(f"enclave {enclave}")
@@ -128,7 +128,7 @@ def audit_text(report: AuditReport) -> str:
         lines += [f"  would be refused: {refusal.text}" for refusal in refused]
         rules = report.never_asked.get(enclave, ())
         granted = (f"{WORDS[rule.operation]} {printable(rule.expression)}" for rule in rules)
-        lines += [f"  granted, never asked for: {each}" for each in granted]
+        lines += [f"  granted, never requested: {each}" for each in granted]
     lines += [f"not recorded: {item.process}: {printable(item.why)}" for item in report.unrecorded]
     lines += [f"the record is not complete: {printable(why)}" for why in report.complaints]
     return "\n".join([*lines, ""])

@@ -66,7 +66,7 @@ class Denial(NamedTuple):
             return lines
         if self.silent:
             lines.append("  on Zenoh nothing fails: the router drops all of it without an error")
-        lines.append(f"  the node is described by {self.described.text}; that does not ask for it")
+        lines.append(f"  the node is described by {self.described.text}; which does not request it")
         if self.unseen:
             lines.append(
                 f"  other descriptions of the node have it; --also unseen grants {some_of(self.unseen, _NAMES)}"
@@ -98,7 +98,7 @@ class NotJoined(NamedTuple):
         head = f"{who} (enclave {self.enclave}) could not join DDS"
         if self.cause is not None:
             return printable(f"{head}: {self.cause.what}; {self.cause.remedy} (said: {self.cause.said})")
-        said = "; ".join(self.texts) or "no reason was given; its output may tell"
+        said = "; ".join(self.texts) or "no reason was given; see its output"
         return printable(f"{head}: {said}")
 
 

@@ -34,7 +34,7 @@ WORDS = {
 }
 
 
-NO_ENCLAVE_YET = "(not known: nobody describes the node)"
+NO_ENCLAVE_YET = "(unknown: there is no description of the node)"
 
 
 class Need(NamedTuple):
@@ -60,7 +60,7 @@ class Description(NamedTuple):
         if self.missing is not None:
             return f"nobody: {self.missing.why}"
         if self.node is None:
-            return "nobody: the plan has no node of this name"
+            return "none: the plan has no node of this name"
         origin = f"{self.origin}: " if self.origin else ""
         return f"{origin}{self.node.interface.source}"
 

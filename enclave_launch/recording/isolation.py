@@ -20,7 +20,7 @@ _GET_FLAGS, _SET_FLAGS, _UP = 0x8913, 0x8914, 0x1  # linux/sockios.h, linux/if.h
 # Those whose ports lie below the ephemeral ones (ROS 2 documentation, ROS_DOMAIN_ID).
 _DOMAINS = range(1, 101)
 
-DEVICES_STAY_REAL = "motors, sensors and device files are not kept apart: what the nodes do to them is real"
+DEVICES_STAY_REAL = "motors, sensors and device files are not isolated: what the nodes do to them is real"
 
 
 class Isolation(str, Enum):
@@ -28,7 +28,7 @@ class Isolation(str, Enum):
 
     NAMESPACE = "network namespace"
     LOCAL = "discovery on this machine only, in a DDS domain of its own"
-    NONE = "nothing: other nodes of its domain hear it and are heard"
+    NONE = "nothing: it communicates with other nodes of its domain"
 
 
 def isolate(wanted: str = "auto") -> Isolation:

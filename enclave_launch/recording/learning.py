@@ -60,7 +60,7 @@ class QuietWatch(Listener):
         now = time.monotonic()
         if self._recording.running and not self._starting(now) and now - self._last >= self._patience:
             self._over = True
-            quiet = f"no new endpoint for {self._patience:g} s: what was to be seen was seen"
+            quiet = f"no new endpoint for {self._patience:g} s"
             self._launch.say("INFO", quiet)
             self._launch.shut_down("learnt")
 

@@ -28,7 +28,7 @@ _CAUSES: tuple[tuple[str, str, str], ...] = (
     (
         r"could not find all security files|SECURITY ERROR: .*not found",
         "files of its enclave are missing",
-        "secure-keystore verify tells which; " + _PROVISION,
+        "secure-keystore verify reports which; " + _PROVISION,
     ),
     (
         r"Could not find domain (\d+) in governance",
@@ -44,12 +44,12 @@ _CAUSES: tuple[tuple[str, str, str], ...] = (
     (
         r"unable to get local issuer certificate",
         "its certificate was issued by another CA than the one that its enclave names",
-        "secure-keystore verify tells which files do not belong together",
+        "secure-keystore verify reports which files do not belong together",
     ),
     (
         r"Failed to parse PKCS7 SMIME document",
         "its signed permissions or governance are damaged, or signed by another CA",
-        "secure-keystore verify tells which; " + _PROVISION,
+        "secure-keystore verify reports which; " + _PROVISION,
     ),
     (
         r"Subject name is invalid",
@@ -78,15 +78,15 @@ _CAUSES: tuple[tuple[str, str, str], ...] = (
     ),
     (
         r"validate_local_identity",
-        "its certificate was not accepted: it was issued by another CA than the one its enclave names, or has ended",
-        "secure-keystore verify tells which",
+        "its certificate was not accepted: it was issued by another CA than the one its enclave names, or has expired",
+        "secure-keystore verify reports which",
     ),
 )
 _AT_LAST = (
     (
         r"Cannot create participant due to initialization error",
         "Fast DDS does not accept the files of its enclave, and does not say which",
-        "secure-keystore verify tells whether its permissions, governance or certificates are damaged, have ended or "
+        "secure-keystore verify reports whether its permissions, governance or certificates are damaged, have ended or "
         "were signed by another CA; " + _PROVISION,
     ),
 )

@@ -271,7 +271,7 @@ class Recording:
         known = {item.process for item in self.unrecorded}
         for started in self.record.silent():
             if started.process not in known:
-                why = "nothing was heard of it: it or what started it does not keep LD_PRELOAD"
+                why = "it never reported: it or what started it does not pass LD_PRELOAD on"
                 self._not_recorded(started.process, why)
         for started in self.record.mute():
             if started.process not in known and started.kind != "executable":

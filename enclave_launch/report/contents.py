@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
+from enclave_common.words import counted
 from enclave_launch.report.graph import ChannelUse, EnclaveGraph, plan_graph, short_path
 from enclave_launch.report.review_text import Judged
 from enclave_launch.review.checks.keystore import Ending
@@ -76,6 +77,29 @@ def report_contents(
     )
 
 
+def in_one_sentence(contents: ReportContents) -> str:
+    """Return what the report says in all: how much runs, whether everything is known, what needs attention."""
+    graph = contents.graph
+    known = sum(member.known for member in graph.members)
+    unknown = len(graph.members) - known
+    running = "runs" if known == 1 else "run"
+    is_known = (
+        f"the interfaces of {counted(unknown, 'program')} are not known"
+        if unknown
+        else "the interfaces of all of them are known"
+    )
+    open_ones = [diagnostic.severity for diagnostic, accepted in contents.judged if accepted is None]
+    counts_of = ((open_ones.count("error"), "error"), (open_ones.count("warning"), "warning"))
+    listed = " and ".join(counted(number, what) for number, what in counts_of if number)
+    accepted = len(contents.judged) - len(open_ones)
+    sentence = f"{counted(known, 'node')} {running} in {counted(len(graph.enclaves), 'enclave')}, {is_known}"
+    sentence += f"; open findings: {listed or 'none'}"
+    sentence += f", and {counted(accepted, 'accepted finding')}" if accepted else ""
+    if contents.endings:
+        sentence += f"; the first expiry in the keystore is {contents.endings[0].ends}"
+    return f"{sentence}."
+
+
 def _influences(plan: PlanDocument) -> Iterator[Influence]:
     graph = flow_graph(plan)
     for source, targets in graph.items():
@@ -84,8 +108,8 @@ def _influences(plan: PlanDocument) -> Iterator[Influence]:
 
 
 def counts(plan: PlanDocument) -> tuple[Count, ...]:
-    """Count what table 2 of the design article counts and a plan knows; ``ros_discovery_info``, which belongs to
-    the middleware, is not counted."""
+    """Count what table 2 of the LiSA4ROS2 paper counts; ``ros_discovery_info``, which belongs to the middleware, is
+    not counted."""
     return (
         Count("N", "nodes", len(plan.nodes), 0),
         _names(plan, "T", "topics", "publish", "subscribe"),

@@ -9,7 +9,7 @@ import re
 from collections.abc import Iterable, Iterator
 
 from enclave_common.terminal import printable
-from enclave_launch.report.contents import ReportContents
+from enclave_launch.report.contents import ReportContents, in_one_sentence
 from enclave_launch.report.diagrams import mermaid
 from enclave_launch.report.graph import ChannelUse, EnclaveGraph, evidence_text
 from enclave_launch.report.review_text import step_text
@@ -25,7 +25,7 @@ def markdown_report(contents: ReportContents) -> str:
 
 
 def _lines(contents: ReportContents) -> Iterator[str]:
-    yield f"# {escaped(contents.title)}"
+    yield from (f"# {escaped(contents.title)}", "", escaped(in_one_sentence(contents)))
     if len(contents.graph.members) + len(contents.graph.channels) <= MOST_DRAWN:
         yield from ("", "```mermaid", mermaid(contents.graph).rstrip("\n"), "```")
     yield from ("", "## Findings", "")
@@ -39,7 +39,8 @@ def _lines(contents: ReportContents) -> Iterator[str]:
         "",
         "## Statistics",
         "",
-        "As in table 2 of the LiSA4ROS2 paper, without `ros_discovery_info`.",
+        f"{'; '.join(f'{one.column}: {one.meaning}' for one in contents.counts)}. As in table 2 of the LiSA4ROS2 "
+        "paper, without `ros_discovery_info`.",
         "",
     )
     yield from _table(

@@ -62,7 +62,7 @@ def test_what_is_granted_and_never_asked_for_is_in_the_report(stand_in: Path, tm
         {"enclave": "/modest", "operation": "call", "name": "/go"},
         {"enclave": "/modest", "operation": "subscribe", "name": "/scan"},
     ]
-    assert "granted, never asked for: subscribe to topic /scan" in output
+    assert "granted, never requested: subscribe to topic /scan" in output
 
 
 def test_a_node_that_nobody_describes_is_audited_all_the_same(stand_in: Path, tmp_path: Path) -> None:

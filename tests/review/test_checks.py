@@ -79,7 +79,7 @@ def test_a_permission_that_no_node_asks_for() -> None:
     assert "permission-unasked" not in codes(checked)
     checked["enclaves"]["/a"]["publish"].append("/of_policy")
     (told,) = [told for told in check_plan(checked) if told.code == "permission-unasked"]
-    assert told.text == "enclave /a may publish /of_policy, and no node of it asks for that"
+    assert told.text == "enclave /a may publish /of_policy, and none of its nodes requests that"
     checked["enclaves"]["/a"]["permissions_unknown"] = ["/helper"]
     assert "permission-unasked" not in codes(checked), "the policy speaks for a program that nobody describes"
 

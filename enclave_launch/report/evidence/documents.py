@@ -120,8 +120,8 @@ def _not_checked(examined: Examined) -> list[str]:
         missing.append("known vulnerabilities and components: no bill of materials was given")
     return [
         *missing,
-        "what the programs do: permissions bound it, and descriptions of nodes are taken as they are written",
-        "ways between processes other than ROS: files, devices, networks, shared memory",
+        "what the programs do: permissions bound it; descriptions of nodes are not verified",
+        "connections between processes other than ROS: files, devices, networks, shared memory",
         "the host: its users, its updates, its physical protection",
         "what runs outside of this launch file",
     ]

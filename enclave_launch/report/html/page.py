@@ -11,9 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from enclave_common.terminal import json_text, printable
-from enclave_common.words import counted
 from enclave_launch import __version__
-from enclave_launch.report.contents import ReportContents
+from enclave_launch.report.contents import ReportContents, in_one_sentence
 from enclave_launch.report.graph import OUTWARD, ChannelUse, EnclaveGraph, evidence_text
 from enclave_launch.report.html import tables
 from enclave_launch.report.html.tables import text
@@ -131,25 +130,12 @@ def _body(contents: ReportContents) -> str:
         for name, heading, body in sections
     )
     return (
-        f"<header><h1>{text(contents.title)}</h1>\n<p>{_summary(contents)}</p>\n"
+        f"<header><h1>{text(contents.title)}</h1>\n<p>{text(in_one_sentence(contents))}</p>\n"
         f'<nav aria-label="Sections">{links}</nav>\n'
         '<button type="button" id="theme" class="screen">light or dark</button></header>\n'
         f"<main>\n{parts}</main>\n<footer>Made by secure-plan {__version__}. The graph is drawn by Cytoscape.js "
         "(MIT licence).</footer>\n"
     )
-
-
-def _summary(contents: ReportContents) -> str:
-    graph = contents.graph
-    open_ones = [diagnostic.severity for diagnostic, accepted in contents.judged if accepted is None]
-    figures = (
-        (len(graph.enclaves), "enclave"),
-        (sum(member.known for member in graph.members), "node"),
-        (open_ones.count("error"), "error"),
-        (open_ones.count("warning"), "warning"),
-        (len(contents.judged) - len(open_ones), "accepted finding"),
-    )
-    return ", ".join(counted(number, what) for number, what in figures)
 
 
 _FILTER = (

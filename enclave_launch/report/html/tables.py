@@ -86,7 +86,7 @@ def findings(contents: ReportContents) -> str:
         return "<p>Nothing was found.</p>"
     ordered = sorted(contents.judged, key=lambda item: (item[1] is not None, item[0].severity))
     return table(
-        "What check finds in this plan",
+        "Findings of secure-plan check",
         ("severity", "rule", "place", "what", "what to do"),
         (_finding(diagnostic, accepted) for diagnostic, accepted in ordered),
     )
@@ -148,7 +148,7 @@ def expiry(endings: Iterable[Ending] | None) -> str:
     """Return when the certificates and documents of the keystore expire, a hint if no keystore was given."""
     if endings is None:
         return "<p>No keystore was given (<code>--keystore DIR</code>).</p>"
-    return table("What of the keystore ends when", ("ends", "days left", "what"), _endings(endings))
+    return table("When parts of the keystore expire", ("ends", "days left", "what"), _endings(endings))
 
 
 def _endings(endings: Iterable[Ending]) -> Iterator[str]:

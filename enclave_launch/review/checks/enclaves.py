@@ -50,7 +50,7 @@ def unasked(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[PlanFin
         if not nodes or document["enclaves"][enclave].get("permissions_unknown"):
             continue
         for grant in sorted(grants - frozenset[GrantedName]().union(*(node.grants for node in nodes))):
-            text = f"enclave {enclave} may {grant}, and no node of it asks for that"
+            text = f"enclave {enclave} may {grant}, and none of its nodes requests that"
             yield finding("permission-unasked", enclave, text)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from enclave_launch.diagnostics import Code
 from enclave_launch.review.document import PlanFinding
 
-_OTHER_END = "look for a slip in the name, or accept it if the other end runs elsewhere"
+_OTHER_END = "look for a typing error in the name, or accept it if the other end runs elsewhere"
 _PROVISION = "secure-launch --secure, or secure-keystore apply-policy, brings it to the plan"
 _SHOWS_ALL = f"{_PROVISION}; secure-plan diff KEYSTORE ... shows all"
 _TABLE: Mapping[str, tuple[str, str]] = {
@@ -20,21 +20,21 @@ _TABLE: Mapping[str, tuple[str, str]] = {
                              "if they are meant to be one, write or remap both alike"),
     "types-differ": ("Both ends of a topic, service or action have different types: they never match.",
                      "they never match: correct one of them"),
-    "qos-differs": ("A publisher offers less QoS than a subscription of the topic asks for: they never match.",
-                    "let the publisher offer it, or the subscription ask for less"),
+    "qos-differs": ("A publisher offers less QoS than a subscription of the topic requests: they never match.",
+                    "let the publisher offer it, or the subscription request less"),
     "node-name-twice": ("Two nodes have the same full name: rcl warns, tools confuse them.",
                         "give each a name of its own"),
-    "wildcard": ("A permission holds a wildcard: it covers names that nobody may have thought of.",
+    "wildcard": ("A permission has a wildcard: it covers names that may be unintended.",
                  "name what is meant, or accept it with the reason why that is not possible"),
-    "enclave-shared": ("Nodes of one enclave may do what only others of it ask for.",
+    "enclave-shared": ("Nodes of one enclave have permissions that only other nodes of it request.",
                        "give them enclaves of their own (enclave=, --enclave-scope node); secure-plan suggest "
                        "shows all"),
-    "permission-unasked": ("An enclave has a permission that no node of it asks for.",
+    "permission-unasked": ("An enclave has a permission that none of its nodes requests.",
                            "take it out of the policy file, or describe who needs it"),
     "remap-dead": ("A remap rule changes no name of any node that it is given to.",
-                   "look for a slip in the name, or remove the rule"),
+                   "look for a typing error in the name, or remove the rule"),
     "parameter-unknown": ("A parameter is set that its node does not declare.",
-                          "look for a slip in the name; rcl passes over what is not declared"),
+                          "look for a typing error in the name; rcl ignores what is not declared"),
     "security-variable-set": ("The launch file itself sets a ROS_SECURITY_ variable of a process.",
                               "leave it to --secure"),
     "secret-in-parameters": (
@@ -44,10 +44,10 @@ _TABLE: Mapping[str, tuple[str, str]] = {
                        "remove one of these steps, or the rule"),
     "rule-idle": ("A rule of the repository names nothing in this plan.", "correct its names, or remove it"),
     "keystore-enclave-missing": ("The keystore lacks an enclave of the plan.", _PROVISION),
-    "keystore-grants-more": ("The keystore permits an enclave more than the plan asks for.", _SHOWS_ALL),
-    "keystore-grants-less": ("The keystore permits an enclave less than the plan asks for.", _SHOWS_ALL),
+    "keystore-grants-more": ("The keystore permits an enclave more than the plan.", _SHOWS_ALL),
+    "keystore-grants-less": ("The keystore permits an enclave less than the plan.", _SHOWS_ALL),
     "keystore-zenoh": ("A file for Zenoh in the keystore is not what follows from what is signed.", ""),
-    "keystore-expires": ("Something that this plan needs of the keystore ends soon, or has ended.",
+    "keystore-expires": ("A part of the keystore that this plan needs expires soon or has expired.",
                          "secure-keystore renew"),
 }  # fmt: skip
 RULES: Mapping[str, str] = {code: meaning for code, (meaning, _) in _TABLE.items()}
