@@ -10,8 +10,9 @@ import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
-from enclave_launch.deployment.deployment import MARK, File
+from enclave_launch.deployment.deployment import File
 from enclave_launch.errors import UsageError
+from keystore.disk.units import MARK
 
 _HEAD = 400  # bytes in which the mark stands
 

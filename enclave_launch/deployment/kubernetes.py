@@ -1,16 +1,16 @@
-"""A deployment as Kubernetes objects: one Deployment for each process, keys in Secrets and nowhere else. Pure.
+"""A deployment as Kubernetes objects: one Deployment for each process, the files of its enclave in a Secret. Pure.
 
-Secret and ConfigMap of an enclave carry their version in the name and are immutable: new material is a new name, so the
-Pods that use it are replaced, and only those. The readiness probe fails once the first of it has ended: on Cyclone DDS
-a process whose certificate ended goes on and is heard by nobody. Multicast does not cross most networks of clusters, so
-peers are named (``ROS_STATIC_PEERS``, from Iron on).
+Names of Secrets stay the same, so new material changes the enclave's Secret and no workload; the process reads it at
+its next start (``kubectl rollout restart``). Multicast does not cross most networks of clusters, so peers are named
+(``ROS_STATIC_PEERS``, from Iron on): they stand in one ConfigMap, and each is a headless Service. No object has a
+namespace: ``kubectl -n`` or kustomize says it. Only volumes that ``podman kube play`` 4.3 takes are used.
 """
 
 from __future__ import annotations
 
 import base64
 import hashlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any
 
 from enclave_launch.deployment.deployment import Deployment, File
@@ -24,23 +24,23 @@ _PARAMETERS = "/parameters"
 _USER = 10001
 _SPDP_PORT = 7410  # unicast discovery of a Pod's only participant in domain 0 (DDSI-RTPS section 9.6.2)
 _DOMAIN_GAIN = 250
-_MEMORY = "512Mi"  # requests and limits, where the hosts file says nothing
+_MEMORY_LIMIT = "512Mi"  # where the hosts file says nothing
+_REQUESTS = {"memory": "64Mi", "cpu": "50m"}
+_PART_OF, _NAME = "app.kubernetes.io/part-of", "app.kubernetes.io/name"
+_DOMAIN = "ros-domain"
+_PEERS = "ROS_STATIC_PEERS"
 
 
 def kubernetes_files(deployment: Deployment, *, image: str) -> dict[str, File]:
-    """File name -> file; ``secrets.yaml`` is the one with keys, the rest can be shown to anybody."""
+    """Return file name -> file; ``secrets.yaml`` is the one with keys, the rest can be shown to anybody."""
     files = {"launch.yaml": File(deployment.header() + yaml_documents(_objects(deployment, image)))}
-    secrets = list(_secrets(deployment))
+    secrets = [_secret(deployment, one) for one in deployment.material.values()]
     if secrets:
-        files["secrets.yaml"] = File(deployment.header() + yaml_documents(secrets), 0o600)
+        files["secrets.yaml"] = File(deployment.mark() + yaml_documents(secrets), 0o600)
     return files
 
 
 def _objects(deployment: Deployment, image: str) -> Iterator[dict[str, Any]]:
-    labels = {"pod-security.kubernetes.io/enforce": "restricted"}
-    yield {"apiVersion": "v1", "kind": "Namespace", "metadata": {"name": deployment.name, "labels": labels}}
-    for material in deployment.material.enclaves.values():
-        yield _config_map(deployment, material)
     for process in deployment.processes:
         if process.parameter_files:
             yield _parameters(deployment, process)
@@ -48,54 +48,55 @@ def _objects(deployment: Deployment, image: str) -> Iterator[dict[str, Any]]:
         if process.enclave is not None:
             yield _service(deployment, process)
     for domain in sorted({one.domain for one in deployment.processes if one.enclave is not None}):
+        yield _peers(deployment, domain)
         yield _network_policy(deployment, domain)
 
 
-def _object(deployment: Deployment, kind: str, name: str, *, api: str = "v1") -> dict[str, Any]:
-    return {"apiVersion": api, "kind": kind, "metadata": {"name": name, "namespace": deployment.name}}
+def _object(
+    deployment: Deployment, kind: str, name: str, *, api: str = "v1", **labels: str
+) -> dict[str, Any]:
+    own = {_NAME: name, _PART_OF: deployment.name, "app.kubernetes.io/managed-by": "enclave-launch", **labels}
+    return {"apiVersion": api, "kind": kind, "metadata": {"name": name, "labels": own}}
 
 
-def material_name(material: EnclaveMaterial) -> str:
-    """Of its Secret and its ConfigMap."""
-    return f"enclave-{label(material.enclave)}-{material.version}"
+def secret_name(enclave: str) -> str:
+    """Return the name of the Secret with the files of ``enclave``."""
+    return f"enclave-{label(enclave)}"
 
 
-def _secrets(deployment: Deployment) -> Iterator[dict[str, Any]]:
-    for material in deployment.material.enclaves.values():
-        if material.key is not None:
-            data = {layout.KEY: base64.b64encode(material.key).decode()}
-            named = _object(deployment, "Secret", material_name(material))
-            yield {**named, "type": "Opaque", "immutable": True, "data": data}
-
-
-def _config_map(deployment: Deployment, material: EnclaveMaterial) -> dict[str, Any]:
-    data = {name: content.decode().replace("\r\n", "\n") for name, content in material.public.items()}
-    return {**_object(deployment, "ConfigMap", material_name(material)), "immutable": True, "data": data}
+def _secret(deployment: Deployment, material: EnclaveMaterial) -> dict[str, Any]:
+    """Without the key if it was made on its host; whoever has it adds it there."""
+    files = {**material.public, **({layout.KEY: material.key} if material.key is not None else {})}
+    data = {name: base64.b64encode(content).decode() for name, content in sorted(files.items())}
+    return {**_object(deployment, "Secret", secret_name(material.enclave)), "type": "Opaque", "data": data}
 
 
 def _parameters(deployment: Deployment, process: DeployedProcess) -> dict[str, Any]:
     data = process.parameter_texts()
-    return {**_object(deployment, "ConfigMap", _parameters_name(process)), "immutable": True, "data": data}
+    return {**_object(deployment, "ConfigMap", _parameters_name(process)), "data": data}
 
 
 def _parameters_name(process: DeployedProcess) -> str:
+    """The content is in the name, so new parameters replace the Pod."""
     digest = hashlib.sha256("\0".join(process.parameter_files.values()).encode()).hexdigest()
     return f"{process.name}-{digest[:10]}"
 
 
 def _deployment(deployment: Deployment, process: DeployedProcess, image: str) -> dict[str, Any]:
     domain = str(process.domain) if process.enclave is not None else "none"
-    labels = {"app": process.name, "ros-launch": deployment.name, "ros-domain": domain}
-    made = _object(deployment, "Deployment", process.name, api="apps/v1")
-    made["metadata"]["labels"] = labels
-    made["metadata"]["annotations"] = {"launch-file": process.place}
+    made = _object(deployment, "Deployment", process.name, api="apps/v1", **{_DOMAIN: domain})
+    labels = made["metadata"]["labels"]
     template = {"metadata": {"labels": labels}, "spec": _pod(deployment, process, image)}
     spec = {
         "replicas": 1,
         "strategy": {"type": "Recreate"},
-        "selector": {"matchLabels": {"app": process.name}},
+        "selector": {"matchLabels": _selector(deployment, process)},
     }
     return {**made, "spec": {**spec, "template": template}}
+
+
+def _selector(deployment: Deployment, process: DeployedProcess) -> dict[str, str]:
+    return {_NAME: process.name, _PART_OF: deployment.name}
 
 
 def _pod(deployment: Deployment, process: DeployedProcess, image: str) -> dict[str, Any]:
@@ -113,51 +114,44 @@ def _pod(deployment: Deployment, process: DeployedProcess, image: str) -> dict[s
             "seccompProfile": {"type": "RuntimeDefault"},
         },
         "containers": [_container(deployment, process, image)],
-        "volumes": list(_volumes(deployment, process)),
+        "volumes": list(_volumes(process)),
     }
 
 
 def _container(deployment: Deployment, process: DeployedProcess, image: str) -> dict[str, Any]:
-    """``args`` only: the image's entrypoint sets up ROS."""
-    variables = {
-        **process.variables(_KEYSTORE), "HOME": "/tmp", "ROS_LOG_DIR": "/tmp/log", "TZ": "UTC",
-        **_peers(deployment, process),
-    }  # fmt: skip
-    memory = process.needs.memory or _MEMORY
+    """It has ``args`` only: the image's entrypoint sets up ROS."""
+    variables = {**process.variables(_KEYSTORE), "HOME": "/tmp", "ROS_LOG_DIR": "/tmp/log", "TZ": "UTC"}
+    environment: list[dict[str, Any]] = [
+        {"name": name, "value": _literal(text)} for name, text in sorted(variables.items())
+    ]
+    if process.enclave is not None and _PEERS not in variables:
+        source = {"name": _peers_name(deployment, process.domain), "key": _PEERS}
+        environment.append({"name": _PEERS, "valueFrom": {"configMapKeyRef": source}})
     return {
         "name": process.name,
         "image": image,
         "args": [_literal(word) for word in process.words(_PARAMETERS)],
         **({"workingDir": process.cwd} if process.cwd is not None else {}),
-        "env": [{"name": name, "value": _literal(text)} for name, text in sorted(variables.items())],
+        "env": environment,
         "securityContext": {
             "allowPrivilegeEscalation": False,
             "readOnlyRootFilesystem": True,
             "capabilities": {"drop": ["ALL"]},
         },
-        "resources": {"limits": {"memory": memory}, "requests": {"memory": memory, "cpu": "50m"}},
-        **_probe(deployment, process),
+        "resources": {"limits": {"memory": process.needs.memory or _MEMORY_LIMIT}, "requests": _REQUESTS},
         "volumeMounts": list(_mounts(process)),
     }
 
 
-def _peers(deployment: Deployment, process: DeployedProcess) -> Mapping[str, str]:
-    peers = [
-        f"{one.name}.{deployment.name}.svc" for one in deployment.processes
-        if one.domain == process.domain and one.name != process.name and one.enclave is not None
-    ]  # fmt: skip
-    if not peers or process.enclave is None or "ROS_STATIC_PEERS" in process.environment:
-        return {}
-    return {"ROS_STATIC_PEERS": ";".join(peers)}
+def _peers(deployment: Deployment, domain: int) -> dict[str, Any]:
+    """All secured processes of the domain, on any host. Who is started later names those before it, so one more
+    process needs no restart of the others."""
+    peers = {_PEERS: ";".join(deployment.members[domain])}
+    return {**_object(deployment, "ConfigMap", _peers_name(deployment, domain)), "data": peers}
 
 
-def _probe(deployment: Deployment, process: DeployedProcess) -> dict[str, Any]:
-    """The container's life is that of its process; what can be asked besides is whether its enclave has ended."""
-    if process.enclave is None:
-        return {}
-    end = int(deployment.material.ends.timestamp())
-    command = ["/bin/sh", "-c", f'test "$(date +%s)" -lt {end}']
-    return {"readinessProbe": {"exec": {"command": command}, "periodSeconds": 60}}
+def _peers_name(deployment: Deployment, domain: int) -> str:
+    return f"{deployment.name}-peers-{domain}"
 
 
 def _mounts(process: DeployedProcess) -> Iterator[dict[str, Any]]:
@@ -169,13 +163,12 @@ def _mounts(process: DeployedProcess) -> Iterator[dict[str, Any]]:
     yield {"name": "tmp", "mountPath": "/tmp"}
 
 
-def _volumes(deployment: Deployment, process: DeployedProcess) -> Iterator[dict[str, Any]]:
-    material = deployment.enclave_of(process)
-    if material is not None:
-        name = material_name(material)
-        key = {"key": layout.KEY, "path": layout.KEY, "mode": 0o400}
-        sources = [{"secret": {"name": name, "items": [key]}}, {"configMap": {"name": name}}]
-        yield {"name": "enclave", "projected": {"defaultMode": 0o400, "sources": sources}}
+def _volumes(process: DeployedProcess) -> Iterator[dict[str, Any]]:
+    if process.enclave is not None:
+        yield {
+            "name": "enclave",
+            "secret": {"secretName": secret_name(process.enclave), "defaultMode": 0o440},
+        }
     if process.parameter_files:
         yield {"name": "parameters", "configMap": {"name": _parameters_name(process)}}
     yield {"name": "tmp", "emptyDir": {"medium": "Memory", "sizeLimit": "64Mi"}}
@@ -187,16 +180,18 @@ def _service(deployment: Deployment, process: DeployedProcess) -> dict[str, Any]
     spec = {
         "clusterIP": "None",
         "publishNotReadyAddresses": True,
-        "selector": {"app": process.name},
+        "selector": _selector(deployment, process),
         "ports": [{"name": "spdp", "protocol": "UDP", "port": port}],
     }
     return {**_object(deployment, "Service", process.name), "spec": spec}
 
 
 def _network_policy(deployment: Deployment, domain: int) -> dict[str, Any]:
-    """Who is in a domain talks UDP with who else is in it, and asks the cluster's DNS. Ports are left open among them:
-    Cyclone DDS takes any for unicast unless it is configured otherwise."""
-    own = {"podSelector": {"matchLabels": {"ros-launch": deployment.name, "ros-domain": str(domain)}}}
+    """Allow UDP among the processes of a domain, and DNS.
+
+    All ports: Cyclone DDS takes any for unicast unless it is configured otherwise.
+    """
+    own = {"podSelector": {"matchLabels": {_PART_OF: deployment.name, _DOMAIN: str(domain)}}}
     udp = [{"protocol": "UDP"}]
     dns = {
         "to": [{
@@ -212,11 +207,11 @@ def _network_policy(deployment: Deployment, domain: int) -> dict[str, Any]:
         "egress": [{"to": [own], "ports": udp}, dns],
     }
     return {
-        **_object(deployment, "NetworkPolicy", f"dds-domain-{domain}", api="networking.k8s.io/v1"),
+        **_object(deployment, "NetworkPolicy", f"{deployment.name}-dds-{domain}", api="networking.k8s.io/v1"),
         "spec": spec,
     }
 
 
 def _literal(text: str) -> str:
-    """Kubernetes puts variables in the place of ``$(NAME)``."""
+    """Kubernetes expands ``$(NAME)``."""
     return text.replace("$(", "$$(")

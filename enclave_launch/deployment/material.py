@@ -1,10 +1,8 @@
-"""The files of enclaves as a keystore or an imported bundle has them, and when the first of them ends. Reads only."""
+"""The files of enclaves as a keystore or an imported bundle has them. Reads only."""
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Iterable, Mapping
-from datetime import datetime
 from typing import NamedTuple
 
 from enclave_common.words import some_of
@@ -19,8 +17,12 @@ PUBLIC_FILES = tuple(name for name in layout.RUNTIME_FILES if name != layout.KEY
 
 
 class EnclaveMaterial(NamedTuple):
-    """``public``: file name -> content, the CRL among them where there is one. ``key`` is None where it is only on
-    its host."""
+    """The files of an enclave.
+
+    Attributes:
+        public: File name -> content, including the CRL if there is one.
+        key: None if it never left its host.
+    """
 
     enclave: str
     public: Mapping[str, bytes]
@@ -29,26 +31,13 @@ class EnclaveMaterial(NamedTuple):
     def __repr__(self) -> str:
         return f"EnclaveMaterial({self.enclave!r})"
 
-    @property
-    def version(self) -> str:
-        """Other with every change: a new key comes with a new certificate. Says nothing about the key."""
-        digest = hashlib.sha256()
-        for name, content in sorted(self.public.items()):
-            digest.update(f"{name}\0{len(content)}\0".encode() + content)
-        return digest.hexdigest()[:10]
 
+def read_material(keystore: str, enclaves: Iterable[str]) -> dict[str, EnclaveMaterial]:
+    """Return enclave -> its files.
 
-class Material(NamedTuple):
-    """``ends``: when the first thing that these enclaves use ends, and ``what`` that is."""
-
-    enclaves: Mapping[str, EnclaveMaterial]
-    ends: datetime
-    what: str
-    has_crl: bool
-
-
-def read_material(keystore: str, enclaves: Iterable[str]) -> Material:
-    """Raises ``ProvisionError`` for an enclave that is not there, is not complete, or has ended."""
+    Raises:
+        ProvisionError: An enclave is not there, is not complete, or is not valid now.
+    """
     wanted = sorted(set(enclaves))
     root = resolve_root(keystore)
     view = KeystoreView(root)
@@ -61,7 +50,7 @@ def read_material(keystore: str, enclaves: Iterable[str]) -> Material:
         raise ProvisionError(
             f"{first.subject} in {keystore} is not valid now; renew it first: secure-keystore renew {keystore}"
         )
-    return Material(found, first.not_after, first.subject, view.has_crl)
+    return found
 
 
 def _enclave(view: KeystoreView, enclave: str) -> EnclaveMaterial:

@@ -1,30 +1,38 @@
 """A deployment as systemd units: one service for each process, one target for all. Pure.
 
-Each service runs as a user of its own, and gets exactly the files of its enclave as credentials (systemd.exec(5)):
-copied by the manager into memory that only this user reads, so the keystore stays root's. Credentials are flat; one
-link makes the enclave's directory of them. Quoting: systemd.syntax(7), systemd.service(5).
+A unit names where its enclave is; what is there is read at each start. Each service runs as a user of its own and gets
+the files of its enclave as credentials (systemd.exec(5)): copied by the manager into memory that only this user reads,
+so the keystore stays root's. Credentials are flat; links make the enclave's directory of them. The list of files never
+changes: ``SetCredential=`` stands in for a CRL that the keystore does not have (yet, or any more).
+Quoting: systemd.syntax(7), systemd.service(5).
 """
 
 from __future__ import annotations
 
+import posixpath
 import re
 import shlex
 from collections.abc import Iterator, Mapping
 
-from enclave_launch.deployment.deployment import Deployment, File, one_line, runtime_names, source_of
+from enclave_launch.deployment.deployment import Deployment, File, one_line
 from enclave_launch.deployment.processes import DeployedProcess
+from enclave_launch.process import Respawn
 from enclave_launch.security_environment import ENABLE, KEYSTORE, OVERRIDE, STRATEGY
 from keystore.disk import layout
+from keystore.disk.units import ENCLAVE_KEY, NO_CRL, NODE_KEY
 from keystore.formats.hosts import Needs
 
 _PLAIN = re.compile(r"[A-Za-z0-9_@+=:,./~-]+\Z")
 _STOP_SECONDS = 10  # launch sends SIGINT, then SIGTERM after 5 s, then SIGKILL after 5 more
+_RESTART_SECONDS = 0.5  # at least: without a pause a process that fails is started some 30 times a second
+_NO_MORE_RETRIES = 177
+_HOMES = ("/home/", "/root/", "/run/user/")
+_EXPIRES_SOON = "14d"
 _HARDENING = """\
 NoNewPrivileges=yes
 CapabilityBoundingSet=
 AmbientCapabilities=
 ProtectSystem=strict
-ProtectHome=yes
 PrivateTmp=yes
 ProtectProc=invisible
 ProtectKernelTunables=yes
@@ -48,29 +56,39 @@ LimitCORE=0
 def systemd_files(
     deployment: Deployment, *, keystore: str, parameters: str, setup: tuple[str, ...] = ()
 ) -> dict[str, File]:
-    """File name -> file. ``keystore``: where bundles are imported on the host; ``parameters``: where the generated
-    parameter files are installed; ``setup``: shell files that set up ROS, sourced before each process."""
+    """Return file name -> file.
+
+    Args:
+        keystore: Where bundles are imported on the host.
+        parameters: Where the generated parameter files are installed.
+        setup: Shell files that set up ROS, sourced before each process.
+    """
     files = {f"{deployment.name}.target": File(_target(deployment))}
     for process in deployment.processes:
         unit = _service(deployment, process, keystore, parameters, setup)
         files[unit_name(deployment, process)] = File(unit)
         files |= deployment.parameter_files(process)
-    files["rolling-restart"] = File(_rolling_restart(deployment), 0o755)
+    files[f"{deployment.name}-expiry.service"] = File(_expiry(deployment, keystore, setup))
+    files[f"{deployment.name}-expiry.timer"] = File(_timer(deployment))
     return files
 
 
 def unit_name(deployment: Deployment, process: DeployedProcess) -> str:
-    """Of the service."""
+    """Return the name of the service."""
     return f"{deployment.name}-{process.name}.service"
 
 
 def _target(deployment: Deployment) -> str:
-    """What ends the launch is bound: when it ends the target ends, and with it all that is part of it."""
+    """Return the target, which lists the services in the order of a rolling restart.
+
+    What ends the launch is bound: when it ends the target ends, and with it all that is part of it.
+    """
+    bound = {one.name for one in deployment.processes if one.process in deployment.ends_launch}
     lines = ["[Unit]", f"Description=ROS 2: {_specifiers(one_line(deployment.source))}"]
-    for process in deployment.processes:
-        unit = unit_name(deployment, process)
-        bound = process.process in deployment.ends_launch
-        lines += [f"BindsTo={unit}", f"After={unit}"] if bound else [f"Wants={unit}"]
+    for name in deployment.order:
+        unit = f"{deployment.name}-{name}.service"
+        lines += [f"BindsTo={unit}", f"After={unit}"] if name in bound else [f"Wants={unit}"]
+    lines.append(f"Wants={deployment.name}-expiry.timer")
     return deployment.header() + "\n".join((*lines, "", "[Install]", "WantedBy=multi-user.target", ""))
 
 
@@ -78,44 +96,44 @@ def _service(
     deployment: Deployment, process: DeployedProcess, keystore: str, parameters: str, setup: tuple[str, ...]
 ) -> str:
     lines = [
-        *_unit_section(deployment, process),
+        *_unit_section(deployment, process, keystore),
         "",
         "[Service]",
         "Type=exec",
         "DynamicUser=yes",
+        f"SyslogIdentifier={process.name}",
         *_environment(deployment, process),
-        *_credentials(deployment, process, keystore),
-        *_start(deployment, process, parameters, setup),
-        *_restart(process),
+        *_credentials(process, keystore),
+        *_start(deployment, process, keystore, parameters, setup),
+        *_restart(process.respawn),
         "",
         *_HARDENING.splitlines(),
+        *_home(process, setup),
         *_hardening_of(process.needs),
         "",
-        "[Install]",
-        f"WantedBy={deployment.name}.target",
-        "",
     ]
-    return deployment.header() + "\n".join(lines)
+    return deployment.mark() + "\n".join(lines)
 
 
-def _unit_section(deployment: Deployment, process: DeployedProcess) -> Iterator[str]:
+def _unit_section(deployment: Deployment, process: DeployedProcess, keystore: str) -> Iterator[str]:
     what = process.fqn or process.process
     where = f"in enclave {process.enclave}" if process.enclave is not None else "without an enclave"
     yield "[Unit]"
     yield f"Description=ROS 2: {_specifiers(one_line(what))} {where}"
-    yield f"# {one_line(process.place)}"
-    yield "Wants=network-online.target"
+    yield f"# {one_line(process.place.rpartition(':')[0])}"
+    yield f"{NODE_KEY}={one_line(what)}"
+    if process.enclave is not None:
+        yield f"{ENCLAVE_KEY}={process.enclave}"
+        # Without it a process that is respawned would be started again and again, in vain.
+        yield f"AssertPathExists={_specifiers(keystore)}/{layout.source_of(process.enclave, layout.CERT)}"
+    yield "Wants=network-online.target time-sync.target"
     yield "After=network-online.target time-sync.target"
     yield f"PartOf={deployment.name}.target"
-    if process.respawn is not None and process.respawn.retries >= 0:
-        yield "StartLimitIntervalSec=infinity"
-        yield f"StartLimitBurst={process.respawn.retries + 1}"
-    else:
-        yield "StartLimitIntervalSec=0"
+    yield "StartLimitIntervalSec=0"
 
 
 def _environment(deployment: Deployment, process: DeployedProcess) -> Iterator[str]:
-    """The keystore is known only when the unit starts, see ``_start``."""
+    """Return all variables but the keystore's, which is known only when the unit starts."""
     folder = unit_name(deployment, process).removesuffix(".service")
     variables: Mapping[str, str] = process.variables("")
     if process.enclave is not None:
@@ -129,26 +147,29 @@ def _environment(deployment: Deployment, process: DeployedProcess) -> Iterator[s
     yield f"LogsDirectory={folder}"
 
 
-def _credentials(deployment: Deployment, process: DeployedProcess, keystore: str) -> Iterator[str]:
-    material = deployment.enclave_of(process)
-    if material is None:
+def _credentials(process: DeployedProcess, keystore: str) -> Iterator[str]:
+    if process.enclave is None:
         return
-    for name in runtime_names(material):
-        yield f"LoadCredential={name}:{_specifiers(keystore)}/{source_of(material, name)}"
-    yield f"RuntimeDirectory={unit_name(deployment, process).removesuffix('.service')}"
-    yield "RuntimeDirectoryMode=0700"
+    for name in (*layout.RUNTIME_FILES, layout.ENCLAVE_CRL):
+        # Behind the keystore's links: systemd takes a stand-in for a missing file, but not for a link that dangles.
+        yield f"LoadCredential={name}:{_specifiers(keystore)}/{layout.source_of(process.enclave, name)}"
+    yield f"SetCredential={layout.ENCLAVE_CRL}:{NO_CRL}"
 
 
 def _start(
-    deployment: Deployment, process: DeployedProcess, parameters: str, setup: tuple[str, ...]
+    deployment: Deployment, process: DeployedProcess, keystore: str, parameters: str, setup: tuple[str, ...]
 ) -> Iterator[str]:
+    unit = unit_name(deployment, process)
+    yield f"RuntimeDirectory={unit.removesuffix('.service')}"
+    yield "RuntimeDirectoryMode=0700"
     if process.enclave is not None:
-        place = layout.enclave_directory(process.enclave)
-        above = place.rpartition("/")[0]
-        # The root enclave's directory is enclaves/ itself.
-        make = f'mkdir -p "$RUNTIME_DIRECTORY/{above}" && ' if above else ""
-        link = f'ln -sfn "$CREDENTIALS_DIRECTORY" "$RUNTIME_DIRECTORY/{place}"'
-        yield f"ExecStartPre=/bin/sh -c {quoted(make + link)}"
+        cert = f"{keystore}/{layout.source_of(process.enclave, layout.CERT)}"
+        yield "TimeoutStartSec=infinity"
+        yield f"ExecStartPre=+/bin/sh -c {quoted(_wait_for_the_clock(cert))}"
+        yield f"ExecStartPre=/bin/sh -c {quoted(_link_credentials(process.enclave))}"
+    if _retries(process.respawn) is not None:
+        show = f'systemctl show --property=NRestarts --value {unit} > "$RUNTIME_DIRECTORY/restarts"'
+        yield f"ExecStartPre=+/bin/sh -c {quoted(f'umask 022; {show}')}"
     if process.cwd is not None:
         yield f"WorkingDirectory={_specifiers(one_line(process.cwd))}"
     script = _script(process, setup)
@@ -159,9 +180,34 @@ def _start(
     yield f"TimeoutStopSec={_STOP_SECONDS}"
 
 
+def _wait_for_the_clock(cert: str) -> str:
+    """A board without a battery starts with a clock at which nothing is valid yet."""
+    return (
+        f"imported=$(stat -L -c %Y {cert}) || exit 1; "
+        '[ "$(date +%s)" -ge "$imported" ] || '
+        f'echo "the clock is earlier than the import of {cert}; waiting until it is set" >&2; '
+        'until [ "$(date +%s)" -ge "$imported" ]; do sleep 1; done'
+    )
+
+
+def _link_credentials(enclave: str) -> str:
+    """Make the enclave's directory; the stand-in for a CRL is none."""
+    return (
+        f'place="$RUNTIME_DIRECTORY/{layout.enclave_directory(enclave)}" && mkdir -p "$place" && '
+        'ln -sf "$CREDENTIALS_DIRECTORY"/* "$place" && '
+        f'if [ "$(cat "$place/{layout.ENCLAVE_CRL}")" = {NO_CRL} ]; then rm "$place/{layout.ENCLAVE_CRL}"; fi'
+    )
+
+
 def _script(process: DeployedProcess, setup: tuple[str, ...]) -> str:
     """Security last: what sets up ROS cannot take it away."""
-    parts = [f". {shlex.quote(file)}" for file in setup]
+    parts = []
+    if (retries := _retries(process.respawn)) is not None:
+        parts.append(
+            f'{{ [ "$(cat "$RUNTIME_DIRECTORY/restarts")" -le {retries} ] || '
+            f"{{ echo 'respawned {retries} times, as respawn_max_retries allows' >&2; exit {_NO_MORE_RETRIES}; }}; }}"
+        )
+    parts += [f". {shlex.quote(file)}" for file in setup]
     exports = [f"{ENABLE}=true", f"{STRATEGY}=Enforce"]
     if process.enclave is not None:
         exports.append(f'{KEYSTORE}="$RUNTIME_DIRECTORY"')
@@ -171,23 +217,55 @@ def _script(process: DeployedProcess, setup: tuple[str, ...]) -> str:
     return " && ".join((*parts, 'exec "$@"'))
 
 
-def _restart(process: DeployedProcess) -> Iterator[str]:
-    """As the launch file says; a refused process is not started again and again unless it says so."""
-    if process.respawn is None:
+def _retries(respawn: Respawn | None) -> int | None:
+    """Return how often launch starts the process again, None without a limit."""
+    return respawn.retries if respawn is not None and respawn.retries >= 0 else None
+
+
+def _restart(respawn: Respawn | None) -> Iterator[str]:
+    """Restart as the launch file says.
+
+    ``StartLimitBurst=`` would count manual starts as well, so the process counts by ``NRestarts``, which does not.
+    """
+    if respawn is None:
         yield "Restart=no"
         return
     yield "Restart=always"
-    yield f"RestartSec={process.respawn.delay:g}"
+    yield f"RestartSec={max(respawn.delay, _RESTART_SECONDS):g}"
+    if _retries(respawn) is not None:
+        yield f"RestartPreventExitStatus={_NO_MORE_RETRIES}"
+
+
+def _home(process: DeployedProcess, setup: tuple[str, ...]) -> Iterator[str]:
+    """Hide the home directories, but for what the process is started from; that can be read only."""
+    folders = home_paths(process, setup)
+    yield f"ProtectHome={'tmpfs' if folders else 'yes'}"
+    if folders:
+        yield f"BindReadOnlyPaths={' '.join(quoted(folder, dollars=False) for folder in folders)}"
+
+
+def home_paths(process: DeployedProcess, setup: tuple[str, ...]) -> tuple[str, ...]:
+    """Return what below home directories the process needs: workspaces, and files named in its command."""
+    found: list[str] = []
+    for file in setup:
+        folder = posixpath.dirname(file)
+        # With colcon's --symlink-install the files of install/ are links to src/ and build/ beside it.
+        found.append(posixpath.dirname(folder) if posixpath.basename(folder) == "install" else folder)
+    found += [word.partition("/lib/")[0] for word in (*process.command, process.cwd or "")]
+    below = sorted({one for one in found if f"{one}/".startswith(_HOMES) and one + "/" not in _HOMES})
+    return tuple(one for one in below if not any(one.startswith(f"{other}/") for other in below))
 
 
 def _hardening_of(needs: Needs) -> Iterator[str]:
-    """What the hosts file says that the process needs is left open, nothing else."""
+    """Leave open what the hosts file says that the process needs, nothing else."""
     if needs.devices:
         yield "PrivateDevices=no"
         yield "DevicePolicy=closed"
         yield from (f"DeviceAllow={device} rw" for device in needs.devices)
     else:
         yield "PrivateDevices=yes"
+    if needs.groups:
+        yield f"SupplementaryGroups={' '.join(needs.groups)}"
     yield f"MemoryDenyWriteExecute={'no' if needs.writable_code else 'yes'}"
     yield f"RestrictRealtime={'no' if needs.realtime else 'yes'}"
     yield "SystemCallFilter=@system-service"
@@ -199,31 +277,44 @@ def _hardening_of(needs: Needs) -> Iterator[str]:
         yield f"MemoryMax={needs.memory.removesuffix('i')}"
 
 
-def _rolling_restart(deployment: Deployment) -> str:
-    """For new certificates or permissions: sources before what they influence, one at a time."""
-    units = [f"{deployment.name}-{name}.service" for name in deployment.order]
+def _expiry(deployment: Deployment, keystore: str, setup: tuple[str, ...]) -> str:
+    """Return the service that fails, and so is listed by ``systemctl --failed``, when something expires soon."""
+    command = ["secure-keystore", "status", keystore, "--within", _EXPIRES_SOON]
+    script = " && ".join((*(f". {shlex.quote(file)}" for file in setup), f"exec {shlex.join(command)}"))
     lines = (
-        "#!/bin/sh",
-        deployment.header().rstrip("\n"),
-        "# Restart what runs, one after the other, sources first; stops at the first that does not come up again.",
-        "# With names of units as arguments only those, in this order.",
-        "set -eu",
-        "for unit in \\",
-        *(f"    {unit} \\" for unit in units),
-        "; do",
-        '    [ $# -eq 0 ] || case " $* " in *" $unit "*) ;; *) continue ;; esac',
-        '    systemctl is-active --quiet "$unit" || continue',
-        '    systemctl restart "$unit"',
-        "    sleep 2",
-        '    systemctl is-active --quiet "$unit" || { echo "$unit did not come up again" >&2; exit 1; }',
-        "done",
+        "[Unit]",
+        f"Description=Warn before certificates and permissions in {_specifiers(keystore)} expire",
+        f"PartOf={deployment.name}.target",
+        "",
+        "[Service]",
+        "Type=oneshot",
+        f"SyslogIdentifier={deployment.name}-expiry",
+        f"ExecStart=/bin/sh -c {quoted(script)}",
+        "",
+        *_HARDENING.splitlines(),
+        "ProtectHome=read-only",
+        *_hardening_of(Needs()),
         "",
     )
-    return "\n".join(lines)
+    return deployment.mark() + "\n".join(lines)
+
+
+def _timer(deployment: Deployment) -> str:
+    lines = (
+        "[Unit]",
+        f"Description=Look every day what expires soon for {deployment.name}",
+        f"PartOf={deployment.name}.target",
+        "",
+        "[Timer]",
+        "OnActiveSec=1min",
+        "OnUnitActiveSec=1d",
+        "",
+    )
+    return deployment.mark() + "\n".join(lines)
 
 
 def quoted(text: str, *, dollars: bool = True) -> str:
-    """One word as systemd reads it; ``dollars``: where it expands variables (ExecStart=, not Environment=)."""
+    """Return one word as systemd reads it. ``dollars``: it expands variables there (ExecStart=, not Environment=)."""
     escaped = _specifiers(text)
     if dollars:
         escaped = escaped.replace("$", "$$")

@@ -5,6 +5,7 @@
                enclaves/governance.{xml,p7s}                  one for all
                enclaves/<path>/...                            one directory per enclave; / is enclaves/ itself
                zenoh/router.{json5,cert.pem,key.pem}          of the Zenoh router, where enclaves are on Zenoh
+               containers/e.<path>/...                        of an imported keystore: enclaves for containers
 
 All paths here are POSIX text relative to the keystore, so that they read the same in reports and tests.
 """
@@ -18,6 +19,7 @@ from keystore.formats.enclave_name import segments, validate_enclave_name
 from keystore.formats.role import Role
 
 PUBLIC, PRIVATE, ENCLAVES = "public", "private", "enclaves"
+CONTAINERS = "containers"
 STAGING = ".staging"
 LOCK = ".lock"
 GITIGNORE = ".gitignore"
@@ -126,11 +128,23 @@ def crl_link(enclave: str) -> str:
     return _links(len(segments(enclave)))[ENCLAVE_CRL]
 
 
+def container_directory(enclave: str) -> str:
+    """Return where an imported keystore has ``enclave`` once more, as files that belong to a container's user."""
+    return f"{CONTAINERS}/{flat_name(enclave)}"
+
+
 def link_source(name: str) -> str:
     """The keystore file that an enclave's link called ``name`` stands for."""
     if name == ENCLAVE_CRL:
         return CRL
     return GOVERNANCE if name == ENCLAVE_GOVERNANCE else f"{PUBLIC}/{name}"
+
+
+def source_of(enclave: str, name: str) -> str:
+    """Return the keystore file behind the file ``name`` of ``enclave``, which may be a link."""
+    if name in (KEY, KEY_URI, CERT, PERMISSIONS):
+        return f"{enclave_directory(enclave)}/{name}"
+    return link_source(name)
 
 
 CA_LINKS = {

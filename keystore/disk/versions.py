@@ -68,7 +68,7 @@ class Versions:
         return staging
 
     def switch(self, number: int) -> None:
-        """Puts what was staged in force, then deletes what was before: its keys are no longer used.
+        """Put what was staged in force, then delete what was before, unless containers may have mounted it.
 
         Beside a version with this number, which is being restored, the new one is ``NUMBER.1`` and so on.
         """
@@ -98,13 +98,26 @@ class Versions:
         return folder == self.folder.name and _VERSION.fullmatch(version) is not None
 
     def _clear(self) -> None:
-        kept = {PENDING, layout.LOCK, *([self.current.name] if self.current else [])}
+        kept = {PENDING, layout.LOCK, *([self.current.name] if self.current else []), *self._mounted()}
         for name in sorted(set(os.listdir(self.folder)) - kept):
             path = self.folder / name
             if path.is_dir() and not path.is_symlink():
                 shutil.rmtree(path)
             else:
                 os.unlink(path)
+
+    def _mounted(self) -> list[str]:
+        """Return the version before the one in force if it has copies for containers.
+
+        podman mounts the folder that the link named when the container was made; without it a restart fails.
+        """
+        others = [
+            name
+            for name in os.listdir(self.folder)
+            if _VERSION.fullmatch(name) and self.folder / name != self.current
+            and (self.folder / name / layout.CONTAINERS).is_dir()
+        ]  # fmt: skip
+        return [max(others, key=lambda name: tuple(map(int, name.split("."))))] if others else []
 
 
 def write_tree(root: Path, entries: Mapping[str, Content | Link], *, durable: bool = False) -> None:

@@ -76,3 +76,10 @@ def check_distinct(names: Iterable[str]) -> None:
 def _prefixes(name: str) -> Iterable[str]:
     parts = segments(name)
     return ("/" + "/".join(parts[:count]) for count in range(1, len(parts) + 1))
+
+
+def from_flat_name(name: str) -> str | None:
+    """Return the enclave that ``e.front.camera`` stands for, None if it is not such a name."""
+    first, *parts = name.split(".")
+    enclave = "/" + "/".join(parts)
+    return enclave if first == "e" and _ENCLAVE.match(enclave) else None

@@ -10,6 +10,7 @@
     needs:                                 # what the hardening of secure-plan export must leave open
       - nodes: ["/camera/*"]
         devices: [/dev/video0]
+        groups: [video]                    # that the devices belong to
         realtime: false                    # may choose its own scheduling
         writable_code: false               # makes code while it runs (JIT compilers)
         memory: 256Mi                      # limit
@@ -35,6 +36,7 @@ from keystore.formats.strict_yaml import Strict, StrictDocument, parse_strict
 
 _MEMORY = re.compile(r"[1-9][0-9]{0,6}[KMG]i\Z")
 _DEVICE = re.compile(r"/dev/[A-Za-z0-9._/-]+\Z")
+_GROUP = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]{0,31}\Z")
 
 
 class HostPatterns(NamedTuple):
@@ -52,6 +54,7 @@ class Needs(NamedTuple):
     realtime: bool = False
     writable_code: bool = False
     memory: str | None = None
+    groups: tuple[str, ...] = ()
 
 
 class NodeNeeds(NamedTuple):
@@ -93,6 +96,7 @@ class Hosts(NamedTuple):
             any(one.realtime for one in found),
             any(one.writable_code for one in found),
             next((one.memory for one in reversed(found) if one.memory is not None), None),
+            tuple(sorted({group for one in found for group in one.groups})),
         )
 
     def _of(self, what: str, name: str, patterns: dict[str, tuple[str, ...]]) -> str | None:
@@ -120,6 +124,7 @@ class _Needs(Strict):
     realtime: StrictBool = False
     writable_code: StrictBool = False
     memory: Optional[StrictStr] = None
+    groups: list[StrictStr] = Field(default_factory=list)
 
 
 class _Document(StrictDocument):
@@ -149,4 +154,8 @@ def _needs(one: _Needs, where: str) -> NodeNeeds:
     for device in one.devices:
         if not _DEVICE.match(device) or ".." in device:
             raise InvalidInputError(f"{where}: devices: {printable(device)} is not a path below /dev")
-    return NodeNeeds(tuple(one.nodes), Needs(tuple(one.devices), one.realtime, one.writable_code, one.memory))
+    for group in one.groups:
+        if not _GROUP.match(group):
+            raise InvalidInputError(f"{where}: groups: {printable(group)} is not a group's name or number")
+    needs = Needs(tuple(one.devices), one.realtime, one.writable_code, one.memory, tuple(one.groups))
+    return NodeNeeds(tuple(one.nodes), needs)

@@ -17,6 +17,13 @@ from typing import NamedTuple
 
 from keystore.disk import layout, lock, safe_files, store
 from keystore.disk.archive import read_bundle
+from keystore.disk.container_copies import (
+    ContainerUser,
+    container_entries,
+    container_owner,
+    differing_copies,
+    give_to,
+)
 from keystore.disk.deployed import differing_files
 from keystore.disk.store import Content, Link
 from keystore.disk.versions import Versions
@@ -59,6 +66,7 @@ class ImportOptions:
     host: str | None = None
     authorities: tuple[str, ...] = ()
     accept_weaker: tuple[str, ...] = ()
+    owner: ContainerUser | None = None
     lock_timeout: float = lock.DEFAULT_TIMEOUT
     now: datetime | None = None
 
@@ -95,15 +103,26 @@ def import_bundle(
         present = _present(versions.current)
         found = _checked(content, printable(bundle), present, chosen)
         differing: list[str] = []
+        owned = container_owner(versions.current) if versions.current is not None else None
+        owner = chosen.owner or owned
         if present is not None and versions.current is not None and found.manifest == present:
             differing = [name for name, _ in differing_files(KeystoreView(versions.current), present)]
-            if not differing:
+            differing += [name for name, _ in differing_copies(versions.current)]
+            if not differing and owner == owned:
                 said = ("this bundle is in force already",)
                 return ImportReport(versions.root, present, (), (), Restart.NOBODY, said)
         elif present is not None:
             _refuse_earlier(found, present)
         _refuse_weaker(found, present, chosen.accept_weaker)
-        return _put_in_force(versions, found, present, chosen.now or utc_now(), differing)
+        return _put_in_force(versions, found, present, chosen.now or utc_now(), differing, owner)
+
+
+def parse_owner(text: str) -> ContainerUser:
+    """Return the owner that ``UID:GID`` names. Raises InvalidInputError."""
+    uid, _, gid = text.partition(":")
+    if not (uid.isdecimal() and gid.isdecimal()):
+        raise InvalidInputError(f"--owner {printable(text)} is not UID:GID in numbers, such as 10001:10001")
+    return ContainerUser(int(uid), int(gid))
 
 
 def _present(version: Path | None) -> Manifest | None:
@@ -246,12 +265,21 @@ def _refuse_weaker(found: _Bundle, present: Manifest | None, accepted: Iterable[
 
 
 def _put_in_force(
-    versions: Versions, found: _Bundle, present: Manifest | None, now: datetime, differing: Collection[str]
+    versions: Versions,
+    found: _Bundle,
+    present: Manifest | None,
+    now: datetime,
+    differing: Collection[str],
+    owner: ContainerUser | None,
 ) -> ImportReport:
     """``differing``: files that are not as the same bundle left them, and are restored."""
     keys = {one.enclave: find_key(versions, one) for one in found.manifest.enclaves if not one.has_key}
-    staged = versions.stage(_entries(found, keys))
+    entries = _entries(found, keys)
+    copies = container_entries(found.manifest.names, entries) if owner is not None else {}
+    staged = versions.stage({**entries, **copies})
     try:
+        if owner is not None:
+            give_to(staged, owner)
         notes = _refuse_unfit(staged, found.place, now)
         versions.switch(found.manifest.number)
     finally:

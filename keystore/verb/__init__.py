@@ -27,7 +27,7 @@ from keystore.verb.common import add_table
 
 VERBS = (
     "create", "create-enclave", "apply-policy", "list", "status", "verify", "renew", "remove", "export",
-    "import", "request", "sign", "fleet", "governance", "shares", "tool-enclave", "zenoh", "denials",
+    "import", "units", "request", "sign", "fleet", "governance", "shares", "tool-enclave", "zenoh", "denials",
 )  # fmt: skip
 
 

@@ -3,18 +3,23 @@
 The first import pins the CAs (--require-ca, twice) and the host's name; later ones refuse what another CA signed,
 another host's bundle, an earlier one, what was changed or cut off, and a governance weaker than the default. The bundle
 in force restores what was changed since. KEYSTORE becomes a link to the version in force; ROS_SECURITY_KEYSTORE names
-it. What is printed last is who has to be restarted.
+it. What is printed last is who has to be restarted; --restart does it, by the systemd units of this host.
 """
 
 from __future__ import annotations
 
 import argparse
+import os
 import socket
+from pathlib import Path
 
-from enclave_common.command_line import PATH, TEXT, TEXTS
+from enclave_common.command_line import FLAG, PATH, TEXT, TEXTS
+from keystore.disk.units import Unit, in_restart_order
 from keystore.disk.versions import Versions
-from keystore.steps.importing import ImportOptions, import_bundle
+from keystore.steps.host_units import UnitOptions, differences, installed_units, stop
+from keystore.steps.importing import ImportOptions, ImportReport, Restart, import_bundle, parse_owner
 from keystore.verb import common
+from keystore.verb.units import restarted
 
 OPTIONS: common.Table = (
     common.KEYSTORE,
@@ -24,6 +29,10 @@ OPTIONS: common.Table = (
      "which CA may do what: identity=SHA256 and permissions=SHA256; both at the first import; repeatable"),
     ("--accept-weaker ATTRIBUTE", TEXTS,
      "take a governance in which this attribute is weaker than the default; repeatable"),
+    ("--owner UID:GID", TEXT,
+     "for containers: write each enclave once more, as a directory of its own that belongs to this user; remembered"),
+    ("--restart", FLAG, "restart the units that have to be, and stop those of enclaves that are gone"),
+    *common.UNITS,
     common.FORMAT,
     common.LOCK,
 )  # fmt: skip
@@ -35,7 +44,11 @@ def run(arguments: argparse.Namespace) -> int:
     if host is None and Versions(arguments.keystore).current is None:
         host = socket.gethostname()
     options = ImportOptions(
-        host, tuple(arguments.require_ca), tuple(arguments.accept_weaker), arguments.lock_timeout
+        host,
+        tuple(arguments.require_ca),
+        tuple(arguments.accept_weaker),
+        parse_owner(arguments.owner) if arguments.owner is not None else None,
+        arguments.lock_timeout,
     )
     report = import_bundle(arguments.keystore, arguments.bundle, options=options)
     content = {
@@ -52,5 +65,24 @@ def run(arguments: argparse.Namespace) -> int:
         f"to restart: {report.restart.value}",
     )
     common.print_answer(arguments, content, lines)
-    common.warn(report.notes, arguments)
-    return 0
+    unit_options = common.unit_options(arguments)
+    units = [one for one in installed_units(unit_options) if _is_of(one, arguments.keystore)]
+    common.warn((*report.notes, *differences(units, report.manifest)), arguments)
+    return _restart(report, units, unit_options) if arguments.restart else 0
+
+
+def _is_of(unit: Unit, keystore: Path) -> bool:
+    return unit.target == unit.name or unit.keystore == os.path.abspath(keystore)
+
+
+def _restart(report: ImportReport, units: list[Unit], options: UnitOptions) -> int:
+    processes = in_restart_order(units)
+    gone = [one for one in processes if one.enclave not in report.manifest.names]
+    stop(gone)
+    common.print_lines(f"{one.name}: stopped, its enclave is gone" for one in gone)
+    left = [one for one in processes if one not in gone]
+    if report.restart is Restart.NOBODY:
+        return 0
+    if report.restart is Restart.CHANGED:
+        left = [one for one in left if one.enclave in report.changed]
+    return restarted(left, options, together=report.restart is Restart.TOGETHER)

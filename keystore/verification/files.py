@@ -13,6 +13,7 @@ from pathlib import Path
 
 from enclave_common.files import read_bytes
 from keystore.disk import layout, safe_files
+from keystore.disk.container_copies import differing_copies
 from keystore.errors import InvalidEnclaveNameError, printable
 from keystore.formats.enclave_name import check_distinct, validate_enclave_name
 from keystore.formats.role import Role
@@ -20,7 +21,7 @@ from keystore.verification import repair
 from keystore.verification.contents import check_content, holds_private_key
 from keystore.verification.finding import Finding, Severity
 
-_TOP = frozenset({layout.PUBLIC, layout.PRIVATE, layout.ENCLAVES, layout.ZENOH})
+_TOP = frozenset({layout.PUBLIC, layout.PRIVATE, layout.ENCLAVES, layout.ZENOH, layout.CONTAINERS})
 _KNOWN = frozenset({
     layout.LOCK, layout.GITIGNORE, layout.SETTINGS, layout.CRL, layout.GOVERNANCE_XML, layout.GOVERNANCE,
     layout.SHARED_CA_CERT, layout.SHARED_CA_KEY, layout.SUPERSEDED, layout.REGISTER, layout.CRL_UNLINKED,
@@ -51,6 +52,9 @@ def check_files(root: Path) -> Iterator[Finding]:
             yield from _check_directory(root, relative, info, names)
         else:
             yield from _check_file(root, relative, info)
+    for relative, problem in differing_copies(root):
+        fix = "import the bundle again: secure-keystore import KEYSTORE HOST.bundle"
+        yield Finding(Severity.ERROR, "container-copy", relative, problem, fix)
     try:
         check_distinct(names)
     except InvalidEnclaveNameError as error:
@@ -74,7 +78,7 @@ def _walk(root: Path, relative: str) -> Iterator[tuple[str, os.stat_result]]:
         name = f"{relative}/{entry.name}".lstrip("/")
         info = entry.stat(follow_symlinks=False)
         yield name, info
-        if stat.S_ISDIR(info.st_mode) and name not in _UNFINISHED:
+        if stat.S_ISDIR(info.st_mode) and name not in (*_UNFINISHED, layout.CONTAINERS):
             yield from _walk(root, name)
 
 

@@ -119,14 +119,19 @@ class StandIn:
         )
 
     def _load_credentials(self) -> None:
+        """A file that is missing has the content of SetCredential=, if that names it (systemd.exec(5))."""
+        instead = dict(line.split(":", 1) for line in self._unit.all("SetCredential"))
         for line in self._unit.all("LoadCredential"):
             name, _, source = line.partition(":")
             target = self._root / "credentials" / name
-            shutil.copyfile(self._expanded(source), target)
+            if name in instead and not os.path.lexists(self._expanded(source)):
+                target.write_text(instead[name])
+            else:
+                shutil.copyfile(self._expanded(source), target)
             os.chmod(target, 0o400)
 
     def _command(self, line: str) -> list[str]:
-        found = [self._expanded(word) for word in words(line)]
+        found = [self._expanded(word) for word in words(line.removeprefix("+"))]
         assert "$" not in "".join(found).replace("$$", ""), f"systemd would expand a variable: {line}"
         return [word.replace("$$", "$") for word in found]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import re
 import subprocess
@@ -13,8 +14,6 @@ import pytest
 import yaml
 
 from keystore.disk import layout
-from keystore.formats.validity import iso
-from keystore.steps.expiry import status
 from keystore.steps.host_bundles import export_hosts, pinned
 from keystore.steps.host_keys import request
 from keystore.steps.importing import ImportOptions, import_bundle
@@ -40,7 +39,7 @@ ODD = """<launch>
 </launch>"""
 NEEDS = """version: 1
 needs:
-  - {nodes: [/front/*], devices: [/dev/video0], realtime: true, writable_code: true, memory: 1Gi}
+  - {nodes: [/front/*], devices: [/dev/video0], groups: [video], realtime: true, writable_code: true, memory: 1Gi}
 """
 LAUNCHES = {"talk": TALK, "demo": DEMO, "odd": ODD, "fifty": fleet_of_fifty()}
 
@@ -71,8 +70,9 @@ def test_every_unit_is_closed_as_far_as_its_needs_allow(tmp_path: Path) -> None:
     """1.5 is "OK" by systemd's scale; a unit without any of it has 9.6, "UNSAFE"."""
     out = made("systemd", tmp_path, LAUNCHES["fifty"])
     levels = exposure(sorted(out.glob("*.service")))
-    assert len(levels) == 50
-    assert set(levels.values()) == {1.5}
+    assert len(levels) == 51, "and the one that looks what expires"
+    assert set(levels.values()) - {1.5} <= {levels["ros-robot-expiry.service"]}
+    assert levels["ros-robot-expiry.service"] < 2.5
 
 
 def test_needs_open_what_they_name_and_nothing_else(tmp_path: Path) -> None:
@@ -86,7 +86,8 @@ def test_needs_open_what_they_name_and_nothing_else(tmp_path: Path) -> None:
         if line not in closed and "speaker" not in line and not line.startswith("# /")
     }
     assert opened == {
-        "PrivateDevices=no", "DevicePolicy=closed", "DeviceAllow=/dev/video0 rw", "MemoryDenyWriteExecute=no",
+        "PrivateDevices=no", "DevicePolicy=closed", "DeviceAllow=/dev/video0 rw",
+        "SupplementaryGroups=video", "MemoryDenyWriteExecute=no",
         "RestrictRealtime=no", "SystemCallFilter=~@privileged", "LimitRTPRIO=99", "LimitMEMLOCK=infinity",
         "MemoryMax=1G",
     }  # fmt: skip
@@ -96,12 +97,63 @@ def test_needs_open_what_they_name_and_nothing_else(tmp_path: Path) -> None:
     assert 1.5 < exposure([out / "ros-robot-front-speaker.service"])["ros-robot-front-speaker.service"] < 3
 
 
-def test_a_unit_loads_exactly_the_files_of_its_enclave(tmp_path: Path) -> None:
+def test_a_unit_loads_exactly_the_files_of_its_enclave_and_a_crl_as_soon_as_there_is_one(
+    tmp_path: Path,
+) -> None:
     unit = Unit(made("systemd", tmp_path) / "ros-robot-front-speaker.service")
     loaded = dict(line.split(":", 1) for line in unit.all("LoadCredential"))
-    assert set(loaded) == set(layout.RUNTIME_FILES)
+    assert set(loaded) == {*layout.RUNTIME_FILES, "crl.pem"}
+    assert unit.all("SetCredential") == ["crl.pem:none"], "it starts without one, too"
     assert not [source for source in loaded.values() if "private" in source or "/ear" in source]
     assert loaded["key.pem"] == "/etc/ros/keystore/enclaves/front/speaker/key.pem"
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_neither_dates_nor_other_nodes_nor_a_revocation_change_what_runs_a_process(
+    tmp_path: Path, engine: str
+) -> None:
+    more = TALK.replace("<launch>", '<launch>\n  <node pkg="demo_nodes" exec="talker" name="first"/>')
+    out = made(engine, tmp_path, more)
+    before = workloads(out)
+    launch, ks = tmp_path / "robot.launch.xml", tmp_path / "ks"
+    renew(ks, ["/ear"], options=RenewOptions(provisioning=options(lifetime=timedelta(days=9))))
+    remove(ks, ["/first"], options=RemoveOptions(durable=False))
+    launch.write_text(TALK)
+    assert export(engine, launch, ks, out) == 0
+    after = workloads(out)
+    assert set(after) < set(before)
+    assert after == {name: before[name] for name in after}
+
+
+def workloads(out: Path) -> dict[str, Any]:
+    """Name -> what runs a process: a unit, a service of Compose, a Deployment."""
+    if (out / "compose.yaml").exists():
+        return dict(yaml.safe_load((out / "compose.yaml").read_text())["services"])
+    units = {path.name: path.read_text() for path in out.glob("*.service")}
+    return units or objects(out, "Deployment")
+
+
+def test_renewing_one_enclave_changes_its_secret_and_nothing_else(tmp_path: Path) -> None:
+    out = made("kubernetes", tmp_path)
+    launched, before = (out / "launch.yaml").read_text(), objects(out, "Secret")
+    renew(tmp_path / "ks", ["/ear"], options=RenewOptions(provisioning=options()))
+    export("kubernetes", tmp_path / "robot.launch.xml", tmp_path / "ks", out)
+    after = objects(out, "Secret")
+    assert [name for name in after if after[name] != before[name]] == ["enclave-ear"]
+    assert (out / "launch.yaml").read_text() == launched
+
+
+def test_a_workspace_below_home_can_be_read_and_no_other_folder_there(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    made("systemd", tmp_path / "a", TALK)
+    closed = Unit(tmp_path / "a/out/ros-robot-ear.service")
+    assert closed.one("ProtectHome") == "yes" and closed.all("BindReadOnlyPaths") == []
+    capsys.readouterr()
+    made("systemd", tmp_path / "b", TALK, "--setup", "/home/me/ws/install/setup.sh")
+    opened = Unit(tmp_path / "b/out/ros-robot-ear.service")
+    assert opened.one("ProtectHome") == "tmpfs" and opened.all("BindReadOnlyPaths") == ["/home/me/ws"]
+    assert "/ear reads below a home directory: /home/me/ws is left readable" in capsys.readouterr().err
 
 
 def test_words_and_values_come_through_systemds_syntax(tmp_path: Path) -> None:
@@ -113,11 +165,8 @@ def test_words_and_values_come_through_systemds_syntax(tmp_path: Path) -> None:
     environment = dict(word.split("=", 1) for line in unit.all("Environment") for word in words(line))
     assert environment["GREETING"] == '50%% of "$HOME" %%n'
     assert unit.one("WorkingDirectory") == "/tmp"
-    assert (unit.one("Restart"), unit.one("RestartSec"), unit.one("StartLimitBurst")) == (
-        "always",
-        "2.5",
-        "4",
-    )
+    assert (unit.one("Restart"), unit.one("RestartSec")) == ("always", "2.5")
+    assert unit.all("StartLimitBurst") == [], "it would count manual starts"
     (shell,) = out.glob("*echo*.service")
     assert words(Unit(shell).one("ExecStart"))[-3:] == ["/bin/sh", "-c", "echo $$HOME | cat"]
     (parameters,) = out.glob("parameters/*")
@@ -144,16 +193,30 @@ def compose(tmp_path: Path, text: str = TALK, *more: str) -> dict[str, Any]:
     return content
 
 
-def test_a_service_sees_its_key_as_a_secret_and_no_other_file_of_anyone(tmp_path: Path) -> None:
+def test_a_service_mounts_the_directory_of_its_enclave_and_no_other_file_of_anyone(tmp_path: Path) -> None:
     content = compose(tmp_path)
-    speaker = content["services"]["front-speaker"]
-    assert [one["target"] for one in speaker["secrets"]] == ["/keystore/enclaves/front/speaker/key.pem"]
-    assert {one["target"].rpartition("/")[2] for one in speaker["configs"]} == {*layout.RUNTIME_FILES} - {
-        "key.pem"
-    }
-    assert not [one for one in content["configs"].values() if one["file"].endswith("key.pem")]
-    sources = [content["configs"][one["source"]]["file"] for one in speaker["configs"]]
-    assert not [source for source in sources if "/ear" in source or "private" in source]
+    (volume,) = content["services"]["front-speaker"]["volumes"]
+    assert volume == {
+        "type": "bind", "source": "/etc/ros/keystore/containers/e.front.speaker",
+        "target": "/keystore/enclaves/front/speaker", "read_only": True, "bind": {"create_host_path": False},
+    }  # fmt: skip
+    assert not {"configs", "secrets"} & set(content), "podman-compose ignores configs"
+
+
+def test_several_hosts_share_their_network_with_the_containers_or_are_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    launch = launch_file(tmp_path)
+    ks = provisioned(launch, tmp_path / "ks")
+    hosts = tmp_path / "hosts.yaml"
+    hosts.write_text("version: 1\nhosts:\n  arm: {nodes: [/ear]}\n  base: {enclaves: ['/front/*']}\n")
+    words = ("compose", launch, ks, tmp_path / "out", "--hosts", str(hosts))
+    assert export(*words) == 2
+    assert "would not hear each other" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+    assert export(*words, "--host-network") == 0
+    content = yaml.safe_load((tmp_path / "out/arm/compose.yaml").read_text())
+    assert content["services"]["ear"]["network_mode"] == "host" and "networks" not in content
 
 
 def test_compose_expands_nothing_of_ours(tmp_path: Path) -> None:
@@ -186,34 +249,57 @@ def objects(out: Path, kind: str) -> dict[str, dict[str, Any]]:
 
 def test_keys_are_in_secrets_and_nowhere_else(tmp_path: Path) -> None:
     out = made("kubernetes", tmp_path)
-    key = (tmp_path / "ks/enclaves/ear/key.pem").read_text()
     assert len(objects(out, "Secret")) == 2
     assert mode(out / "secrets.yaml") == 0o600
     assert "PRIVATE KEY" not in (out / "launch.yaml").read_text()
-    assert key.splitlines()[1] not in (out / "launch.yaml").read_text()
-    for one in objects(out, "ConfigMap").values():
-        assert "key.pem" not in one["data"]
-    assert {tuple(one["data"]) for one in objects(out, "Secret").values()} == {("key.pem",)}
+    for enclave in ("ear", "front/speaker"):
+        data = objects(out, "Secret")[f"enclave-{enclave.replace('/', '-')}"]["data"]
+        assert set(data) == set(layout.RUNTIME_FILES)
+        assert base64.b64decode(data["key.pem"]) == (tmp_path / f"ks/enclaves/{enclave}/key.pem").read_bytes()
 
 
-def test_a_pod_sees_its_enclave_and_new_material_has_a_new_name(tmp_path: Path) -> None:
-    out = made("kubernetes", tmp_path)
-    before = objects(out, "Deployment")["ear"]["spec"]["template"]["spec"]
-    sources = before["volumes"][0]["projected"]["sources"]
-    names = {next(iter(one.values()))["name"] for one in sources}
-    assert len(names) == 1 and names <= set(objects(out, "Secret")) & set(objects(out, "ConfigMap"))
-    assert before["containers"][0]["volumeMounts"][0]["mountPath"] == "/keystore/enclaves/ear"
-    renew(tmp_path / "ks", ["/ear"], options=RenewOptions(provisioning=options()))
-    export("kubernetes", tmp_path / "robot.launch.xml", tmp_path / "ks", out)
-    after = objects(out, "Deployment")
-    assert after["ear"]["spec"]["template"]["spec"]["volumes"] != before["volumes"]
-    assert set(objects(out, "Secret")) & names == set()
+def test_a_pod_sees_its_enclave(tmp_path: Path) -> None:
+    pod = objects(made("kubernetes", tmp_path), "Deployment")["ear"]["spec"]["template"]["spec"]
+    assert pod["volumes"][0] == {
+        "name": "enclave",
+        "secret": {"secretName": "enclave-ear", "defaultMode": 0o440},
+    }
+    assert pod["containers"][0]["volumeMounts"][0]["mountPath"] == "/keystore/enclaves/ear"
+
+
+def test_peers_are_those_of_all_hosts_and_stand_in_one_place(tmp_path: Path) -> None:
+    hosts = tmp_path / "hosts.yaml"
+    hosts.write_text("version: 1\nhosts:\n  arm: {nodes: [/ear]}\n  base: {enclaves: ['/front/*']}\n")
+    out = made("kubernetes", tmp_path, TALK, "--hosts", str(hosts))
+    arm, base = objects(out / "arm", "ConfigMap"), objects(out / "base", "ConfigMap")
+    assert arm == base
+    assert arm["ros-robot-peers-0"]["data"] == {"ROS_STATIC_PEERS": "ear;front-speaker"}
+    (ear,) = objects(out / "arm", "Deployment")["ear"]["spec"]["template"]["spec"]["containers"]
+    assert ear["env"][-1] == {
+        "name": "ROS_STATIC_PEERS",
+        "valueFrom": {"configMapKeyRef": {"name": "ros-robot-peers-0", "key": "ROS_STATIC_PEERS"}},
+    }
+    assert set(objects(out / "arm", "Service")) == {"ear"}, "a name for each peer, on the host that has it"
+
+
+def test_objects_have_labels_and_no_namespace_and_reserve_little(tmp_path: Path) -> None:
+    out = made("kubernetes", tmp_path, ODD)
+    listed = [one for path in out.glob("*.yaml") for one in yaml.safe_load_all(path.read_text())]
+    assert {one["metadata"]["labels"]["app.kubernetes.io/part-of"] for one in listed} == {"ros-robot"}
+    assert not [one for one in listed if "namespace" in one["metadata"] or one["kind"] == "Namespace"]
+    for one in objects(out, "Deployment").values():
+        (container,) = one["spec"]["template"]["spec"]["containers"]
+        assert container["resources"]["requests"] == {"memory": "64Mi", "cpu": "50m"}
+    renamed = [{**one, "metadata": {**one["metadata"], "namespace": "other"}} for one in listed]
+    (tmp_path / "renamed.yaml").write_text(yaml.safe_dump_all(renamed))
+    validate = tool("kubernetes-validate", "pip install kubernetes-validate")
+    assert run(validate, "--strict", tmp_path / "renamed.yaml").returncode == 0
 
 
 def test_only_members_of_the_domain_talk(tmp_path: Path) -> None:
     out = made("kubernetes", tmp_path, ODD)
     (policy,) = objects(out, "NetworkPolicy").values()
-    own = {"matchLabels": {"ros-launch": "ros-robot", "ros-domain": "0"}}
+    own = {"matchLabels": {"app.kubernetes.io/part-of": "ros-robot", "ros-domain": "0"}}
     assert policy["spec"]["podSelector"] == own
     assert policy["spec"]["ingress"] == [{"from": [{"podSelector": own}], "ports": [{"protocol": "UDP"}]}]
     outside = [one for name, one in objects(out, "Deployment").items() if name.startswith("echo")]
@@ -225,22 +311,12 @@ def test_a_key_that_is_only_on_its_host_is_not_written(tmp_path: Path) -> None:
     ks = provisioned(launch, tmp_path / "ks")
     sign_requests(ks, request(tmp_path / "host", ["/ear"]), options=SigningOptions(provisioning=options()))
     assert export("kubernetes", launch, ks, tmp_path / "out") == 0
-    assert [name for name in objects(tmp_path / "out", "Secret") if "ear" in name] == []
-    assert [name for name in objects(tmp_path / "out", "ConfigMap") if "ear" in name]
+    secrets = objects(tmp_path / "out", "Secret")
+    assert "key.pem" not in secrets["enclave-ear"]["data"]
+    assert "key.pem" in secrets["enclave-front-speaker"]["data"]
 
 
 # All of them
-
-
-@pytest.mark.parametrize("engine", ENGINES)
-def test_the_earliest_end_is_written_into_each_file(tmp_path: Path, engine: str) -> None:
-    launch = launch_file(tmp_path)
-    ks = provisioned(launch, tmp_path / "ks")
-    renew(ks, ["/ear"], options=RenewOptions(provisioning=options(lifetime=timedelta(days=9))))
-    assert export(engine, launch, ks, tmp_path / "out") == 0
-    first = status(ks).expiries[0]
-    for path in (tmp_path / "out").glob("*"):
-        assert f"# ends: {iso(first.not_after)} ({first.subject})" in path.read_text()
 
 
 @pytest.mark.parametrize("engine", ENGINES)
@@ -297,15 +373,3 @@ def test_a_saved_plan_and_an_imported_bundle_do_as_well(tmp_path: Path, engine: 
     for path in (path for path in out.rglob("*") if path.is_file()):
         again = tmp_path / "again" / path.relative_to(out)
         assert path.read_text() == again.read_text().replace(str(saved), str(launch))
-
-
-def test_a_crl_is_loaded_where_there_is_one(tmp_path: Path) -> None:
-    launch = launch_file(
-        tmp_path, TALK.replace("</launch>", '<node pkg="demo_nodes" exec="talker" name="x"/></launch>')
-    )
-    ks = provisioned(launch, tmp_path / "ks")
-    remove(ks, ["/x"], options=RemoveOptions(durable=False))
-    launch.write_text(TALK)
-    assert export("systemd", launch, ks, tmp_path / "out") == 0
-    unit = Unit(tmp_path / "out/ros-robot-ear.service")
-    assert "crl.pem:/etc/ros/keystore/public/crl.pem" in unit.all("LoadCredential")

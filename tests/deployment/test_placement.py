@@ -113,10 +113,11 @@ def test_a_process_on_no_host_is_told_and_nothing_is_exported(
 def test_each_host_gets_a_folder_with_its_own_processes(tmp_path: Path, engine: str) -> None:
     launch = launch_file(tmp_path)
     ks = provisioned(launch, tmp_path / "ks")
-    assert export(engine, launch, ks, tmp_path / "out", "--hosts", hosts_file(tmp_path)) == 0
+    more = ("--host-network",) if engine == "compose" else ()
+    assert export(engine, launch, ks, tmp_path / "out", "--hosts", hosts_file(tmp_path), *more) == 0
     arm, base = ("".join(path.read_text() for path in (tmp_path / "out" / host).rglob("*") if path.is_file())
                  for host in ("arm", "base"))  # fmt: skip
-    assert "/front/speaker" not in arm and "enclaves/ear" in arm
+    assert "--enclave /front/speaker" not in arm and "- /front/speaker" not in arm and "enclaves/ear" in arm
     assert "--enclave /ear" not in base and "- /ear" not in base and "/front/speaker" in base
 
 

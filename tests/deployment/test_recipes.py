@@ -18,7 +18,7 @@ from keystore.steps.host_keys import request
 from keystore.steps.importing import ImportOptions, import_bundle
 from keystore.steps.renewal import RenewOptions, renew
 from keystore.verification import verify
-from tests.deployment.kit import made, tool
+from tests.deployment.kit import TALK, made, tool
 from tests.keystore.kit import filled, openssl, options, policy
 from tests.keystore.test_external_ca import ExternalCa
 
@@ -28,7 +28,7 @@ RECIPES = dict(re.findall(r"<!-- recipe: (.*?) -->\n```sh\n(.*?)```", TEXT, re.D
 
 
 def test_the_recipes_are_found() -> None:
-    assert set(RECIPES) == {"rolling restart", "external ca", "age", "systemd-creds"}
+    assert set(RECIPES) == {"restart", "external ca", "age", "systemd-creds"}
 
 
 def follow(name: str, folder: Path, **environment: str) -> str:
@@ -111,21 +111,21 @@ def test_a_key_is_bound_to_the_machine(tmp_path: Path) -> None:
 
 
 def test_an_import_is_followed_by_restarts_in_order(tmp_path: Path) -> None:
-    """With a systemctl that only notes what it is asked."""
-    made("systemd", tmp_path)
+    """With a systemctl for which everything runs; a real one is in test_booted.py."""
+    made("systemd", tmp_path, TALK, "--host-keystore", str(tmp_path / "ks-of-host"))
     (tmp_path / "out").rename(tmp_path / "deploy")
+    for unit in (tmp_path / "deploy").glob("*.service"):
+        unit.write_text(unit.read_text().replace("ks-of-host", "ks"))
     (tmp_path / "ks").rename(tmp_path / "ca")
     next_bundle(tmp_path, "*")
     (tmp_path / "fake").mkdir()
-    (tmp_path / "fake/systemctl").write_text('#!/bin/sh\necho "$@"\n')
-    (tmp_path / "fake/sleep").write_text("#!/bin/sh\n")
-    for path in (tmp_path / "fake").iterdir():
-        path.chmod(0o755)
-    printed = follow(
-        "rolling restart", tmp_path, PATH=f"{tmp_path}/programs:{tmp_path}/fake:{os.environ['PATH']}"
+    (tmp_path / "fake/systemctl").write_text(
+        f'#!/bin/sh\necho "$@" >> {tmp_path}/asked\necho ActiveState=inactive\necho Result=success\n'
     )
+    (tmp_path / "fake/systemctl").chmod(0o755)
+    printed = follow("restart", tmp_path, PATH=f"{tmp_path}/programs:{tmp_path}/fake:{os.environ['PATH']}")
     assert "to restart: the changed enclaves, one after the other" in printed
-    assert re.findall("^restart (.*)$", printed, re.M) == [
+    assert re.findall("^restart (.*)$", (tmp_path / "asked").read_text(), re.M) == [
         "ros-robot-front-speaker.service",
         "ros-robot-ear.service",
     ]

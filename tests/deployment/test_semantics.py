@@ -121,7 +121,9 @@ def test_devices_and_real_time_are_said_to_the_engines_that_know_them(
     launch = launch_file(tmp_path, TALK, "robot.launch.xml")
     ks = provisioned(launch, tmp_path / "ks")
     hosts = tmp_path / "hosts.yaml"
-    hosts.write_text("version: 1\nneeds:\n  - {nodes: [/front/*], devices: [/dev/video0], realtime: true}\n")
+    hosts.write_text(
+        "version: 1\nneeds:\n  - {nodes: [/front/*], devices: [/dev/video0], groups: [video], realtime: true}\n"
+    )
     words = (engine, launch, ks, tmp_path / "out")
     status = export(*words, "--hosts", str(hosts))
     error = capsys.readouterr().err
@@ -130,6 +132,9 @@ def test_devices_and_real_time_are_said_to_the_engines_that_know_them(
         assert export(*words, "--hosts", str(hosts), "--accept-unexpressed") == 0
     else:
         assert (status, error) == (0, "")
+        hosts.write_text(hosts.read_text().replace("groups: [video], ", ""))
+        assert export(*words, "--hosts", str(hosts)) == 0
+        assert "name the group of the device" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("engine", ENGINES)

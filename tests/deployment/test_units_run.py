@@ -8,7 +8,6 @@ from __future__ import annotations
 import os
 import shlex
 import signal
-import subprocess
 import sys
 import time
 from collections.abc import Iterator
@@ -155,33 +154,3 @@ def test_participants_of_imported_bundles_talk_between_two_hosts_on_fast_dds(
         listening.wait_for_voices({"speaker"})
         time.sleep(0.5)
         assert listening.answers().voices == {"speaker"}, listening.answers().log + talking.answers().log
-
-
-def test_the_rolling_restart_goes_in_order_and_stops_where_a_unit_does_not_come_up(tmp_path: Path) -> None:
-    from tests.deployment.kit import made
-
-    script = made("systemd", tmp_path) / "rolling-restart"
-    fake = tmp_path / "bin"
-    fake.mkdir()
-    (fake / "sleep").write_text("#!/bin/sh\n")
-    (fake / "systemctl").write_text(
-        f'#!/bin/sh\necho "$@" >> {tmp_path}/log\n'
-        f'[ "$1" != restart ] || touch {tmp_path}/restarted-$2\n'
-        f'[ "$1" != is-active ] || [ ! -e {tmp_path}/restarted-$BROKEN ] || [ "$3" != "$BROKEN" ]\n'
-    )
-    for path in fake.iterdir():
-        path.chmod(0o755)
-
-    def run(broken: str, *units: str) -> tuple[int, list[str]]:
-        (tmp_path / "log").write_text("")
-        for path in tmp_path.glob("restarted-*"):
-            path.unlink()
-        env = {"PATH": f"{fake}:/usr/bin:/bin", "BROKEN": broken}
-        status = subprocess.run([script, *units], env=env, capture_output=True).returncode
-        lines = (tmp_path / "log").read_text().splitlines()
-        return status, [line.removeprefix("restart ") for line in lines if line.startswith("restart ")]
-
-    speaker, ear = "ros-robot-front-speaker.service", "ros-robot-ear.service"
-    assert run("none") == (0, [speaker, ear]), "who speaks before who listens"
-    assert run("none", ear) == (0, [ear])
-    assert run(speaker) == (1, [speaker])

@@ -35,7 +35,7 @@ from enclave_launch.deployment.semantics import (
     unexpressed,
     unexpressed_needs,
 )
-from enclave_launch.deployment.systemd import systemd_files
+from enclave_launch.deployment.systemd import home_paths, systemd_files
 from enclave_launch.errors import ManifestError, UsageError
 from enclave_launch.review.document import plan_from_document
 from enclave_launch.review.information_flow import flow_graph
@@ -57,11 +57,13 @@ OPTIONS = {
          "where bundles are imported on the hosts (/etc/ros/keystore)"),
     ),
     "systemd": (
-        ("--setup FILE", TEXTS, "sourced before each process, such as /opt/ros/jazzy/setup.sh; repeatable"),
+        ("--setup FILE", TEXTS,
+         "the workspace's, such as /opt/robot/install/setup.sh: sourced before each process; repeatable"),
     ),
     "compose and kubernetes": (
         ("--image", TEXT, "of every process; its entrypoint sets up ROS"),
         ("--user", {"default": "10001:10001"}, "uid:gid in Compose's containers (10001:10001)"),
+        ("--host-network", FLAG, "Compose: containers share the host's network, as several hosts need"),
     ),
 }  # fmt: skip
 
@@ -79,12 +81,14 @@ def run(options: argparse.Namespace) -> int:
     _refuse_lost(lost, engine, options.accept_unexpressed)
     _refuse_nowhere(placement)
     several = list(placement.hosts) != [ONLY_HOST]
+    _refuse_separate_networks(placement, engine, options.host_network)
+    shared = _deployment(document, placement, lost, options)
     made = {}
     for host, own in placement.hosts.items():
         if own:
             folder = options.output / host if several else options.output
-            deployment = _deployment(document, own, host if several else None, lost, options)
-            made[folder] = _files(deployment, options)
+            made[folder] = _files(_on_host(shared, host if several else None, own), options)
+    _report(processes, engine, options.setup)
     changed = [str(folder / name) for folder, files in made.items() for name in write_folder(folder, files)]
     sys.stdout.write("".join(f"{printable(name)}\n" for name in changed) or "nothing changed\n")
     return 0
@@ -136,30 +140,74 @@ def _refuse_nowhere(placement: Placement) -> None:
         )
 
 
+def _refuse_separate_networks(placement: Placement, engine: Engine, host_network: bool) -> None:
+    """Raises ``UsageError`` if containers could not reach those of other hosts."""
+    hosts = [host for host, own in placement.hosts.items() if own]
+    if engine is Engine.COMPOSE and len(hosts) > 1 and not host_network:
+        raise UsageError(
+            f"a network of Compose ends at its host, so processes on {', '.join(hosts)} would not hear each other. "
+            "Share the hosts' network with the containers: --host-network (they are then not separated from what "
+            "else is on it); or use --format systemd or kubernetes"
+        )
+
+
+def _report(processes: list[DeployedProcess], engine: Engine, setup: list[str]) -> None:
+    """Warn about what works only if the host is prepared for it."""
+    told = []
+    for one in processes:
+        if one.needs.devices and not one.needs.groups and engine is not Engine.KUBERNETES:
+            told.append(
+                f"{one.fqn or one.process} may open {', '.join(one.needs.devices)} only if every user may: name the "
+                "group of the device in the hosts file (needs: groups: [video])"
+            )
+        homes = home_paths(one, tuple(setup)) if engine is Engine.SYSTEMD else ()
+        if homes:
+            told.append(
+                f"{one.fqn or one.process} reads below a home directory: {', '.join(homes)} is left readable"
+            )
+    for text in told:
+        print(f"secure-plan: warning: {message(text)}", file=sys.stderr)
+
+
 def _deployment(
     document: Mapping[str, Any],
-    processes: tuple[DeployedProcess, ...],
-    host: str | None,
+    placement: Placement,
     lost: tuple[Unexpressed, ...],
     options: argparse.Namespace,
 ) -> Deployment:
+    """Return the deployment of all hosts together."""
     graph = flow_graph(plan_from_document(document))
     notes = differences(document, Engine(options.format))
     file = Path([word for word in options.words if ":=" not in word][-1])
     for note in notes:
         print(f"secure-plan: warning: {note}", file=sys.stderr)
+    processes = tuple(one for own in placement.hosts.values() for one in own)
+    secured = [one for one in processes if one.enclave is not None]
     return Deployment(
         name=label(options.name or f"ros-{file.name.partition('.')[0]}"),
         source=" ".join(options.words),
-        host=host,
+        host=None,
         processes=processes,
         order=tuple(one.name for one in in_restart_order(processes, graph)),
-        material=read_material(
-            options.keystore, [one.enclave for one in processes if one.enclave is not None]
-        ),
+        members={
+            domain: tuple(sorted(one.name for one in secured if one.domain == domain))
+            for domain in {one.domain for one in secured}
+        },
+        material=read_material(options.keystore, [one.enclave for one in secured if one.enclave is not None]),
         ends_launch=ends_launch(document),
         lost=lost,
         notes=notes,
+    )
+
+
+def _on_host(shared: Deployment, host: str | None, processes: tuple[DeployedProcess, ...]) -> Deployment:
+    names = {one.name for one in processes}
+    enclaves = {one.enclave for one in processes}
+    return shared._replace(
+        host=host,
+        processes=processes,
+        order=tuple(name for name in shared.order if name in names),
+        material={path: one for path, one in shared.material.items() if path in enclaves},
     )
 
 
@@ -169,6 +217,11 @@ def _files(deployment: Deployment, options: argparse.Namespace) -> dict[str, Fil
         parameters = f"/etc/ros/{deployment.name}/parameters"
         return systemd_files(deployment, keystore=keystore, parameters=parameters, setup=tuple(options.setup))
     if options.format == "compose":
-        return compose_files(deployment, image=options.image, user=options.user, keystore=keystore)
-
+        return compose_files(
+            deployment,
+            image=options.image,
+            user=options.user,
+            keystore=keystore,
+            host_network=options.host_network,
+        )
     return kubernetes_files(deployment, image=options.image)

@@ -1,0 +1,287 @@
+"""Day two on a booted systemd: what is revoked, renewed, rolled over, added or removed reaches the units of a host.
+
+Units are exported once, at the beginning, and never again unless a node comes or goes.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator
+from datetime import timedelta
+from pathlib import Path
+
+import pytest
+
+from keystore.formats.role import Role
+from keystore.steps.host_bundles import BundleOptions, HostBundle, export_hosts, pinned
+from keystore.steps.removal import RemoveOptions, remove
+from keystore.steps.renewal import RenewOptions, renew
+from keystore.steps.rollover import Step, roll_over
+from tests.deployment.booted import Machine, NotPermitted, booted
+from tests.deployment.kit import export, launch_file, provisioned
+from tests.deployment.networks import LOOPBACK
+from tests.deployment.test_units_run import set_up_ros
+from tests.keystore.kit import options
+
+pytestmark = pytest.mark.dds
+
+LONGEST = 30.0  # seconds; only what hangs takes so long
+DAY = timedelta(days=1)
+KS = "/etc/ros/keystore"
+SPEAKER, EAR, SPY = (f"ros-robot-{name}.service" for name in ("speaker", "ear", "spy"))
+HEARD = "I heard: [Hello World: "
+
+
+def node(executable: str, name: str, more: str = "") -> str:
+    uri = LOOPBACK.cyclonedds_uri.replace('"', "&quot;").replace("<", "&lt;")
+    return (
+        f'<node pkg="demo_nodes" exec="{executable}" name="{name}"><env name="CYCLONEDDS_URI" value="{uri}"/>'
+        f'<param name="rate" value="10"/><param name="seconds" value="600"/>{more}'
+        '<remap from="chatter" to="/talk"/></node>'
+    )
+
+
+def robot(*nodes: str) -> str:
+    return f"""<launch>
+      <set_env name="RMW_IMPLEMENTATION" value="rmw_cyclonedds_cpp"/>
+      {"".join(nodes)}
+    </launch>"""
+
+
+TALKING = (node("talker", "speaker"), node("listener", "ear"), node("listener", "spy"))
+GIVEN_UP = "respawned 2 times, as respawn_max_retries allows"
+RESPAWNED = (
+    '<executable cmd="false" enclave="/flaky" respawn="true" respawn_max_retries="2" respawn_delay="0.1"/>'
+)
+
+
+class Host:
+    """A booted machine, the CA that makes its bundles, and the launch that it runs."""
+
+    def __init__(self, machine: Machine, folder: Path):
+        self.machine = machine
+        self.ca = folder / "ca"
+        self._folder = folder
+        self._number = 0
+        self._setup = "/srv/" + Path(set_up_ros(folder)).name
+
+    def launch(self, text: str, *words: str) -> Path:
+        """Provision ``text`` and export its units; where they are."""
+        out = self._folder / f"units{len(words)}"
+        file = launch_file(self._folder, text)
+        provisioned(file, self.ca)
+        assert export("systemd", file, self.ca, out, "--setup", self._setup, *words) == 0
+        return out
+
+    def bundle(self) -> HostBundle:
+        self._number += 1
+        output = self._folder / f"bundle{self._number}"
+        return export_hosts(self.ca, output, {"robot": ["*"]}, options=BundleOptions(durable=False))[0]
+
+    def keystore(self, *words: str | Path, status: int | None = 0) -> str:
+        """Run secure-keystore there; no process is watched for longer than is needed here."""
+        more = ("--settle", "0.3") if words[0] in ("import", "units") else ()
+        command = (Path(sys.executable).parent / "secure-keystore", *words, *more)
+        try:
+            return self.machine.run("env", f"PATH={os.environ['PATH']}", *command, status=status)
+        except AssertionError as error:
+            log = self.machine.run("journalctl", "--no-pager", "--unit=ros-*", "--lines=40", status=None)
+            raise AssertionError(f"{error}\n{log}") from None
+
+    def take(self, *words: str | Path, status: int = 0) -> str:
+        """Bring what the CA has now to the host, and restart what has to be."""
+        return self.keystore("import", KS, self.bundle().path, "--restart", *words, status=status)
+
+    def hears(self, unit: str) -> bool:
+        return HEARD in self.machine.journal(unit)
+
+
+def until(what: Callable[[], bool], told: Callable[[], str]) -> None:
+    end = time.monotonic() + LONGEST
+    while not what():
+        assert time.monotonic() < end, told()
+        time.sleep(0.2)
+
+
+@pytest.fixture(scope="module")
+def host(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Host]:
+    folder = tmp_path_factory.mktemp("robot")
+    for parent in (folder, *folder.parents[:2]):
+        os.chmod(parent, 0o755)  # services have users of their own
+    (folder / "shared").mkdir()
+    try:
+        with booted(folder / "root", folder / "shared") as machine:
+            yield Host(machine, folder / "shared")
+    except NotPermitted as missing:
+        pytest.skip(f"this machine cannot boot systemd in namespaces: {missing}")
+
+
+@pytest.fixture(scope="module")
+def running(host: Host) -> Host:
+    """Day one: units exported from a keystore without a CRL, installed, and a bundle imported."""
+    units = host.launch(robot(*TALKING))
+    host.keystore("units", "install", units)
+    bundle = host.bundle()
+    pins = [word for pin in pinned(bundle.manifest) for word in ("--require-ca", pin)]
+    host.machine.run("mkdir", "-p", "/etc/ros")
+    host.keystore("import", KS, bundle.path, "--host", "robot", *pins)
+    for name in (SPEAKER, EAR, SPY):
+        assert f"{name}: up" in host.keystore("units", "restart", name)
+    until(lambda: host.hears(EAR) and host.hears(SPY), lambda: host.machine.journal(EAR))
+    return host
+
+
+def test_units_talk(running: Host) -> None:
+    assert "secured by enclave /ear" in running.machine.journal(EAR)
+    assert running.machine.run("systemctl", "is-enabled", "ros-robot.target").strip() == "enabled"
+
+
+def test_a_renewal_restarts_the_unit_of_the_renewed_enclave_and_no_other(running: Host) -> None:
+    others = {name: running.machine.property(name, "MainPID") for name in (EAR, SPY)}
+    renew(running.ca, ["/speaker"], options=RenewOptions(provisioning=options()))
+    assert up(running.take()) == [SPEAKER]
+    assert {name: running.machine.property(name, "MainPID") for name in others} == others
+
+
+def up(printed: str) -> list[str]:
+    return [line.removesuffix(": up") for line in printed.splitlines() if line.endswith(": up")]
+
+
+def test_a_ca_is_rolled_over_and_the_units_that_were_exported_before_start(running: Host) -> None:
+    for step in (Step.START, Step.SWITCH, Step.FINISH):
+        roll_over(running.ca, step, tuple(Role), options=options())
+        assert {SPEAKER, EAR, SPY} <= set(up(running.take()))
+    until(lambda: running.hears(EAR), lambda: running.machine.journal(EAR))
+
+
+def test_a_revoked_listener_is_refused_by_units_that_were_exported_before_any_revocation(
+    running: Host,
+) -> None:
+    """Its host took no part: it goes on with the keystore that it had."""
+    machine = running.machine
+    stolen = "/etc/ros/stolen"
+    machine.run("sh", "-c", f"cp -a $(realpath {KS}) {stolen}")
+    unit = machine.run("cat", f"/etc/systemd/system/{SPY}")
+    machine.write("/etc/systemd/system/spy.service", unit.replace(f"{KS}/", f"{stolen}/"))
+    machine.run("systemctl", "daemon-reload")
+    machine.run("systemctl", "start", "spy")
+    until(lambda: running.hears("spy"), lambda: machine.journal("spy"))
+
+    remove(running.ca, ["/spy"], options=RemoveOptions(durable=False))
+    printed = running.take()
+    assert f"{SPY}: stopped, its enclave is gone" in printed
+    assert f"{SPY} runs enclave /spy, which this bundle does not have" in printed
+    assert {SPEAKER, EAR} <= set(up(printed))
+    machine.run("systemctl", "restart", "spy")
+    until(lambda: running.hears(EAR), lambda: machine.journal(EAR))
+    assert not running.hears("spy"), "who is not revoked has heard the speaker since"
+    machine.run("systemctl", "stop", "spy")
+
+
+def test_after_a_revocation_a_new_ca_drops_the_crl_and_the_units_start(running: Host) -> None:
+    assert running.machine.run("ls", f"{KS}/public").split().count("crl.pem") == 1
+    for step in (Step.START, Step.SWITCH, Step.FINISH):
+        roll_over(running.ca, step, tuple(Role), options=options())
+        assert {SPEAKER, EAR} <= set(up(running.take()))
+    assert "crl.pem" not in running.machine.run("ls", f"{KS}/public").split()
+    until(lambda: running.hears(EAR), lambda: running.machine.journal(EAR))
+
+
+def test_a_node_that_leaves_the_launch_file_is_stopped_and_a_new_one_is_started(running: Host) -> None:
+    units = running.launch(robot(*TALKING[:2], node("listener", "new")))
+    running.take()
+    printed = running.keystore("units", "install", units, "--restart")
+    assert f"{SPY}: stopped and removed" in printed
+    assert up(printed) == ["ros-robot-new.service"], "and no other was restarted"
+    until(lambda: running.hears("ros-robot-new.service"), lambda: running.machine.journal("ros-robot-new"))
+
+
+def test_a_unit_is_called_by_its_node_or_enclave_and_unknown_names_are_refused(running: Host) -> None:
+    for name in ("/ear", "ros-robot-ear", EAR):
+        assert up(running.keystore("units", "restart", name)) == [EAR]
+    assert "no installed unit, node or enclave is called" in running.keystore(
+        "units", "restart", "ea", status=2
+    )
+
+
+def test_a_process_is_respawned_as_often_as_the_launch_file_says_however_often_it_is_started_by_hand(
+    running: Host,
+) -> None:
+    running.keystore("units", "install", running.launch(robot(RESPAWNED), "--name", "flaky"))
+    name = "flaky-false.service"
+
+    def said() -> str:
+        # By its identifier: of a process that is gone already the journal may not find out the unit.
+        return running.machine.run("journalctl", "--no-pager", "--identifier=false", status=None)
+
+    printed = running.keystore("units", "restart", name, status=1)
+    assert "its enclave is not in the keystore" in printed, "and it is not started again and again, in vain"
+    assert running.machine.property(name, "ActiveState") == "inactive"
+    running.take(status=1)
+    until(lambda: running.machine.property(name, "ActiveState") == "failed", said)
+    before = said().count(GIVEN_UP)
+    running.machine.run("systemctl", "start", name, status=None)
+    until(lambda: said().count(GIVEN_UP) > before, said)
+    until(lambda: running.machine.property(name, "ActiveState") == "failed", said)
+    assert running.machine.property(name, "NRestarts") == "3", "two tries more, then one that only says so"
+
+
+def test_a_restart_stops_at_the_first_that_does_not_stay_up_and_says_how_to_go_on(running: Host) -> None:
+    printed = running.keystore("units", "restart", "flaky", "ros-robot", status=1)
+    assert up(printed) == [], "flaky.target is the first by name"
+    assert "error: flaky-false.service is" in printed
+    assert f"go on with\n    secure-keystore units restart flaky-false.service {SPEAKER} {EAR}" in printed
+    assert "flaky-false.service is" in running.keystore("units", "status", status=1)
+    running.keystore("units", "remove", "flaky")
+    assert f"{EAR}: runs" in running.keystore("units", "status")
+
+
+def test_a_unit_waits_for_a_clock_that_is_earlier_than_the_import(running: Host) -> None:
+    """As on a board without a battery; here the import lies in the future."""
+    machine = running.machine
+    machine.run("touch", "--date=+4 seconds", f"{KS}/enclaves/speaker/cert.pem")
+    began = time.monotonic()
+    machine.run("systemctl", "restart", SPEAKER)
+    assert time.monotonic() - began > 2
+    assert "waiting until it is set" in machine.journal(SPEAKER)
+    assert machine.property(SPEAKER, "ActiveState") == "active"
+
+
+def test_what_expires_soon_makes_the_daily_look_fail_and_what_does_not_leaves_it_well(running: Host) -> None:
+    machine = running.machine
+    machine.run("systemctl", "start", "ros-robot-expiry.service")
+    renew(running.ca, ["/ear"], options=RenewOptions(provisioning=options(lifetime=9 * DAY)))
+    running.take()
+    machine.run("systemctl", "start", "ros-robot-expiry.service", status=1)
+    assert "/ear" in machine.journal("ros-robot-expiry.service")
+
+
+def test_a_disk_that_is_full_at_an_import_leaves_the_keystore_and_the_units_as_they_were(
+    running: Host,
+) -> None:
+    machine = running.machine
+    place = "/etc/full"
+    machine.run("mkdir", place)
+    machine.run("mount", "-t", "tmpfs", "-o", "size=100k", "tmpfs", place)
+    bundle = running.bundle()
+    pins = [word for pin in pinned(bundle.manifest) for word in ("--require-ca", pin)]
+    running.keystore("import", f"{place}/keystore", bundle.path, "--host", "robot", *pins)
+    before = machine.run("readlink", f"{place}/keystore")
+    renew(running.ca, ["/ear"], options=RenewOptions(provisioning=options()))
+    machine.run("sh", "-c", f"head -c 200k /dev/zero > {place}/filler", status=None)
+    printed = running.keystore("import", f"{place}/keystore", running.bundle().path, status=1)
+    assert "No space left on device" in printed
+    assert machine.run("readlink", f"{place}/keystore") == before
+
+
+def test_removing_stops_and_deletes_what_was_installed_and_nothing_else(running: Host) -> None:
+    machine = running.machine
+    machine.write("/etc/systemd/system/mine.service", "[Service]\nExecStart=true\n")
+    printed = running.keystore("units", "remove", "ros-robot")
+    assert f"{SPEAKER}: removed" in printed
+    left = machine.run("ls", "/etc/systemd/system").split()
+    assert [name for name in left if name.startswith("ros-")] == []
+    assert "mine.service" in left
+    assert machine.property(SPEAKER, "MainPID") == "0"
