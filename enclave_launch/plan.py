@@ -58,16 +58,20 @@ Named = tuple[Operation, str]
 class Described(NamedTuple):
     """What one source of knowledge says of a program under one start.
 
-    ``source``: the file that says it; ``names``: each with the place that says it; ``complete``: nothing is left open;
+    ``source``: the file that says it; ``names``: each with the place that says it; ``open``: what it leaves open;
     ``used``: the plan grants what it says; ``doubt``: it was written for another version.
     """
 
     origin: InterfaceOrigin
     source: str
     names: Mapping[Named, str]
-    complete: bool
+    open: tuple[str, ...]
     used: bool
     doubt: str = ""
+
+    @property
+    def complete(self) -> bool:
+        return not self.open
 
 
 class Found(NamedTuple):

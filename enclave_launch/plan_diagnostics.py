@@ -111,9 +111,11 @@ def _difference(program: str, item: PlannedProcess | PlannedComponent) -> Iterat
     others = [each for each in item.descriptions[1:] if not each.doubt]
     beyond = {named: place for each in others for named, place in each.names.items() if named not in granted}
     if first.origin in (InterfaceOrigin.RECORDED, InterfaceOrigin.PACKAGE):
-        lacking = record_lacks if first.origin is InterfaceOrigin.RECORDED else manifest_lacks
-        if first.used and beyond:
-            yield lacking(program, first.source, _places(beyond), item.location)
+        unknown = [text for each in others if not each.used for text in each.open]
+        if first.origin is InterfaceOrigin.PACKAGE and first.used and beyond:
+            yield manifest_lacks(program, first.source, _places(beyond), item.location)
+        elif first.origin is InterfaceOrigin.RECORDED and first.used and (beyond or unknown):
+            yield record_lacks(program, first.source, _places(beyond), unknown, item.location)
         return
     library = item.descriptions[-1]
     if library.doubt or not (first.complete and library.complete):

@@ -38,18 +38,25 @@ def manifest_lacks(program: str, manifest: str, lacks: Sequence[str], place: Sou
     return Diagnostic(Code.MANIFEST_LACKS, program, text, place, remedy)
 
 
-def record_lacks(program: str, record: str, lacks: Sequence[str], place: SourceLocation) -> Diagnostic:
-    """Report names that a record lacks.
+def record_lacks(
+    program: str, record: str, lacks: Sequence[str], unknown: Sequence[str], place: SourceLocation
+) -> Diagnostic:
+    """Report what other descriptions have beyond a record.
 
-    :param lacks: each name with the place that has it"""
-    text = (
-        f"the record of {program} ({record}) lacks {counted(len(lacks), 'name')} that another description has, so "
-        f"{_they_are(lacks)} not permitted: {some_of(lacks, _INTERFACES, '; ')}"
-    )
-    remedy = (
-        "--also unseen grants what was never seen; or record again while somebody uses it, as some names exist only "
-        "while somebody reads another"
-    )
+    :param lacks: each name with the place that says it
+    :param unknown: what the others leave open, so that nobody knows whether the record has it"""
+    texts = []
+    if lacks:
+        texts.append(
+            f"lacks {counted(len(lacks), 'name')} that another description has, so {_they_are(lacks)} not permitted: "
+            f"{some_of(lacks, _INTERFACES, '; ')}"
+        )
+    if unknown:
+        texts.append(f"may lack what another description leaves open: {some_of(unknown, _INTERFACES, '; ')}")
+    remedy = "record again while somebody uses it, as some names exist only while somebody reads another"
+    if lacks:
+        remedy = f"--also unseen grants the names that were never seen; or {remedy}"
+    text = f"the record of {program} ({record}) {'; it '.join(texts)}"
     return Diagnostic(Code.RECORD_LACKS, program, text, place, remedy)
 
 

@@ -88,7 +88,7 @@ def meeting(
                 each.description.origin,
                 str(each.description.interfaces[0].source),
                 each.names,
-                each.complete,
+                each.open,
                 any(each is one for one in used),
                 each.description.doubt,
             )
@@ -100,7 +100,11 @@ def meeting(
 class _Judged(NamedTuple):
     description: ProgramDescription
     names: dict[Named, str]
-    complete: bool
+    open: tuple[str, ...]
+
+    @property
+    def complete(self) -> bool:
+        return not self.open
 
 
 def _chosen(judged: Sequence[_Judged], also_unseen: bool) -> tuple[_Judged, tuple[_Judged, ...]]:
@@ -124,27 +128,29 @@ def _chosen(judged: Sequence[_Judged], also_unseen: bool) -> tuple[_Judged, tupl
     return first, (library,)
 
 
-def _names(description: ProgramDescription, start: ProgramStart) -> tuple[dict[Named, str], bool]:
-    """Return the final names with the places that say them, and True if nothing is left open."""
+def _names(description: ProgramDescription, start: ProgramStart) -> tuple[dict[Named, str], tuple[str, ...]]:
+    """Return the final names with the places that say them, and what is left open."""
     names: dict[Named, str] = {}
-    complete = bool(description.interfaces)
+    left: list[str] = []
     for interface in description.interfaces:
         try:
             node = start.node(interface)
-        except UnknownNodeName:
-            complete = False
+        except UnknownNodeName as error:
+            left.append(error.message)
             continue
-        found, is_all = names_of(node, start.distro)
+        found, still = names_of(node, start.distro)
         names.update(found)
-        complete = complete and is_all
-    return names, complete
+        left += still
+    return names, tuple(left)
 
 
-def names_of(node: RunningNode, distro: str) -> tuple[dict[Named, str], bool]:
-    """Return the names that ``node`` is described to need, and True if its description leaves nothing open."""
+def names_of(node: RunningNode, distro: str) -> tuple[dict[Named, str], tuple[str, ...]]:
+    """Return the names that ``node`` is described to need, and what its description leaves open."""
     found = node_permissions(node, distro=distro, options=PolicyOptions())
     declared = (each for each in found.permissions if each.reason.origin == "declared")
-    return {(each.operation, each.name): each.reason.place for each in declared}, not found.unresolved
+    return {(each.operation, each.name): each.reason.place for each in declared}, tuple(
+        f"{each.diagnostic.text} ({each.diagnostic.location})" for each in found.unresolved
+    )
 
 
 def _united(
@@ -171,8 +177,8 @@ def _beyond(interface: NodeInterface, known: frozenset[Named], start: ProgramSta
     except UnknownNodeName:
         return
     for endpoint in interface.endpoints:
-        names, is_known = names_of(
+        names, still = names_of(
             node._replace(interface=interface._replace(endpoints=(endpoint,), gaps=())), start.distro
         )
-        if is_known and not names.keys() <= known:
+        if not still and not names.keys() <= known:
             yield endpoint

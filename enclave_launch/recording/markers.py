@@ -6,7 +6,7 @@ follow come from it, those that do not are fixed. Reads the records of the folde
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -66,12 +66,10 @@ class MarkerRun:
         wanted = self._asked.inputs.get(
             (process.package or "", process.executable.rpartition("/")[2]), frozenset()
         )
-        given = {
-            name: process.parameters.get(name, "") for name in sorted(wanted) if not name.startswith("<")
-        }
+        given = {name: process.parameters.get(name, "") for name in sorted(wanted) if name[0] not in "<-"}
         parameters = {name: self._marker(value) for name, value in given.items()}
         words = own_words(process)
-        arguments = [self._next() if f"<{place}>" in wanted else word for place, word in enumerate(words, 1)]
+        arguments = list(self._words(words, wanted))
         marked = _with_words(cmd, words, arguments)
         if marked == cmd:
             arguments = list(words)
@@ -80,6 +78,16 @@ class MarkerRun:
             for name, value in parameters.items():
                 marked += ("-p", f"{name}:={_yaml(value)}")
         return Marked(marked, parameters, tuple(arguments))
+
+    def _words(self, words: Sequence[str], wanted: frozenset[str]) -> Iterator[str]:
+        before = ""
+        for place, word in enumerate(words, 1):
+            option, equals, _ = word.partition("=")
+            if equals and option in wanted:
+                yield f"{option}={self._next()}"
+            else:
+                yield self._next() if f"<{place}>" in wanted or before in wanted else word
+            before = word
 
     def _marker(self, value: object) -> object:
         return tuple(self._next() for _ in value) if isinstance(value, tuple) else self._next()

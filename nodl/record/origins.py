@@ -25,7 +25,7 @@ MARKER = "enclave_launch_marker_"
 """Values that a run for learning gives in place of a user's begin so; none is a name that a manifest may have."""
 
 Inputs = Mapping[str, object]
-"""Parameters by name; words of the command line as ``<1>``, ``<2>``."""
+"""Parameters by name; words of the command line as ``<1>``, ``<2>``, or the values of its options by their names."""
 
 
 class Name(NamedTuple):
@@ -85,10 +85,19 @@ FIXED = NameOrigin()
 
 
 def arguments_as_inputs(words: Sequence[str]) -> dict[str, str]:
-    """Words of a command line by their place, from ``<1>``; options have no place that can be relied on."""
-    if any(word.startswith("-") for word in words):
-        return {}
-    return {f"<{index}>": word for index, word in enumerate(words, 1)}
+    """Return the words of a command line by their place, from ``<1>``.
+
+    Beside options, one of which may take the next word, a place tells nothing: then the values of the options are
+    returned by their names.
+    """
+    if not any(word.startswith("-") for word in words):
+        return {f"<{index}>": word for index, word in enumerate(words, 1)}
+    options = {}
+    for word, following in zip(words, (*words[1:], "-"), strict=True):
+        option, equals, value = word.partition("=")
+        if option.startswith("-") and (equals or not following.startswith("-")):
+            options[option] = value if equals else following
+    return options
 
 
 def origins_of(observations: Sequence[Observation]) -> dict[Name, NameOrigin]:
@@ -111,11 +120,11 @@ def candidates(name: str, inputs: Inputs) -> tuple[Source, ...]:
 
 
 def possible_sources(name: Name, seen: Observation) -> tuple[Source, ...]:
-    """What the launch gave and what the program declared, and lists whose entries the program appends something to.
+    """Return what the launch gave and the program declared, and lists whose entries the program appends something to.
 
     A program that declares what stands on its command line copied it from there (topic_tools).
     """
-    copied = any(value == name.name for key, value in seen.inputs.items() if key.startswith("<"))
+    copied = any(value == name.name for key, value in seen.inputs.items() if key[0] in "<-")
     found = candidates(name.name, seen.inputs if copied else seen.values)
     return (*found, *_names_below(name, seen))
 

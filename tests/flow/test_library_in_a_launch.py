@@ -415,3 +415,14 @@ def test_a_coincidence_of_values_is_not_a_rule(
     plan = launch(node, library_folders=(document("pkg/prog", "status", section),))
     assert allowed(plan, "publish") == granted and not plan.problems
     assert ("record-undecided" in codes(plan)) is told
+
+
+def test_what_others_leave_open_a_record_may_lack(
+    launch: Launch, install: Callable[..., Path], document: Callable[..., Path]
+) -> None:
+    install("pkg", "prog", source=PYTHON.format(topic="open('topic').read()"))
+    plan = launch(NODE, library_folders=(document("pkg/prog", "seen", IN_RECORD),))
+    assert allowed(plan, "publish") == ["/seen"] and not plan.problems
+    (told,) = (each for each in plan.warnings if each.code.value == "record-lacks")
+    assert "may lack what another description leaves open" in told.text and "is not known" in told.text
+    assert "--also unseen" not in told.remedy

@@ -126,7 +126,7 @@ def test_the_name_where_nothing_is_set_is_the_default() -> None:
 
 def test_words_of_a_command_line_count_by_their_place() -> None:
     assert candidates("out", arguments_as_inputs(["in", "out"])) == (Source("<2>"),)
-    assert arguments_as_inputs(["--rate", "5", "in"]) == {}
+    assert arguments_as_inputs(["--rate", "5", "in", "-v", "--to=out"]) == {"--rate": "5", "--to": "out"}
 
 
 texts = st.sampled_from(["a", "b", "c", "d"])
