@@ -24,6 +24,7 @@ _MODULES = {
     ),
     "enclave_launch.flow": (
         "evaluate_launch",
+        "find_launch_file",
         "launch_source",
         "provision",
         "resolve",

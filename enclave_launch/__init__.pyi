@@ -7,6 +7,7 @@ from enclave_launch.errors import ManifestError as ManifestError
 from enclave_launch.errors import ProvisionError as ProvisionError
 from enclave_launch.errors import RuntimeFailure as RuntimeFailure
 from enclave_launch.flow import evaluate_launch as evaluate_launch
+from enclave_launch.flow import find_launch_file as find_launch_file
 from enclave_launch.flow import launch_source as launch_source
 from enclave_launch.flow import provision as provision
 from enclave_launch.flow import resolve as resolve

@@ -20,7 +20,7 @@ from enclave_launch.admission.middleware import halves, middleware_of, why_not
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.diagnostics.enclaves import middleware_refused
 from enclave_launch.diagnostics.evaluation import program_not_executable
-from enclave_launch.errors import ManifestError
+from enclave_launch.errors import LaunchFileError, ManifestError
 from enclave_launch.evaluation.evaluate import evaluate
 from enclave_launch.evaluation.programs import missing_programs
 from enclave_launch.host.plan_host import PlanHost
@@ -37,12 +37,25 @@ from enclave_launch.security_environment import SecuritySettings
 from enclave_launch.served_domains import with_domains
 from keystore.disk.share_files import LaunchHold
 from keystore.steps.options import ProvisionOptions
-from nodl.ament_index import search_prefixes
+from nodl.ament_index import launch_file_path, search_prefixes
 
 if TYPE_CHECKING:
     from enclave_launch.running import Launch
     from enclave_launch.runtime.running_launch import RunningLaunch
     from enclave_launch.secured import ProvisionedLaunch
+
+
+def find_launch_file(package: str, file_name: str, *, prefixes: Sequence[str | os.PathLike[str]] = ()) -> str:
+    """Return the path of a launch file of an installed package, as ``ros2 launch PACKAGE FILE`` finds it.
+
+    :param prefixes: searched before ``AMENT_PREFIX_PATH``
+    :raises LaunchFileError: the package is not installed, or does not have exactly one file of this name."""
+    try:
+        return launch_file_path(
+            package, file_name, search_prefixes([os.fspath(prefix) for prefix in prefixes])
+        )
+    except (LookupError, OSError, ValueError) as error:
+        raise LaunchFileError(str(error)) from error
 
 
 def resolve(

@@ -61,7 +61,7 @@ def install_sources(sources: Path, target: Path) -> dict[str, Path]:
     :returns: the prefix of each package by its name
     :raises UsageError: a ``setup.py`` fails."""
     prefixes = {}
-    for name, folder in sorted(source_packages(sources).items()):
+    for name, folder in sorted(source_packages(sources.resolve()).items()):
         prefix = target / name
         (prefix / INDEX_FOLDER / "packages").mkdir(parents=True)
         (prefix / INDEX_FOLDER / "packages" / name).touch()

@@ -1,0 +1,119 @@
+"""Pages of the documentation as scripts: files that a reader writes, commands that a reader types, what they print.
+
+A fenced block whose first line ends in ``file=PATH`` is a file. A block of language ``console`` has commands after
+``$`` and below each what it prints; a line ``...`` stands for any lines, ``...`` within a line for any text. A command
+that ends in ``# exit status N`` ends with that status, others with 0. Blocks of other languages are not run.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+_BLOCK = re.compile(r"^( *)```(\w+)(?: file=(\S+))?\n(.*?)^ *```$", re.S | re.M)
+_STATUS = re.compile(r"  # exit status (\d+)$")
+_COLCON = """#!{python}
+# As colcon would place this workspace's packages, from their install rules.
+from pathlib import Path
+from shutil import rmtree
+from enclave_launch.verb.secure_plan.source_prefix import install_sources
+rmtree("install", ignore_errors=True)
+prefixes = install_sources(Path("src"), Path("install"))
+listed = ":".join(str(prefix.resolve()) for prefix in prefixes.values())
+Path("install/setup.sh").write_text(f"export AMENT_PREFIX_PATH={{listed}}:$UNDERLAY\\n")
+print("Summary:", len(prefixes), "packages finished")
+"""
+
+
+class Command(NamedTuple):
+    words: str
+    shown: list[str]
+    status: int
+
+
+def parts(page: Path) -> Iterator[tuple[str, str] | Command]:
+    """Yield the files (path and text) and the commands of a page in their order."""
+    for found in _BLOCK.finditer(page.read_text(encoding="utf-8")):
+        indent, language, file, text = found.groups()
+        lines = [line.removeprefix(indent) for line in text.splitlines()]
+        if file:
+            yield file, "".join(f"{line}\n" for line in lines)
+        elif language == "console":
+            yield from _commands(lines)
+
+
+def _commands(lines: list[str]) -> Iterator[Command]:
+    starts = [number for number, line in enumerate(lines) if line.startswith("$ ")]
+    for start, end in zip(starts, [*starts[1:], len(lines)], strict=True):
+        words = lines[start][2:]
+        status = _STATUS.search(words)
+        yield Command(_STATUS.sub("", words), lines[start + 1 : end], int(status[1]) if status else 0)
+
+
+def write_files(page: Path, folder: Path) -> None:
+    """Write the files of a page, without running anything."""
+    for part in parts(page):
+        if not isinstance(part, Command):
+            _write(folder, *part)
+
+
+def read_aloud(page: Path, folder: Path, environment: dict[str, str]) -> None:
+    """Do what the page says, in ``folder``; fail at the first command that does otherwise."""
+    script = folder.parent / "variables"
+    script.write_text("")
+    for part in parts(page):
+        if not isinstance(part, Command):
+            _write(folder, *part)
+            continue
+        line = f". {script}\n{part.words}\nstatus=$?\nexport -p > {script}\nexit $status\n"
+        done = subprocess.run(
+            ["bash", "-c", line], cwd=folder, env=environment, text=True, timeout=150, check=False,
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+        )  # fmt: skip
+        place = f"{page.name}: $ {part.words}\n{done.stdout}"
+        assert done.returncode == part.status, f"exit status {done.returncode}, not {part.status}: {place}"
+        assert _is_shown(done.stdout, part.shown), "\n".join(
+            ("the page shows:", *part.shown, "printed:", place)
+        )
+
+
+def make_colcon(folder: Path) -> None:
+    """Put a ``colcon`` into ``folder`` that installs Python packages from their sources."""
+    colcon = folder / "colcon"
+    colcon.write_text(_COLCON.format(python=sys.executable))
+    colcon.chmod(0o755)
+
+
+def reader_environment(home: Path, tools: Path, underlay: str = "") -> dict[str, str]:
+    """Return the variables of a reader's shell: our commands, a name for git, nothing of ROS."""
+    kept = {
+        name: text for name, text in os.environ.items() if not name.startswith(("ROS_", "AMENT_", "GIT_"))
+    }
+    path = os.pathsep.join((str(tools), str(Path(sys.executable).parent), kept.get("PATH", "")))
+    identity = {
+        f"GIT_{who}_{what}": "reader@example.org"
+        for who in ("AUTHOR", "COMMITTER")
+        for what in ("NAME", "EMAIL")
+    }
+    return {**kept, **identity, "PATH": path, "HOME": str(home), "UNDERLAY": underlay, "NO_COLOR": "1"}
+
+
+def _write(folder: Path, path: str, text: str) -> None:
+    (folder / path).parent.mkdir(parents=True, exist_ok=True)
+    (folder / path).write_text(text, encoding="utf-8")
+
+
+def _is_shown(printed: str, shown: list[str]) -> bool:
+    patterns = [r"(?:.*\n)*" if line.strip() == "..." else f"{_line(line)}\n" for line in shown]
+    return bool(
+        re.fullmatch("".join(patterns), printed if not printed or printed.endswith("\n") else f"{printed}\n")
+    )
+
+
+def _line(line: str) -> str:
+    return ".*".join(map(re.escape, line.split("...")))

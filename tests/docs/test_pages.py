@@ -1,0 +1,70 @@
+"""Every command of the tutorial and the how-to pages is run, in the workspace that the tutorial makes."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from tests.docs.pages import Command, make_colcon, parts, read_aloud, reader_environment, write_files
+
+ROOT = Path(__file__).parent.parent.parent
+DOCS = ROOT / "docs"
+TUTORIAL = DOCS / "tutorial.md"
+HOW_TO = sorted((DOCS / "how-to").glob("*.md"))
+DEMO = ROOT / "fixtures" / "demo_ws"
+PROVISION = ["secure-launch", "--secure", "--provision-only", "--keystore", "ks", "--enclave-scope", "node"]
+
+
+@pytest.fixture
+def workspace(tmp_path: Path) -> Path:
+    (tmp_path / "bin").mkdir()
+    make_colcon(tmp_path / "bin")
+    folder = tmp_path / "robot_ws"
+    folder.mkdir()
+    return folder
+
+
+def test_the_tutorial_does_what_it_says(workspace: Path) -> None:
+    read_aloud(TUTORIAL, workspace, reader_environment(workspace.parent, workspace.parent / "bin"))
+
+
+@pytest.mark.parametrize(
+    "page", [page for page in HOW_TO if page.name != "asyncio.md"], ids=lambda page: page.stem
+)
+def test_a_page_does_what_it_says(workspace: Path, page: Path) -> None:
+    write_files(TUTORIAL, workspace)
+    (workspace / "enclaves.review.yaml").unlink()
+    environment = reader_environment(workspace.parent, workspace.parent / "bin")
+    subprocess.run(["colcon", "build"], cwd=workspace, env=environment, check=True, capture_output=True)
+    environment["AMENT_PREFIX_PATH"] = str(workspace / "install" / "robot")
+    if page.name not in ("fix-a-refused-node.md", "second-robot.md"):
+        provision = [*PROVISION, "robot", "robot.launch.xml"]
+        subprocess.run(provision, cwd=workspace, env=environment, check=True, capture_output=True)
+    read_aloud(page, workspace, environment)
+
+
+@pytest.mark.dds
+def test_the_asyncio_launcher_runs_the_demo(workspace: Path) -> None:
+    environment = reader_environment(workspace.parent, workspace.parent / "bin")
+    environment["AMENT_PREFIX_PATH"] = str(DEMO)
+    read_aloud(DOCS / "how-to" / "asyncio.md", workspace, environment)
+
+
+@pytest.mark.parametrize("page", [DOCS / "README.md", TUTORIAL, *HOW_TO], ids=lambda page: page.stem)
+def test_links_lead_somewhere(page: Path) -> None:
+    targets = re.findall(r"\]\((?!http)([^)#]+)[^)]*\)", page.read_text(encoding="utf-8"))
+    assert [target for target in targets if not (page.parent / target).exists()] == []
+
+
+def test_every_page_is_in_the_index() -> None:
+    index = (DOCS / "README.md").read_text(encoding="utf-8")
+    pages = [path.relative_to(DOCS).as_posix() for path in DOCS.rglob("*.md") if path.name != "README.md"]
+    assert [page for page in pages if f"({page}" not in index] == []
+
+
+def test_there_is_something_to_run() -> None:
+    for page in (TUTORIAL, *HOW_TO):
+        assert any(isinstance(part, Command) for part in parts(page)), page
