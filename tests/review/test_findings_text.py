@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from enclave_launch.report.review_text import findings_text
+from enclave_launch.review.checks.rules import MEANINGS
 from enclave_launch.review.document import PlanFinding
 
 
@@ -37,3 +40,11 @@ def test_an_accepted_finding_is_never_summed_up() -> None:
     text = findings_text([(finding, "one process"), told("enclave-shared", "/b")])
     assert "accepted (one process): /a is odd [enclave-shared]" in text
     assert "0 errors, 1 warning, 1 accepted (1 enclave-shared; -v lists them)" in text
+
+
+def test_every_code_has_a_section_of_its_own_in_the_documentation() -> None:
+    page = (Path(__file__).parent.parent.parent / "docs" / "checks.md").read_text(encoding="utf-8")
+    headings = [
+        code for line in page.splitlines() if line.startswith("### ") for code in line[4:].split(", ")
+    ]
+    assert sorted(headings) == sorted(MEANINGS)
