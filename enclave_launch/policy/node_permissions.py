@@ -242,11 +242,11 @@ class _Collector:
                 self._result.permissions.append(event)
 
     def _helper(self, operation: Operation, name: str, place: str) -> Permission:
-        """Return the permission of a node of this process whose name cannot be known in advance."""
+        """Return the permission of a node of this process whose name cannot be known in advance.
+
+        The program gives the name among its own arguments, which no remap rule of a launch can override."""
         final = join(self._node.process_namespace, name)
-        note = "a pattern, because its name is made up at each start"
-        told = pattern_accepted(self._fqn, operation.verb, final, f"{note} ({place})", self._node.location)
-        self._result.warnings.append(told)
+        note = "a pattern, because the program makes up the name at each start"
         return Permission(operation, final, Reason(self._fqn, "built-in", place, name, (), note))
 
     def _built_in(self, rows: Iterable[tuple[Operation, str, str]]) -> None:
