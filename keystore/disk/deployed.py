@@ -36,7 +36,7 @@ def differing_files(
     """
     chosen = manifest.names if enclaves is None else [name for name in enclaves if name in manifest.names]
     has_key = {one.enclave: one.has_key for one in manifest.enclaves}
-    wanted = layout.bundle_files(((name, has_key[name]) for name in chosen), crl=layout.CRL in manifest.files)
+    wanted = layout.bundle_files(((name, has_key[name]) for name in chosen), crl=True, handover=True)
     for name in sorted(wanted & set(manifest.files)):
         found = safe_files.read_if_there(view.root, name)
         if found is None:

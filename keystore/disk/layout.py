@@ -40,6 +40,10 @@ ZENOH_ROUTER = "zenoh/router.json5"
 ZENOH_ROUTER_CERT, ZENOH_ROUTER_KEY = "zenoh/router.cert.pem", "zenoh/router.key.pem"
 BUNDLE = "bundle.p7s"
 """The signed manifest: first in a bundle, and beside ``public/`` where one was imported."""
+HANDOVER = "handover.p7s"
+"""In a bundle and where one was imported: which CAs follow, signed by the permissions CA before them."""
+SIGNED_HANDOVER = f"private/{HANDOVER}"
+"""The same where it was signed; the CA that signed it may be gone since."""
 REQUESTS = "private/requests"
 """Of enclaves whose keys were made on their hosts: the certificate requests, in the place of the keys."""
 BUNDLES = "private/bundles"
@@ -159,9 +163,10 @@ def signed_bundle(host: str) -> str:
     return f"{BUNDLES}/{host}.p7s"
 
 
-def bundle_files(enclaves: Iterable[tuple[str, bool]], *, crl: bool) -> set[str]:
-    """Every file that a host's bundle of these enclaves has besides its manifest; True: with its private key."""
-    names = {*(ca_cert(role) for role in Role), GOVERNANCE, *([CRL] if crl else [])}
+def bundle_files(enclaves: Iterable[tuple[str, bool]], *, crl: bool, handover: bool = False) -> set[str]:
+    """Return every file that a host's bundle of these enclaves has besides its manifest; True: with its private key."""
+    names = {*(ca_cert(role) for role in Role), GOVERNANCE}
+    names |= {name for name, is_there in ((CRL, crl), (HANDOVER, handover)) if is_there}
     for enclave, has_key in enclaves:
         own = (CERT, PERMISSIONS, *([KEY] if has_key else []))
         names |= {f"{enclave_directory(enclave)}/{name}" for name in own}

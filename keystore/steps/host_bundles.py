@@ -113,7 +113,10 @@ def _export(
     opened: Store, output: Path, host: str, names: list[str], options: BundleOptions, now: datetime
 ) -> HostBundle:
     view = KeystoreView(opened.root)
-    files = files_of(view, names)
+    files = dict(files_of(view, names))
+    handover = safe_files.read_if_there(view.root, layout.SIGNED_HANDOVER)
+    if handover is not None:
+        files[layout.HANDOVER] = Content(handover)
     manifest = _manifest(view, host, names, files)
     present = last_signed(view, host)
     is_new = present is None or not manifest.same_content(present[0])

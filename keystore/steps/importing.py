@@ -9,6 +9,7 @@ since. Nothing is half-imported: a run that is killed leaves the keystore of bef
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime
 from enum import Enum
@@ -37,6 +38,7 @@ from keystore.errors import (
 from keystore.formats.bundle import BundledEnclave, Manifest, parse_manifest, pins_of
 from keystore.formats.certificate import read_certificates
 from keystore.formats.governance import parse_governance
+from keystore.formats.handover import parse_handover
 from keystore.formats.role import Role
 from keystore.formats.validity import utc_now
 from keystore.signing import smime
@@ -101,7 +103,10 @@ def import_bundle(
     content = read_bundle(Path(bundle))
     with versions.opened(chosen.lock_timeout):
         present = _present(versions.current)
-        found = _checked(content, printable(bundle), present, chosen)
+        pins = _pins(present, chosen)
+        if not chosen.authorities and versions.current is not None:
+            pins = _with_successors(pins, content.get(layout.HANDOVER), KeystoreView(versions.current))
+        found = _checked(content, printable(bundle), present, pins, chosen)
         differing: list[str] = []
         owned = container_owner(versions.current) if versions.current is not None else None
         owner = chosen.owner or owned
@@ -134,16 +139,20 @@ def _present(version: Path | None) -> Manifest | None:
 
 
 def _checked(
-    content: Mapping[str, bytes], place: str, present: Manifest | None, options: ImportOptions
+    content: Mapping[str, bytes],
+    place: str,
+    present: Manifest | None,
+    pins: Mapping[Role, frozenset[str]],
+    options: ImportOptions,
 ) -> _Bundle:
-    """Who signed it comes first: nothing else of it is believed before."""
+    """Return the bundle in ``content`` if it is whole. Who signed it comes first: nothing is believed before."""
     signed = content.get(layout.BUNDLE)
     if signed is None:
         raise DamagedKeystoreError(
             f"{place} has no {layout.BUNDLE}: not a host's bundle (secure-keystore export --hosts), or cut off"
         )
     document = smime.read(signed, place)
-    _check_signer(document, content, _pins(present, options), place)
+    _check_signer(document, content, pins, place)
     manifest = parse_manifest(document.document, place)
     _refuse_other_host(manifest, present, options, place)
     found = _Bundle(manifest, {name: data for name, data in content.items() if name != layout.BUNDLE}, place)
@@ -165,6 +174,22 @@ def _pins(present: Manifest | None, options: ImportOptions) -> dict[Role, frozen
     return {role: frozenset(present.authorities[role]) for role in Role}
 
 
+def _with_successors(
+    pins: Mapping[Role, frozenset[str]], handover: bytes | None, present: KeystoreView
+) -> dict[Role, frozenset[str]]:
+    """Return ``pins`` and the CAs that a permissions CA trusted here has named as those that follow it.
+
+    A handover by another CA is of a replacement that this host has followed already, or is forged: it changes nothing.
+    """
+    named: Mapping[Role, frozenset[str]] = {}
+    if handover is not None:
+        with suppress(DamagedKeystoreError):
+            document = smime.read(handover, layout.HANDOVER)
+            smime.check(document, present.ca_bundle(Role.PERMISSIONS), layout.HANDOVER)
+            named = parse_handover(document.document, layout.HANDOVER)
+    return {role: pins[role] | named.get(role, frozenset()) for role in Role}
+
+
 def _check_signer(
     document: smime.SignedDocument,
     content: Mapping[str, bytes],
@@ -178,8 +203,8 @@ def _check_signer(
     trusted = [ca for ca in authorities if fingerprint(ca.der) in pins[Role.PERMISSIONS]]
     if not trusted:
         raise UnsafeKeystoreError(
-            f"{place} is by another permissions CA than the one pinned here. If the CA was replaced and this host "
-            "missed a step, pin the new ones with --require-ca"
+            f"{place} is by another permissions CA than the one pinned here, which did not name it as the one that "
+            "follows. If the CA was replaced more than once since the last import, pin the new ones with --require-ca"
         )
     try:
         smime.check(document, trusted, place)
@@ -207,7 +232,9 @@ def _check_files(found: _Bundle) -> None:
     """Exactly the files of the manifest, each with its hash; and only such that a bundle can have."""
     manifest, place = found.manifest, found.place
     enclaves = [(one.enclave, one.has_key) for one in manifest.enclaves]
-    expected = layout.bundle_files(enclaves, crl=layout.CRL in manifest.files)
+    expected = layout.bundle_files(
+        enclaves, crl=layout.CRL in manifest.files, handover=layout.HANDOVER in manifest.files
+    )
     for name in sorted(set(manifest.files) ^ expected):
         raise DamagedKeystoreError(f"{place}: its list of files does not fit its enclaves: {printable(name)}")
     for name in sorted(set(found.files) - expected):

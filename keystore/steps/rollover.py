@@ -30,12 +30,15 @@ from keystore.disk.store import Content, Store
 from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import DamagedKeystoreError, InvalidInputError
 from keystore.formats.certificate import read_certificate
+from keystore.formats.handover import handover_json
 from keystore.formats.register import AuthorityState
 from keystore.formats.role import Role
 from keystore.formats.tool_needs import is_tool_enclave
 from keystore.formats.validity import utc_now
 from keystore.signing import smime
-from keystore.signing.public_key import issued_by
+from keystore.signing.ca_access import CaAccess
+from keystore.signing.public_key import fingerprint, issued_by
+from keystore.signing.smime import sign_document
 from keystore.steps.comparison import WantedEnclave, with_domains
 from keystore.steps.creation import CreateOptions, new_ca
 from keystore.steps.crl import drop_crl
@@ -80,6 +83,8 @@ def roll_over(
             _refuse_to_strand(opened, roles)
             _refuse_without_start(opened, roles)
         done = [_STEPS[step](opened, role, creation) for role in roles]
+        if step is Step.START:
+            _hand_over(opened, chosen.access)
         refresh_copies(opened)
     if step is not Step.SWITCH:
         warnings = tuple(follow(root, chosen))
@@ -113,6 +118,19 @@ def _start(opened: Store, role: Role, creation: CreateOptions) -> str:
             batch.directory(_waiting(role), pair)
     new = safe_files.read(opened.root, f"{_waiting(role)}/{layout.CERT}")
     return _trust(opened, role, view.ca(role).pem + new)
+
+
+def _hand_over(opened: Store, access: CaAccess) -> None:
+    """Let the present permissions CA sign who follows; hosts that miss the next steps are shown it."""
+    view = KeystoreView(opened.root)
+    named = {role: tuple(fingerprint(ca.der) for ca in view.ca_bundle(role)) for role in Role}
+    document = handover_json(named)
+    present = safe_files.read_if_there(opened.root, layout.SIGNED_HANDOVER)
+    if present is not None and smime.read(present, layout.SIGNED_HANDOVER).document == document:
+        return
+    signed = sign_document(document, view.authority(Role.PERMISSIONS, access))
+    with opened.batch() as batch:
+        batch.file(layout.SIGNED_HANDOVER, signed, store.PRIVATE_MODE)
 
 
 def _trust(opened: Store, role: Role, bundle: bytes) -> str:

@@ -26,7 +26,7 @@ _KNOWN = frozenset({
     layout.LOCK, layout.GITIGNORE, layout.SETTINGS, layout.CRL, layout.GOVERNANCE_XML, layout.GOVERNANCE,
     layout.SHARED_CA_CERT, layout.SHARED_CA_KEY, layout.SUPERSEDED, layout.REGISTER, layout.CRL_UNLINKED,
     layout.ZENOH_ROUTER, layout.ZENOH_ROUTER_CERT, layout.ZENOH_ROUTER_KEY,
-    layout.BUNDLE,
+    layout.BUNDLE, layout.HANDOVER, layout.SIGNED_HANDOVER,
     *(layout.ca_cert(role) for role in Role),
     *(layout.ca_key(role) for role in Role), *(layout.ca_key_uri(role) for role in Role),
 })  # fmt: skip

@@ -323,8 +323,41 @@ def test_a_new_ca_comes_by_the_bundles_of_the_old_one(ca: Path, host: Path, tmp_
     assert verify(host).is_good
 
 
-def test_a_host_that_missed_a_step_has_to_be_told_the_new_ca(ca: Path, host: Path, tmp_path: Path) -> None:
-    for step in (Step.START, Step.SWITCH, Step.FINISH):
+@pytest.mark.parametrize("missed", ["start", "start and switch"])
+@pytest.mark.parametrize("revokes", [False, True])
+def test_a_host_that_slept_through_steps_follows_since_the_old_ca_named_the_new_one(
+    ca: Path, host: Path, tmp_path: Path, missed: str, revokes: bool
+) -> None:
+    """After a revocation, too: the numbers of the new CA's CRLs are a series of their own."""
+    if revokes:
+        remove(ca, ["/arm"], options=RemoveOptions(durable=False))
+        import_bundle(host, exported(ca, tmp_path / "revoked").path)
+    for step in (Step.START, Step.SWITCH):
+        roll_over(ca, step, tuple(Role), options=options())
+    if missed == "start":
+        assert import_bundle(host, exported(ca, tmp_path / "switch").path).restart is Restart.TOGETHER
+    roll_over(ca, Step.FINISH, tuple(Role), options=options())
+    import_bundle(host, exported(ca, tmp_path / "finish").path)
+    assert verify(host).is_good
+    remove(ca, ["/base/camera"], options=RemoveOptions(durable=False))
+    assert import_bundle(host, exported(ca, tmp_path / "next").path).restart is Restart.ALL
+
+
+def test_only_the_ca_that_a_host_trusts_can_name_the_one_that_follows(
+    ca: Path, host: Path, tmp_path: Path
+) -> None:
+    other = filled(tmp_path / "other", NAMES)
+    roll_over(other, Step.START, tuple(Role), options=options())
+    roll_over(other, Step.SWITCH, tuple(Role), options=options())
+    refused(
+        host, exported(other, tmp_path / "foreign").path, UnsafeKeystoreError, "by another permissions CA"
+    )
+
+
+def test_a_host_that_slept_through_two_replacements_has_to_be_told_the_new_ca(
+    ca: Path, host: Path, tmp_path: Path
+) -> None:
+    for step in (Step.START, Step.SWITCH, Step.FINISH) * 2:
         roll_over(ca, step, tuple(Role), options=options())
     bundle = exported(ca, tmp_path / "late")
     refused(host, bundle.path, UnsafeKeystoreError, "pin the new ones with --require-ca")
