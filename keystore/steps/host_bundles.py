@@ -16,6 +16,7 @@ from pathlib import Path
 from keystore.disk import layout, safe_files, store
 from keystore.disk.archive import archive_bytes
 from keystore.disk.crl_file import crl_number, crl_validity
+from keystore.disk.register_file import read_register
 from keystore.disk.store import Content, Store
 from keystore.disk.versions import write_new
 from keystore.disk.view import KeystoreView, keystore_at
@@ -23,6 +24,7 @@ from keystore.errors import InvalidInputError, StorageError, printable
 from keystore.formats.bundle import BundledEnclave, Manifest, manifest_json, parse_manifest, pin
 from keystore.formats.certificate import read_certificate
 from keystore.formats.hosts import Hosts, refuse_host_name
+from keystore.formats.register import Register
 from keystore.formats.role import Role
 from keystore.formats.validity import utc_now
 from keystore.signing import smime
@@ -146,6 +148,31 @@ def last_signed(view: KeystoreView, host: str) -> tuple[Manifest, bytes] | None:
         return manifest._replace(files={}), signed
     smime.check(document, [view.ca(Role.PERMISSIONS)], place)
     return manifest, signed
+
+
+def hosts_that_left(
+    keystore: Path | str, hosts: Iterable[str], now: datetime | None = None
+) -> dict[str, tuple[str, ...]]:
+    """Return hosts with a bundle of this keystore that are not among ``hosts`` -> their enclaves.
+
+    Only enclaves whose certificates on that host are neither revoked nor expired: whoever has the host can use them.
+    """
+    view, moment = keystore_at(keystore), now or utc_now()
+    register = read_register(view.root) or Register()
+    present = set(hosts)
+    found = {}
+    for path in sorted((view.root / layout.BUNDLES).glob("*.p7s")):
+        last = last_signed(view, path.stem) if path.stem not in present else None
+        good = [
+            one.enclave
+            for one in (last[0].enclaves if last is not None else ())
+            if (issued := register.certificates.get(one.serial)) is not None
+            and issued.revoked is None
+            and one.not_after > moment
+        ]
+        if good:
+            found[path.stem] = tuple(good)
+    return found
 
 
 def _manifest(view: KeystoreView, host: str, names: list[str], files: Mapping[str, Content]) -> Manifest:

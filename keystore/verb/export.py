@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 
 from enclave_common.command_line import FLAG, PATH, TEXTS, one_of
@@ -19,7 +20,14 @@ from keystore.formats.hosts import load_hosts
 from keystore.formats.role import Role
 from keystore.signing.public_key import fingerprint
 from keystore.steps.bundle import PublicFiles, export
-from keystore.steps.host_bundles import BundleOptions, enclaves_of_hosts, export_hosts, pinned
+from keystore.steps.host_bundles import (
+    SUFFIX,
+    BundleOptions,
+    enclaves_of_hosts,
+    export_hosts,
+    hosts_that_left,
+    pinned,
+)
 from keystore.steps.provisioning import list_enclaves
 from keystore.verb import common
 
@@ -61,13 +69,30 @@ def _export_hosts(arguments: argparse.Namespace) -> int:
         accept_shared=arguments.accept_shared_enclaves,
         **common.change(arguments),
     )
-    made = export_hosts(arguments.keystore, arguments.output, _assigned(arguments), options=options)
+    assigned = _assigned(arguments)
+    made = export_hosts(arguments.keystore, arguments.output, assigned, options=options)
     for one in made:
         state = "" if one.is_new else " (as last time)"
         print(f"{one.path}: number {one.manifest.number}, {len(one.manifest.enclaves)} enclaves{state}")
+    if arguments.hosts and not arguments.host:
+        _report_hosts_that_left(arguments, assigned)
     pins = " ".join(f"--require-ca {one}" for one in pinned(made[0].manifest))
     print(f"the first import on a host wants these, by another way than the bundle: {pins}", file=sys.stderr)
     return 0
+
+
+def _report_hosts_that_left(arguments: argparse.Namespace, hosts: Iterable[str]) -> None:
+    """Warn who could still use what a host has that is not in the hosts file any more; remove its bundle here."""
+    for host, enclaves in hosts_that_left(arguments.keystore, hosts).items():
+        text = (
+            f"host {host} is not in {arguments.hosts} any more and has good keys of {', '.join(enclaves)}: revoke "
+            "them (secure-keystore remove), also where an enclave lives elsewhere now (renew --new-keys --revoke-old)"
+        )
+        common.warn([text], arguments)
+        bundle = arguments.output / f"{host}{SUFFIX}"
+        if bundle.is_file():
+            bundle.unlink()
+            print(f"{bundle}: removed")
 
 
 def _assigned(arguments: argparse.Namespace) -> dict[str, list[str]]:

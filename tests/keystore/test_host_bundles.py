@@ -13,6 +13,7 @@ import pytest
 
 from keystore.disk import layout
 from keystore.disk.archive import archive_bytes, read_archive
+from keystore.disk.container_copies import ContainerUser
 from keystore.disk.store import Content
 from keystore.errors import (
     DamagedKeystoreError,
@@ -420,3 +421,60 @@ def test_the_commands_from_the_ca_to_the_host(
     assert "to restart: the changed enclaves" in capsys.readouterr().out
     assert main(["import", str(tmp_path / "ks"), bundle, "--host", "arm"]) == 2
     assert "error: this keystore is that of host base" in capsys.readouterr().err
+
+
+def test_a_host_that_left_the_hosts_file_is_reported_until_its_keys_are_revoked(
+    ca: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    hosts, out = tmp_path / "hosts.yaml", tmp_path / "out"
+    words = ["export", str(ca), "-o", str(out), "--hosts", str(hosts)]
+    hosts.write_text("version: 1\nhosts:\n  base: {enclaves: ['/base*']}\n  arm: {enclaves: ['/arm*']}\n")
+    assert main(words) == 0
+    assert "any more" not in capsys.readouterr().err
+    hosts.write_text("version: 1\nhosts:\n  base: {enclaves: ['/base*', '/arm']}\n")
+    assert main(words) == 0
+    assert (
+        "host arm is not in" in (told := capsys.readouterr().err) and "good keys of /arm, /arm/hand" in told
+    )
+    assert sorted(path.name for path in out.iterdir()) == ["base.bundle"]
+    remove(ca, ["/arm/hand"], options=RemoveOptions(durable=False))
+    assert main(words) == 0
+    assert "good keys of /arm: revoke them" in capsys.readouterr().err, (
+        "the enclave moved, its key is on both"
+    )
+    renew(ca, ["/arm"], options=RenewOptions(new_keys=True, revoke_old=True, provisioning=options()))
+    assert main(words) == 0
+    assert "any more" not in capsys.readouterr().err
+
+
+def test_copies_for_containers_stand_alone_belong_to_their_user_and_are_checked(
+    ca: Path, tmp_path: Path
+) -> None:
+    """Run as root, so that keys can be given away; else they are given to who imports."""
+    user = ContainerUser(10001, 10001) if os.geteuid() == 0 else ContainerUser(os.geteuid(), os.getegid())
+    bundle = exported(ca, tmp_path / "one")
+    pins = ImportOptions(host="base", authorities=pinned(bundle.manifest), owner=user)
+    place = tmp_path / "ks"
+    import_bundle(place, bundle.path, options=pins)
+    camera = place / "containers/e.base.camera"
+    assert sorted(os.listdir(camera)) == sorted(layout.RUNTIME_FILES)
+    assert not any(path.is_symlink() for path in camera.iterdir())
+    info = (camera / "key.pem").stat()
+    assert ((info.st_uid, info.st_gid), mode(camera / "key.pem")) == (user, 0o600)
+    assert (camera / "cert.pem").stat().st_uid == os.geteuid(), (
+        "nothing but the key can be changed by containers"
+    )
+    assert verify(place).is_good
+
+    remove(ca, ["/arm"], options=RemoveOptions(durable=False))
+    import_bundle(place, exported(ca, tmp_path / "two").path)
+    assert (camera / "crl.pem").is_file() and (camera / "key.pem").stat().st_uid == user.uid, "remembered"
+    assert len(list((tmp_path / "ks.d").glob("[0-9]*"))) == 2, (
+        "containers may still have mounted the version before"
+    )
+
+    (camera / "cert.pem").write_bytes((place / "enclaves/base/cert.pem").read_bytes())
+    assert "container-copy" in {finding.code for finding in verify(place).findings}
+    report = import_bundle(place, tmp_path / "two/base.bundle")
+    assert "restored: containers/e.base.camera/cert.pem" in report.notes
+    assert verify(place).is_good
