@@ -15,7 +15,7 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from enclave_common.files import read_text
-from nodl.infer.kept import KeptAnswer
+from nodl.infer.cache import CachedAnswer
 from nodl.infer.program import Program
 from nodl.infer.start import LaunchKey
 from nodl.node_interface import NodeInterface
@@ -49,15 +49,15 @@ def infer_python(
     """
     finder = _Finder(prefixes)
     target = finder.target(path, package, executable)
-    kept = KeptAnswer(finder.program, (path, package, executable, target))
-    known = kept.find()
+    cached = CachedAnswer(finder.program, (path, package, executable, target))
+    known = cached.find()
     if known is not None:
         interfaces, why = known
         return interfaces, why
     from nodl.infer.python_program import infer_program  # the whole analysis of Python comes with it
 
     answer = infer_program(finder.program, target, path, LaunchKey(package, executable))
-    kept.keep(answer)
+    cached.store(answer)
     return answer
 
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 import ast
 
 from nodl.infer.interpreter.define import is_key, program_classes
+from nodl.infer.interpreter.elements import elements
 from nodl.infer.interpreter.frames import Arguments, Frame
-from nodl.infer.interpreter.iterate import elements
 from nodl.infer.interpreter.run import Run
-from nodl.infer.methods import PropertyValue
 from nodl.infer.values import (
     ABSENT,
     ANY,
@@ -24,6 +23,7 @@ from nodl.infer.values import (
     Items,
     Key,
     ModuleValue,
+    PropertyValue,
     Sequence,
     Value,
     join,
@@ -167,7 +167,7 @@ def _store_element(run: Run, owner: Sequence, key: Value, value: Value) -> None:
     items = owner.items
     exact = items.exact
     if exact is None:
-        run.state.store(owner, ITEMS, (Items(None, join(items.rest, value)),))
+        _edited(run, owner, value)
         return
     index = key[0] if len(key) == 1 else None
     if isinstance(index, int) and -len(exact) <= index < len(exact):

@@ -8,14 +8,6 @@ from nodl.infer.interpreter import imports
 from nodl.infer.interpreter.define import is_enumeration, linearized, program_classes
 from nodl.infer.interpreter.frames import Arguments, Frame
 from nodl.infer.interpreter.run import AttributeReader, Run
-from nodl.infer.methods import (
-    BoundMethod,
-    ClassMethod,
-    ForeignMethod,
-    NativeMethod,
-    PropertyValue,
-    SuperProxy,
-)
 from nodl.infer.models import foreign
 from nodl.infer.text import Text
 from nodl.infer.values import (
@@ -23,13 +15,19 @@ from nodl.infer.values import (
     ANY,
     BOTTOM,
     RESULT,
+    BoundMethod,
+    ClassMethod,
     ClassValue,
     Dictionary,
     External,
+    ForeignMethod,
     FunctionValue,
     Instance,
     ModuleValue,
+    NativeMethod,
+    PropertyValue,
     Sequence,
+    SuperProxy,
     Unknown,
     Value,
     external,

@@ -8,17 +8,18 @@ import functools
 from nodl.infer.interpreter.frames import Arguments, Call, Frame
 from nodl.infer.interpreter.loops import fixpoint
 from nodl.infer.interpreter.run import MAX_DEPTH, Run
-from nodl.infer.methods import BoundMethod, Partial
 from nodl.infer.values import (
     ANY,
     BOTTOM,
     NONE,
     OTHER,
+    BoundMethod,
     Dictionary,
     FunctionValue,
     Items,
     Key,
     LocalCells,
+    Partial,
     Value,
     join,
     unknown,

@@ -6,12 +6,14 @@ import ast
 
 from nodl.infer.interpreter.frames import Arguments, Call, Frame
 from nodl.infer.interpreter.run import Run
-from nodl.infer.methods import BoundMethod, ClassMethod, PropertyValue
 from nodl.infer.values import (
+    BoundMethod,
+    ClassMethod,
     ClassValue,
     External,
     FunctionValue,
     Instance,
+    PropertyValue,
     Sequence,
     Unknown,
     Value,

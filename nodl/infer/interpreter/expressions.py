@@ -6,17 +6,15 @@ import ast
 import builtins
 from functools import partial
 
-from nodl.infer.interpreter import comprehensions
 from nodl.infer.interpreter.assign import assign, copy_dictionary, store_item
 from nodl.infer.interpreter.conditions import compare, decide, forked, narrowed, only_if, truth, truth_of
 from nodl.infer.interpreter.define import make_function
+from nodl.infer.interpreter.elements import elements, subscript
 from nodl.infer.interpreter.formatting import f_string
 from nodl.infer.interpreter.frames import Arguments, Frame
-from nodl.infer.interpreter.iterate import elements
+from nodl.infer.interpreter.loops import comprehension, dict_comprehension
 from nodl.infer.interpreter.operators import binary
 from nodl.infer.interpreter.run import Evaluator, Run
-from nodl.infer.interpreter.subscripts import subscript
-from nodl.infer.methods import SuperProxy
 from nodl.infer.text import Text, input_of, with_edit
 from nodl.infer.values import (
     ANY,
@@ -27,6 +25,7 @@ from nodl.infer.values import (
     Dictionary,
     Instance,
     Items,
+    SuperProxy,
     Unknown,
     Value,
     boolean,
@@ -283,10 +282,10 @@ EXPRESSIONS: dict[type, Evaluator] = {
     ast.Dict: _dict,
     ast.Subscript: subscript,
     ast.Lambda: _lambda,
-    ast.ListComp: comprehensions.comprehension,
-    ast.SetComp: comprehensions.comprehension,
-    ast.GeneratorExp: comprehensions.comprehension,
-    ast.DictComp: comprehensions.dict_comprehension,
+    ast.ListComp: comprehension,
+    ast.SetComp: comprehension,
+    ast.GeneratorExp: comprehension,
+    ast.DictComp: dict_comprehension,
     ast.NamedExpr: _walrus,
     ast.Await: _inner,
     ast.Yield: _yield,

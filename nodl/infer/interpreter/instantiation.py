@@ -14,9 +14,17 @@ from nodl.infer.interpreter.define import (
 )
 from nodl.infer.interpreter.frames import Arguments, Call
 from nodl.infer.interpreter.run import Run
-from nodl.infer.methods import BoundMethod, ForeignMethod
 from nodl.infer.models import foreign
-from nodl.infer.values import ClassValue, External, FunctionValue, Instance, Value, unknown
+from nodl.infer.values import (
+    BoundMethod,
+    ClassValue,
+    External,
+    ForeignMethod,
+    FunctionValue,
+    Instance,
+    Value,
+    unknown,
+)
 
 
 def instantiate(run: Run, cls: ClassValue, call: Call) -> Value:

@@ -12,26 +12,29 @@ from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from nodl.infer.findings import Findings, OptionDefaults
-from nodl.infer.interpreter.allocations import Allocations
 from nodl.infer.interpreter.frames import Arguments, Call, Frame
-from nodl.infer.methods import BoundMethod, ClassMethod, ForeignMethod, Partial, SuperProxy
 from nodl.infer.packages import find_package
 from nodl.infer.program import Program, SourceModule
-from nodl.infer.state import ProgramState
+from nodl.infer.state import Allocations, ProgramState
 from nodl.infer.text import Text
 from nodl.infer.values import (
     ANY,
     BOTTOM,
+    BoundMethod,
+    ClassMethod,
     ClassValue,
     Dictionary,
     External,
     FieldCells,
+    ForeignMethod,
     FunctionValue,
     Instance,
     Items,
     LocalCells,
     ModuleValue,
+    Partial,
     Sequence,
+    SuperProxy,
     Unknown,
     Value,
     join,
@@ -48,7 +51,6 @@ if TYPE_CHECKING:
 MAX_STEPS = 800_000
 MAX_STEPS_IN_VAIN = 200_000  # for a program of which something stays unknown, whatever else is found
 MAX_DEPTH = 120  # analysed calls inside calls
-MAX_RECEIVERS = 4  # callables of one call that are followed one by one
 
 
 # Others can do nothing with these.
@@ -187,28 +189,8 @@ class Run(Allocations):
         self.steps += len(callee)
         if len(callee) == 1:
             return self.call_atom(callee[0], call)
-        if len(callee) > MAX_RECEIVERS:
-            callee, merged = self._merge_receivers(callee, call)
-        else:
-            merged = BOTTOM
-        if len(callee) == 1 and not merged:
-            return self.call_atom(callee[0], call)
         results = self.state.each(partial(self.call_atom, atom, call) for atom in callee if atom is not None)
-        return join_all((merged, *results)) or ANY
-
-    def _merge_receivers(self, callee: Value, call: Call) -> tuple[Value, Value]:
-        """One call for a method of many objects, ``self`` being any of them; returns what is left to call."""
-        receivers: dict[FunctionValue, list[object]] = {}
-        for atom in callee:
-            if isinstance(atom, BoundMethod):
-                receivers.setdefault(atom.function, []).append(atom.receiver)
-        merged = BOTTOM
-        done = [function for function, objects in receivers.items() if len(objects) > 1]
-        for function in done:
-            shifted = Call(call.args.preceded(tuple(receivers[function])), call.node, call.frame)
-            merged = join(merged, self.state.perhaps(partial(self.call_atom, function, shifted)))
-        left = tuple(a for a in callee if not (isinstance(a, BoundMethod) and a.function in done))
-        return left, merged
+        return join_all(results) or ANY
 
     def call_atom(self, atom: object, call: Call) -> Value:
         handler = self.tables.callables.get(type(atom))

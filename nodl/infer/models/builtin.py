@@ -7,10 +7,10 @@ from collections.abc import Callable
 from nodl.infer.interpreter.assign import copy_dictionary, store_attribute
 from nodl.infer.interpreter.conditions import truth
 from nodl.infer.interpreter.define import expect_methods, is_key, linearized, new_instance, program_classes
+from nodl.infer.interpreter.elements import elements, keys_of
 from nodl.infer.interpreter.formatting import as_texts, text_value
 from nodl.infer.interpreter.frames import Arguments, Call
 from nodl.infer.interpreter.imports import import_module
-from nodl.infer.interpreter.iterate import elements, keys_of
 from nodl.infer.interpreter.run import Model, Run
 from nodl.infer.text import input_of, with_edit
 from nodl.infer.values import (

@@ -12,7 +12,7 @@ from nodl.infer.interpreter.run import Run
 from nodl.infer.models.signatures import COMMON_CALLBACKS
 from nodl.infer.text import Text, concatenate
 from nodl.infer.values import ANY, NONE, External, Instance, Unknown, Value, join, result_of
-from nodl.node_interface import EndpointKind
+from nodl.node_interface import EndpointKind, QosPolicies
 
 _CLASS_OF = {
     EndpointKind.PUBLISHER: "rclpy.publisher.Publisher",
@@ -64,3 +64,35 @@ def _introspect(receiver: Instance, call: Call) -> None:
             full = concatenate(name, EVENT) if isinstance(name, str | Text) else name
             for event_type in types or [""]:
                 record.add_endpoint(EndpointKind.PUBLISHER, full, event_type, call.source)
+
+
+def _keep_last(depth: int, reliability: str = "RELIABLE") -> QosPolicies:
+    return (
+        ("depth", depth),
+        ("durability", "VOLATILE"),
+        ("history", "KEEP_LAST"),
+        ("reliability", reliability),
+    )
+
+
+_PROFILES = {
+    "sensor_data": _keep_last(5, "BEST_EFFORT"),
+    "services_default": _keep_last(10),
+    "parameters": _keep_last(1000),
+}
+_BY_PATH = {
+    path: quality
+    for name, quality in _PROFILES.items()
+    for path in (f"rclpy.qos.qos_profile_{name}", f"rclpy.qos.QoSPresetProfiles.{name.upper()}.value")
+}
+
+
+def known_quality(call: Call, position: int) -> QosPolicies:
+    """Policies by NoDL v2's names, sorted; empty where they are not certain."""
+    value = call.args.at(position, "qos_profile")
+    if value is None or len(value) != 1 or call.args.at(-1, "qos_overriding_options") is not None:
+        return ()
+    (given,) = value
+    if isinstance(given, External):
+        return _BY_PATH.get(given.path, ())
+    return _keep_last(given) if type(given) is int and given > 0 else ()

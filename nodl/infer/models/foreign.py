@@ -12,7 +12,6 @@ import sys
 
 from nodl.infer.interpreter.frames import Call
 from nodl.infer.interpreter.run import Run
-from nodl.infer.methods import ForeignMethod, NativeMethod
 from nodl.infer.models import (
     builtin,
     endpoints,
@@ -28,7 +27,9 @@ from nodl.infer.values import (
     ANY,
     RESULT,
     External,
+    ForeignMethod,
     Instance,
+    NativeMethod,
     Unknown,
     Value,
     external,

@@ -6,11 +6,10 @@ from collections.abc import Callable
 
 from nodl.infer.interpreter.assign import copy_dictionary, store_item
 from nodl.infer.interpreter.define import is_constant, is_key
+from nodl.infer.interpreter.elements import chosen_by_parameter, elements, keys_of, values_of
 from nodl.infer.interpreter.formatting import joined, str_format, text_value
 from nodl.infer.interpreter.frames import Call
-from nodl.infer.interpreter.iterate import elements, keys_of, values_of
 from nodl.infer.interpreter.run import Run
-from nodl.infer.interpreter.subscripts import chosen_by_parameter
 from nodl.infer.models.builtin import store_pairs
 from nodl.infer.text import MAX_LENGTH, Text, TextAtom, edited, input_of, with_edit
 from nodl.infer.values import (
@@ -172,7 +171,7 @@ def _copy_sequence(run: Run, owner: Sequence, call: Call) -> Value:
 
 
 def _edited(run: Run, owner: Sequence, call: Call) -> Value:
-    """``insert``, ``remove``, ``clear``, ``sort`` ...: what is left, in which order, is not known."""
+    """``insert``, ``remove``, ``sort`` ...: what is left, in which order, is not known."""
     run.register_callback(call.args.keywords.get("key", BOTTOM), 1)
     return _stored(
         run, owner, None, join_all((owner.items.any_element(), *call.args.positional)), edited=True
@@ -183,9 +182,10 @@ SequenceMethod = Callable[[Run, Sequence, Call], Value]
 _SEQUENCE: dict[str, SequenceMethod] = {
     **dict.fromkeys(("append", "add", "appendleft"), _append),
     **dict.fromkeys(("extend", "update"), _extend),
-    **dict.fromkeys(("insert", "remove", "discard", "clear", "sort", "reverse"), _edited),
+    **dict.fromkeys(("insert", "remove", "discard", "sort", "reverse"), _edited),
     "pop": _pop,
     "popleft": lambda run, owner, call: _pop(run, owner, call, first=True),
+    "clear": lambda run, owner, call: _stored(run, owner, [], owner.items.any_element(), edited=True),
     "copy": _copy_sequence,
 }
 

@@ -12,8 +12,7 @@ from nodl.infer.interpreter.formatting import as_texts, text_value
 from nodl.infer.interpreter.frames import Call
 from nodl.infer.interpreter.run import Run
 from nodl.infer.models import ros_parameters
-from nodl.infer.models.endpoints import endpoint_object
-from nodl.infer.models.quality import known_quality
+from nodl.infer.models.endpoints import endpoint_object, known_quality
 from nodl.infer.models.ros_nodes import (
     LIFECYCLE_CLASS,
     NODE_CLASS,
@@ -69,7 +68,7 @@ def add_endpoints(run: Run, made: EndpointCall, records: list[NodeRecord], call:
     run.understood.add(call.node)
     kinds = types_of(types)
     if len(kinds) > 1 and len(names_of(names)) > 1:
-        kinds = [""]  # nobody knows which of them go together
+        kinds, names = [""], unknown("which name goes with which type")
     for record in records:
         for name in names_of(names):
             for interface_type in kinds:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from nodl.builtin_interfaces import LOGGER_SERVICES
 from nodl.infer.findings import NodeRecord
 from nodl.infer.interpreter.conditions import truth
+from nodl.infer.interpreter.elements import elements
 from nodl.infer.interpreter.frames import Call
-from nodl.infer.interpreter.iterate import elements
 from nodl.infer.interpreter.run import Run
 from nodl.infer.models.library_nodes import library_node
 from nodl.infer.models.ros_parameters import assign_parameters

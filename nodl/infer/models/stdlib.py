@@ -5,11 +5,10 @@ from __future__ import annotations
 import os.path
 from collections.abc import Callable
 
+from nodl.infer.interpreter.elements import elements
 from nodl.infer.interpreter.formatting import as_texts, text_value
 from nodl.infer.interpreter.frames import Arguments, Call
-from nodl.infer.interpreter.iterate import elements
 from nodl.infer.interpreter.run import Model, Run
-from nodl.infer.methods import Partial
 from nodl.infer.models import builtin, options
 from nodl.infer.text import Input, concatenations, make_text
 from nodl.infer.values import (
@@ -22,6 +21,7 @@ from nodl.infer.values import (
     External,
     Instance,
     Items,
+    Partial,
     Sequence,
     Value,
     constant_strings,

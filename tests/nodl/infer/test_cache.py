@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from nodl.infer import infer_executable, python_program
-from nodl.infer.kept import own_sources
+from nodl.infer.cache import own_sources
 from nodl.infer.program import Program
 from nodl.infer.python_executable import ProgramTarget
 from nodl.infer.start import LaunchKey

@@ -1,7 +1,7 @@
-"""Answers about Python programs, kept by content between runs: an analysis is a function of what it asked of the disk.
+"""A cache of answers about Python programs, by content.
 
-An answer holds while our own code, the interpreter and everything that the analysis asked are as they were: the
-content of each file, the names in each folder where it looked for modules. Reads and writes files.
+A cached answer is valid while our own code, the Python version and everything that the analysis read are unchanged: the
+content of each file, and the names in each folder where it looked for modules. Reads and writes files.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from nodl.infer.program import Program
 
 VARIANTS = 4
-"""Answers to one question, after different edits, of which the newest are kept."""
+"""Number of answers cached for one question, after different edits; the newest stay."""
 
 
 _OWN_SOURCES = (
@@ -28,19 +28,19 @@ _OWN_SOURCES = (
 
 
 def own_sources() -> list[Path]:
-    """Our own code that answers come from."""
+    """Return the files of our own code that answers depend on."""
     root = Path(__file__).parents[1]
     return sorted(path for pattern in _OWN_SOURCES for path in root.glob(pattern))
 
 
 @lru_cache(maxsize=1)
 def _analyser() -> str:
-    """Of our own code, and of the Python that parses and computes."""
+    """Return a digest of our own code and of the Python version."""
     return digest(sys.version, [(path.name, digest_of(str(path))) for path in own_sources()])
 
 
-class KeptAnswer:
-    """The answer to one ``question`` (whose ``repr`` says all of it) about ``program``."""
+class CachedAnswer:
+    """The cached answer to one ``question``, identified by its ``repr``, about ``program``."""
 
     def __init__(self, program: Program, question: object) -> None:
         self._program = program
@@ -52,12 +52,13 @@ class KeptAnswer:
         return digest("python", _analyser(), self._program.roots, self._question)
 
     def find(self) -> Any:
-        """What was kept; ``None``: nothing, or the disk would answer otherwise now."""
+        """Return the cached answer, or None if there is none or a file that it depends on has changed."""
         for asked, answer in variants(self._folder, self._key):
             if all(self._program.ask(kind, what) == said for kind, what, said in asked):
                 return answer
         return None
 
-    def keep(self, answer: object) -> None:
+    def store(self, answer: object) -> None:
+        """Cache ``answer`` with everything that the analysis read."""
         asked = [(kind, what, said) for (kind, what), said in self._program.asked.items()]
         keep_variant(self._folder, self._key, (asked, answer), VARIANTS)
