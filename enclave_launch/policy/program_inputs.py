@@ -8,6 +8,7 @@ counts; where it cannot be told, the default in the source must not be believed.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import takewhile
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -50,16 +51,16 @@ def environment_inputs(process: ResolvedProcess) -> ProgramInputs:
 def program_inputs(process: ResolvedProcess) -> ProgramInputs:
     """Return the inputs of ``process``.
 
-    The value of an option follows ``=`` or is the next word without a dash. Without any options each word is also
-    known by its place (``<1>``, as learnt manifests have it)."""
+    The value of an option follows ``=`` or is the next word without a dash. The words before any option are also known
+    by their places (``<1>``, as learnt manifests have it)."""
     values = dict(environment_inputs(process).values)
     words = own_words(process)
     for word, following in zip(words, (*words[1:], ""), strict=False):
         if _is_flag(word):
             name, equals, value = word.partition("=")
             values[name] = value if equals or _is_flag(following) else following
-    if not any(map(_is_flag, words)):  # an option may take the next word: beside options places tell nothing
-        values.update((f"<{place}>", word) for place, word in enumerate(words, 1))
+    leading = takewhile(lambda word: not _is_flag(word), words)  # behind an option places tell nothing
+    values.update((f"<{place}>", word) for place, word in enumerate(leading, 1))
     return ProgramInputs(
         values,
         bare_words=any(not _is_flag(word) for word in words),

@@ -7,10 +7,10 @@
           - {in: subscriptions, name: front, parameter: scan_topic, default: scan, proof: one run, runs: [a]}
 
 ``name`` is that of the standard entry, the name that was seen. ``parameter`` gives the node's parameter (or ``<1>``,
-a word of its command line) whose value the name is, ``each`` says that it is a list, ``suffix`` what the program
-appends to the value, ``default`` the name where nothing is set. ``written`` is the source's name where NoDL v2 cannot
-hold it, ``introspection`` says that the calls of a service are published. ``undecided`` and ``runs`` are for the
-reader: plans show them.
+a word of its command line, or ``--option``) whose value the name is, ``each`` says that it is a list, ``prefix`` and
+``suffix`` what the program puts before and after the value, ``default`` the value where nothing is set. ``written`` is
+the source's name where NoDL v2 cannot hold it, ``introspection`` says that the calls of a service are published.
+``undecided`` and ``runs`` are for the reader: plans show them.
 
 A coincidence of values is not a rule: with ``proof: one run`` the name may as well be fixed, and ``seen`` lists further
 names that came from the same parameter. Where several parameters had the value, ``candidates`` lists them beside the
@@ -113,8 +113,9 @@ def _template(fields: _Fields, row: YamlMap) -> NameTemplate:
     if parameter:
         item = "each" if fields.get("each") is True else None
         given = str(default) if default is not None else None
-        part, suffix = ParameterPart(str(parameter), given, item), str(fields.get("suffix") or "")
-        return NameTemplate((part, suffix) if suffix else (part,))
+        part = ParameterPart(str(parameter), given, item)
+        prefix, suffix = str(fields.get("prefix") or ""), str(fields.get("suffix") or "")
+        return NameTemplate((*filter(None, (prefix,)), part, *filter(None, (suffix,))))
     return _fixed(str(fields.get("written") or fields["name"]), row)
 
 

@@ -93,12 +93,16 @@ _LEARNT_ENDPOINT = map_of(
         "parameter": text_of(),
         "each": boolean,
         "suffix": text_of(),
+        "prefix": text_of(),
         "default": text_of(),
         "proof": text_of(),
         "undecided": _TEXTS,
         "seen": _TEXTS,
         "candidates": list_of(
-            map_of({"parameter": text_of(), "each": boolean, "suffix": text_of()}, required=("parameter",))
+            map_of(
+                {"parameter": text_of(), "each": boolean, "suffix": text_of(), "prefix": text_of()},
+                required=("parameter",),
+            )
         ),
         "introspection": boolean,
         "runs": _TEXTS,

@@ -126,6 +126,7 @@ def _about(entry: LearntEndpoint) -> dict[str, Any]:
         fields["parameter"] = origin.source.parameter
         fields["each"] = origin.source.each
         fields["suffix"] = origin.source.suffix or None
+        fields["prefix"] = origin.source.prefix or None
         fields["default"] = origin.default
         fields["proof"] = "another value was followed" if origin.proven else ONE_RUN
         fields["seen"] = [] if origin.proven else list(entry.seen)

@@ -1,9 +1,10 @@
 """Which parameter or argument a recorded name came from, over all observations of one node. Pure.
 
 Measured on nine stacks with ordinary and with hostile values: a name that comes from a parameter is its value
-verbatim, or one entry of it where it is a list; a value as a part of a name was a coincidence each time, but for lists
-of which every entry has the same names below it (``node_names`` of nav2's lifecycle_manager). Parameters whose name
-ends in ``frame``, ``frame_id`` or ``type`` were never the source of a name.
+verbatim, or one entry of it where it is a list, or below every entry of a list (``node_names`` of nav2's
+lifecycle_manager). A name below any other value was a coincidence each time there; as programs that build names so
+exist, the value is a candidate. Parameters whose name ends in ``frame``, ``frame_id`` or ``type`` were never the source
+of a name.
 
 One observation gives candidates. A second one with another value decides: the name followed the value (proven), or
 it did not (fixed). Until then both hold: the name that was seen, and the value of each candidate.
@@ -13,19 +14,21 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from itertools import takewhile
 from types import MappingProxyType
 from typing import NamedTuple
 
 from nodl.node_interface import EndpointKind
 
 _NEVER = re.compile(r"(frame|frame_id|type)\Z")
+_BEFORE = ("", "/", "~/")
 _PREFERRED = re.compile(r"(topic|topic_name)\Z")
 
 MARKER = "enclave_launch_marker_"
 """Values that a run for learning gives in place of a user's begin so; none is a name that a manifest may have."""
 
 Inputs = Mapping[str, object]
-"""Parameters by name; words of the command line as ``<1>``, ``<2>``, or the values of its options by their names."""
+"""Parameters by name; of the command line words as ``<1>``, ``<2>`` and the values of options by their names."""
 
 
 class Name(NamedTuple):
@@ -52,16 +55,19 @@ class Observation(NamedTuple):
 
 
 class Source(NamedTuple):
-    """A parameter, or with ``each`` any entry of a list, and what the program appends to it. ``*`` in ``parameter``
-    stands for one part of its name."""
+    """A parameter, or with ``each`` any entry of a list, and what the program puts before and after it.
+
+    ``*`` in ``parameter`` stands for one part of its name.
+    """
 
     parameter: str
     each: bool = False
     suffix: str = ""
+    prefix: str = ""
 
     def __str__(self) -> str:
         value = f"each of {self.parameter}" if self.each else self.parameter
-        return f"{value} and {self.suffix}" if self.suffix else value
+        return " and ".join(filter(None, (self.prefix, value, self.suffix)))
 
 
 class NameOrigin(NamedTuple):
@@ -85,15 +91,13 @@ FIXED = NameOrigin()
 
 
 def arguments_as_inputs(words: Sequence[str]) -> dict[str, str]:
-    """Return the words of a command line by their place, from ``<1>``.
+    """Return the words of a command line by their place, from ``<1>``, and the values of options by their names.
 
-    Beside options, one of which may take the next word, a place tells nothing: then the values of the options are
-    returned by their names.
+    Behind an option, which may take the next word, a place tells nothing.
     """
-    if not any(word.startswith("-") for word in words):
-        return {f"<{index}>": word for index, word in enumerate(words, 1)}
-    options = {}
-    for word, following in zip(words, (*words[1:], "-"), strict=True):
+    leading = takewhile(lambda word: not word.startswith("-"), words)
+    options = {f"<{index}>": word for index, word in enumerate(leading, 1)}
+    for word, following in zip(words, (*words[1:], "-"), strict=False):
         option, equals, value = word.partition("=")
         if option.startswith("-") and (equals or not following.startswith("-")):
             options[option] = value if equals else following
@@ -125,8 +129,8 @@ def possible_sources(name: Name, seen: Observation) -> tuple[Source, ...]:
     A program that declares what stands on its command line copied it from there (topic_tools).
     """
     copied = any(value == name.name for key, value in seen.inputs.items() if key[0] in "<-")
-    found = candidates(name.name, seen.inputs if copied else seen.values)
-    return (*found, *_names_below(name, seen))
+    found = (*candidates(name.name, seen.inputs if copied else seen.values), *_names_below(name, seen))
+    return found or tuple(_texts_within(name, seen))
 
 
 def _source(parameter: str, value: object, name: str) -> Source | None:
@@ -162,21 +166,37 @@ def _all_sources(name: Name, seen: Observation) -> Iterable[Source]:
         if source is not None:
             yield source
     yield from _names_below(name, seen)
+    yield from _texts_within(name, seen)
 
 
 def _names_below(name: Name, seen: Observation) -> Iterable[Source]:
-    """Lists of which every entry has a name like this one below it."""
+    """Yield lists of which every entry has a name like this one below it."""
     for parameter, value in sorted(seen.inputs.items()):
         entries = _entries(value)
-        for entry in entries if not _NEVER.search(parameter) else ():
-            suffix = name.name.removeprefix(entry)
-            below = suffix != name.name and suffix.startswith("/")
-            if below and all(name._replace(name=each + suffix) in seen.names for each in entries):
-                yield Source(parameter, each=True, suffix=suffix)
+        for source in (each for entry in entries for each in _within(name.name, parameter, entry, each=True)):
+            texts = (f"{source.prefix}{entry}{source.suffix}" for entry in entries)
+            if all(name._replace(name=text) in seen.names for text in texts):
+                yield source
+
+
+def _texts_within(name: Name, seen: Observation) -> Iterable[Source]:
+    """Yield texts below which the name is: by chance more often than not, so that another run has to decide."""
+    for parameter, value in sorted(seen.values.items()):
+        if isinstance(value, str):
+            yield from _within(name.name, parameter, value, each=False)
+
+
+def _within(name: str, parameter: str, entry: str, *, each: bool) -> Iterable[Source]:
+    if not entry or _NEVER.search(parameter):
+        return
+    for prefix in _BEFORE:
+        suffix = name.removeprefix(prefix + entry)
+        if suffix != name and suffix.startswith("/"):
+            yield Source(parameter, each, suffix, prefix)
 
 
 def _is_telling(source: Source, seen: Observation) -> bool:
-    """Enough for one run to tell: what begins with the one entry of a list may do so by chance."""
+    """Return True if one run is enough: what is below the one entry of a list, or a text, may be so by chance."""
     return not source.suffix or len(_entries(seen.inputs.get(source.parameter))) > 1
 
 
@@ -186,9 +206,8 @@ def _entries(value: object) -> frozenset[str]:
 
 def _values(source: Source, seen: Observation) -> frozenset[str]:
     value = seen.values.get(source.parameter)
-    if source.each:
-        return frozenset(entry + source.suffix for entry in _entries(value))
-    return frozenset((value,)) if isinstance(value, str) else frozenset()
+    entries = _entries(value) if source.each else [value] if isinstance(value, str) else ()
+    return frozenset(f"{source.prefix}{entry}{source.suffix}" for entry in entries)
 
 
 def _contradicts(name: Name, source: Source, other: Observation) -> bool:
@@ -222,12 +241,12 @@ def _generalised(found: Mapping[Name, NameOrigin]) -> dict[Name, NameOrigin]:
     for name, origin in found.items():
         if origin.source and origin.default is None:
             for family in _families(origin.source.parameter):
-                alike = (name.kind, name.type, origin.source.suffix, family)
+                alike = (name.kind, name.type, origin.source[2:], family)
                 families.setdefault(alike, set()).add(origin.source.parameter)
     result = dict(found)
     for name, origin in found.items():
         for family in _families(origin.source.parameter) if origin.source and origin.default is None else ():
-            if origin.source and len(families[name.kind, name.type, origin.source.suffix, family]) > 1:
+            if origin.source and len(families[name.kind, name.type, origin.source[2:], family]) > 1:
                 result[name] = origin._replace(source=origin.source._replace(parameter=family))
                 break
     return result
@@ -245,7 +264,7 @@ def _without_defaults(
     """A fixed name that is there only where the parameter is not set is the parameter's default."""
     result = dict(found)
     for name, origin in found.items():
-        if origin.source is None or origin.default is not None:
+        if origin.source is None or origin.default is not None or origin.source.suffix:
             continue
         unset = [each for each in observations if not _given(origin.source, each.inputs)]
         names_when_set = {

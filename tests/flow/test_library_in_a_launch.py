@@ -386,6 +386,7 @@ def test_explain_says_of_one_name_which_descriptions_have_it(
 ROWS = "{{runs: [{{id: a}}], endpoints: [{{in: publishers, name: status, {}, runs: [a]}}]}}"
 AFTER_ONE_RUN = ROWS.format("parameter: label, default: status, proof: one run")
 PROVEN = ROWS.format("parameter: label, default: status, proof: another value was followed")
+BELOW = ROWS.format("candidates: [{parameter: camera, prefix: /, suffix: /status}]")
 SEVERAL = ROWS.format("undecided: [a, b], candidates: [{parameter: a}, {parameter: b, each: true}]")
 
 
@@ -398,6 +399,7 @@ SEVERAL = ROWS.format("undecided: [a, b], candidates: [{parameter: a}, {paramete
         (AFTER_ONE_RUN, "label", "robot 7 ok", ["/status"], True),
         (PROVEN, "label", "warehouse", ["/warehouse"], False),
         (SEVERAL, "a", "front", ["/front", "/status"], True),
+        (BELOW, "camera", "rgb", ["/rgb/status", "/status"], True),
         (SEVERAL, "b", "[left, right]", ["/left", "/right", "/status"], True),
     ],
 )
