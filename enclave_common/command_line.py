@@ -33,9 +33,23 @@ def given_path(text: str) -> Path:
     return Path(text)
 
 
+def time_span(text: str) -> float:
+    """Return ``20s``, ``5m``, ``1h``, ``2d``, or a number of seconds, in seconds.
+
+    :raises argparse.ArgumentTypeError: it is something else."""
+    found = _SPAN.fullmatch(text)
+    if found is None:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a time such as 20s, 5m, 1h or 2d")
+    return float(found[1]) * _UNITS[found[2] or "s"]
+
+
+_SPAN = re.compile(r"([0-9]+(?:\.[0-9]+)?)(s|m|h|d)?")
+_UNITS = {"s": 1.0, "m": 60.0, "h": 3600.0, "d": 86400.0}
+
 FLAG: Kind = {"action": "store_true"}
 TEXT: Kind = {}
 PATH: Kind = {"type": given_path}
+TIME: Kind = {"type": time_span}
 TEXTS: Kind = {"action": "append", "default": []}
 PATHS: Kind = {**TEXTS, **PATH}
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from enclave_common.dependencies import installed
 from enclave_common.words import counted, some_of
-from enclave_launch.errors import ManifestError, UsageError, translated
+from enclave_launch.errors import ManifestError, translated
 from enclave_launch.recording.isolation import DEVICES_STAY_REAL, isolate
 from enclave_launch.recording.learning import (
     RECORDS,
@@ -25,8 +25,6 @@ from enclave_launch.recording.markers import MarkerRun, questions
 from enclave_launch.recording.recording import Recording
 from enclave_launch.runtime.companion import LaunchCompanion
 from enclave_launch.verb.target import LaunchTarget
-from keystore.errors import KeystoreError
-from keystore.formats.validity import parse_duration
 from nodl.errors import NoDLError
 
 _NAMES = 6  # named in a message
@@ -35,20 +33,10 @@ Start = Callable[["LaunchCompanion"], int]
 """Run the launch with a companion; gives the exit status."""
 
 
-def seconds(text: str | None) -> float | None:
-    """Convert ``10s`` or ``2m`` to seconds.
-
-    :raises UsageError: it is no duration."""
-    try:
-        return None if text is None else parse_duration(text).total_seconds()
-    except KeystoreError as error:
-        raise UsageError(f"--learn-for {text}: not a duration; write for example 10s or 2m") from error
-
-
 def learn_launch(target: LaunchTarget, options: argparse.Namespace, start: Start) -> int:
     """Record one run (and a second one for ``--learn-parameters``), then write what was learnt. Gives the exit status
     of the launch."""
-    patience = seconds(options.learn_for)
+    patience: float | None = options.learn_for
     folder = Path(options.learn).absolute()
     prepare_folder(folder)
     isolation = isolate(options.learn_isolation)

@@ -14,6 +14,7 @@ from enclave_common.command_line import (
     PATHS,
     TEXT,
     TEXTS,
+    TIME,
     CommandParser,
     Option,
     add_options,
@@ -147,7 +148,7 @@ RUNNING: tuple[Option, ...] = (
 RECORDING: tuple[Option, ...] = (
     ("--learn DIR", PATH,
      "run the launch, record what its nodes request, and write their manifests into DIR"),
-    ("--learn-for TIME", TEXT,
+    ("--learn-for TIME", TIME,
      "end the learning run when nothing new was recorded for TIME, such as 10s (default: at Ctrl-C)"),
     ("--learn-isolation", one_of("auto", "local", "none"),
      "isolate the learning run in a network namespace, else on this machine (auto), only the latter, or not"),
@@ -200,7 +201,13 @@ def add_security_options(group: argparse._ArgumentGroup) -> None:
 
 
 def resolve_options(options: argparse.Namespace) -> ResolveOptions:
-    """Return what the options say about evaluation and permissions."""
+    """Return what the options say about evaluation and permissions.
+
+    :raises UsageError: a path of ``--nodl`` or ``--source`` does not exist, or a pattern is malformed."""
+    for name in ("nodl", "source"):
+        for path in getattr(options, name):
+            if not os.path.exists(path):
+                raise UsageError(f"--{name} {path}: no such file or directory")
     return ResolveOptions(
         prefixes=tuple(options.prefix),
         manifests=tuple(options.nodl),

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import math
 import sys
 from collections.abc import Iterable
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from enclave_common.command_line import FLAG, PATH, TEXT, Option, add_options, one_of
+from enclave_common.command_line import FLAG, PATH, TEXT, TIME, Option, add_options, one_of
 from enclave_common.terminal import ProgressBar, json_text, wanted
 from enclave_common.words import counted
 from keystore.disk.lock import DEFAULT_TIMEOUT
@@ -37,18 +36,11 @@ class SecretOptions(NamedTuple):
 Table = tuple[Option | SecretOptions, ...]
 
 
-def _seconds(text: str) -> float:
-    seconds = float(text)
-    if not 0 <= seconds < math.inf:
-        raise ValueError
-    return seconds
-
-
 KEYSTORE: Option = ("keystore KEYSTORE", PATH, "root directory of the keystore")
 FORMAT: Option = ("--format", one_of("text", "json"), "how to print (text)")
 LOCK: Option = (
-    "--lock-timeout SECONDS", {"type": _seconds, "default": DEFAULT_TIMEOUT},
-    "how long to wait for another run (30)",
+    "--lock-timeout TIME", {**TIME, "default": DEFAULT_TIMEOUT},
+    "how long to wait for another run (30s)",
 )  # fmt: skip
 WITHIN: Option = ("--within TIME", {"default": "30d"}, "what counts as soon (30d)")
 DOMAINS: Option = ("--domain-id IDS", TEXT, "domains of the permissions (default: the governance's)")
@@ -101,8 +93,8 @@ PROVISIONING: Table = (
 
 
 UNITS: Table = (
-    ("--settle SECONDS", {"type": _seconds, "default": UnitOptions().settle},
-     "how long a process must run before it counts as up (5)"),
+    ("--settle TIME", {**TIME, "default": UnitOptions().settle},
+     "how long a process must run before it counts as up (5s)"),
     ("--units DIR", {**PATH, "default": UNITS_FOLDER}, "where systemd reads units (/etc/systemd/system)"),
 )  # fmt: skip
 """Of each verb that looks at systemd units; read by ``unit_options``."""

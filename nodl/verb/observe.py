@@ -10,7 +10,6 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import re
 import socket
 import subprocess
 import sys
@@ -19,7 +18,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
-from enclave_common.command_line import FLAG, PATH, TEXT, Option, add_options, one_of
+from enclave_common.command_line import FLAG, PATH, TEXT, TIME, Option, add_options, one_of
 from enclave_common.environment import domain_id
 from enclave_common.terminal import json_text, printable
 from enclave_common.words import counted
@@ -37,8 +36,6 @@ from nodl.record.manifest import OBSERVED_HEAD, manifest_file_name, manifest_tex
 from nodl.verb import add_verb, write_documents
 
 _HIGHEST_DOMAIN = 232  # beyond, there are no ports (DDS-RTPS 9.6.1)
-_SECONDS = re.compile(r"([0-9]+(?:\.[0-9]+)?)(s|m|h)?\Z")
-_UNITS = {None: 1.0, "s": 1.0, "m": 60.0, "h": 3600.0}
 
 
 def domain(text: str) -> int:
@@ -49,21 +46,13 @@ def domain(text: str) -> int:
     return number
 
 
-def seconds(text: str) -> float:
-    """``90``, ``90s``, ``5m`` or ``1h`` in seconds. Raises ``ValueError``."""
-    match = _SECONDS.match(text)
-    if not match:
-        raise ValueError
-    return float(match[1]) * _UNITS[match[2]]
-
-
 RUNS: tuple[Option, ...] = (
     ("runs RUN.json", {**PATH, "nargs": "*"}, "earlier observations, merged with this one"),
 )
 LOOKING: tuple[Option, ...] = (
     ("--domain-id N", {"type": domain}, "default: ROS_DOMAIN_ID, else 0"),
-    ("--for TIME", {"dest": "longest", "type": seconds, "default": 60.0}, "at the longest (60s)"),
-    ("--settle TIME", {"type": seconds, "default": 5.0}, "end when nothing changed for this long (5s)"),
+    ("--for TIME", {**TIME, "dest": "longest", "default": 60.0}, "at the longest (60s)"),
+    ("--settle TIME", {**TIME, "default": 5.0}, "end when nothing changed for this long (5s)"),
     ("--with", {**one_of("auto", "cyclonedds", "rclpy"), "dest": "source"},
      "what to look with: Cyclone DDS's Python binding (sees processes and more) or rclpy"),
     ("--merge-only", FLAG, "look at nothing; merge the observations that are named"),

@@ -73,7 +73,7 @@ def test_where_nothing_runs_the_status_and_the_message_say_so(
     ("words", "says"),
     [
         (["--merge-only"], "needs observations to merge"),
-        (["--for", "soon"], "invalid seconds value"),
+        (["--for", "soon"], "is not a time such as 20s"),
         (["--domain-id", "233"], "invalid domain value"),
     ],
 )

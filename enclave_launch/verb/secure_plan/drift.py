@@ -17,7 +17,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from enclave_common.command_line import PATH, PATHS, TEXT, TEXTS, one_of
+from enclave_common.command_line import PATH, PATHS, TEXT, TEXTS, TIME, one_of
 from enclave_common.environment import environment_with
 from enclave_common.terminal import json_text, message
 from enclave_launch.admission.variables import domain_of
@@ -50,9 +50,8 @@ OPTIONS = {
         ("--domain-id N", {"type": int}, "default: the domain that the plan is for"),
         ("--keystore DIR", PATH, "of a secured system"),
         ("--enclave NAME", TEXT, "the observer's own"),
-        ("--for SECONDS", {"type": float, "dest": "longest", "default": 30.0},
-         "how long to wait for planned nodes (30)"),
-        ("--settle SECONDS", {"type": float, "default": 5.0}, "compare when nothing changed for this time (5)"),
+        ("--for TIME", {**TIME, "dest": "longest", "default": 30.0}, "how long to wait for planned nodes (30s)"),
+        ("--settle TIME", {**TIME, "default": 5.0}, "compare when nothing changed for this time (5s)"),
         ("--with", {**one_of("auto", "cyclonedds", "rclpy"), "dest": "observer"}, ""),
         ("--graph RUN.json", PATH, "a file of secure-nodl observe --save, instead of observing"),
     ),

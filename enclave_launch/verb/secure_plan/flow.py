@@ -1,6 +1,7 @@
 """Show which enclave can influence which, over any number of hops.
 
-  secure-plan flow --from /camera --to /base PACKAGE LAUNCH_FILE     the shortest ways, or that there is none
+  secure-plan flow --from /camera --to /base PACKAGE LAUNCH_FILE     the shortest paths, or that there is none
+  secure-plan flow --from /camera --to /cmd_vel PACKAGE LAUNCH_FILE  to whoever receives a topic, service or action
   secure-plan flow PACKAGE LAUNCH_FILE                               what each enclave reaches
 
 An enclave counts as passing on all that it receives. What every node has (parameter services, /rosout ...) counts only
@@ -11,18 +12,43 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections.abc import Collection
 
 from enclave_common.command_line import FLAG
 from enclave_launch.errors import UsageError
 from enclave_launch.report.review_text import paths_text, reach_text
-from enclave_launch.review.document import plan_from_document
-from enclave_launch.review.information_flow import flow_graph, shortest_paths
+from enclave_launch.review.document import Operation, PlanDocument, plan_from_document
+from enclave_launch.review.information_flow import FlowGraph, flow_graph, shortest_paths
 from enclave_launch.verb.secure_plan.plans import read_plan
+
+SENDING: Collection[Operation] = (
+    "publish",
+    "call_services",
+    "call_actions",
+    "serve_services",
+    "serve_actions",
+)
+RECEIVING: Collection[Operation] = (
+    "subscribe",
+    "serve_services",
+    "serve_actions",
+    "call_services",
+    "call_actions",
+)
+"""Requests and answers flow both ways, so both ends of a service or action send and receive."""
 
 OPTIONS = {
     "": (
-        ("--from ENCLAVE|NODE", {"dest": "influence_from"}, "source: an enclave, node or name"),
-        ("--to ENCLAVE|NODE", {"dest": "influence_to"}, "target: an enclave, node or name"),
+        (
+            "--from ENCLAVE|NODE|NAME",
+            {"dest": "influence_from"},
+            "source: an enclave, a node, or whoever sends on a topic, service or action",
+        ),
+        (
+            "--to ENCLAVE|NODE|NAME",
+            {"dest": "influence_to"},
+            "target: an enclave, a node, or whoever receives from one",
+        ),
         ("--built-in", FLAG, "count what every node has, too"),
     )
 }
@@ -37,15 +63,36 @@ def run(options: argparse.Namespace) -> int:
     if options.influence_from is None:
         sys.stdout.write(reach_text(plan, graph))
         return 0
-    homes = {**{node.fqn: node.enclave for node in plan.nodes}, **{path: path for path in plan.enclaves}}
-    for end in (options.influence_from, options.influence_to):
-        if end not in homes:
-            known = " ".join(sorted(homes))
-            raise UsageError(f"flow: {end} is neither an enclave nor a node of this plan; it has: {known}")
-    source, target = homes[options.influence_from], homes[options.influence_to]
-    if source == target:
-        ends = f"{options.influence_from} and {options.influence_to}"
-        sys.stdout.write(f"{ends} are both in enclave {source}: nothing separates them\n")
-        return 0
-    sys.stdout.write(paths_text(source, target, shortest_paths(graph, source, target)))
+    sources = _enclaves(plan, options.influence_from, SENDING)
+    targets = _enclaves(plan, options.influence_to, RECEIVING)
+    for source in sources:
+        for target in targets:
+            sys.stdout.write(_paths(graph, source, target))
     return 0
+
+
+def _paths(graph: FlowGraph, source: str, target: str) -> str:
+    if source == target:
+        return f"both ends are in enclave {source}: nothing separates them\n"
+    return paths_text(source, target, shortest_paths(graph, source, target))
+
+
+def _enclaves(plan: PlanDocument, end: str, operations: Collection[Operation]) -> list[str]:
+    """Return the enclave ``end``, that of the node, or those that use the name so."""
+    homes = {**{node.fqn: node.enclave for node in plan.nodes}, **{path: path for path in plan.enclaves}}
+    if end in homes:
+        return [homes[end]]
+    users = [node for node in plan.nodes if any(grant.name == end for grant in node.grants)]
+    found = {
+        node.enclave
+        for node in users
+        for grant in node.grants
+        if grant.name == end and grant.operation in operations
+    }
+    if found:
+        return sorted(found)
+    if users:
+        what = "sends on it" if operations is SENDING else "receives from it"
+        raise UsageError(f"flow: {end} is a name of this plan, but no node {what}")
+    known = " ".join(sorted(homes))
+    raise UsageError(f"flow: {end} is no enclave, node or name of this plan; its enclaves and nodes: {known}")
