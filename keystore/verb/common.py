@@ -18,8 +18,6 @@ from keystore.formats.domains import Domains
 from keystore.formats.subject import SubjectScheme
 from keystore.formats.validity import DEFAULT_BACKDATE, iso, parse_duration, parse_end, utc_now
 from keystore.signing.ca_access import CaAccess, Secret
-from keystore.steps.host_units import UNITS as UNITS_FOLDER
-from keystore.steps.host_units import UnitOptions
 from keystore.steps.options import ProvisionOptions
 
 if TYPE_CHECKING:
@@ -92,14 +90,6 @@ PROVISIONING: Table = (
 """Of each verb that issues certificates for enclaves; read by ``provision_options``."""
 
 
-UNITS: Table = (
-    ("--settle TIME", {**TIME, "default": UnitOptions().settle},
-     "how long a process must run before it counts as up (5s)"),
-    ("--units DIR", {**PATH, "default": UNITS_FOLDER}, "where systemd reads units (/etc/systemd/system)"),
-)  # fmt: skip
-"""Of each verb that looks at systemd units; read by ``unit_options``."""
-
-
 def add_table(parser: argparse.ArgumentParser, table: Table) -> None:
     """Add the options of a verb; argparse's help leaves out a group without any."""
     ca_keys = parser.add_argument_group("CA keys")
@@ -167,11 +157,6 @@ def provision_options(arguments: argparse.Namespace, **more: Any) -> ProvisionOp
         **change(arguments),
         **more,
     )
-
-
-def unit_options(arguments: argparse.Namespace) -> UnitOptions:
-    """Return what ``UNITS`` was given."""
-    return UnitOptions(units=arguments.units, settle=arguments.settle)
 
 
 def print_json(content: Any) -> None:

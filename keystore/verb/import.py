@@ -19,7 +19,7 @@ from keystore.disk.versions import Versions
 from keystore.steps.host_units import UnitOptions, differences, installed_units, stop
 from keystore.steps.importing import ImportOptions, ImportReport, Restart, import_bundle, parse_owner
 from keystore.verb import common
-from keystore.verb.units import restarted
+from keystore.verb.units import UNIT_OPTIONS, restarted, unit_options
 
 OPTIONS: common.Table = (
     common.KEYSTORE,
@@ -32,7 +32,7 @@ OPTIONS: common.Table = (
     ("--owner UID:GID", TEXT,
      "for containers: write each enclave once more, as a directory of its own that belongs to this user; remembered"),
     ("--restart", FLAG, "restart the units that have to be, and stop those of enclaves that are gone"),
-    *common.UNITS,
+    *UNIT_OPTIONS,
     common.FORMAT,
     common.LOCK,
 )  # fmt: skip
@@ -65,10 +65,10 @@ def run(arguments: argparse.Namespace) -> int:
         f"to restart: {report.restart.value}",
     )
     common.print_answer(arguments, content, lines)
-    unit_options = common.unit_options(arguments)
-    units = [one for one in installed_units(unit_options) if _is_of(one, arguments.keystore)]
+    found = unit_options(arguments)
+    units = [one for one in installed_units(found) if _is_of(one, arguments.keystore)]
     common.warn((*report.notes, *differences(units, report.manifest)), arguments)
-    return _restart(report, units, unit_options) if arguments.restart else 0
+    return _restart(report, units, found) if arguments.restart else 0
 
 
 def _is_of(unit: Unit, keystore: Path) -> bool:

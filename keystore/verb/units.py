@@ -18,8 +18,11 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from enclave_common.command_line import FLAG
+from enclave_common.command_line import FLAG, PATH, TIME
 from keystore.errors import InvalidInputError
+from keystore.steps.host_units import (
+    UNITS as UNITS_FOLDER,
+)
 from keystore.steps.host_units import (
     UnitOptions,
     chosen_units,
@@ -34,6 +37,13 @@ from keystore.verb import common
 if TYPE_CHECKING:
     from keystore.disk.units import Unit
 
+UNIT_OPTIONS: common.Table = (
+    ("--settle TIME", {**TIME, "default": UnitOptions().settle},
+     "how long a process must run before it counts as up (5s)"),
+    ("--units DIR", {**PATH, "default": UNITS_FOLDER}, "where systemd reads units (/etc/systemd/system)"),
+)  # fmt: skip
+"""Of each verb that looks at systemd units; read by ``unit_options``."""
+
 OPTIONS: common.Table = (
     (
         "what WHAT",
@@ -46,13 +56,18 @@ OPTIONS: common.Table = (
         "DIR of install, TARGET of remove; else units, targets, nodes or enclaves",
     ),
     ("--restart", FLAG, "with install: restart what changed or is new"),
-    *common.UNITS,
+    *UNIT_OPTIONS,
 )
+
+
+def unit_options(arguments: argparse.Namespace) -> UnitOptions:
+    """Return what ``UNIT_OPTIONS`` was given."""
+    return UnitOptions(units=arguments.units, settle=arguments.settle)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Do what ``what`` says. Returns 1 if something does not run."""
-    options = common.unit_options(arguments)
+    options = unit_options(arguments)
     if arguments.what == "install":
         return _install(arguments, options)
     if arguments.what == "remove":
