@@ -161,14 +161,16 @@ def _united(
 ) -> tuple[NodeInterface, ...]:
     """Return ``interfaces`` with the endpoints of ``others`` that give a name beyond ``known``."""
     known = frozenset(known)
-    united = {start.node(each).fqn: each for each in interfaces}
+    united = list(interfaces)
+    places = {start.node(each).fqn: place for place, each in enumerate(united)}
     for other in others:
-        beyond = other._replace(endpoints=tuple(_beyond(other, known, start)), gaps=())
-        if beyond.endpoints:
-            fqn = start.node(other).fqn
-            same = united.get(fqn)
-            united[fqn] = same._replace(endpoints=same.endpoints + beyond.endpoints) if same else beyond
-    return tuple(united.values())
+        beyond = tuple(_beyond(other, known, start))
+        place = places.get(start.node(other).fqn) if beyond else None
+        if place is not None:
+            united[place] = united[place]._replace(endpoints=united[place].endpoints + beyond)
+        elif beyond:
+            united.append(other._replace(endpoints=beyond, gaps=()))
+    return tuple(united)
 
 
 def _beyond(interface: NodeInterface, known: frozenset[Named], start: ProgramStart) -> Iterator[Endpoint]:

@@ -428,3 +428,19 @@ def test_what_others_leave_open_a_record_may_lack(
     (told,) = (each for each in plan.warnings if each.code.value == "record-lacks")
     assert "may lack what another description leaves open" in told.text and "is not known" in told.text
     assert "--also unseen" not in told.remedy
+
+
+def test_further_nodes_stay_as_they_are_where_descriptions_are_joined(
+    launch: Launch, install: Callable[..., Path], document: Callable[..., Path]
+) -> None:
+    """Of two recorded nodes one gets what was never seen; a node that only the source makes comes along."""
+    second = "extra = Node('extra')\nextra.create_publisher(String, 'far', 1)\n"
+    install(
+        "pkg", "prog", source=PYTHON.format(topic="'unseen'").replace("rclpy.spin", f"{second}rclpy.spin")
+    )
+    section = "{package: pkg, executable: prog, node: NODE, runs: [{id: a}]}"
+    for node in ("n", "other"):
+        folder = document(f"pkg__prog.{node}", f"of_{node}", section.replace("NODE", node))
+    plan = launch('<node pkg="pkg" exec="prog"/>', library_folders=(folder,), also=("unseen",))
+    names = {node.fqn: [str(each.name) for each in node.interface.endpoints] for node in plan.nodes}
+    assert names == {"/n": ["of_n", "unseen"], "/other": ["of_other"], "/extra": ["far"]}
