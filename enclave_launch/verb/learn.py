@@ -66,6 +66,7 @@ def _report_unseen(folder: Path, options: argparse.Namespace) -> None:
     """Report what other descriptions of the recorded nodes have: some names exist only while somebody reads another."""
     from nodl.verb.check_record import never_seen  # an add-on: inference
 
+    _say("comparing the records with sources and the library")
     with translated(NoDLError, ManifestError):
         found = never_seen([folder / RECORDS], options.prefix, options.source)
     for about, names in found.items():

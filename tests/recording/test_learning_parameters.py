@@ -178,3 +178,21 @@ def test_a_folder_that_cannot_be_written_is_told_before_anything_runs(stand_in: 
     assert ran.returncode == 1 and "nothing was started" in ran.stderr and "process started" not in ran.stdout
     told = workspace.run("--learn", str(tmp_path / "learnt"), "--learn-for", "10")
     assert told.returncode == 2 and "write for example 10s or 2m" in told.stderr
+
+
+def test_the_value_of_an_option_is_an_input_as_a_parameter_is(stand_in: Path, tmp_path: Path) -> None:
+    """The second run gives the option a marker, and the name follows."""
+    program = Program(
+        "relay",
+        "node relay\nsubscription %2 std_msgs/msg/String\nwait\n",
+        attributes='args="--topic scan"',
+    )
+    names = learn(tmp_path, stand_in, program)
+    assert names["subscription"].parts == (ParameterPart("--topic"),)
+    learn(tmp_path, stand_in, program, "--learn-parameters")
+    (file,) = (tmp_path / "learnt").glob("*.nodl.yaml")
+    assert "proof: another value was followed" in file.read_text()
+    other = program._replace(attributes='args="--topic front"')
+    make_workspace(tmp_path / "ws", stand_in, [other])
+    (node,) = plan_of(tmp_path).derived.nodes["/"]
+    assert "/front" in "\n".join(explained(plan_of(tmp_path), node.fqn))
