@@ -64,7 +64,7 @@ _HARMLESS_CLASSES = re.compile(
     r"|(?:std|Eigen|cv|boost|pcl|YAML|nlohmann|fmt|spdlog|tinyxml2|urdf|KDL|angles|grid_map|urcl|gtsam|ouster|dai|rs2|sl|asio|"
     r"websocketpp|gz|ignition|sdf|octomap|octomath|fcl|ceres|g2o|Sophus|torch|nvinfer1|zmq|google|absl|casadi|pinocchio|ompl|"
     r"mavconn|mavlink|zbar|open3d|tbb|Magick|xt|Ogre|libcamera|GeographicLib|proj|osqp|autoware_utils_(?:geometry|math|system)|"
-    r"cartographer|mcap|tl|gsl|CLI|toml)::.*"
+    r"cartographer|mcap|tl|gsl|CLI|toml|rtabmap|bosdyn)::.*"
     r"|rclcpp::(?:Rate|WallRate|GenericRate|GenericTimer|WallTimer|\w*Handle|\w*Guard|Event|Clock|TimeSource|Time|Duration|QoS|\w*QoS|QoSInitialization|KeepLast|KeepAll|Logger|Parameter|"
     r"ParameterValue|NodeOptions|\w*Options|Context|TimerBase|CallbackGroup|MessageInfo|SerializedMessage|Serialization|"
     r"WaitSet|GuardCondition|PublisherEventCallbacks|SubscriptionEventCallbacks|NetworkFlow\w*|ParameterMap|ParameterType|"
@@ -74,8 +74,8 @@ _HARMLESS_CLASSES = re.compile(
     r"|rclcpp_action::(?:\w*GoalHandle|ResultCode|GoalUUID|.*Options)"
     r"|tf2::.*|tf2_ros::(?:CreateTimerROS|CreateTimerInterface|AsyncBufferInterface)"
     r"|rcl\w*_\w+|rcutils_\w+|rmw_\w+|rcpputils::.*|class_loader::.*|builtin_interfaces::.*"
-    r"|\w+::(?:msg|srv|action)::.*|Q[A-Z]\w*|Ui::.*"
-    r"|(?:unsigned |signed |long |short )*(?:bool|int|float|double|char|void|long|short|unsigned|size_t|auto)?"
+    r"|\w+::(?:msg|srv|action)::.*|Q[A-Z]\w*|qreal|emit|Ui::.*|U(?:Mutex|ScopeMutex|Timer|Semaphore|Directory|File)"
+    r"|(?:unsigned |signed |long |short )*(?:bool|int|float|double|char|void|long|short|unsigned|size_t|auto)?(?:\[\])?"
     r"|u?int(?:8|16|32|64)_t|uint|byte|va_list|FILE|pthread_\w+|timespec|timeval|sigset_t|[A-Z]"
 )
 _HARMLESS_FUNCTIONS = re.compile(

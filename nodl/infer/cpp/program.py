@@ -27,7 +27,7 @@ from nodl.infer.cpp.running.callbacks import run_callbacks
 from nodl.infer.cpp.running.constructors import construct
 from nodl.infer.cpp.running.machine import Frame, Machine, StepLimitExceeded
 from nodl.infer.cpp.running.values import Seq, Value, unknown
-from nodl.infer.cpp.syntax import children, line_of, text
+from nodl.infer.cpp.syntax import line_of
 from nodl.infer.start import Start
 from nodl.source_ref import SourceRef
 
@@ -214,9 +214,10 @@ def _globals(run: Machine, entry: Entry) -> None:
 
     for file in entry.files:
         index = run.names.files.get(file)
-        for each in _variables(run, index) if index is not None else ():
-            kind = run.names.resolve(each.type, each.scope, each.file)
+        listed = (each for found in index.globals.values() for each in found) if index is not None else ()
+        for each in sorted(listed, key=lambda found: found.node.start_byte):
             mark = run.store.mark()
+            kind = run.names.resolve(each.type, each.scope, each.file)
             if run.names.class_of(kind, each.scope, each.file) is not None or each.value is not None:
                 constant(run, "::".join((*each.scope, each.name)), Frame(each.file, each.scope))
             _check_order(run, each, mark)
@@ -230,17 +231,6 @@ def _check_order(run: Machine, initialised: Global, mark: int) -> None:
             place = SourceRef(initialised.file.file, line_of(initialised.node))
             why = f"{owner.name} is changed before main by another file than its own: in which order is not known"
             run.gap_at(place, why)
-
-
-def _variables(run: Machine, index: FileIndex) -> list[Global]:
-    """Those of a file in their order, with what reads as a function whose parameters are variables."""
-    found = [each for listed in index.globals.values() for each in listed]
-    for each in index.maybe:
-        given = [text(argument) for argument in children(each.value)]
-        if any(run.names.find_global(name, each.scope, index) for name in given):
-            run.names.globals.setdefault(each.name, []).append(each)
-            found.append(each)
-    return sorted(found, key=lambda each: each.node.start_byte)
 
 
 def _run_main(run: Machine, function: Function) -> None:
@@ -257,7 +247,8 @@ def _construct_entry(run: Machine, entry: Entry) -> None:
         why = f"the source of component {entry.cls} was not found in its package"
         run.gap_at(SourceRef(entry.place), why)
         return
-    cls = run.names.find_class(entry.cls, (), index)
+    kind = run.names.resolve(entry.cls, (), index)
+    cls = run.names.class_of(kind, (), index) or run.names.only_class(entry.cls)
     if cls is None:
         why = f"the class {entry.cls} was not found in the sources of its library"
         run.gap_at(SourceRef(index.file), why)

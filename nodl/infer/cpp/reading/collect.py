@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from itertools import pairwise
 from typing import NamedTuple
 
 from nodl.infer.cpp.reading.declarations import (
@@ -105,12 +104,9 @@ class _Collector:
         made.template_defaults, self.defaults = (self.defaults if templates else {}), {}
         for child in node.named_children:
             if child.type == "base_class_clause":
-                listed = [
-                    b for b in child.children if b.type == "virtual" or (b.is_named and b.type != "comment")
-                ]
-                listed = [b for b in listed if b.type != "access_specifier"]
-                made.bases = [text(b) for b in listed if b.type != "virtual"]
-                made.virtual_bases = {text(b) for before, b in pairwise(listed) if before.type == "virtual"}
+                listed = [b for b in children(child) if b.type not in ("access_specifier", "virtual")]
+                made.bases = [text(b) for b in listed]
+                made.virtual_base = any(b.type == "virtual" for b in child.children)
         self.index.classes.setdefault(name, []).append(made)
         self.collect(body, inner, [], made)
 
@@ -200,21 +196,18 @@ class _Collector:
             made = self._function(node, scope, templates, cls)
             if made is not None:
                 self._declare(made, cls)
-                if cls is None and made.parameters and not any(p.name for p in made.parameters):
-                    self._object_or_function(node, made)
+                if cls is None and any(each.type in self.index.globals for each in made.parameters):
+                    self._object(node, made)
             return
         for declared in declared_names(node):
             self._variable(node, declared, scope, templates, cls)
 
-    def _object_or_function(self, node: Node, made: Function) -> None:
-        """``Foo foo(bar);`` is a variable where ``bar`` is one."""
-        declarator = function_declarator(node)
-        listed = text(field_of(declarator, "parameters")) if declarator is not None else "()"
-        call = parse_expression(f"f{listed}")
-        given = field_of(call, "arguments")
-        self.index.maybe.append(
-            Global(made.name, type_text(node), given, node, made.scope, self.index, False)
-        )
+    def _object(self, node: Node, made: Function) -> None:
+        """Add the variable ``Foo foo(bar);``, which reads as a function, where ``bar`` is a variable."""
+        written = text(field_of(function_declarator(node), "parameters"))
+        given = field_of(parse_expression(f"f{written}"), "arguments")
+        found = Global(made.name, type_text(node), given, node, made.scope, self.index, False)
+        self.index.globals.setdefault(made.name, []).append(found)
 
     def _variable(
         self, node: Node, declared: DeclaredVariable, scope: Scope, templates: list[str], cls: Class | None

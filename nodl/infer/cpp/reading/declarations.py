@@ -105,7 +105,7 @@ class Class:
     node: Node
     scope: Scope
     bases: list[str] = field(default_factory=list)
-    virtual_bases: set[str] = field(default_factory=set)
+    virtual_base: bool = False  # one of them is virtual
     templates: list[str] = field(default_factory=list)
     fields: dict[str, Field] = field(default_factory=dict)
     methods: dict[str, list[Function]] = field(default_factory=dict)
@@ -157,7 +157,6 @@ class FileIndex:
     errors: list[tuple[int, int, str]] = field(default_factory=list)  # first byte, line, text
     all_functions: list[Function] = field(default_factory=list)
     sites: tuple[Site, ...] | None = None  # where it may make interfaces, when asked
-    maybe: list[Global] = field(default_factory=list)  # declarations that read as functions, too
 
 
 def conversion(node: Node) -> Node | None:

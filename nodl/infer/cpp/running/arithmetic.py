@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, TypeVar
 
 from nodl.infer.cpp.running.values import (
     MAX_LETTERS,
@@ -21,6 +21,7 @@ from nodl.infer.cpp.running.values import (
     unknown,
 )
 
+Computed = TypeVar("Computed")
 _INT = (-(2**31), 2**31 - 1)
 _LONG = (-(2**63), 2**63 - 1)
 _RANGES = {
@@ -56,17 +57,10 @@ _ARITHMETIC: dict[str, Callable[[Any, Any], Any]] = {
     ">=": lambda a, b: a >= b, "|": lambda a, b: int(a) | int(b), "&": lambda a, b: int(a) & int(b),
     "^": lambda a, b: int(a) ^ int(b), "<<": lambda a, b: a << b if b < 32 else None, ">>": lambda a, b: a >> b,
 }  # fmt: skip
-_OF_TEXTS: dict[str, Callable[[str, str], bool]] = {
-    "<": lambda a, b: a < b, ">": lambda a, b: a > b, "<=": lambda a, b: a <= b, ">=": lambda a, b: a >= b,
-}  # fmt: skip
 
 
 def arithmetic(operator: str, left: object, right: object) -> Value:
     """``left operator right`` of two numbers, or the order of two texts."""
-    if isinstance(left, Text) and isinstance(right, Text) and operator in _OF_TEXTS:
-        texts = plain(left), plain(right)
-        if texts[0] is not None and texts[1] is not None and len(texts[0]) != 1 != len(texts[1]):
-            return (_OF_TEXTS[operator](texts[0], texts[1]),)
     if not isinstance(left, int | float) or not isinstance(right, int | float):
         return unknown("a computed value")
     try:
@@ -134,28 +128,24 @@ CHANGES_TEXT = frozenset({
 
 
 def asked_of_text(known: str, name: str, values: Sequence[Value]) -> Value | None:
-    """What a method tells of the text ``known``; ``None`` if that is not certain."""
-    arguments = _plain(values)
-    answer = _ASKED.get(name)
-    if answer is None or arguments is None:
-        return None
-    try:
-        return answer(known, *arguments)
-    except (TypeError, IndexError, ValueError):
-        return None
+    """Return what a method tells of the text ``known``; ``None`` if that is not certain."""
+    return _computed(_ASKED.get(name), known, values)
 
 
 def changed_text(known: str, name: str, values: Sequence[Value]) -> str | None:
-    """The text ``known`` after a method that changes it; ``None`` if that is not certain."""
+    """Return the text ``known`` after a method that changes it; ``None`` if that is not certain."""
+    after = _computed(_CHANGED.get(name), known, values)
+    return after if after is not None and len(after) <= MAX_LETTERS else None
+
+
+def _computed(method: Callable[..., Computed] | None, known: str, values: Sequence[Value]) -> Computed | None:
     arguments = _plain(values)
-    change = _CHANGED.get(name)
-    if change is None or arguments is None:
+    if method is None or arguments is None:
         return None
     try:
-        after = change(known, *arguments)
+        return method(known, *arguments)
     except (TypeError, IndexError, ValueError):
         return None
-    return after if len(after) <= MAX_LETTERS else None
 
 
 def _plain(values: Sequence[Value]) -> list[str | int] | None:

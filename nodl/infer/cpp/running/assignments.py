@@ -48,9 +48,9 @@ def assignment(run: Machine, node: Node, frame: Frame) -> Value:
     right = field_of(node, "right")
     if left is None:
         return BOTTOM
-    misread = next((child for child in node.children if child.is_error), None)
-    if misread is not None:
-        return _with_comma(run, left, misread, right, frame)
+    if any(child.is_error for child in node.children):
+        assign(run, left, unknown("what the parser did not understand"), frame)
+        return run.evaluate(right, frame)
     if operator == "=" and right is not None and right.type == "initializer_list":
         value = in_braces(run, right, declared_type(run, left, frame)[0], frame)
     else:
@@ -89,16 +89,6 @@ def _points_elsewhere(run: Machine, name: Node, value: Value, frame: Frame) -> N
         owner.aliases[text(name)] = None
         value = unknown(f"what {text(name)} points to")
     _assign_name(run, name, value, frame)
-
-
-def _with_comma(run: Machine, left: Node, misread: Node, right: Node | None, frame: Frame) -> Value:
-    """``(x = a, b)``, which the parser reads as ``x = b`` with an error ``a,`` in between."""
-    listed = children(misread)
-    value = unknown("what the parser did not understand")
-    if text(misread).endswith(",") and len(listed) == 1:
-        value = run.evaluate(listed[0], frame)
-    assign(run, left, value, frame)
-    return run.evaluate(right, frame)
 
 
 def _assigned(run: Machine, targets: Sequence[Obj], value: Value, node: Node, frame: Frame) -> bool:
@@ -180,6 +170,8 @@ def _assign_result(run: Machine, call: Node, value: Value, frame: Frame) -> None
             parts = [a.items[index] for a in value if isinstance(a, Group) and index < len(a.items)]
             assign(run, each, join(*parts) if parts else unknown("what is taken apart"), frame)
         return
+    if _TEMPORARY.match(text(call)):
+        return
     name = text(field_of(function, "field"))
     owner = field_of(function, "argument")
     holders = run.evaluate(owner, frame) if owner is not None else BOTTOM
@@ -192,6 +184,9 @@ def _assign_result(run: Machine, call: Node, value: Value, frame: Frame) -> None
         assign(run, owner, tuple(_one_of(atom, value) for atom in holders), frame)
     elif any(isinstance(atom, Text | Seq | Map | Param) for atom in value) or _gives_reference(run, function):
         run.gap(call, frame, f"what {text(call)[:60]} = ... writes to is not known")
+
+
+_TEMPORARY = re.compile(r"std::(?:string|vector<[^()]*>)\(")
 
 
 def _gives_reference(run: Machine, callee: Node | None) -> bool:

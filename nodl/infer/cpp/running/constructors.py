@@ -216,7 +216,9 @@ def _member_name(name: str) -> str:
 def _bases(
     run: Machine, this: Obj, cls: Class, given: dict[str, Node], arguments: Sequence[Value], node: Node, inner: Frame
 ) -> None:  # fmt: skip
-    for written in _made_by(run, this, cls):
+    if cls.virtual_base:
+        run.gap(node, inner, f"{cls.name} has a virtual base: who makes it is not followed")
+    for written in cls.bases:
         kind = run.names.resolve(written, cls.scope, cls.file, this.bindings.get(cls))
         where = given.get(_member_name(written)) or given.get(kind.last)
         where = where or _alias_initialiser(run, cls, kind, given, inner)
@@ -231,14 +233,6 @@ def _bases(
         else:
             frame = inner if where is not None else Frame(cls.file, cls.scope, path=inner.path)
             _foreign_base(run, this, cls, kind, values, where or node, frame)
-
-
-def _made_by(run: Machine, this: Obj, cls: Class) -> list[str]:
-    """The bases that a constructor makes: virtual ones only that of the object's own class, and those of its bases."""
-    if this.cls is not cls:
-        return [written for written in cls.bases if written not in cls.virtual_bases]
-    above = [written for each in run.names.ancestry(cls)[1:] for written in sorted(each.virtual_bases)]
-    return [*dict.fromkeys((*above, *cls.bases))]
 
 
 def _alias_initialiser(

@@ -176,9 +176,8 @@ def _map_call(run: Machine, atom: Map, name: str, site: CallSite) -> Value:
 def _new_entry(run: Machine, site: CallSite) -> tuple[Value, Value]:
     """Key and value of ``emplace(key, arguments of the value ...)``."""
     key, *rest = site.values
-    if len(rest) == 2 and all(isinstance(a, Group) for v in rest for a in v):  # std::piecewise_construct
-        key = rest[0][0].items[0] if rest[0] and rest[0][0].items else BOTTOM
-        rest = list(rest[1][0].items) if rest[1] else []
+    if len(rest) > 1 and any(isinstance(a, Group) for v in rest for a in v):  # std::piecewise_construct
+        return unknown("a key"), unknown("an element that is made of pieces")
     kind, _ = declared_type(run, site.receiver, site.frame)
     inner = kind.arguments[1] if len(kind.arguments) > 1 else None
     cls = run.held_class(inner, site.frame)
@@ -241,9 +240,6 @@ def _sequence_call(run: Machine, atom: Seq | Group, name: str, site: CallSite) -
         return (len(items),) if exact else unknown("a size")
     if name == "empty":
         return (not items,) if exact else unknown("a condition")
-    if name == "count" and exact and len(first) == 1 and plain(first[0]) is not None:
-        listed = [plain(item[0]) if len(item) == 1 else None for item in items]
-        return unknown("a count") if None in listed else (listed.count(plain(first[0])),)
     if name == "swap" and len(values) == 1 and isinstance(atom, Seq):
         before = run.evaluate(site.given[0], site.frame)
         assign(run, site.given[0], (atom,), site.frame)

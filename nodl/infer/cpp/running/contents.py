@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import re
 from collections.abc import Sequence
 
@@ -13,7 +12,6 @@ from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     Group,
-    Lambda,
     Map,
     Obj,
     Param,
@@ -24,7 +22,7 @@ from nodl.infer.cpp.running.values import (
     literal,
     unknown,
 )
-from nodl.infer.cpp.syntax import Node, text, walk
+from nodl.infer.cpp.syntax import Node
 
 
 def nodes_in(value: Value) -> list[Obj]:
@@ -63,30 +61,12 @@ def copied(run: Machine, value: Value, node: Node, frame: Frame, cls: Class | No
 
     Into an object of ``cls`` goes of a derived class what it has of ``cls`` (slicing), also from behind a pointer.
     """
-    if not any(
-        (isinstance(atom, Obj) and atom.cls is not None and atom.node is None) or isinstance(atom, Lambda)
-        for atom in value
-    ):
+    if not any(isinstance(atom, Obj) and atom.cls is not None and atom.node is None for atom in value):
         return value
     return tuple(_copy(run, atom, node, frame, cls) for atom in value)
 
 
-def _copy_of_closure(run: Machine, atom: Lambda, node: Node, frame: Frame) -> Lambda:
-    """A closure that changes what it captured by value does so in each copy of its own."""
-    if not any(child.type == "mutable" or text(child) == "mutable" for child in walk(atom.node)):
-        return atom
-    key = ("copy", atom, frame.file.file, node.start_byte, frame.path)
-    twin = run.frame(
-        key, dataclasses.replace(atom.frame, names={*atom.frame.names}, exits=[], exit_values=[], loops=[])
-    )
-    for name in atom.frame.names:
-        run.store.set((twin, name), run.store.get((atom.frame, name)) or BOTTOM)
-    return Lambda(atom.node, twin)
-
-
 def _copy(run: Machine, atom: object, node: Node, frame: Frame, cls: Class | None) -> object:
-    if isinstance(atom, Lambda):
-        return _copy_of_closure(run, atom, node, frame)
     if not isinstance(atom, Obj) or atom.cls is None or atom.node is not None:
         return atom
     target = cls if cls is not None and cls in run.names.ancestry(atom.cls) else atom.cls

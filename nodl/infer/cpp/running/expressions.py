@@ -211,6 +211,10 @@ def lambda_(run: Machine, node: Node, frame: Frame) -> Value:
         depth=frame.depth, captured=True,
     )  # fmt: skip
     inner = run.frame((node.id, frame, frame.path), inner)
+    if re.search(r"\)\s*mutable\b", text(field_of(node, "declarator"))) and (
+        run.subtree_matters(node) or '"' in text(node)
+    ):
+        run.gap(node, frame, "a mutable closure changes what it captured: what it makes is not followed")
     outer: Frame | None = frame
     while outer is not None:
         outer.captured, outer = True, outer.outer

@@ -5,25 +5,21 @@ A member that a derived class hides shares its cell with the hidden one; where a
 
 from __future__ import annotations
 
+import re
+
 from nodl.infer.cpp.reading.declarations import Class, type_text
 from nodl.infer.cpp.reading.names import hidden
 from nodl.infer.cpp.reading.type_names import NO_TYPE, Type
 from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.values import Obj
-from nodl.infer.cpp.syntax import Node, callee_name, field_of, text, unwrapped
+from nodl.infer.cpp.syntax import Node, callee_name, field_of, template_arguments, text, unwrapped
 
 
 def check_hidden(run: Machine, cls: Class, node: Node, frame: Frame) -> None:
-    """Add a gap if ``cls`` has two members of one name that hold texts, or two such methods that are not virtual and
-    give texts or make interfaces: which is meant is not followed."""
-    ancestry = run.names.ancestry(cls)
+    """Add a gap if ``cls`` has two members of one name that hold texts: which is meant is not followed."""
     for name in hidden(run.names, cls):
-        fields = [each.fields[name].type for each in ancestry if name in each.fields]
-        methods = [m for each in ancestry for m in run.names.methods[each].get(name, ())]
-        given = [*fields, *(type_text(method.node) for method in methods)]
-        if any("string" in kind or "char" in kind for kind in given) or any(
-            map(run.makes_interfaces, methods)
-        ):
+        fields = [each.fields[name].type for each in run.names.ancestry(cls) if name in each.fields]
+        if any("string" in kind or "char" in kind for kind in fields):
             run.gap(node, frame, f"{cls.name} hides {name} of a base: which of them is meant is not followed")
 
 
@@ -33,13 +29,26 @@ def class_around(run: Machine, frame: Frame) -> Class | None:
     return run.names.find_class(owner, frame.scope, frame.file) if owner else None
 
 
-def class_of_member(run: Machine, atom: Obj, access: Node, frame: Frame) -> Class | None:
-    """Return the class in which ``x.name`` or ``x.Base::name`` is looked up where ``x`` is ``atom``."""
+def class_of_member(run: Machine, atom: Obj, name: str, access: Node, frame: Frame) -> Class | None:
+    """Return the class in which ``x.name``, ``x->name`` or ``x.Base::name`` is looked up where ``x`` is ``atom``.
+
+    A method that is not virtual is that of the class which ``x`` has at compile time; a gap if that is not known.
+    """
     head = text(field_of(access, "field")).rpartition("::")[0]
-    if not head:
+    ancestry = run.names.ancestry(atom.cls)
+    if head:
+        named = run.class_of(run.type_of(head, frame), frame)
+        return next((c for c in ancestry if c is named or c.name == head), atom.cls)
+    hidden_ones = [m for each in ancestry for m in run.names.methods[each].get(name, ())]
+    if name not in run.hidden_names(atom) or not hidden_ones:
         return atom.cls
-    named = run.class_of(run.type_of(head, frame), frame)
-    return next((c for c in run.names.ancestry(atom.cls) if c is named or c.name == head), atom.cls)
+    seen = seen_class(run, field_of(access, "argument"), frame)
+    matters = any("string" in type_text(m.node) for m in hidden_ones) or any(
+        map(run.makes_interfaces, hidden_ones)
+    )
+    if seen is None and matters:
+        run.gap(access, frame, f"which {name}() is called here is not known: a derived class hides it")
+    return seen if seen in ancestry else atom.cls
 
 
 def seen_class(run: Machine, node: Node | None, frame: Frame) -> Class | None:
@@ -61,12 +70,17 @@ def seen_type(run: Machine, node: Node | None, frame: Frame) -> Type:
         return element_type(seen_type(run, field_of(node, "argument"), frame))
     if node.type == "call_expression":
         callee = field_of(node, "function")
+        made = template_arguments(callee) if _MAKES.search(callee_name(callee or node)) else []
+        if made:
+            return run.type_of(text(made[0]), frame)
         inner, name = field_of(callee, "argument"), callee_name(field_of(callee, "field") or node)
         kind = seen_type(run, inner, frame) if name in GIVES_INNER | _GIVES_ELEMENT else NO_TYPE
         return element_type(kind) if name in _GIVES_ELEMENT else kind
     owner = field_of(node, "argument") if node.type == "field_expression" else None
     if owner is None or owner.type == "this":
-        return declared_type(run, node, frame)[0]
+        kind, holder = declared_type(run, node, frame)[0], frame.owner_of(text(node))
+        initial = holder.initial.get(text(node)) if holder is not None and kind.name == "auto" else None
+        return kind if initial is None or holder is None else seen_type(run, initial, holder)
     name = text(field_of(node, "field"))
     for each in run.names.ancestry(seen_class(run, owner, frame)):
         if name in each.fields:
@@ -81,4 +95,5 @@ def element_type(kind: Type) -> Type:
 
 
 GIVES_INNER = frozenset({"get", "lock", "value", "release"})
+_MAKES = re.compile(r"(?:^|::)(?:make_(?:shared|unique)|\w+_cast)$")
 _GIVES_ELEMENT = frozenset({"at", "front", "back", "top"})

@@ -14,7 +14,7 @@ from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.constructors import as_parameter, bind_parameters, is_written_back
 from nodl.infer.cpp.running.contents import copied, handed_over
 from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
-from nodl.infer.cpp.running.memory import MEMORY_DEPTH, CallOutcome, Changes
+from nodl.infer.cpp.running.memory import MEMORY_DEPTH, CallOutcome
 from nodl.infer.cpp.running.overloads import candidates, chosen
 from nodl.infer.cpp.running.unknown_calls import unknown_call
 from nodl.infer.cpp.running.values import Bound, Lambda, Obj, Unknown, Value, join, unknown
@@ -324,8 +324,6 @@ def _run_body(run: Machine, function: Function, values: Sequence[Value], inner: 
     run.active.append(function)
     bind_parameters(run, function, values, inner)
     outcome = run.execute(function.body, inner) if function.body is not None else NEXT
-    if function.name in HOOKS:
-        inner.exits = _successes(inner)
     run.settle(inner.mark, inner.exits, bool(outcome & NEXT))
     run.active.pop()
     left = {p.name: run.store.get((inner, p.name)) for p in function.parameters if is_written_back(p)}
@@ -348,19 +346,6 @@ def _as_returned(run: Machine, function: Function, inner: Frame) -> Value:
 
 # Transitions of a lifecycle node (rclcpp_lifecycle/node_interfaces/lifecycle_node_interface.hpp).
 HOOKS = ("on_configure", "on_activate", "on_deactivate", "on_cleanup", "on_shutdown", "on_error")
-
-
-def _successes(inner: Frame) -> list[Changes]:
-    """A transition that fails leaves the node where nothing else runs."""
-    kept = [
-        changes
-        for changes, value in zip(inner.exits, inner.exit_values, strict=True)
-        if not value or not all(_FAILED.search(str(getattr(a, "why", getattr(a, "name", "")))) for a in value)
-    ]
-    return kept or inner.exits
-
-
-_FAILED = re.compile(r"::(?:FAILURE|ERROR)$")
 
 
 def _class_bindings(function: Function, this_object: Obj) -> dict[str, Type]:

@@ -377,6 +377,7 @@ class Frame:
     path: tuple[object, ...] = ()
     conditions: tuple[Condition, ...] = ()
     types: dict[str, str] = field(default_factory=dict)
+    initial: dict[str, Node | None] = field(default_factory=dict)  # values that variables were declared with
     names: set[str] = field(default_factory=set)
     returned: Value = BOTTOM
     exits: list[Changes] = field(default_factory=list)

@@ -99,7 +99,7 @@ def on_object(run: Machine, atom: Obj, name: str, site: CallSite) -> Value:
     if atom.cls is not None:
         argument = field_of(callee, "argument")
         own = argument is not None and argument.type == "this" and "::" not in text(field_of(callee, "field"))
-        seen = None if own else class_of_member(run, atom, callee, frame)
+        seen = None if own else class_of_member(run, atom, name, callee, frame)
         methods = run.names.find_methods(seen, name) if seen is not None else of_this(run, atom, name, frame)
         if methods:
             return site.call_methods(methods, atom)

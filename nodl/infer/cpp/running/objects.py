@@ -11,7 +11,6 @@ from nodl.infer.cpp.reading.type_names import NO_TYPE, Type
 from nodl.infer.cpp.running.arithmetic import as_type
 from nodl.infer.cpp.running.contents import copied, elements_copied, items_of
 from nodl.infer.cpp.running.hiding import seen_type
-from nodl.infer.cpp.running.launch_values import settled_text
 from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.references import keep_references
 from nodl.infer.cpp.running.values import (
@@ -234,14 +233,6 @@ def text_of(run: Machine, values: Sequence[Value]) -> Value:
     if len(values) == 1:
         is_made = any(isinstance(atom, int | float | Seq) for atom in values[0])
         return unknown("a made text") if is_made else values[0]
-    single = [value[0] if len(value) == 1 else None for value in values]
-    known = [settled_text(run, atom) if isinstance(atom, Text) else None for atom in single]
-    numbers = [atom if isinstance(atom, int) else -1 for atom in single]
-    whole = known[0]
-    if len(values) == 2 and 0 <= numbers[0] <= 256 and known[1] is not None and len(known[1]) == 1:
-        return literal(known[1] * numbers[0])
-    if len(values) == 3 and whole is not None and 0 <= numbers[1] <= len(whole) and numbers[2] >= 0:
-        return literal(whole[numbers[1] : numbers[1] + numbers[2]])
     return unknown("a text made of several values")
 
 

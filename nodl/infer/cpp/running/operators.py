@@ -10,7 +10,7 @@ from nodl.infer.cpp.running.arithmetic import added, arithmetic
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.contents import items_of
 from nodl.infer.cpp.running.hiding import class_of_member, seen_type
-from nodl.infer.cpp.running.launch_values import settled_text
+from nodl.infer.cpp.running.launch_values import settled_text, text_of
 from nodl.infer.cpp.running.machine import NEXT, Frame, Machine, expression
 from nodl.infer.cpp.running.objects import default_value
 from nodl.infer.cpp.running.own_operators import by_operator, pointed_to
@@ -50,7 +50,7 @@ def field(run: Machine, node: Node, frame: Frame) -> Value:
     found: list[Value] = []
     for atom in owners:
         if isinstance(atom, Obj):
-            value = member(run, atom, name, class_of_member(run, atom, node, frame))
+            value = member(run, atom, name, class_of_member(run, atom, name, node, frame))
             if value is None and atom.cls is None and name.endswith(("options", "callbacks")):
                 value = (run.obj(("field", atom, name), Type("")),)  # options in options
                 run.store.set((atom, name), value)
@@ -75,9 +75,7 @@ def binary(run: Machine, node: Node, frame: Frame) -> Value:
     if own is not None:
         return own
     if operator == ">>" and has_text(left):
-        if right_node is not None:
-            assign(run, right_node, unknown("a word that is read from a stream"), frame)
-        return unknown("a stream")
+        return _extracted(run, left_node, left, right_node, frame)
     if operator == "<<" and not (len(left) == 1 and isinstance(left[0], int)):
         return _streamed(run, left_node, left, right_node, right, frame)
     if operator == "+" and (has_text(left) or has_text(right)):
@@ -174,6 +172,20 @@ def _streamed(
     if inner is not None and inner.type in ("identifier", "field_expression", "field_identifier"):
         assign(run, inner, found, frame)
     return found
+
+
+def _extracted(run: Machine, stream: Node | None, left: Value, right: Node | None, frame: Frame) -> Value:
+    """Take the first word of a text that is known for ``stream >> word``; the rest stays."""
+    words = [text_of(run, atom) for atom in left]
+    if len(words) != 1 or words[0] is None or stream is None or right is None:
+        if right is not None:
+            assign(run, right, unknown("a word that is read from a stream"), frame)
+        return unknown("a stream")
+    found = words[0].split(None, 1)
+    assign(run, stream, literal(found[1] if len(found) > 1 else ""), frame)
+    if found:
+        assign(run, right, literal(found[0]), frame)
+    return (bool(found),)
 
 
 @expression("unary_expression")

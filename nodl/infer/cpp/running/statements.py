@@ -302,7 +302,7 @@ def declaration(run: Machine, node: Node, frame: Frame) -> int:
             # Each variable is an object of its own.
             frame.path = (*path, name) if len(declarators) > 1 else path
             run.local(frame, name, initial(), kind)
-            frame.path = path
+            frame.path, frame.initial[name] = path, value
             bind_reference(run, name, kind, value, frame)
     return NEXT
 
