@@ -49,7 +49,7 @@ class ManifestLookup:
         self._packages: dict[str, _Package] = {}
 
     def find(self, package: str, *, executable: str | None = None, plugin: str | None = None) -> Lookup:
-        """The nodes that ``executable`` runs, or the one that ``plugin`` is.
+        """Return the nodes that ``executable`` runs, or the one that ``plugin`` is.
 
         Raises ``InvalidNoDLError`` for a broken document of the package, ``ConflictingNoDLError``.
         """
@@ -70,7 +70,7 @@ class ManifestLookup:
         return Lookup(_agreed(f"{package}/{executable or plugin}", found), installed.searched)
 
     def all_of(self, package: str) -> Lookup:
-        """Every node that the documents of ``package`` describe, conflicts included."""
+        """Return every node that the documents of ``package`` describe, conflicts included."""
         installed = self._package(package)
         return Lookup(tuple(node.interface for node in installed.nodes), installed.searched)
 
@@ -84,7 +84,7 @@ class ManifestLookup:
         return read_document(file, package=package, prefixes=self._prefixes)
 
     def _owner(self, file: str) -> str | None:
-        """The package whose share directory or index entry ``file`` is; ``None`` for a file elsewhere."""
+        """Return the package whose share directory or index entry ``file`` is; None for a file elsewhere."""
         absolute = os.path.abspath(file)
         for prefix in self._prefixes:
             relative = os.path.relpath(absolute, prefix).split(os.sep)
@@ -135,7 +135,7 @@ def _v1_files(share: str) -> list[str]:
 
 
 def _files(path: str) -> list[str]:
-    """``path``, or the manifests of a folder and of those below it, in the order of their names."""
+    """Return ``path``, or the manifests of a folder and of those below it, in the order of their names."""
     if not os.path.isdir(path):
         return [path]
     suffixes = (V1_SUFFIX, *(suffix for suffix in V2_SUFFIXES if suffix.startswith(".nodl.")))
@@ -143,7 +143,7 @@ def _files(path: str) -> list[str]:
 
 
 def _program(node: ManifestNode) -> str:
-    """Package and program as far as the document says them."""
+    """Return package and program as far as the document says them."""
     interface = node.interface
     program = interface.executable or interface.plugin or "a node of no program"
     return f"{interface.package}/{program}" if interface.package else program
@@ -165,11 +165,10 @@ def _same_package(node: ManifestNode, package: str) -> bool:
 
 
 def _agreed(subject: str, nodes: Sequence[ManifestNode]) -> tuple[NodeInterface, ...]:
-    """The nodes without repetitions. Raises ``ConflictingNoDLError`` when documents disagree.
+    """Return the nodes without repetitions. Raises ``ConflictingNoDLError`` if documents disagree.
 
-    One file may describe several nodes of an executable under different names. Two files that describe
-    it must say the same, except v2 documents that name the executable themselves: v2 needs one document
-    for each node.
+    One file may describe several nodes of an executable under different names. Two files that describe it must say the
+    same, except v2 documents that name the executable themselves: v2 needs one document for each node.
     """
     distinct: dict[object, ManifestNode] = {}
     for node in nodes:
@@ -184,6 +183,6 @@ def _agreed(subject: str, nodes: Sequence[ManifestNode]) -> tuple[NodeInterface,
 
 
 def _meaning(interface: NodeInterface) -> object:
-    """What two definitions must have in common to be the same one; the place does not count."""
+    """Return what two definitions must have in common to be the same one; the place does not count."""
     endpoints = frozenset((e.kind, e.name, e.type) for e in interface.endpoints)
     return interface.name, interface.namespace or "/", endpoints, interface.lifecycle

@@ -166,13 +166,13 @@ class _Comparison:
             yield self._about(Kind.NOT_AUTHENTICATED, process, text, enclave=enclave, remedy=remedy)
 
     def _enclave(self, process: GraphProcess) -> str:
-        """By proof; empty where nothing proves one."""
+        """Return the enclave that is proved; empty if nothing proves one."""
         if self._security is None or not process.participant.claims_security:
             return ""
         return self._security.enclaves.get(process.participant.subject_hash, "")
 
     def _is_opaque(self, process: GraphProcess, enclave: str) -> bool:
-        """A program that the plan starts without knowing its nodes, or a node whose name it does not know."""
+        """Return True for a program whose nodes the plan does not know, or a node whose name it does not know."""
         unnamed = bool(process.nodes) and all(map(self._is_unnamed, process.nodes))
         return unnamed or enclave in self._expected.opaque
 
@@ -233,8 +233,10 @@ class _Comparison:
         return (node.fqn.rpartition("/")[0] or "/") in self._expected.unnamed
 
     def _is_helper(self, node: GraphNode, process: GraphProcess) -> bool:
-        """A node that a library makes under a name of its own, and the plan grants by pattern: all that it has is
-        granted to a planned node of its process."""
+        """Return True for a node that a library makes under a name of its own.
+
+        All that it has is granted to a planned node of its process; the plan grants its name by pattern.
+        """
         granted = [
             each.grant
             for other in process.nodes
@@ -340,7 +342,7 @@ class _End(NamedTuple):
 
 
 def _between(topic: str, writer: _End, reader: _End) -> Iterator[DriftFinding]:
-    """Why data does not go from one to the other, though both are on one topic."""
+    """Yield why data does not go from one to the other, though both are on one topic."""
     types = ros_type(writer.endpoint.type), ros_type(reader.endpoint.type)
     subject = f"{writer.owner} -> {reader.owner}"
     who = f"{writer.who}; {reader.who}"
@@ -354,7 +356,7 @@ def _between(topic: str, writer: _End, reader: _End) -> Iterator[DriftFinding]:
 
 
 def _other_quality(interface: SeenInterface, planned: Sequence[Mapping[str, Any]]) -> tuple[str, ...]:
-    """Why no endpoint of a topic that the plan knows is like this; of several that a node has on one topic, any."""
+    """Return why the endpoint is like none of that topic in the plan, which may have several."""
     if interface.kind not in _TOPICS or not planned:
         return ()
     found = [[differences(qos, each.quality) for qos in planned] for each in interface.endpoints]

@@ -52,15 +52,20 @@ class Expected(NamedTuple):
 
 
 def out_of_sight(documents: Iterable[Mapping[str, Any]]) -> tuple[str, ...]:
-    """Processes on Zenoh. An observer takes part in DDS: to it they would look as if they were missing, and what
-    runs beside them would be overlooked."""
+    """Return the processes on Zenoh.
+
+    An observer takes part in DDS: to it they would look as if they were missing, and what runs beside them would be
+    overlooked.
+    """
     processes = (process for document in documents for process in document["processes"])
     return tuple(process["process"] for process in processes if process["middleware"] == ZENOH)
 
 
 def expected_in(documents: Iterable[Mapping[str, Any]], domain: int) -> Expected:
-    """Of all launches that run in the domain, as documents that ``report.contract.DryRun`` accepts; processes of other
-    domains are left out."""
+    """Return what all launches in the domain expect; processes of other domains are left out.
+
+    ``documents`` are as ``report.contract.DryRun`` accepts them.
+    """
     plans = tuple(documents)
     document = {
         part: [each for plan in plans for each in plan[part]] for part in ("processes", "components", "nodes")
@@ -96,7 +101,7 @@ def expected_in(documents: Iterable[Mapping[str, Any]], domain: int) -> Expected
 
 
 def _fqn(started: Mapping[str, Any]) -> str:
-    """As rcl has it: where launch gives no namespace, the root one."""
+    """Return the name as rcl has it: the root namespace if launch gives none."""
     return str(started["fqn"]).replace(UNSPECIFIED_NODE_NAMESPACE, "")
 
 

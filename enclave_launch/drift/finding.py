@@ -89,13 +89,13 @@ until its lease ends (10 s on Cyclone DDS, 20 s on Fast DDS), so that a respawne
 def finding(
     kind: Kind, subject: str, text: str, *, name: str = "", enclave: str = "", who: str = "", remedy: str = ""
 ) -> DriftFinding:
-    """An alarm, with the certainty that its kind has."""
+    """Make an alarm, with the certainty that its kind has."""
     certainty = _CERTAINTY.get(kind, FindingCertainty.FACT)
     return DriftFinding(kind, subject, name, text, certainty, Level.ALARM, enclave, who, remedy)
 
 
 def finding_text(finding: DriftFinding) -> str:
-    """One line."""
+    """Return the finding in one line."""
     who = f" ({finding.who})" if finding.who and finding.who != finding.subject else ""
     subject = f"{finding.subject}: " if finding.subject == finding.who else ""
     remedy = f"; {finding.remedy}" if finding.remedy else ""
@@ -103,7 +103,7 @@ def finding_text(finding: DriftFinding) -> str:
 
 
 def drift_text(findings: Sequence[DriftFinding], graph: Graph) -> str:
-    """A report: what is different, alarms first, and what was looked at."""
+    """Return a report: what is different, alarms first, and what was looked at."""
     levels = list(Level)
     ordered = sorted(findings, key=lambda each: (levels.index(each.level), each.kind.value, each.subject))
     seen = f"{len(graph.processes)} participants, {sum(1 for _ in graph.nodes)} nodes"
@@ -131,7 +131,7 @@ def drift_document(findings: Iterable[DriftFinding], graph: Graph) -> dict[str, 
 
 
 def finding_document(finding: DriftFinding) -> dict[str, Any]:
-    """As plain values."""
+    """Return the finding as plain values."""
     fields = finding._asdict()
     del fields["certainty"]
     return {**fields, "kind": finding.kind.value, "level": finding.level.value}

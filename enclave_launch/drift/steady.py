@@ -53,11 +53,11 @@ class Steady:
 
     @property
     def standing(self) -> tuple[DriftFinding, ...]:
-        """What was told and is so."""
+        """Return what was reported and still holds."""
         return tuple(self._told.values())
 
     def at(self, now: float, findings: Iterable[DriftFinding]) -> Change:
-        """What is to be told at ``now``."""
+        """Return what is to be reported at ``now``."""
         found = {each.key: each for each in findings}
         self._went.update({key[0]: now for key in self._since if key not in found})
         self._since = {key: self._since.get(key, now) for key in found}

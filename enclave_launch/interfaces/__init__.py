@@ -70,8 +70,10 @@ class InterfaceFinder:
         distro: str = "rolling",
         launch: Evaluation | None = None,
     ) -> None:
-        """``launch``: all that starts, for nodes that must know others. Raises ``UsageError`` for a folder of documents
-        that is not there."""
+        """Prepare to answer for one launch; ``launch`` is all that starts, for nodes that must know others.
+
+        Raises ``UsageError`` for a folder of documents that is not there.
+        """
         self._options = options or ResolveOptions()
         self._prefixes = prefixes
         self._distro = distro
@@ -182,14 +184,16 @@ class InterfaceFinder:
 
 
 def _shortly(places: Sequence[str]) -> str:
-    """The first, which are the package's own, and how many more: each prefix of a workspace has some."""
+    """Return the first places, which are the package's own, and how many more there are: each prefix of a workspace
+    has some.
+    """
     if len(places) <= _PLACES + 1:
         return ", ".join(places)
     return f"{', '.join(places[:_PLACES])} and {len(places) - _PLACES} more places"
 
 
 def _of_manifest(manifest: Lookup) -> ProgramDescription:
-    """A manifest that was learnt says so itself, wherever it lies."""
+    """Return the description; a manifest that was learnt says so itself, wherever it lies."""
     origin = InterfaceOrigin.NAMED if manifest.named else InterfaceOrigin.PACKAGE
     if any(each.runs for each in manifest.found):
         origin = InterfaceOrigin.RECORDED
@@ -197,7 +201,7 @@ def _of_manifest(manifest: Lookup) -> ProgramDescription:
 
 
 def _executable_name(process: ResolvedProcess) -> str:
-    """Without a package launch takes ``exec`` as a path: manifests speak of its last part."""
+    """Return the name by which manifests know the program: without a package launch takes ``exec`` as a path."""
     return process.executable if process.package else process.executable.rpartition("/")[2]
 
 

@@ -33,7 +33,7 @@ _TAKE_A_VALUE = frozenset(
 
 
 def launched(evaluation: Evaluation) -> Launched:
-    """What ``evaluation`` starts, as far as other nodes depend on it."""
+    """Return what ``evaluation`` starts, as far as other nodes depend on it."""
     of_manager = (item for item in evaluation.processes if item.package == "controller_manager")
     spawners = (item for item in of_manager if item.executable in ("spawner", "spawner.py"))
     return Launched(
@@ -43,7 +43,7 @@ def launched(evaluation: Evaluation) -> Launched:
 
 
 def _robot_description(evaluation: Evaluation) -> str:
-    """The URDF that some node has as its parameter: robot_state_publisher, mostly."""
+    """Return the URDF that some node has as its parameter: robot_state_publisher, mostly."""
     given = [item.parameters for item in evaluation.processes]
     given += [item.parameters for item in evaluation.components]
     texts = (parameters.get("robot_description") for parameters in given)
@@ -74,7 +74,7 @@ def _spawned(process: ResolvedProcess) -> Iterator[Spawned]:
 
 
 def _options(words: Sequence[str]) -> tuple[list[tuple[str, str]], list[str]]:
-    """Pairs of option and value in their order, and the words that belong to none."""
+    """Return pairs of option and value in their order, and the words that belong to none."""
     options: list[tuple[str, str]] = []
     names: list[str] = []
     rest = iter(words)

@@ -30,7 +30,7 @@ class LibraryAccess:
     def __init__(
         self, prefixes: Sequence[str], options: ResolveOptions, distro: str, launch: Evaluation | None = None
     ):
-        """``launch``: all that starts, for nodes that must know others.
+        """Open nothing yet; ``launch`` is all that starts, for nodes that must know others.
 
         Raises ``UsageError`` for a folder of documents that is not there.
         """
@@ -57,15 +57,18 @@ class LibraryAccess:
         return launched(self._launch)
 
     def find(self, package: str | None, name: str) -> Hit | None:
-        """Raises ``InvalidNoDLError`` for a broken document."""
+        """Return the document of a program, if there is one. Raises ``InvalidNoDLError`` for a broken document."""
         if package is None or not (self._enabled or self._folders):
             return None
         version = package_version(package, self._prefixes)
         return self._library.find(package, name, distro=self._distro, version=version)
 
     def recorded(self, package: str | None, name: str) -> tuple[Hit, ...]:
-        """Documents that the user recorded and keeps in a folder of ``--library``, one for each node of the program.
-        Raises as ``find``."""
+        """Return the documents that the user recorded and keeps in a folder of ``--library``, one for each node of the
+        program.
+
+        Raises as ``find``.
+        """
         if not self._folders or package is None:
             return ()
         version = package_version(package, self._prefixes)
@@ -77,8 +80,10 @@ class LibraryAccess:
         started: ResolvedProcess | ResolvedComponent,
         container: ResolvedProcess | None,
     ) -> tuple[NodeInterface, ...]:
-        """The nodes of one start, those that they bring along included. Raises ``InvalidNoDLError`` and, for a remap
-        rule at which the process would end, ``LaunchFileError``."""
+        """Return the nodes of one start, those that they bring along included.
+
+        Raises ``InvalidNoDLError`` and, for a remap rule at which the process would end, ``LaunchFileError``.
+        """
         return tuple(node for each in interfaces for node in self._complete(each, started, container))
 
     def _complete(
@@ -96,7 +101,9 @@ class LibraryAccess:
             yield from self._complete(further, started, container, depth + 1)
 
     def _named(self, interface: NodeInterface, started: ResolvedProcess | ResolvedComponent) -> NodeInterface:
-        """A program that makes its node's name from its command line has it before launch's rules apply."""
+        """Return ``interface`` with the name that its program makes from the command line, before launch's rules
+        apply.
+        """
         if interface.depends is None or not (interface.depends.node_name or interface.depends.random_name):
             return interface
 

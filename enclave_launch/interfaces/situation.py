@@ -26,8 +26,11 @@ def situation_of(
     distro: str,
     installed: frozenset[str] | None = None,
 ) -> Situation:
-    """Of one node of what launch starts. A component's main node gets what the load request says, a further one what
-    the container's command line says. Raises ``LaunchFileError`` for a remap rule at which the process would end."""
+    """Return the situation of one node of what launch starts.
+
+    A component's main node gets what the load request says, a further one what the container's command line says.
+    Raises ``LaunchFileError`` for a remap rule at which the process would end.
+    """
     parameters: Mapping[str, object] = started.parameters
     words: tuple[str, ...] = ()
     if isinstance(started, ResolvedProcess):
@@ -49,7 +52,7 @@ def situation_of(
 
 
 def parameters_of_node(process: ResolvedProcess, namespace: str, name: str) -> Mapping[str, ParameterValue]:
-    """What the command line of ``process`` gives the node of this final name."""
+    """Return what the command line of ``process`` gives the node of this final name."""
     tokens = [token for token in (*namespace.split("/"), name) if token]
     written = process.parameter_files
     return resolve_parameters(
@@ -61,6 +64,6 @@ def parameters_of_node(process: ResolvedProcess, namespace: str, name: str) -> M
 
 
 def _remap(node: RunningNode) -> Callable[[str], str]:
-    """What a topic that the node's code names is called in the end. Raises ``InvalidNameError``."""
+    """Return a function from topics of the node's code to final names. That raises ``InvalidNameError``."""
     names = NodeNames(node.name, node.namespace, node.rules)
     return lambda name: names.topic(name).name

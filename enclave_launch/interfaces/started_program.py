@@ -25,11 +25,11 @@ class StartedProgram:
         self._distro = distro
 
     def parameters(self, node: str | None) -> Mapping[str, object]:
-        """What launch sets for the node that the source calls ``node``."""
+        """Return what launch sets for the node that the source calls ``node``."""
         return self._situation(node).parameters
 
     def final_name(self, node: str | None) -> tuple[str | None, str | None]:
-        """Its name and namespace under the remap rules of the launch."""
+        """Return the node's name and namespace under the remap rules of the launch."""
         situation = self._situation(node)
         return situation.node, situation.namespace
 

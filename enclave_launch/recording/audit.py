@@ -49,7 +49,7 @@ class AuditReport(NamedTuple):
 
     @property
     def exit_status(self) -> int:
-        """0: the plan grants all that was asked for, and all was seen."""
+        """Return 0 if the plan grants all that was requested, and all was seen."""
         return 1 if self.refusals or self.unrecorded or self.complaints else 0
 
 
@@ -112,14 +112,14 @@ def _used(rule: Rule, enclave: str, used: set[tuple[str, Operation, str]]) -> bo
 
 
 def _parts_used(rule: Rule, enclave: str, used: set[tuple[str, Operation, str]]) -> bool:
-    """A part of an action that was remapped by itself is used with the action."""
+    """Return True for a part of a used action that was remapped by itself."""
     action, part, _ = rule.expression.partition("/_action/")
     actions = (Operation.EXECUTE, Operation.CALL)
     return bool(part) and any((enclave, operation, action) in used for operation in actions)
 
 
 def audit_text(report: AuditReport) -> str:
-    """For a person, by enclave."""
+    """Return the report for a person, by enclave."""
     lines = [f"audit: {report.checked} endpoints were requested; {len(report.refusals)} would be refused"]
     enclaves = sorted({refusal.need.enclave for refusal in report.refusals} | set(report.never_asked))
     for enclave in enclaves:
@@ -135,7 +135,7 @@ def audit_text(report: AuditReport) -> str:
 
 
 def audit_json(report: AuditReport) -> str:
-    """For programs; sorted."""
+    """Return the report for programs, sorted."""
     content = {
         "version": 1,
         "exit_status": report.exit_status,

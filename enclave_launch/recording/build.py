@@ -30,7 +30,10 @@ _FLAGS = ("-std=gnu11", "-shared", "-fPIC", "-O2", "-Wl,-z,now")
 
 
 def recorder_library() -> Path:
-    """The library, built if it is not there. Raises ``RuntimeFailure`` where that is not possible."""
+    """Return the path of the library, and build it if it is not there.
+
+    Raises ``RuntimeFailure`` if that is not possible.
+    """
     text = SOURCE.read_bytes() + " ".join(_FLAGS).encode()
     wanted = _cache() / f"recorder-{hashlib.sha256(text).hexdigest()[:16]}-{platform.machine()}.so"
     if not _is_ours(wanted):
@@ -48,7 +51,7 @@ def _cache() -> Path:
 
 
 def _is_ours(path: Path) -> bool:
-    """Every process of a launch loads it: nobody else may have written it."""
+    """Return True if nobody else can have written it: every process of a launch loads it."""
     try:
         status = path.stat()
     except OSError:
@@ -84,7 +87,9 @@ def _build(wanted: Path) -> None:
 def with_recorder(
     environment: Mapping[str, str], library: str, record: str, sanitizer: str | None = None
 ) -> dict[str, str]:
-    """``environment`` with the recorder; ``sanitizer`` is the runtime that must come first, if the program has one."""
+    """Return ``environment`` with the recorder behind ``sanitizer``, the runtime that must come first, if the program
+    has one.
+    """
     present = [name for name in re.split(r"[ :]+", environment.get(PRELOAD, "")) if name]
     first = [sanitizer] if sanitizer and not any("libasan" in name for name in present) else []
     others = [name for name in present if name != library]

@@ -143,7 +143,7 @@ class Explainer(Listener):
         self._tell_waiting(float("inf"))
 
     def _middleware(self, line: Initialised) -> None:
-        """Told once: what two of them cannot say to each other shows as silence, not as an error."""
+        """Warn once of two middlewares: what they cannot say to each other shows as silence, not as an error."""
         known = set(self._middlewares)
         self._middlewares.add(line.middleware)
         if line.middleware and known and line.middleware not in known and len(self._middlewares) == 2:
@@ -151,7 +151,7 @@ class Explainer(Listener):
             self._launch.say("WARNING", f"processes of this launch use {said}: {why.what}; {why.remedy}")
 
     def _endpoint(self, line: EndpointMade, process: RecordedProcess, node: RecordedNode) -> None:
-        """Refused, or made all the same (``rc`` 0) by a Zenoh router that refuses without a word to the node."""
+        """Explain one that was refused, or made (``rc`` 0) and refused by a Zenoh router without a word to the node."""
         silent, name = line.rc == 0, _name(process)
         if role_of(line) is EndpointRole.PART_OF_ACTION or (silent and name not in self._on_zenoh):
             return  # of an action: its own line follows

@@ -56,7 +56,7 @@ class Description(NamedTuple):
 
     @property
     def text(self) -> str:
-        """Where its interface comes from, for a person."""
+        """Return where the interface of the node comes from, for a person."""
         if self.missing is not None:
             return f"nobody: {self.missing.why}"
         if self.node is None:
@@ -78,7 +78,7 @@ class PlannedGrants:
         return tuple(self._rules)
 
     def enclave_of(self, process: RecordedProcess) -> str | None:
-        """``None`` for a process that runs without an enclave, or was not planned."""
+        """Return the enclave of a process, None if it runs without one or was not planned."""
         planned = self._processes.get(process.started.process) if process.started else None
         if planned is None:
             return None
@@ -89,7 +89,7 @@ class PlannedGrants:
     def need(
         self, process: RecordedProcess, node: RecordedNode, line: EndpointMade
     ) -> tuple[Need, Asked] | None:
-        """The permission for what ``line`` asked for; ``None`` where nothing is enforced, or no name is known."""
+        """Return the permission for what ``line`` asked for, None if nothing is enforced or no name is known."""
         enclave, asked = self.enclave_of(process), asked_endpoint(process, node, line)
         if enclave is None or asked is None or not asked.final:
             return None
@@ -113,7 +113,7 @@ class PlannedGrants:
         )
 
     def described(self, process: RecordedProcess, node: RecordedNode) -> Description:
-        """Who describes this node in the plan."""
+        """Return who describes this node in the plan."""
         planned = self._planned(process, node)
         if planned is None:
             return Description(None)
@@ -123,8 +123,10 @@ class PlannedGrants:
         return Description(named[0] if named else None, planned.origin, planned.missing, planned.descriptions)
 
     def rules_of(self, enclave: str) -> Iterable[Rule]:
-        """What the plan allows in ``enclave``, without what every node has; nothing of the launcher's own, which is not
-        recorded."""
+        """Yield what the plan allows in ``enclave``, without what every node has.
+
+        Of the launcher's own enclave nothing is yielded, as it is not recorded.
+        """
         if self._plan.launcher is not None and enclave == self._plan.launcher.enclave:
             return
         built_in = self._plan.derived.built_in_names(enclave)

@@ -32,7 +32,10 @@ class Isolation(str, Enum):
 
 
 def isolate(wanted: str = "auto") -> Isolation:
-    """``auto``: a namespace where allowed, else local discovery; ``local``; ``none``. Gives what was done."""
+    """Isolate this process: ``auto`` (a namespace if allowed, else local discovery), ``local`` or ``none``.
+
+    Return what was done.
+    """
     if wanted == "none":
         return Isolation.NONE
     if wanted == "auto" and _a_child_can() and _enter_namespace():
@@ -43,7 +46,7 @@ def isolate(wanted: str = "auto") -> Isolation:
 
 
 def local_discovery(domain_in_use: str) -> dict[str, str]:
-    """Variables for all releases: the first one since iron, the second one before."""
+    """Return variables for all releases: the first one since iron, the second one before."""
     others = [str(domain) for domain in _DOMAINS if str(domain) != domain_in_use]
     return {
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
@@ -53,7 +56,7 @@ def local_discovery(domain_in_use: str) -> dict[str, str]:
 
 
 def _a_child_can() -> bool:
-    """Whether it works: half of it, done to ourselves, could not be undone."""
+    """Return True if it works in a child: half of it, done to ourselves, could not be undone."""
     child = os.fork()
     if child == 0:
         os._exit(0 if _enter_namespace() else 1)
@@ -61,7 +64,7 @@ def _a_child_can() -> bool:
 
 
 def _enter_namespace() -> bool:
-    """A network namespace with its loopback up; as an ordinary user inside a user namespace with the same user."""
+    """Enter a network namespace with its loopback up; as an ordinary user in a user namespace with the same user."""
     libc = ctypes.CDLL(None, use_errno=True)
     user, group = os.geteuid(), os.getegid()
     if user == 0:

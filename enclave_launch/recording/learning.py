@@ -65,7 +65,7 @@ class QuietWatch(Listener):
             self._launch.shut_down("learnt")
 
     def _starting(self, now: float) -> bool:
-        """Whether a process that began a short while ago has said nothing to rcl yet."""
+        """Return True if a process that began a short while ago has said nothing to rcl yet."""
         record = self._recording.record
         speaking = {p.started.pid for p in record.attributed() if p.started is not None}
         return any(
@@ -74,7 +74,7 @@ class QuietWatch(Listener):
         )
 
     def _news(self, line: Line) -> tuple[object, ...] | None:
-        """What a line tells that may not have been told before; a process that is started again repeats itself."""
+        """Return what a line says that may be new; a process that is started again repeats itself."""
         if isinstance(line, EndpointMade):
             return (line.kind, line.fqn, line.written)
         if isinstance(line, NodeMade):
@@ -93,14 +93,14 @@ class LearntFolder(NamedTuple):
 
 
 def new_run(launch_file: str, distro: str, isolation: str, *, secured: bool = False) -> RecordedRun:
-    """Named by the time, so that runs sort in the order in which they were made."""
+    """Return a run that is named by the time, so that runs sort in the order in which they were made."""
     now = datetime.now(timezone.utc)
     identifier = f"{now:%Y%m%dT%H%M%S}-{os.getpid():x}{int(now.microsecond / 1000):03x}"
     return RecordedRun(identifier, launch_file, distro, isolation, now.isoformat(timespec="seconds"), secured)
 
 
 def prepare_folder(folder: Path) -> None:
-    """Before anything runs: what was seen must not be lost for want of a place. Raises ``ManifestError``."""
+    """Make the folder before anything runs, so that no record is lost for want of a place. Raises ``ManifestError``."""
     records = folder / RECORDS
     try:
         records.mkdir(parents=True, exist_ok=True)
@@ -111,15 +111,17 @@ def prepare_folder(folder: Path) -> None:
 
 
 def keep_record(folder: Path, run: RecordedRun, data: bytes) -> Path:
-    """The record of ``run`` in the folder. Raises ``ManifestError`` where it cannot be written."""
+    """Write the record of ``run`` into the folder. Raises ``ManifestError`` if it cannot be written."""
     path = folder / RECORDS / f"{run.id}.record"
     _write(path, data)
     return path
 
 
 def write_manifests(folder: Path) -> LearntFolder:
-    """The manifests of all records in ``folder``. Raises ``ManifestError`` for one that cannot be written, or that
-    somebody has made unreadable."""
+    """Write the manifests of all records in ``folder``.
+
+    Raises ``ManifestError`` for one that cannot be written, or that somebody has made unreadable.
+    """
     records = [_read(path) for path in sorted((folder / RECORDS).glob("*.record"))]
     learnt = learn(records)
     programs = Counter((node.key.package, node.key.executable, node.key.plugin) for node in learnt.nodes)
@@ -134,7 +136,7 @@ def write_manifests(folder: Path) -> LearntFolder:
 
 
 def _drop_other_form(folder: Path, files: dict[Path, LearntNode]) -> None:
-    """A program that showed a second node gets a file for each; the file for the whole would contradict them."""
+    """Remove the file for a whole program that showed a second node: it would contradict the files of its nodes."""
     for path, node in files.items():
         whole = folder / manifest_file_name(node, alone=True)
         if whole not in files and whole.exists() and whole != path:
@@ -166,7 +168,7 @@ def _notes(learnt: Learnt, records: Iterable[Record]) -> Iterable[str]:
 
 
 def _write(path: Path, data: bytes) -> None:
-    """Whole or not at all."""
+    """Write the whole file or nothing."""
     with translated(OSError, ManifestError, f"{path}: cannot be written: "):
         path.parent.mkdir(parents=True, exist_ok=True)
         write_bytes(path, data)

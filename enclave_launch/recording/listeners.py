@@ -27,16 +27,16 @@ class Listener:
         self._launch, self._recording = launch, recording
 
     def added(self, line: Line) -> None:
-        """``line`` is in the record already."""
+        """Hear of ``line``, which is in the record already."""
 
     def happened(self, event: RunEvent) -> None:
-        """In the launch."""
+        """Hear of an event of the launch."""
 
     def looked(self) -> None:
-        """After each look at the record."""
+        """Hear that the record was read again."""
 
     def closed(self) -> None:
-        """Every process has ended and every line was added."""
+        """Hear that every process has ended and every line was added."""
 
 
 class EndpointEvents(Listener):

@@ -41,8 +41,10 @@ class Marked(NamedTuple):
 
 
 def questions(folder: Path) -> Questions:
-    """What the records of ``folder`` leave to decide. Components are left out: their parameters do not come with a
-    command line."""
+    """Return what the records of ``folder`` leave to decide.
+
+    Components are left out: their parameters do not come with a command line.
+    """
     found: dict[tuple[str, str], set[str]] = {}
     for path in sorted(folder.glob("records/*.record")):
         for node in all_asked(read_record(path.read_bytes()).attributed()):
@@ -62,7 +64,7 @@ class MarkerRun:
         self._count = 0
 
     def mark(self, process: ResolvedProcess, cmd: tuple[str, ...]) -> Marked:
-        """``cmd`` with a marker in place of each value in question; later ROS arguments win over earlier ones."""
+        """Return ``cmd`` with a marker for each value in question; later ROS arguments win over earlier ones."""
         wanted = self._asked.inputs.get(
             (process.package or "", process.executable.rpartition("/")[2]), frozenset()
         )
@@ -102,7 +104,9 @@ def _yaml(value: object) -> str:
 
 
 def _with_words(cmd: tuple[str, ...], words: Sequence[str], others: Sequence[str]) -> tuple[str, ...]:
-    """``words`` exchanged for ``others``, one by one; launch puts a program's own arguments before ``--ros-args``."""
+    """Return ``cmd`` with ``words`` exchanged for ``others``; launch puts a program's own arguments before ``--ros-
+    args``.
+    """
     end = cmd.index("--ros-args") if "--ros-args" in cmd else len(cmd)
     start = end - len(words)
     if start < 1 or list(cmd[start:end]) != list(words):

@@ -32,8 +32,10 @@ class Patch(NamedTuple):
 
 
 def manifest_patch(file: str, text: str, line: int, asked: Asked) -> Patch | None:
-    """One entry more in the manifest ``text`` of ``file`` for the node that begins at ``line``; ``None`` where the
-    name or the shape of the file does not let a line be added safely."""
+    """Add one entry to the manifest ``text`` of ``file`` for the node that begins at ``line``.
+
+    Returns None if the name or the shape of the file does not let a line be added safely.
+    """
     if not re.search(NAME_PATTERN, asked.name) or not re.search(TYPE_PATTERN, asked.type):
         return None
     added = _into_v1(text, line, asked) if text.lstrip()[:1] == "<" else _into_v2(text, asked)
@@ -116,7 +118,7 @@ def _v2_entry(asked: Asked) -> str:
 
 
 def _into_v1(text: str, line: int, asked: Asked) -> str | None:
-    """Before the end of the ``node`` element that begins at ``line``, counted from 1."""
+    """Add the entry before the end of the ``node`` element that begins at ``line``, counted from 1."""
     lines = text.splitlines(keepends=True)
     for number in range(max(line - 1, 0), len(lines)):
         if "</node>" in lines[number]:

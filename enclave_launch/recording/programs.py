@@ -29,7 +29,7 @@ class ProgramToRecord(NamedTuple):
 
 
 def look_at_command(words: Sequence[str], search_path: str = os.defpath) -> ProgramToRecord:
-    """The first program of a command line that stands in the way, else the last one that is run."""
+    """Return the first program of a command line that cannot be recorded, else the last one that is run."""
     programs = list(_programs(words, search_path))
     hindered = next((program for program in programs if program.obstacle), None)
     if hindered is not None:
@@ -61,12 +61,12 @@ def _state(path: str) -> tuple[int, int]:
 
 @lru_cache(maxsize=1024)
 def _looked_at(path: str, state: tuple[int, int]) -> ProgramToRecord:
-    """Launches start one program many times; ``state`` changes with the file."""
+    """Look at a program once, as launches start one many times; ``state`` changes with the file."""
     return look_at_program(path)
 
 
 def look_at_program(path: str, depth: int = 0) -> ProgramToRecord:
-    """What the head of the file says; a script is what its interpreter is."""
+    """Return what the head of the file says; a script is what its interpreter is."""
     try:
         with open(path, "rb") as file:
             status = os.fstat(file.fileno())
@@ -134,7 +134,7 @@ def _segments(head: bytes, file: BinaryIO, wide: bool, order: str) -> list[_Segm
 
 
 def _needed(file: BinaryIO, segments: Sequence[_Segment], wide: bool, order: str) -> list[str]:
-    """The libraries that the dynamic section asks for."""
+    """Return the libraries that the dynamic section asks for."""
     dynamic = next((segment for segment in segments if segment[0] == _DYNAMIC), None)
     if dynamic is None:
         return []

@@ -110,7 +110,7 @@ HARMLESS = re.compile(r"Remote secure participant .* not allowed")
 
 
 def cause_of(texts: Iterable[str]) -> Cause | None:
-    """The first cause that one of ``texts`` tells."""
+    """Return the first cause that one of ``texts`` names."""
     said = tuple(texts)
     return _told(said, _COMPILED) or _told(said, _COMPILED_AT_LAST)
 

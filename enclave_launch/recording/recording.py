@@ -186,8 +186,10 @@ class Recording:
         return self._folder / "recorder.so"
 
     def _try_it(self) -> None:
-        """One program with the recorder, before any node depends on it: a folder without execution, or a libc of
-        another kind, is told now."""
+        """Run one program with the recorder before any node depends on it.
+
+        A folder without execution, or a libc of another kind, is reported now.
+        """
         trial = self._library.with_name("trial")
         trial.touch()
         environment = {**os.environ, "LD_PRELOAD": str(self._library), RECORD_VARIABLE: str(trial)}
@@ -233,8 +235,10 @@ class Recording:
                 self._untold.append((now, line))
 
     def _tell(self, now: float) -> None:
-        """Listeners hear of a line once it is known which process of the launch it comes from: a process may speak
-        before the launch has said that it started."""
+        """Tell the listeners of a line once it is known which process of the launch it comes from.
+
+        A process may speak before the launch has said that it started.
+        """
         untold, self._untold = self._untold, []
         for since, line in untold:
             if self._has_origin(line) or now - since > _LONGEST_WAIT:
@@ -312,6 +316,6 @@ def _component(component: ResolvedComponent) -> LoadedComponent:
 
 
 def _plain(parameters: Mapping[str, object]) -> dict[str, object]:
-    """As JSON has them; byte strings, which are not names, are left out."""
+    """Return the values as JSON has them; byte strings, which are not names, are left out."""
     values = {name: value if isinstance(value, tuple) else (value,) for name, value in parameters.items()}
     return {name: parameters[name] for name in values if not any(isinstance(v, bytes) for v in values[name])}

@@ -52,7 +52,7 @@ class Library:
         return None
 
     def recorded(self, package: str, name: str, *, distro: str, version: str | None) -> tuple[Hit, ...]:
-        """What the user recorded of a program, one document for each of its nodes. Raises as ``find``."""
+        """Return what the user recorded of a program, one document for each of its nodes. Raises as ``find``."""
         for folder in self._folders:
             entries = [e for e in self._entries(folder) if e.package == package and name in e.programs]
             hits = (self._chosen(folder, [entry], distro, version) for entry in entries)
@@ -62,11 +62,11 @@ class Library:
         return ()
 
     def of_class(self, plugin_class: str, *, distro: str = "") -> Hit | None:
-        """The document of a plugin, by the name of its class as launch files give it."""
+        """Return the document of a plugin, by the name of its class as launch files give it."""
         return self._first(lambda entry: plugin_class in entry.classes, distro)
 
     def named(self, name: str, *, distro: str = "") -> Hit | None:
-        """The document ``package/stem``, as documents refer to each other."""
+        """Return the document ``package/stem``, as documents refer to each other."""
         return self._first(lambda entry: entry.stem == name, distro)
 
     def _first(self, fitting: Callable[[IndexEntry], bool], distro: str) -> Hit | None:
@@ -77,7 +77,7 @@ class Library:
         return None
 
     def transports(self) -> tuple[tuple[str, str, NodeInterface], ...]:
-        """Short name, package and description of each transport of image_transport."""
+        """Return short name, package and description of each transport of image_transport."""
         found: dict[str, tuple[str, str, NodeInterface]] = {}
         for folder in self._all():
             for entry in self._entries(folder):
@@ -87,7 +87,7 @@ class Library:
         return tuple(found.values())
 
     def documents(self) -> Iterator[LibraryDocument]:
-        """All of them, each package and name once, sorted."""
+        """Yield each package and name once, sorted."""
         seen: dict[str, tuple[str, str]] = {}
         for folder in self._all():
             for entry in self._entries(folder):
@@ -104,7 +104,7 @@ class Library:
         return self._indexes[folder]
 
     def _chosen(self, folder: str, entries: Sequence[IndexEntry], distro: str, version: str | None) -> Hit:
-        """The entry for this version, else the last, with a doubt that names both."""
+        """Return the entry for this version, else the last, with a doubt that names both."""
         fitting = [entry for entry in entries if fits(entry.versions, distro, version)]
         file = (fitting or entries)[-1].file
         document = self._document(folder, file)
@@ -123,22 +123,22 @@ class LibraryDocuments(NamedTuple):
     distro: str = ""
 
     def of_class(self, plugin_class: str) -> NodeInterface | None:
-        """The description of a plugin by its class."""
+        """Return the description of a plugin by its class."""
         hit = self.library.of_class(plugin_class, distro=self.distro)
         return hit.document.interface if hit else None
 
     def named(self, name: str) -> NodeInterface | None:
-        """The description ``package/stem``."""
+        """Return the description ``package/stem``."""
         hit = self.library.named(name, distro=self.distro)
         return hit.document.interface if hit else None
 
     def transports(self) -> tuple[tuple[str, str, NodeInterface], ...]:
-        """As ``Library.transports``."""
+        """Return what ``Library.transports`` returns."""
         return self.library.transports()
 
 
 def fits(versions: dict[str, str], distro: str, version: str | None) -> bool:
-    """Whether a document that was read from ``versions`` (a series by distribution) holds here.
+    """Return True if a document that was read from ``versions`` (a series by distribution) holds here.
 
     A series covers what begins with it: 1.3 covers 1.3.7. Without an installed version the distribution decides; a
     document that names none holds for all.

@@ -24,7 +24,7 @@ class Agreement(NamedTuple):
 
 
 def read_agreements(folder: str) -> dict[str, Agreement]:
-    """By the stem of the document; empty where nothing was kept."""
+    """Return what was noted, by the stem of the document."""
     path = os.path.join(folder, FILE)
     if not os.path.exists(path):
         return {}

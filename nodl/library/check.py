@@ -41,12 +41,12 @@ class LibraryVerdict(NamedTuple):
 
     @property
     def is_wrong(self) -> bool:
-        """They differ, and the document does not say why."""
+        """Return True if they differ and the document does not say why."""
         return bool(self.only_document or self.only_source) and not self.document.evidence.differs
 
     @property
     def in_short(self) -> str:
-        """For a table."""
+        """Return the verdict for a table."""
         if self.not_compared:
             return self.not_compared.partition(",")[0]
         return "agrees" if self.agrees else "differs" if self.is_wrong else "differs, explained"
@@ -66,7 +66,7 @@ class LibraryVerdict(NamedTuple):
 
 
 def check(library: Library, folder: str) -> list[LibraryVerdict]:
-    """One verdict for each document whose package is below ``folder``. Raises ``FileNotFoundError``."""
+    """Return one verdict for each document whose package is below ``folder``. Raises ``FileNotFoundError``."""
     if not os.path.isdir(folder):
         raise FileNotFoundError(2, "no such directory", folder)
     packages = dict(_packages(folder))
@@ -90,8 +90,10 @@ def check(library: Library, folder: str) -> list[LibraryVerdict]:
 
 
 def compare(document: LibraryDocument, nodes: Iterable[NodeInterface], library: Library) -> LibraryVerdict:
-    """``document`` with what inference found in its package; what its default plugins and further nodes have, which
-    ``library`` describes, may be found too."""
+    """Compare ``document`` with what inference found in its package.
+
+    What its default plugins and further nodes have, which ``library`` describes, may be found too.
+    """
     if document.classes or document.transport:
         return LibraryVerdict(document, not_compared="a plugin, whose node is made by those who load it")
     same = [node for node in nodes if _is_same(document, node)]
@@ -113,19 +115,19 @@ def _is_same(document: LibraryDocument, node: NodeInterface) -> bool:
 
 
 def _key(name: str) -> str:
-    """``{node}/x``, ``get_name() + "/x"`` in the source, is ``~/x``; tf's names are written with and without slash."""
+    """Return the name to compare: ``{node}/x`` is ``~/x``, and tf's names are written with and without slash."""
     private = f"~/{name.removeprefix('{node}/')}" if name.startswith("{node}/") else name
     return private.removeprefix("/") if private.startswith("/tf") else private
 
 
 def _is_known(endpoint: Endpoint) -> bool:
-    """A name of the node's own: known, and none that every node has anyway."""
+    """Return True for a known name of the node's own, not one that every node has anyway."""
     name = endpoint.name.text
     return bool(name) and "*" not in name and name.lstrip("/") not in _BUILT_IN
 
 
 def _brought(interface: NodeInterface, library: Library) -> set[_Name]:
-    """The names of the plugins, transports and further nodes of a start without parameters."""
+    """Return the names of the plugins, transports and further nodes of a start without parameters."""
     transports = frozenset(package for _, package, _ in library.transports())
     situation = Situation("rolling", interface.name or "node", "/", installed=transports)
     names: set[_Name] = set()

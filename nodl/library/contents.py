@@ -28,7 +28,7 @@ launch needs it, and refused by `--secure`.
 
 
 def contents_text(documents: Iterable[LibraryDocument], agreements: Mapping[str, Agreement]) -> str:
-    """The whole document, one row for each of ``documents``."""
+    """Return the whole document, one row for each of ``documents``."""
     known = list(documents)
     said = {each.stem: agreements[each.stem].said for each in known if each.stem in agreements}
     agree = [each for each in known if said.get(each.stem) == "agrees"]

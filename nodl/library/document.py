@@ -14,7 +14,7 @@ SUFFIX = ".nodl.yaml"
 
 
 def stem_of(file: str) -> str:
-    """``PACKAGE/NAME`` of a file of a library: ``PACKAGE/NAME.nodl.yaml``, or ``PACKAGE__NAME.nodl.yaml``."""
+    """Return ``PACKAGE/NAME`` of ``PACKAGE/NAME.nodl.yaml`` or ``PACKAGE__NAME.nodl.yaml``, a file of a library."""
     name = file.removesuffix(SUFFIX)
     return name if "/" in name else name.replace("__", "/", 1)
 
@@ -52,7 +52,7 @@ class LibraryDocument(NamedTuple):
 
 
 def read_library_document(folder: str, file: str) -> LibraryDocument:
-    """The document ``file`` of the library in ``folder``. Raises ``InvalidNoDLError``."""
+    """Read the document ``file`` of the library in ``folder``. Raises ``InvalidNoDLError``."""
     path = os.path.join(folder, file)
     stem = stem_of(file)
     package, _, name = stem.partition("/")

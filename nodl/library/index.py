@@ -36,8 +36,10 @@ class IndexEntry(NamedTuple):
 
 
 def read_index(folder: str) -> tuple[IndexEntry, ...]:
-    """What the index file of a library folder lists. Raises ``OSError``, ``ValueError`` for JSON that does
-    not parse."""
+    """Return what the index file of a library folder lists.
+
+    Raises ``OSError``, ``ValueError`` for JSON that does not parse.
+    """
     with open(os.path.join(folder, INDEX), encoding="utf-8") as stream:
         listed = json.load(stream)
     return tuple(
@@ -53,8 +55,10 @@ def read_index(folder: str) -> tuple[IndexEntry, ...]:
 
 
 def scanned(folder: str) -> tuple[IndexEntry, ...]:
-    """The entries of all documents below ``folder``. Raises ``InvalidNoDLError`` for a broken one, ``NoDLError`` for
-    one that would never be found."""
+    """Return the entries of all documents below ``folder``.
+
+    Raises ``InvalidNoDLError`` for a broken one, ``NoDLError`` for one that would never be found.
+    """
     found = {file: read_library_document(folder, file) for file in _files(folder)}
     for file, document in found.items():
         if "/" not in document.stem and not document.recorded:  # a program without a package can be recorded
@@ -63,7 +67,7 @@ def scanned(folder: str) -> tuple[IndexEntry, ...]:
 
 
 def index_text(folder: str) -> str:
-    """What the index of ``folder`` must say."""
+    """Return what the index of ``folder`` must say."""
     fields = ("programs", "classes", "versions", "transport")
     entries = {
         entry.file: {name: getattr(entry, name) for name in fields if getattr(entry, name)}
@@ -84,8 +88,10 @@ def _entry(folder: str, document: LibraryDocument) -> IndexEntry:
 
 
 def _files(folder: str) -> Iterator[str]:
-    """``PACKAGE/NAME.nodl.yaml``, and ``PACKAGE__NAME.nodl.yaml`` as ``--learn`` writes them. Raises ``NoDLError`` for
-    other documents: to pass over them would look as if they said nothing."""
+    """Yield ``PACKAGE/NAME.nodl.yaml``, and ``PACKAGE__NAME.nodl.yaml`` as ``--learn`` writes them.
+
+    Raises ``NoDLError`` for other documents: to pass over them would look as if they said nothing.
+    """
     for name in sorted(os.listdir(folder)):
         if os.path.isdir(os.path.join(folder, name)):
             inside = sorted(os.listdir(os.path.join(folder, name)))

@@ -102,7 +102,7 @@ class AskedNode(NamedTuple):
 
 
 def role_of(endpoint: EndpointMade) -> EndpointRole:
-    """Why ``endpoint`` is there."""
+    """Return why ``endpoint`` is there."""
     by, kind, final = endpoint.by, endpoint.kind, endpoint.final or endpoint.written
     if by == "librcl.so":
         return EndpointRole.INTROSPECTION if final.endswith(_INTROSPECTION) else EndpointRole.BUILT_IN
@@ -132,7 +132,7 @@ def _role_of_server(endpoint: EndpointMade) -> EndpointRole:
 
 
 def asked_by(process: RecordedProcess, node: RecordedNode) -> AskedNode:
-    """What ``node`` asked for, with what the launch started there."""
+    """Return what ``node`` asked for, with what the launch started there."""
     started, component = process.started, node.component
     rules = _rules(started, component)
     made = node.made
@@ -165,8 +165,10 @@ def asked_by(process: RecordedProcess, node: RecordedNode) -> AskedNode:
 
 
 def asked_endpoint(process: RecordedProcess, node: RecordedNode, endpoint: EndpointMade) -> Asked | None:
-    """``endpoint`` of ``node`` by itself, as it comes in; whoever made it. ``None`` for what is only a part of an
-    action, or rcl's call of itself."""
+    """Return ``endpoint`` of ``node`` by itself, as it comes in.
+
+    Returns None for what is only a part of an action, or rcl's call of itself.
+    """
     if role_of(endpoint) in (EndpointRole.PART_OF_ACTION, EndpointRole.REPEATED):
         return None
     final = endpoint.final
@@ -179,7 +181,7 @@ def asked_endpoint(process: RecordedProcess, node: RecordedNode, endpoint: Endpo
 
 
 def all_asked(processes: Iterable[RecordedProcess]) -> list[AskedNode]:
-    """Every node that could be made, in the order of the record."""
+    """Return every node that could be made, in the order of the record."""
     return [asked_by(process, node) for process in processes for node in process.nodes.values() if node.fqn]
 
 
@@ -194,7 +196,7 @@ def _program(
 
 
 def _rules(started: StartedProcess | None, component: LoadedComponent | None) -> RemapRules:
-    """The launch's rules that act on the node; one that rcl would refuse cannot have acted."""
+    """Return the launch's rules that act on the node; one that rcl would refuse cannot have acted."""
     if component is not None:
         return RemapRules(local=valid_rules(component.rules))
     return RemapRules(process=valid_rules(started.rules if started else ()))
@@ -237,8 +239,11 @@ def _own(
 
 
 def _action_name(parts: list[EndpointMade], action: EndpointMade) -> str:
-    """An action's parts come before its own line, and only they have the name that it gets (rcl of jazzy and older
-    does not remap actions, though it resolves their names as if it did)."""
+    """Return the name that the parts of an action have, which come before its own line.
+
+    Only they have the name that it gets: rcl of jazzy and older does not remap actions, though it resolves their names
+    as if it did.
+    """
     for part in reversed(parts):
         if part.node == action.node and part.final.endswith(_FIRST_PART):
             return part.final.removesuffix(_FIRST_PART)

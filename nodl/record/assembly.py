@@ -45,7 +45,7 @@ class RecordedNode:
 
     @property
     def fqn(self) -> str:
-        """The final name; empty for a node that could not be made."""
+        """Return the final name; empty for a node that could not be made."""
         if self.made is not None and self.made.fqn:
             return self.made.fqn
         return next((endpoint.fqn for endpoint in self.endpoints if endpoint.fqn), "")
@@ -82,7 +82,7 @@ class Record:
 
     @property
     def started(self) -> tuple[StartedProcess, ...]:
-        """All processes of the launch that the supervisor named."""
+        """Return all processes of the launch that the supervisor named."""
         return tuple(self._started.values())
 
     def add(self, line: Line) -> None:
@@ -99,14 +99,14 @@ class Record:
             self._add_to_process(line)
 
     def process_of(self, pid: int) -> RecordedProcess | None:
-        """The program that runs in process ``pid`` now, with what the launch started there."""
+        """Return the program that runs in process ``pid`` now, with what the launch started there."""
         process = self._current.get(pid)
         if process is not None and process.started is None:
             process.started = self._origin(pid)
         return process
 
     def node_of(self, line: EndpointMade | NodeMade) -> tuple[RecordedProcess, RecordedNode]:
-        """Where a line that was added belongs."""
+        """Return where a line that was added belongs."""
         process = self.process_of(line.pid)
         assert process is not None, "the line was added"
         node = process.node(line.node)
@@ -114,19 +114,21 @@ class Record:
         return process, node
 
     def attributed(self) -> list[RecordedProcess]:
-        """All processes that use ROS, each with what started it."""
+        """Return all processes that use ROS, each with what started it."""
         for process in self.processes:
             process.started = process.started or self._origin(process.pid)
             self._match_components(process)
         return [process for process in self.processes if process.initialised or process.nodes]
 
     def silent(self) -> list[StartedProcess]:
-        """Processes of the launch from which nothing was heard: the recorder is in none of their programs."""
+        """Return processes of the launch from which nothing was heard: the recorder is in none of their programs."""
         heard = {origin.pid for pid in self._loaded if (origin := self._origin(pid))}
         return [started for pid, started in self._started.items() if pid not in heard]
 
     def mute(self) -> list[StartedProcess]:
-        """Processes that the recorder is in and that never called rcl: no ROS, or a copy of librcl of their own."""
+        """Return processes that the recorder is in and that never called rcl: no ROS, or a copy of librcl of their
+        own.
+        """
         speaking = {p.started.pid for p in self.attributed() if p.started is not None}
         unheard = {started.pid for started in self.silent()}
         return [s for pid, s in self._started.items() if pid not in speaking and pid not in unheard]
@@ -184,7 +186,7 @@ class Record:
             before = node if node.component is not None else before
 
     def _component(self, node: RecordedNode, container: str, taken: set[int]) -> LoadedComponent | None:
-        """The first request with this name; a plugin may have been loaded twice under one."""
+        """Return the first request with this name; a plugin may have been loaded twice under one."""
         asked = [item for item in self.components if _is(item.container, container) and _made(item, node)]
         named = [item for item in asked if item.name]
         return next((item for item in asked if id(item) not in taken), named[-1] if named else None)
@@ -209,13 +211,13 @@ def _maker(
 
 
 def read_record(text: bytes) -> Record:
-    """The whole of a record; what was lost is in ``complaints``."""
+    """Read the whole of a record; what was lost is in ``complaints``."""
     lines, complaints = read_lines(text)
     return Record(lines, complaints)
 
 
 def _is(container: str, fqn: str) -> bool:
-    """A target is taken as it is written; a leading slash may be left out."""
+    """Return True if both are one name; a target is taken as it is written, and its leading slash may be left out."""
     return "/" + container.lstrip("/") == fqn
 
 

@@ -52,7 +52,7 @@ class Comparison(NamedTuple):
 
     @property
     def fits(self) -> bool:
-        """Nothing is missing or wrong; that more is described than was seen is for the reader."""
+        """Return True if nothing is missing or wrong; that more is described than was seen is for the reader."""
         return not any(d.verdict in (Verdict.MISSING, Verdict.WRONG) for d in self.differences)
 
 
@@ -94,7 +94,7 @@ def compare(node: AskedNode, interfaces: Sequence[NodeInterface]) -> Comparison:
 
 
 def _logger_services(node: AskedNode) -> tuple[str, ...]:
-    """An attribute of the recorded node, not endpoints of its own."""
+    """Return the logger services, an attribute of the recorded node and not endpoints of its own."""
     return tuple(f"{node.fqn}/{name}" for name in LOGGER_SERVICES)
 
 
@@ -106,7 +106,7 @@ def _matching(node: AskedNode, interfaces: Sequence[NodeInterface]) -> NodeInter
 
 
 def _is_named(node: AskedNode, described: str | None) -> bool:
-    """A name with a random ending is the source's own, or the one that rules inside the program give."""
+    """Return True if ``described`` is the node's name, or has a random ending and begins as it does."""
     if described is None or not described.endswith(RANDOM_ENDING):
         return described == node.name
     stem = described.removesuffix(RANDOM_ENDING) + "_"
@@ -114,7 +114,7 @@ def _is_named(node: AskedNode, described: str | None) -> bool:
 
 
 def _granted(node: AskedNode) -> list[Asked]:
-    """What rcl took, or refused: names that it calls invalid are not asked of anybody."""
+    """Return what rcl took, or refused: names that it calls invalid are not asked of anybody."""
     seen = {(each.kind, each.final): each for each in node.endpoints if each.rc in (0, 1) and each.final}
     return list(seen.values())
 
@@ -153,7 +153,7 @@ def _never_seen(
 
 
 def _find(asked: Asked, described: Iterable[_Described]) -> _Described | None:
-    """The one that is named so, rather than one whose pattern fits."""
+    """Return the one that is named so, rather than one whose pattern fits."""
     fitting = [e for e in described if e.kind is asked.kind and e.pattern.fullmatch(asked.final)]
     return min(fitting, key=lambda each: each.is_pattern, default=None)
 
@@ -171,7 +171,7 @@ _STAND_IN = "STAR_OF_A_PATTERN"
 
 
 def _finals(node: AskedNode, kind: EndpointKind, template: NameTemplate) -> set[str]:
-    """The final name; of an action, with and without its remapping, as the distribution is not told here."""
+    """Return the final name; of an action, with and without its remapping, as the distribution is not known here."""
     namespace, name = split_fqn(node.fqn)
     names = NodeNames(name, namespace, node.rules)
     text = template.text.replace("*", _STAND_IN)

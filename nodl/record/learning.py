@@ -89,12 +89,12 @@ class _Seen(NamedTuple):
 
 
 def learn(records: Iterable[Record]) -> Learnt:
-    """What all ``records`` together teach; order does not matter."""
+    """Return what all ``records`` together teach; order does not matter."""
     return learn_from((record.run, all_asked(record.attributed())) for record in records)
 
 
 def learn_from(runs: Iterable[tuple[RecordedRun, Sequence[AskedNode]]]) -> Learnt:
-    """The same for runs whose nodes are known otherwise: by observing the graph."""
+    """Learn from runs whose nodes are known otherwise: by observing the graph."""
     groups: dict[ProgramKey, list[_Seen]] = {}
     listeners: set[ProgramKey] = set()
     unforeseeable: set[str] = set()
@@ -122,8 +122,10 @@ def learn_from(runs: Iterable[tuple[RecordedRun, Sequence[AskedNode]]]) -> Learn
 
 
 def _unforeseeable(node: AskedNode) -> str:
-    """The final name as a pattern, where rules inside the program make it of a number or an address: another one in
-    each run. A number in the source's own name is learnt (``random_name``)."""
+    """Return the final name as a pattern, if the program makes it of a number or an address: another one in each run.
+
+    A number in the source's own name is learnt (``random_name``).
+    """
     name = node.fqn.rpartition("/")[2]
     pattern = f"{_numbered(name)}_*"
     if pattern == _TF_LISTENER:
@@ -220,7 +222,7 @@ def _entry(name: Name, origin: NameOrigin, names: set[Name], seen: Sequence[_See
 
 
 def _common(qualities: Sequence[tuple[int, ...]]) -> tuple[int, ...]:
-    """What all have; 0, which is "the system's", where one has another, as a parameter may decide it."""
+    """Return what all have; 0, which is "the system's", if one has another, as a parameter may decide it."""
     first = qualities[0]
     if any(len(each) != len(first) for each in qualities):
         return ()
@@ -228,7 +230,7 @@ def _common(qualities: Sequence[tuple[int, ...]]) -> tuple[int, ...]:
 
 
 def observation_of(node: AskedNode, run: str = "") -> Observation:
-    """What ``node`` was given, and the names that it asked for."""
+    """Return what ``node`` was given, and the names that it asked for."""
     names = frozenset(_name(asked) for asked in node.endpoints if asked.rc in (0, 1))
     inputs = {**node.parameters, **arguments_as_inputs(node.arguments)}
     defaults = {n: text for n, text in node.declared.items() if n not in inputs and isinstance(text, str)}

@@ -190,12 +190,12 @@ class LineReader:
         self._missing: dict[int, set[int]] = {}
 
     def feed(self, data: bytes) -> list[Line]:
-        """The lines that ``data`` completes."""
+        """Return the lines that ``data`` completes."""
         *whole, self._rest = (self._rest + data).split(b"\n")
         return [line for text in whole if (line := self._line(text)) is not None]
 
     def close(self) -> None:
-        """Nothing follows: a last line without its end was cut, and what has not come by now is lost."""
+        """Report what is missing: a last line without its end was cut, and what has not come by now is lost."""
         if self._rest.strip():
             self._complain(0, f"a line was cut off: {_shown(self._rest)}")
         self._rest = b""
@@ -241,7 +241,7 @@ class LineReader:
 
 
 def read_lines(text: bytes) -> tuple[list[Line], list[Complaint]]:
-    """A whole record at once."""
+    """Read a whole record at once."""
     reader = LineReader()
     lines = reader.feed(text)
     reader.close()
@@ -249,7 +249,7 @@ def read_lines(text: bytes) -> tuple[list[Line], list[Complaint]]:
 
 
 def line_text(line: RecordedRun | StartedProcess | LoadedComponent) -> bytes:
-    """A line of the supervisor, ready to be appended."""
+    """Return a line of the supervisor, ready to be appended."""
     what = {RecordedRun: "run", StartedProcess: "process", LoadedComponent: "component"}[type(line)]
     fields = {name: dict(v) if isinstance(v, Mapping) else v for name, v in line._asdict().items()}
     text = json.dumps({"what": what, **fields}, ensure_ascii=True, default=_plain)
@@ -257,7 +257,7 @@ def line_text(line: RecordedRun | StartedProcess | LoadedComponent) -> bytes:
 
 
 def _plain(value: object) -> object:
-    """Byte strings of parameters, as ROS parameter files write them."""
+    """Return byte strings of parameters as ROS parameter files write them."""
     return value.decode(errors="replace") if isinstance(value, bytes) else str(value)
 
 
@@ -287,7 +287,7 @@ _KINDS: dict[str, Any] = {
 
 
 def _values(names: Iterable[str], fields: Mapping[str, Any]) -> list[Any]:
-    """Fields of these names in this order, each of the type that its name has in every line."""
+    """Return fields of these names in this order, each of the type that its name has in every line."""
     return [_READERS.get(name, _str)(fields, name) for name in names]
 
 

@@ -32,8 +32,10 @@ OBSERVED_HEAD = (
 
 
 def manifest_text(node: LearntNode, before: str = "", head: str = _HEAD) -> str:
-    """The document of ``node``; ``before`` is the text that stands there, ``head`` says where it is from. Raises
-    ``yaml.YAMLError`` for a text that is not YAML."""
+    """Return the document of ``node``; ``before`` is the text that stands there, ``head`` says where it is from.
+
+    Raises ``yaml.YAMLError`` for a text that is not YAML.
+    """
     old = load_yaml(before) if before.strip() else None
     document = _united(_document(node), old if isinstance(old, dict) else {})
     dumper = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
@@ -43,7 +45,7 @@ def manifest_text(node: LearntNode, before: str = "", head: str = _HEAD) -> str:
 
 
 def manifest_file_name(node: LearntNode, alone: bool) -> str:
-    """``PACKAGE__PROGRAM.nodl.yaml``; with the node's name where it is not ``alone`` in its program."""
+    """Return ``PACKAGE__PROGRAM.nodl.yaml``; with the node's name if it is not ``alone`` in its program."""
     key = node.key
     program = (key.plugin or key.executable).replace("::", ".")
     name = f"{key.package}__{program}" if key.package else program
@@ -100,7 +102,7 @@ def _entry(entry: LearntEndpoint) -> dict[str, Any]:
 
 
 def _plain_name(entry: LearntEndpoint) -> str:
-    """What NoDL v2 lets a name be; ``written`` in our section has the source's where that is something else."""
+    """Return what NoDL v2 lets a name be; ``written`` in our section has the source's if that is something else."""
     if re.search(NAME_PATTERN, entry.name):
         return entry.name
     return "unwritable_" + re.sub(r"[^A-Za-z0-9]+", "_", entry.name).strip("_")
@@ -117,7 +119,7 @@ def _quality(qos: tuple[int, ...]) -> dict[str, Any]:
 
 
 def _about(entry: LearntEndpoint) -> dict[str, Any]:
-    """What the standard entry cannot say."""
+    """Return what the standard entry cannot say."""
     name, origin = _plain_name(entry), entry.origin
     fields: dict[str, Any] = {"in": entry.kind.category, "name": name}
     if name != entry.name:
@@ -141,7 +143,7 @@ def _about(entry: LearntEndpoint) -> dict[str, Any]:
 
 
 def _united(new: dict[str, Any], old: Mapping[str, Any]) -> dict[str, Any]:
-    """``new``, with all of ``old`` that it does not say itself."""
+    """Return ``new``, with all of ``old`` that it does not say itself."""
     united = {**{key: value for key, value in old.items() if key not in new}, **new}
     section = _section_of(new)
     ours, theirs = section.get("endpoints", []), _section_of(old).get("endpoints", [])
@@ -170,7 +172,7 @@ def _section_of(document: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _united_entries(new: Any, old: Any, dropped: set[Any]) -> list[dict[str, Any]]:
-    """``dropped``: names that the same records explained differently before."""
+    """Return the entries of both; ``dropped``: names that the same records explained differently before."""
     ours = list(new or ())
     theirs = {each["name"]: each for each in old or () if isinstance(each, dict) and "name" in each}
     kept = [{**theirs.get(each["name"], {}), **each} for each in ours]

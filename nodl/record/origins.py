@@ -50,7 +50,7 @@ class Observation(NamedTuple):
 
     @property
     def values(self) -> Inputs:
-        """Everything that the node could read."""
+        """Return everything that the node could read."""
         return {**self.defaults, **self.inputs}
 
 
@@ -105,7 +105,7 @@ def arguments_as_inputs(words: Sequence[str]) -> dict[str, str]:
 
 
 def origins_of(observations: Sequence[Observation]) -> dict[Name, NameOrigin]:
-    """The origin of each name that was seen in any of ``observations`` (all of one node of one program)."""
+    """Return the origin of each name that was seen in any of ``observations`` (all of one node of one program)."""
     found = {
         name: _with_default(_origin(name, observations), observations)
         for name in sorted({name for each in observations for name in each.names})
@@ -114,7 +114,7 @@ def origins_of(observations: Sequence[Observation]) -> dict[Name, NameOrigin]:
 
 
 def candidates(name: str, inputs: Inputs) -> tuple[Source, ...]:
-    """The inputs whose value is ``name``; those that are called a topic go before all others."""
+    """Return the inputs whose value is ``name``; those that are called a topic go before all others."""
     found = [
         source
         for parameter, value in sorted(inputs.items())
@@ -211,7 +211,7 @@ def _values(source: Source, seen: Observation) -> frozenset[str]:
 
 
 def _contradicts(name: Name, source: Source, other: Observation) -> bool:
-    """Other values were given, and the old name is there all the same while none of the new ones is."""
+    """Return True if other values were given, the old name is there and none of the new ones is."""
     values = _values(source, other)
     if not values or name.name in values:
         return False
@@ -219,7 +219,7 @@ def _contradicts(name: Name, source: Source, other: Observation) -> bool:
 
 
 def _follows(name: Name, source: Source, other: Observation) -> bool:
-    """Other values were given, all their names are there, and the old one is not."""
+    """Return True if other values were given, all their names are there, and the old one is not."""
     values = _values(source, other)
     if not values or name.name in values or name in other.names:
         return False
@@ -227,7 +227,7 @@ def _follows(name: Name, source: Source, other: Observation) -> bool:
 
 
 def _with_default(origin: NameOrigin, observations: Sequence[Observation]) -> NameOrigin:
-    """With what the program declares where the launch gives nothing."""
+    """Return ``origin`` with what the program declares where the launch gives nothing."""
     if origin.source is None or origin.source.each:
         return origin
     declared = {each.defaults.get(origin.source.parameter) for each in observations} - {None}
@@ -235,8 +235,10 @@ def _with_default(origin: NameOrigin, observations: Sequence[Observation]) -> Na
 
 
 def _generalised(found: Mapping[Name, NameOrigin]) -> dict[Name, NameOrigin]:
-    """``topics.a.topic`` and ``topics.b.topic`` → ``topics.*.topic``: keys that are data, where two were seen. A
-    parameter with a default is one that the program knows by name."""
+    """Replace ``topics.a.topic`` and ``topics.b.topic`` by ``topics.*.topic``: keys that are data, if two were seen.
+
+    A parameter with a default is one that the program knows by name.
+    """
     families: dict[tuple[object, ...], set[str]] = {}
     for name, origin in found.items():
         if origin.source and origin.default is None:
@@ -253,7 +255,10 @@ def _generalised(found: Mapping[Name, NameOrigin]) -> dict[Name, NameOrigin]:
 
 
 def _families(parameter: str) -> list[str]:
-    """One middle part, or the first of several, replaced: never the last, which tells what the value means."""
+    """Return the parameter with one middle part, or the first of several, replaced.
+
+    The last part says what the value means and stays.
+    """
     parts = parameter.split(".")
     return [".".join([*parts[:i], "*", *parts[i + 1 :]]) for i in range(len(parts) - 1)][::-1]
 
@@ -261,7 +266,7 @@ def _families(parameter: str) -> list[str]:
 def _without_defaults(
     found: Mapping[Name, NameOrigin], observations: Sequence[Observation]
 ) -> dict[Name, NameOrigin]:
-    """A fixed name that is there only where the parameter is not set is the parameter's default."""
+    """Take a fixed name that is there only where the parameter is not set for the parameter's default."""
     result = dict(found)
     for name, origin in found.items():
         if origin.source is None or origin.default is not None or origin.source.suffix:

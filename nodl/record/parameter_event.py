@@ -14,7 +14,9 @@ _STRING, _STRING_LIST = 4, 9  # rcl_interfaces/msg/ParameterType
 
 
 def declared_texts(event: bytes) -> Mapping[str, object]:
-    """By name, the declared parameters that hold a text or a list of texts. Of an event that was cut, those before."""
+    """Return by name the declared parameters that hold a text or a list of texts; of an event that was cut, those
+    before.
+    """
     found: dict[str, object] = {}
     if event[:2] not in (b"\0\0", b"\0\1"):
         return found
@@ -50,7 +52,7 @@ class _Cursor:
         return text.rstrip(b"\0").decode()
 
     def value(self) -> object:
-        """A rcl_interfaces/msg/ParameterValue: all its fields are there, whichever counts."""
+        """Read a rcl_interfaces/msg/ParameterValue: all its fields are there, whichever counts."""
         kind, _, _, _ = self.number("B"), self.number("B"), self.number("Q"), self.number("Q")
         text = self.text()
         for form in "BBQQ":

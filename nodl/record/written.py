@@ -26,7 +26,9 @@ class Meant(NamedTuple):
 
 
 def meant_name(kind: EndpointKind, written: str, final: str, fqn: str, rules: RemapRules | None) -> Meant:
-    """What the source of the node ``fqn`` means by ``written``, which became ``final`` by the launch's ``rules``."""
+    """Return what the source of the node ``fqn`` means by ``written``, which became ``final`` by the launch's
+    ``rules``.
+    """
     name = private_name(written, fqn)
     if rules is None or not final or not fqn or final in final_names(kind, name, fqn, rules):
         return Meant(name)
@@ -34,7 +36,7 @@ def meant_name(kind: EndpointKind, written: str, final: str, fqn: str, rules: Re
 
 
 def private_name(written: str, fqn: str) -> str:
-    """``~/x`` for a name that begins with the node's own; substitutions that say the same are written plainly."""
+    """Return ``~/x`` for a name that begins with the node's own; substitutions of that meaning are written plainly."""
     if fqn:
         for own in (f"{fqn}/", f"{split_fqn(fqn)[1]}/", "{node}/"):
             if written.startswith(own):
@@ -46,7 +48,7 @@ def private_name(written: str, fqn: str) -> str:
 
 
 def final_names(kind: EndpointKind, name: str, fqn: str, rules: RemapRules) -> set[str]:
-    """What ``name`` may become in the node ``fqn``; actions with and without rules, as distributions differ."""
+    """Return what ``name`` may become in the node ``fqn``; actions with and without rules, as distributions differ."""
     namespace, node = split_fqn(fqn)
     names = NodeNames(node, namespace, rules)
     try:
@@ -60,17 +62,17 @@ def final_names(kind: EndpointKind, name: str, fqn: str, rules: RemapRules) -> s
 
 
 def written_names(kind: EndpointKind, final: str, fqn: str, rules: RemapRules) -> tuple[str, ...]:
-    """What the source of the node ``fqn`` may write for ``final``: the inverse of expansion and remapping.
+    """Return what the source of the node ``fqn`` may write for ``final``: the inverse of expansion and remapping.
 
     The likelier first: what a rule says, then private names, then relative ones. Each is tried forwards, by the rules
-    of rcl; empty when no name that is written leads there.
+    of rcl; empty if no name that is written leads there.
     """
     found = [*_by_rule(kind, final, fqn, rules), *spellings(final, fqn)]
     return tuple(dict.fromkeys(each for each in found if final in final_names(kind, each, fqn, rules)))
 
 
 def spellings(full: str, fqn: str) -> tuple[str, ...]:
-    """The ways to write the full name ``full`` in the node ``fqn``: private, relative, absolute."""
+    """Return the ways to write the full name ``full`` in the node ``fqn``: private, relative, absolute."""
     namespace, _ = split_fqn(fqn)
     above = namespace.rstrip("/") + "/"
     found = [f"~/{full[len(fqn) + 1 :]}"] if full.startswith(f"{fqn}/") else []
