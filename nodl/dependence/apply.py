@@ -51,7 +51,7 @@ class Applied(NamedTuple):
 
 
 def applied(interface: NodeInterface, situation: Situation, documents: Documents) -> Applied:
-    """``interface`` as it is in ``situation``; one that depends on nothing is returned as it is."""
+    """Return ``interface`` as it is in ``situation``; one that depends on nothing is returned as it is."""
     if interface.depends is None:
         return Applied(interface)
     work = _Application(interface, situation, documents)
@@ -63,7 +63,9 @@ def applied(interface: NodeInterface, situation: Situation, documents: Documents
 
 
 def own_name(interface: NodeInterface, situation: Situation) -> str | None:
-    """The name that the program gives its node, where that follows the command line or is random (then with ``*``)."""
+    """Return the name that the program gives its node, if that follows the command line or is random (then with
+    ``*``).
+    """
     depends = interface.depends
     if depends is None:
         return interface.name
@@ -148,7 +150,7 @@ class _Application:
         self.describe(described, instance, (f"plugin {instance} of class {plugin_class}",), depth + 1)
 
     def _own_node(self, described: NodeInterface, instance: str) -> NodeInterface:
-        """A plugin that is a node: a controller, with what its spawner gives it."""
+        """Return a plugin that is a node: a controller, with what its spawner gives it."""
         mine = [item for item in self._spawned() if item.controller == instance]
         return described._replace(
             name=instance,
@@ -157,7 +159,7 @@ class _Application:
         )
 
     def _spawned(self) -> Iterator[Spawned]:
-        """The controllers that spawners of the launch load into this node."""
+        """Yield the controllers that spawners of the launch load into this node."""
         manager = join(self._situation.namespace, self._situation.node)
         return (item for item in self._situation.launched.spawned if item.manager == manager)
 
@@ -257,7 +259,7 @@ def _varied(
 
 
 def _default(endpoint: Endpoint, template: str, notes: tuple[str, ...]) -> Endpoint:
-    """The listed name: what it has while nobody sets the parameter."""
+    """Return the listed name: what it has while nobody sets the parameter."""
     parameter = template.removeprefix("$(param ").removesuffix(")")
     note = "; ".join((f"parameter {parameter}, its default", *notes))
     return endpoint._replace(note=note, certainty=Certainty.FROM_DEFAULT)
@@ -276,8 +278,10 @@ def _sequence(value: object) -> tuple[object, ...]:
 
 
 def _tf_listener(interface: NodeInterface) -> NodeInterface:
-    """The node that ``tf2_ros::TransformListener`` makes where it is given none (transform_listener.cpp): named by a
-    memory address, in the process's namespace, without parameter services."""
+    """Return the node that ``tf2_ros::TransformListener`` makes if it is given none (transform_listener.cpp).
+
+    It is named by a memory address, in the process's namespace, without parameter services.
+    """
     return NodeInterface(
         package=interface.package,
         executable=interface.executable,

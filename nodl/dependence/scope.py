@@ -40,7 +40,7 @@ class Filled(NamedTuple):
 
     @property
     def text(self) -> str | None:
-        """The whole text, ``None`` when a piece is not known."""
+        """Return the whole text, None if a piece is not known."""
         return "".join(str(part) for part in self.parts) if self.template.is_literal else None
 
 
@@ -72,11 +72,11 @@ class Scope:
         self._options, self._arguments = _command_line(situation.words, options)
 
     def fill(self, template: str, item: str = "") -> Filled:
-        """``template`` with its references replaced; a value that is not known becomes an unknown part."""
+        """Return ``template`` with its references replaced; a value that is not known becomes an unknown part."""
         return _Filling(self, {**self._bound, "item": item}).of(template)
 
     def holds(self, when: When, item: str = "") -> bool:
-        """A distribution that we do not know counts as the newest."""
+        """Return True if the condition holds; a distribution that we do not know counts as the newest."""
         known = self.situation.distro in DISTROS
         age = DISTROS.index(self.situation.distro) if known else len(DISTROS)
         if when.since and age < DISTROS.index(when.since):
@@ -86,8 +86,11 @@ class Scope:
         return not when.any_of or any(all(self._passes(t, item) for t in group) for group in when.any_of)
 
     def items(self, each: str) -> Iterator[str]:
-        """The entries of a list parameter, the words of a text, what ``*`` (or ``#``, a number) stands for in parameter
-        names, or with ``arguments N`` the words of the command line from the N-th on."""
+        """Yield the entries of a list parameter, or the words of a text.
+
+        ``*`` (or ``#``, a number) yields what it stands for in parameter names, ``arguments N`` the words of the
+        command line from the N-th on.
+        """
         each = self._plain(each)
         if each.startswith(_ARGUMENTS):
             yield from self._arguments[int(each.removeprefix(_ARGUMENTS)) - 1 :]
@@ -102,8 +105,9 @@ class Scope:
             yield from _entries(value.value)
 
     def value(self, name: str, default: object = None) -> Value | None:
-        """Of a parameter; of an option when ``name`` begins with ``--``, of a word of the command line when it is
-        ``argument N``."""
+        """Return the value of a parameter, of an option (``--name``), or of a word of the command line (``argument
+        N``).
+        """
         if name.startswith("--"):
             return self.option(name[2:], default)
         if name.startswith(_ARGUMENT):
@@ -178,7 +182,7 @@ class _Filling:
         return self._hold(_text(found.value, lower=False))
 
     def _remapped(self, word: str, name: str) -> str:
-        """``image_transport::getCameraInfoTopic`` takes the remapped name of the image, and what stands beside it."""
+        """Return the remapped name, or what stands beside it, as ``image_transport::getCameraInfoTopic`` does."""
         final = self._scope.situation.remap(name)
         return final if word == "remapped" else f"{final.rpartition('/')[0]}/camera_info"
 
@@ -212,7 +216,7 @@ def _entries(value: object) -> list[str]:
 
 
 def _text(value: object, *, lower: bool = True) -> str:
-    """Booleans as ROS writes them; compared without regard to case."""
+    """Return booleans as ROS writes them; compared without regard to case."""
     text = str(value).lower() if isinstance(value, bool) else str(value)
     return text.lower() if lower else text
 
@@ -220,7 +224,7 @@ def _text(value: object, *, lower: bool = True) -> str:
 def _command_line(
     words: Sequence[str], options: Mapping[str, tuple[str, ...]]
 ) -> tuple[dict[str, str], list[str]]:
-    """Values of the declared options (the first value of each), and the words that belong to none."""
+    """Return the declared options (the first value of each), and the words that belong to none."""
     by_spelling = {spelling: name for name, spellings in options.items() for spelling in spellings}
     values: dict[str, str] = {}
     arguments: list[str] = []

@@ -35,10 +35,10 @@ _MAX_BYTES = 4_000_000
 def read_document(
     path: str | Path, *, package: str | None = None, name: str | None = None, prefixes: Sequence[str] = ()
 ) -> tuple[ManifestNode, ...]:
-    """All nodes of one file, whichever version it is in; what begins with ``<`` is XML.
+    """Read all nodes of one file, whichever version it is in; what begins with ``<`` is XML.
 
-    ``name`` is the registered name of a v2 document (default: from the file name). Raises
-    ``InvalidNoDLError`` with file:line, also for a file that cannot be read.
+    ``name`` is the registered name of a v2 document (default: from the file name). Raises ``InvalidNoDLError`` with
+    file:line, also for a file that cannot be read.
     """
     file = str(path)
     return parse_document(_read(file), file, package=package, name=name, prefixes=prefixes)
@@ -60,7 +60,7 @@ def parse_document(
 
 
 def read_root(path: str | Path) -> YamlMap:
-    """A v2 document as it is written, checked. Raises ``InvalidNoDLError`` as ``read_document``."""
+    """Read a v2 document as it is written, checked. Raises ``InvalidNoDLError`` as ``read_document``."""
     return check_document(parse_yaml(_read(str(path)), str(path)))
 
 

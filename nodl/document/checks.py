@@ -16,12 +16,12 @@ Checker = Callable[[YamlValue, str], None]
 
 
 def fail(value: YamlValue, message: str) -> None:
-    """Raises ``InvalidNoDLDocumentError`` with the place of ``value``."""
+    """Raise ``InvalidNoDLDocumentError`` with the place of ``value``."""
     raise InvalidNoDLDocumentError.at(value.source, message)
 
 
 def text_of(pattern: str | None = None, meaning: str = "") -> Checker:
-    """Text, and if ``pattern`` is given, text in which it is found; ``meaning`` says in the error what that is."""
+    """Check for text in which ``pattern``, if given, is found; ``meaning`` says in the error what that is."""
     compiled = re.compile(pattern) if pattern else None
 
     def check(value: YamlValue, what: str) -> None:
@@ -34,7 +34,7 @@ def text_of(pattern: str | None = None, meaning: str = "") -> Checker:
 
 
 def one_of(*allowed: str) -> Checker:
-    """One of the given words."""
+    """Check for one of the given words."""
 
     def check(value: YamlValue, what: str) -> None:
         if not isinstance(value, YamlScalar) or value.value not in allowed:
@@ -44,7 +44,7 @@ def one_of(*allowed: str) -> Checker:
 
 
 def integer(minimum: int, maximum: int | None = None) -> Checker:
-    """An integer within bounds."""
+    """Check for an integer within bounds."""
 
     def check(value: YamlValue, what: str) -> None:
         number = value.value if isinstance(value, YamlScalar) else None
@@ -58,24 +58,24 @@ def integer(minimum: int, maximum: int | None = None) -> Checker:
 
 
 def boolean(value: YamlValue, what: str) -> None:
-    """``true`` or ``false``."""
+    """Check for ``true`` or ``false``."""
     if not isinstance(value, YamlScalar) or not isinstance(value.value, bool):
         fail(value, f"{what} must be true or false")
 
 
 def number(value: YamlValue, what: str) -> None:
-    """An integer or a float."""
+    """Check for an integer or a float."""
     given = value.value if isinstance(value, YamlScalar) else None
     if isinstance(given, bool) or not isinstance(given, (int, float)):
         fail(value, f"{what} must be a number")
 
 
 def anything(value: YamlValue, what: str) -> None:
-    """No rule."""
+    """Check nothing."""
 
 
 def list_of(item: Checker, length: int | None = None, minimum: int = 0) -> Checker:
-    """A list whose elements pass ``item``."""
+    """Check for a list whose elements pass ``item``."""
 
     def check(value: YamlValue, what: str) -> None:
         if not isinstance(value, YamlList):
@@ -98,7 +98,7 @@ def map_of(
     patterns: Mapping[str, Checker] | None = None,
     also: Callable[[YamlMap, str], None] | None = None,
 ) -> Checker:
-    """A mapping: known ``keys``, else by ``patterns``, else ``others``; an unknown key is an error."""
+    """Check for a mapping: known ``keys``, else by ``patterns``, else ``others``; an unknown key is an error."""
 
     def check(value: YamlValue, what: str) -> None:
         if not isinstance(value, YamlMap):
@@ -123,7 +123,7 @@ def map_of(
 
 
 def either(*checkers: Checker) -> Checker:
-    """The first checker that is content; the complaint of the last one otherwise."""
+    """Check by the first checker that is content; the complaint is that of the last one."""
 
     def check(value: YamlValue, what: str) -> None:
         for checker in checkers[:-1]:
@@ -137,6 +137,6 @@ def either(*checkers: Checker) -> Checker:
 
 
 def null(value: YamlValue, what: str) -> None:
-    """Nothing, as for a key that takes no argument."""
+    """Check for nothing, as for a key that takes no argument."""
     if not isinstance(value, YamlScalar) or value.value is not None:
         fail(value, f"{what} takes no argument")

@@ -46,7 +46,7 @@ _ALLOWED_ANYWHERE = (f"{_XSI}schemaLocation", f"{_XSI}noNamespaceSchemaLocation"
 
 
 def parse_v1(text: bytes, file: str, package: str | None = None) -> tuple[ManifestNode, ...]:
-    """The nodes of one document, in document order. Raises ``InvalidNoDLError`` with file:line."""
+    """Return the nodes of one document, in document order. Raises ``InvalidNoDLError`` with file:line."""
     root = parse_xml(text, file)
     _expect(root, "interface", ("version",), file)
     version = root.get("version", "")
@@ -99,7 +99,7 @@ def _node(element: XmlElement, file: str, package: str | None) -> ManifestNode:
 
 
 def _node_name(element: XmlElement, file: str) -> tuple[str | None, str]:
-    """Namespace (when the name has one, as in ``/ns/node``) and node name."""
+    """Return namespace (if the name has one, as in ``/ns/node``) and node name."""
     written = element.get("name", "")
     try:
         if "/" not in written:
@@ -114,7 +114,7 @@ def _node_name(element: XmlElement, file: str) -> tuple[str | None, str]:
 
 
 def _endpoints(element: XmlElement, file: str, own_prefix: str) -> list[Endpoint]:
-    """``/node_name/x`` is v1's habit of writing the private name ``~/x``, and is taken as that."""
+    """Return the endpoints; ``/node_name/x`` is v1's habit of writing the private name ``~/x``."""
     tag = element.tag
     _expect(element, tag, ("name", "type", "role"), file)
     _expect_no_elements(element, file)
@@ -136,7 +136,7 @@ def _endpoints(element: XmlElement, file: str, own_prefix: str) -> list[Endpoint
 
 
 def _once(endpoints: Iterable[Endpoint]) -> tuple[Endpoint, ...]:
-    """Each (kind, name, type) once, the first mention stays."""
+    """Return each (kind, name, type) once, the first mention stays."""
     first: dict[tuple[EndpointKind, NameTemplate, str], Endpoint] = {}
     for endpoint in endpoints:
         first.setdefault((endpoint.kind, endpoint.name, endpoint.type), endpoint)

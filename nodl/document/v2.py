@@ -36,9 +36,10 @@ ANY_TYPE = "of any type"
 def parse_v2(
     text: bytes, file: str, *, package: str | None, name: str, prefixes: Sequence[str] = ()
 ) -> ManifestNode:
-    """The node of one document. ``name`` as registered; ``prefixes`` to find ``nodl://`` includes.
+    """Return the node of one document.
 
-    Reads the included files. Raises ``InvalidNoDLError`` with file:line.
+    ``name`` as registered; ``prefixes`` to find ``nodl://`` includes. Reads the included files. Raises
+    ``InvalidNoDLError`` with file:line.
     """
     return parse_root(
         check_document(parse_yaml(text, file)), file, package=package, name=name, prefixes=prefixes
@@ -48,7 +49,7 @@ def parse_v2(
 def parse_root(
     root: YamlMap, file: str, *, package: str | None, name: str, prefixes: Sequence[str] = ()
 ) -> ManifestNode:
-    """``parse_v2`` for a document that was read and checked."""
+    """Parse as ``parse_v2`` a document that was read and checked."""
     documents = (Included(file, root), *follow_includes(root, file, prefixes))
     own, learnt = _identified(root, file, package, name), learnt_from(root)
     parameters = _parameters(documents)
@@ -66,14 +67,14 @@ def parse_root(
 
 
 def _fields(root: YamlMap) -> dict[str, str | int | float | bool | None]:
-    """What our section of the document says in one word."""
+    """Return what our section of the document says in one word."""
     ours = section_of(root)
     given = ours.items if ours else {}
     return {key: value.value for key, value in given.items() if isinstance(value, YamlScalar)}
 
 
 def _identified(root: YamlMap, file: str, package: str | None, name: str) -> NodeInterface:
-    """The node without its interfaces."""
+    """Return the node without its interfaces."""
     fields = _fields(root)
     executable, plugin = _text(fields, "executable"), _text(fields, "plugin")
     if executable is None and plugin is None:
@@ -105,7 +106,7 @@ def _text(fields: dict[str, str | int | float | bool | None], key: str) -> str |
 
 
 def _node_name_from(name: str) -> str | None:
-    """The registered name as node name, when it can be one."""
+    """Return the registered name as node name, if it can be one."""
     try:
         validate_node_name(name)
     except InvalidNameError:
@@ -178,7 +179,7 @@ def _is_placeholder(entry: YamlMap, type_name: str) -> bool:
 
 
 def _full_type(type_name: str, kind: EndpointKind) -> str:
-    """``std_msgs/String`` -> ``std_msgs/msg/String``: the middle part may be omitted in v2."""
+    """Return ``std_msgs/msg/String`` for ``std_msgs/String``: the middle part may be omitted in v2."""
     package, _, rest = type_name.partition("/")
     return type_name if "/" in rest else f"{package}/{kind.type_folder}/{rest}"
 

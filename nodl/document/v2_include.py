@@ -35,7 +35,7 @@ class Included(NamedTuple):
 
 
 def follow_includes(root: YamlMap, file: str, prefixes: Sequence[str]) -> tuple[Included, ...]:
-    """All documents that ``root`` includes, depth first. Raises ``IncludeError`` with file:line."""
+    """Return all documents that ``root`` includes, depth first. Raises ``IncludeError`` with file:line."""
     origin = Path(file).resolve()
     walk = _Walk(prefixes, {origin: (str(file),)})
     return tuple(walk.of(root, origin, (str(file),)))
@@ -110,7 +110,7 @@ def _local(body: str, source: SourceRef, origin: Path) -> Path:
 
 
 def package_root(document: Path) -> Path:
-    """The folder that local includes may not leave: that of ``package.xml``, else the document's own."""
+    """Return the folder that local includes may not leave: that of ``package.xml``, else the document's own."""
     for folder in document.parents:
         if (folder / "package.xml").is_file():
             return folder

@@ -54,14 +54,17 @@ class LearntFrom(NamedTuple):
 
 
 def learnt_from(root: YamlMap) -> LearntFrom:
-    """What the document says of the runs that taught it; nothing, where a person wrote it."""
+    """Return what the document says of the runs that taught it; nothing, if a person wrote it."""
     section = _section(root)
     runs = section.get("runs")
     return LearntFrom(len(runs.items) if isinstance(runs, YamlList) else 0, _texts(section.get("incomplete")))
 
 
 def learnt_names(root: YamlMap) -> dict[tuple[str, str], LearntName]:
-    """By list (``publishers``) and name of the standard entry. Raises ``InvalidElementError`` for a bad name."""
+    """Return what was learnt, by list (``publishers``) and name of the standard entry.
+
+    Raises ``InvalidElementError`` for a bad name.
+    """
     rows = _section(root).get("endpoints")
     found: dict[tuple[str, str], LearntName] = {}
     for row in rows.items if isinstance(rows, YamlList) else ():
@@ -77,7 +80,7 @@ def learnt_names(root: YamlMap) -> dict[tuple[str, str], LearntName]:
 
 
 def _note(row: YamlMap) -> str:
-    """``recorded in 2 runs``, and how sure its source is."""
+    """Return ``recorded in 2 runs``, and how sure its source is."""
     runs, undecided = _texts(row.items.get("runs")), _texts(row.items.get("undecided"))
     proof = row.items.get("proof")
     texts = [f"recorded in {counted(len(runs), 'run')}"] if runs else []
@@ -95,7 +98,7 @@ def _texts(value: YamlValue | None) -> tuple[str, ...]:
 
 
 def logger_services(root: YamlMap) -> Iterator[Endpoint]:
-    """The services of a node that was made with ``enable_logger_service`` (rclcpp node_logging.cpp)."""
+    """Yield the services of a node that was made with ``enable_logger_service`` (rclcpp node_logging.cpp)."""
     given = _section(root).get("logger_services")
     if isinstance(given, YamlScalar) and given.value is True:
         for name, type_name in LOGGER_SERVICES.items():
@@ -120,7 +123,7 @@ def _template(fields: _Fields, row: YamlMap) -> NameTemplate:
 
 
 def _readings(fields: _Fields, row: YamlMap) -> Iterator[NameTemplate]:
-    """What else the recorded name may be: fixed, or the value of one of several parameters."""
+    """Yield what else the recorded name may be: fixed, or the value of one of several parameters."""
     if fields.get("parameter") and fields.get("proof") == ONE_RUN:
         yield _fixed(str(fields.get("written") or fields["name"]), row)
         for name in _texts(row.items.get("seen")):

@@ -26,7 +26,7 @@ from nodl.yaml_text import YamlMap, YamlScalar, YamlValue
 
 
 def check_document(root: YamlValue) -> YamlMap:
-    """``root`` if it is a NoDL v2 document. Raises ``InvalidNoDLDocumentError`` for the first difference."""
+    """Return ``root`` if it is a NoDL v2 document. Raises ``InvalidNoDLDocumentError`` for the first difference."""
     _DOCUMENT(root, "the document")
     assert isinstance(root, YamlMap)
     return root

@@ -150,14 +150,14 @@ _DEPENDENT = frozenset(
 
 
 def section_of(root: YamlMap) -> YamlMap | None:
-    """Our section of a checked document."""
+    """Return our section of a checked document."""
     codegen = root.items.get("codegen")
     ours = codegen.items.get(IDENTITY_KEY) if isinstance(codegen, YamlMap) else None
     return ours if isinstance(ours, YamlMap) else None
 
 
 def dependence_of(root: YamlMap) -> Dependence | None:
-    """What varies, ``None`` when nothing does. ``root`` is a checked document."""
+    """Return what varies, None if nothing does. ``root`` is a checked document."""
     section = section_of(root)
     if section is None or _DEPENDENT.isdisjoint(section.items):
         return None
@@ -190,7 +190,7 @@ def dependence_of(root: YamlMap) -> Dependence | None:
 
 
 def plain(value: YamlValue) -> object:
-    """The value without its places."""
+    """Return the value without its places."""
     if isinstance(value, YamlScalar):
         return value.value
     if isinstance(value, YamlList):
@@ -205,7 +205,7 @@ def _tf_listener(given: object) -> When | None:
 
 
 def _maps(given: Mapping[str, object], key: str) -> list[dict[str, str]]:
-    """The entries of a list of mappings; the schema has seen to the types of those that are used."""
+    """Return the entries of a list of mappings; the schema has seen to the types of those that are used."""
     return given.get(key) or []  # type: ignore[return-value]
 
 
@@ -270,7 +270,7 @@ def _test(parameter: str, demand: object) -> Test:
 
 
 def _values(value: object) -> tuple[str, ...]:
-    """As they are compared: booleans as ROS writes them, all in small letters."""
+    """Return the values as they are compared: booleans as ROS writes them, all in small letters."""
     listed = value if isinstance(value, list) else [value]
     return tuple(str(each).lower() for each in listed)
 

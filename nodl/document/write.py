@@ -44,7 +44,7 @@ class Written(NamedTuple):
 
 
 def v2_yaml(node: ManifestNode) -> Written:
-    """One document. Raises ``InvalidNoDLDocumentError`` for names and types that v2 cannot hold."""
+    """Write one document. Raises ``InvalidNoDLDocumentError`` for names and types that v2 cannot hold."""
     interface = node.interface
     lines = ["nodl_version: 2", *_identity(interface)]
     if node.parameter_types:
@@ -66,7 +66,7 @@ def v2_yaml(node: ManifestNode) -> Written:
 
 
 def v1_xml(nodes: Sequence[ManifestNode]) -> Written:
-    """One document with all ``nodes``. Raises ``InvalidNoDLDocumentError`` for a node without name."""
+    """Write one document with all ``nodes``. Raises ``InvalidNoDLDocumentError`` for a node without name."""
     lines = ['<?xml version="1.0" encoding="UTF-8"?>', '<interface version="1">']
     notes: list[str] = []
     for node in nodes:
@@ -82,7 +82,7 @@ def v1_xml(nodes: Sequence[ManifestNode]) -> Written:
 
 
 def _identity(interface: NodeInterface) -> list[str]:
-    """Our section, only when the registered name alone would not tell the same."""
+    """Return our section, only if the registered name alone would not say the same."""
     fields: dict[str, str] = {}
     if interface.executable != interface.name:
         fields |= {"executable": interface.executable or "", "plugin": interface.plugin or ""}
@@ -97,7 +97,7 @@ def _identity(interface: NodeInterface) -> list[str]:
 
 
 def _own_namespace(interface: NodeInterface) -> str:
-    """The namespace if it says more than "the root, as everyone's"."""
+    """Return the namespace if it says more than "the root, as everyone's"."""
     return "" if interface.namespace in (None, "/") else str(interface.namespace)
 
 

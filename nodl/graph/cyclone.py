@@ -91,7 +91,7 @@ class CycloneObserver:
         self.state = GraphState(self._participant.guid.bytes.hex())
 
     def look(self) -> int:
-        """Gives how many changes there have been in all."""
+        """Look once, and return how many changes there have been in all."""
         self._ports = UdpPorts()
         # Endpoints are fetched before participants, so that the participant of each is known when it is read.
         fetched = [(reader.take(N=_MOST_AT_ONCE), read) for reader, read in reversed(self._readers)]
@@ -110,11 +110,11 @@ class CycloneObserver:
 
     @property
     def forged(self) -> tuple[str, ...]:
-        """Lists that were not believed, in words."""
+        """Return the lists that were not believed, in words."""
         return tuple(self.state.forged)
 
     def close(self) -> None:
-        """Deletes the entities while the interpreter still works: DDS threads may be calling it until then."""
+        """Remove the entities while the interpreter still works: DDS threads may be calling it until then."""
         readers = (reader for reader, _ in self._readers)
         for entity in (*readers, self._lists, self._participant, self._domain):
             entity._delete(entity._ref)
@@ -154,7 +154,7 @@ class CycloneObserver:
 
 
 def _domain(domain_id: int, environment: Mapping[str, str]) -> Any:
-    """A machine that has no other interface than ``lo`` cannot name it beside the one that is determined by itself."""
+    """Make the domain; a machine that has only ``lo`` cannot name it beside the interface that is found by itself."""
     from cyclonedds.core import DDSException
     from cyclonedds.domain import Domain
 
@@ -168,7 +168,7 @@ def _domain(domain_id: int, environment: Mapping[str, str]) -> Any:
 
 
 def configuration(environment: Mapping[str, str]) -> str:
-    """What Cyclone DDS is told: ROS's variables for how far to look, as rmw_cyclonedds reads them, then the user's
+    """Return what Cyclone DDS is told: ROS's variables as rmw_cyclonedds reads them, then the user's
     ``CYCLONEDDS_URI``, which wins.
 
     On this machine only, both of its addresses are used: nodes on Cyclone DDS up to Humble are at 127.0.0.1 alone,
@@ -193,8 +193,10 @@ def configuration(environment: Mapping[str, str]) -> str:
 
 
 def security_properties(directory: Path) -> dict[str, str]:
-    """Of a participant in the enclave whose files are in ``directory``; names as rmw_dds_common ``security.cpp`` has
-    them. Raises ``ObserverError`` for a file that is missing."""
+    """Return the properties of a participant in the enclave whose files are in ``directory``.
+
+    Names are as rmw_dds_common ``security.cpp`` has them. Raises ``ObserverError`` for a file that is missing.
+    """
     missing = [name for name in _FILES.values() if not (directory / name).is_file()]
     if missing:
         raise ObserverError(f"{directory} is not the directory of an enclave: it has no {', '.join(missing)}")
@@ -209,7 +211,7 @@ def security_properties(directory: Path) -> dict[str, str]:
 
 
 def _library(name: str) -> str:
-    """Debian keeps the plugins in a folder beside libddsc that the loader does not search."""
+    """Find the plugin: Debian keeps them in a folder beside libddsc that the loader does not search."""
     loaded = re.findall(r"(/\S*)/libddsc\.so", Path("/proc/self/maps").read_text(encoding="utf-8"))
     for place in dict.fromkeys(loaded):
         for path in sorted(Path(place).glob(f"libddsc*/**/lib{name}.so")):
@@ -218,7 +220,7 @@ def _library(name: str) -> str:
 
 
 def participant_from(guid: str, qos: Any) -> SeenParticipant:
-    """What the participant's QoS tells of it; never its security properties, which name files of keys."""
+    """Return what the participant's QoS says of it; never its security properties, which name files of keys."""
     properties = _properties(qos)
     user_data = next((bytes(each.data) for each in qos if type(each).__qualname__ == "Policy.Userdata"), b"")
     pid = properties.get("__Pid") or properties.get("fastdds.physical_data.process", "")
@@ -238,12 +240,18 @@ def _properties(qos: Any) -> dict[str, str]:
 
 
 def _is_cyclone(guid: str, properties: Mapping[str, str]) -> bool:
-    """Vendor numbers begin unsecured GUIDs (DDSI-RTPS: eProsima has 01.0f); physical data is announced in clear."""
+    """Return True for Cyclone DDS.
+
+    Vendor numbers begin unsecured GUIDs (DDSI-RTPS: eProsima has 01.0f); physical data is announced in clear.
+    """
     return not guid.startswith("010f") and not any(name.startswith("fastdds.") for name in properties)
 
 
 def quality_from(qos: Any, *, has_history: bool) -> Quality:
-    """Of an endpoint. Fast DDS does not announce its history, and the binding then shows a default."""
+    """Return the quality of an endpoint.
+
+    Fast DDS does not announce its history, and the binding then shows a default.
+    """
     fields: dict[str, Any] = {}
     for policy in qos:
         reader = _POLICIES.get(policy.__scope__)
@@ -265,7 +273,7 @@ _POLICIES: Mapping[str, Callable[[str, Any], dict[str, Any]]] = {
 
 
 def _word(policy: type) -> str:
-    """The class ``Policy.Durability.TransientLocal`` as NoDL v2 writes it: ``TRANSIENT_LOCAL``."""
+    """Return the class ``Policy.Durability.TransientLocal`` as NoDL v2 writes it: ``TRANSIENT_LOCAL``."""
     name = policy.__qualname__.rpartition(".")[2]
     return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).upper()
 
@@ -281,12 +289,12 @@ def _alive(info: Any) -> bool:
 
 
 def _participant_guid(endpoint: str) -> str:
-    """The entity id of a participant is fixed (DDSI-RTPS 9.3.1.5)."""
+    """Return the participant's GUID: its entity id is fixed (DDSI-RTPS 9.3.1.5)."""
     return f"{endpoint[:24]}000001c1" if endpoint else ""
 
 
 def _list_reader(participant: Any) -> Any:
-    """A reader that hands out the bytes of each message: peers of both sizes must be understood.
+    """Make a reader that hands out the bytes of each message: peers of both sizes must be understood.
 
     What rmw sends carries no description of its type, which this binding always adds to its own; with it, peers whose
     description differs would not match. So it is left empty.

@@ -41,7 +41,7 @@ class ParticipantList(NamedTuple):
 
 
 def decode(message: bytes) -> ParticipantList | None:
-    """``message`` with its header of four bytes; ``None`` for what fits neither size to the last byte."""
+    """Decode ``message`` with its header of four bytes; None for what fits neither size to the last byte."""
     for size in GID_SIZES:
         try:
             return _Decoder(message, size).participant_list()

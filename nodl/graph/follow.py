@@ -21,7 +21,7 @@ _LOOK = 0.2
 
 
 def main() -> int:
-    """Exit status 0 when the reader has gone, 1 with a message where the domain cannot be observed."""
+    """Return 0 when the reader has gone, 1 with a message if the domain cannot be observed."""
     parser = argparse.ArgumentParser(prog="nodl.graph.follow")
     parser.add_argument("domain", type=int)
     parser.add_argument("--with", dest="source", choices=SOURCES, default="auto")

@@ -28,12 +28,12 @@ class NotAGraph(ValueError):
 
 
 def graph_document(graph: Graph) -> dict[str, Any]:
-    """As plain values."""
+    """Return the graph as plain values."""
     return {"version": VERSION, "processes": [_process(each) for each in graph.processes]}
 
 
 def graph_from_document(document: Any) -> Graph:
-    """The reverse. Raises ``NotAGraph``."""
+    """Return the graph of a document. Raises ``NotAGraph``."""
     try:
         if document["version"] != VERSION:
             raise NotAGraph(f"its version is {document['version']!r}, not {VERSION}")

@@ -45,13 +45,15 @@ class SeenParticipant(NamedTuple):
 
     @property
     def claims_security(self) -> bool:
-        """Its GUID begins as DDS-Security 9.3.3 makes it of a certificate: the highest bit is set. Unsecured ones
-        begin with the vendor's number. Peers that authenticate it have verified that."""
+        """Return True if its GUID begins as DDS-Security 9.3.3 makes it of a certificate: the highest bit is set.
+
+        Unsecured ones begin with the vendor's number. Peers that authenticate it have verified that.
+        """
         return int(self.guid[:2], 16) & 0x80 != 0
 
     @property
     def subject_hash(self) -> int:
-        """The first 48 bits of its GUID: of a secured one a hash of the certificate's subject."""
+        """Return the first 48 bits of its GUID: of a secured one a hash of the certificate's subject."""
         return int(self.guid[:_HASH_DIGITS], 16)
 
 
@@ -67,7 +69,7 @@ class SeenEndpoint(NamedTuple):
 
 
 def claimed_enclave(user_data: bytes) -> str:
-    """The enclave that rmw writes into the participant's user data (``enclave=/x;``); empty for none."""
+    """Return the enclave that rmw writes into the participant's user data (``enclave=/x;``); empty for none."""
     match = _ENCLAVE.search(user_data.decode("utf-8", "replace"))
     return match[1] if match else ""
 
@@ -156,8 +158,10 @@ class Graph(NamedTuple):
 
     @property
     def half_open(self) -> bool:
-        """Whether discovery is under way somewhere: an interface lacks a part, or a participant has nothing at all
-        (what secured ones have is told only to those that they authenticate)."""
+        """Return True if discovery is under way: an interface lacks a part, or a participant has nothing at all.
+
+        What secured ones have is told only to those that they authenticate.
+        """
         return any(not each.complete for process in self.processes for each in process.interfaces) or any(
             not process.participant.claims_security and not process.announced for process in self.processes
         )
@@ -173,7 +177,7 @@ def process_of(
     listed: ParticipantList | None,
     owners: Owners,
 ) -> GraphProcess:
-    """``endpoints`` are the participant's; ``listed`` the newest list that it published itself."""
+    """Return the process; ``endpoints`` are the participant's, ``listed`` the newest list that it published itself."""
     parts: list[tuple[SeenEndpoint, Part]] = []
     foreign = []
     ordered = sorted(endpoints)
@@ -203,7 +207,7 @@ def process_of(
 
 
 def owners_in(listed: ParticipantList) -> dict[str, Owner]:
-    """What one list says."""
+    """Return the owner of each endpoint by what one list says."""
     return {
         guid: owner
         for owner, node in zip(_owners(listed), listed.nodes, strict=True)
@@ -270,7 +274,10 @@ def _interfaces(
 def _joined(
     kind: EndpointKind, name: str, members: Sequence[tuple[SeenEndpoint, Part]], by: Mapping[str, Attribution]
 ) -> Iterator[SeenInterface]:
-    """The parts of one name; the topics of an action without any of its services are topics (``ros2 topic echo``)."""
+    """Yield the interfaces that the parts of one name make.
+
+    The topics of an action without any of its services are topics (``ros2 topic echo``).
+    """
     if kind in _AS_TOPICS and all(part.part in ACTION_TOPICS for _, part in members):
         for endpoint, part in members:
             topic = part_of(
@@ -287,7 +294,7 @@ def _joined(
 
 
 def _by_type(members: Sequence[tuple[SeenEndpoint, Part]]) -> dict[str, list[tuple[SeenEndpoint, Part]]]:
-    """Parts that do not tell a type belong to each that the others tell."""
+    """Sort by type; parts that do not have one belong to each that the others have."""
     types = sorted({part.type for _, part in members if part.type}) or [""]
     return {each: [(e, part) for e, part in members if part.type in ("", each)] for each in types}
 
@@ -324,14 +331,16 @@ class GraphState:
             self._back(seen.guid)
 
     def gone(self, guid: str) -> None:
-        """A participant or an endpoint has ended. The endpoints of a participant end with it."""
+        """Note that a participant or an endpoint has ended. The endpoints of a participant end with it."""
         known = guid in self._participants or guid in self._endpoints
         if known and guid not in self._gone:
             self._gone.add(guid)
             self.changes += 1
 
     def listed(self, message: ParticipantList, writer: str) -> None:
-        """``writer``: GUID of the participant that published ``message``; empty when that is not known."""
+        """Note a list; ``writer`` is the GUID of the participant that published ``message``, empty if that is not
+        known.
+        """
         if writer and writer != message.participant:
             text = f"participant {writer} publishes a list of the nodes of {message.participant}; it is not believed"
             if text not in self.forged:
@@ -344,7 +353,7 @@ class GraphState:
             self.changes += 1
 
     def graph(self, *, past: bool = False) -> Graph:
-        """What is there now; with ``past`` also all that has ended meanwhile."""
+        """Return what is there now; with ``past`` also all that has ended meanwhile."""
         return Graph(
             tuple(self._process(guid, past) for guid in sorted(self._participants) if self._there(guid, past))
         )

@@ -30,7 +30,7 @@ class Observed(NamedTuple):
 
 
 def observed_text(observed: Observed) -> str:
-    """A file that ``read_observed`` reads."""
+    """Return a file that ``read_observed`` reads."""
     document = {
         "run": observed.run._asdict(),
         "graph": graph_document(observed.graph),
@@ -41,7 +41,7 @@ def observed_text(observed: Observed) -> str:
 
 
 def read_observed(path: Path) -> Observed:
-    """Raises ``ObservationError``, and ``OSError`` for a file that cannot be read."""
+    """Read a saved run. Raises ``ObservationError``, and ``OSError`` for a file that cannot be read."""
     try:
         document = json.loads(path.read_text(encoding="utf-8"))
         return Observed(
@@ -60,8 +60,10 @@ def _start(fields: Mapping[str, Any]) -> StartedNode:
 
 
 def command_lines(graph: Graph, host: str) -> dict[str, tuple[str, ...]]:
-    """Of the participants on this machine that say their pid, by their GUIDs. A pid of another pid namespace (a
-    container) may be somebody else's here: then the program in it is."""
+    """Return the commands of the participants on this machine that say their pid, by their GUIDs.
+
+    A pid of another pid namespace (a container) may be somebody else's here: then the program in it is.
+    """
     found = {}
     for process in graph.processes:
         words = _command_line(process, host)

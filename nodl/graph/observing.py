@@ -66,7 +66,7 @@ def chosen_source(wanted: str) -> str:
 
 @contextmanager
 def observer(where: Where, environment: Mapping[str, str]) -> Iterator[Observer]:
-    """Up inside the block. Raises ``ObserverError``."""
+    """Observe inside the block. Raises ``ObserverError``."""
     source = chosen_source(where.source)
     up: Observer
     if source == "rclpy":
@@ -112,7 +112,7 @@ class Quiet:
 
 
 def _ros_variables(where: Where) -> dict[str, str]:
-    """rclpy reads the domain and the enclave from the environment when its context is made."""
+    """Return what rclpy reads from the environment when its context is made: the domain and the enclave."""
     wanted = {"ROS_DOMAIN_ID": str(where.domain_id)}
     if where.enclave_directory is not None:
         keystore, slash, enclave = str(where.enclave_directory.resolve()).rpartition("/enclaves/")

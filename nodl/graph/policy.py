@@ -18,7 +18,7 @@ Enclaves = dict[str, dict[str, dict[EndpointKind, set[str]]]]
 
 
 def observed_policy(graphs: Iterable[Graph]) -> str:
-    """The union of all ``graphs``; hidden nodes and half open interfaces are left out."""
+    """Return the union of all ``graphs``; hidden nodes and half open interfaces are left out."""
     enclaves: Enclaves = {}
     for graph in graphs:
         for process in graph.processes:

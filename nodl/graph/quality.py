@@ -34,7 +34,7 @@ class Quality(NamedTuple):
 
     @property
     def rmw_numbers(self) -> tuple[int, int, int, int]:
-        """History, depth, reliability, durability as ``rmw_qos_profile_t`` has them; 0 where it was not announced."""
+        """Return history, depth, reliability, durability as ``rmw_qos_profile_t`` has them; 0 if not announced."""
         return (
             _RMW_HISTORY.get(self.history, 0),
             self.depth,
@@ -44,7 +44,7 @@ class Quality(NamedTuple):
 
 
 def unmet(offered: Quality, requested: Quality) -> tuple[str, ...]:
-    """Why a reader that asks for ``requested`` gets nothing from a writer of ``offered``; empty when they meet."""
+    """Return why a reader that asks for ``requested`` gets nothing from a writer of ``offered``; empty if they meet."""
     return tuple(_unmet(offered, requested))
 
 
@@ -66,7 +66,7 @@ def _unmet(offered: Quality, requested: Quality) -> Iterator[str]:
 
 
 def differences(planned: Mapping[str, str | int], seen: Quality) -> tuple[str, ...]:
-    """How ``seen`` is another than ``planned``, by NoDL v2's names; what either does not say does not count."""
+    """Return how ``seen`` is another than ``planned``, by NoDL v2's names; what either does not say does not count."""
     return tuple(
         f"{what} is {has}, planned is {wanted}"
         for what, has, wanted in _compared(planned, seen)

@@ -52,7 +52,7 @@ class RclpyObserver:
         self._changes = 0
 
     def look(self) -> int:
-        """Gives how many changes there have been in all."""
+        """Look once, and return how many changes there have been in all."""
         now = tuple(self._processes())
         if now != self._now:
             self._now = now
@@ -68,7 +68,7 @@ class RclpyObserver:
 
     @property
     def forged(self) -> tuple[str, ...]:
-        """rclpy does not tell who wrote a list."""
+        """Return nothing: rclpy does not tell who wrote a list."""
         return ()
 
     def close(self) -> None:
@@ -132,7 +132,7 @@ class RclpyObserver:
 
 
 def _asked(ask: Any, name: str, namespace: str) -> Iterable[tuple[str, list[str]]]:
-    """A node may end while it is asked about."""
+    """Ask for what a node has; it may end meanwhile."""
     from rclpy.node import NodeNameNonExistentError
 
     try:
@@ -156,7 +156,7 @@ def _quality(profile: Any) -> Quality:
 
 
 def _united(before: GraphProcess, now: GraphProcess) -> GraphProcess:
-    """With what has ended meanwhile."""
+    """Return both, with what has ended meanwhile."""
     nodes = {(each.fqn, each.ordinal): each for each in before.nodes}
     for node in now.nodes:
         known = nodes.get((node.fqn, node.ordinal))

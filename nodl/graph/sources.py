@@ -45,7 +45,7 @@ class _Placed(NamedTuple):
 
 
 def learn_observed(runs: Sequence[Observed]) -> LearntFromGraph:
-    """All ``runs`` together; their order does not matter."""
+    """Learn from all ``runs`` together; their order does not matter."""
     left_out: list[str] = []
     placed = [each for observed in runs for each in _placed(observed, left_out)]
     by_run: dict[str, tuple[RecordedRun, list[AskedNode]]] = {}
@@ -79,13 +79,13 @@ def _placed(observed: Observed, left_out: list[str]) -> Iterator[_Placed]:
 
 
 def _same_program(one: _Placed, other: _Placed) -> bool:
-    """A renamed node may be any of its program."""
+    """Return True if both are one program; a renamed node may be any of its program."""
     names = {_own_name(one), _own_name(other)} - {""}
     return one.start.program == other.start.program and len(names) <= 1
 
 
 def _own_name(placed: _Placed) -> str:
-    """What the program calls the node; empty where the launch renames it, so that nobody can see."""
+    """Return what the program calls the node; empty if the launch renames it, so that nobody can see."""
     name = split_fqn(placed.node.fqn)[1]
     renamed = any(
         rule.replacement == name and rule.kind.value == "__node" and rule.node is None
@@ -95,7 +95,7 @@ def _own_name(placed: _Placed) -> str:
 
 
 def _known_name(placed: _Placed, others: Iterable[_Placed]) -> str:
-    """Of a renamed node the name that another run shows, if all of them show the same."""
+    """Return the name of a renamed node that another run shows, if all of them show the same."""
     own = _own_name(placed)
     shown = {name for other in others if (name := _own_name(other))}
     return own or (shown.pop() if len(shown) == 1 else "")
@@ -151,7 +151,7 @@ def _endpoint(interface: SeenInterface, placed: _Placed, others: Sequence[_Place
 
 
 def _left(kind: EndpointKind, candidates: Sequence[str], runs: Sequence[_Placed]) -> Iterator[str]:
-    """Those that explain a name in the most runs; a run that lacks it altogether decides nothing."""
+    """Yield those that explain a name in the most runs; a run that lacks it altogether decides nothing."""
     explained = {
         each: sum(
             any((kind, final) in run.ends for final in final_names(kind, each, run.node.fqn, run.start.rules))
@@ -164,7 +164,7 @@ def _left(kind: EndpointKind, candidates: Sequence[str], runs: Sequence[_Placed]
 
 
 def _values(start: StartedNode) -> set[object]:
-    """All texts that the start gives: names may be any of them."""
+    """Return all texts that the start gives: names may be any of them."""
     found: set[object] = set()
     for value in (*start.parameters.values(), *arguments_as_inputs(start.arguments).values()):
         found.update([value] if isinstance(value, str) else value if isinstance(value, list | tuple) else [])

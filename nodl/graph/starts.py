@@ -39,13 +39,13 @@ class StartedNode(NamedTuple):
 
     @property
     def rules(self) -> RemapRules:
-        """Those that rcl would take."""
+        """Return the rules that rcl would take."""
         rules = valid_rules(self.rule_texts)
         return RemapRules(local=rules) if self.plugin else RemapRules(process=rules)
 
 
 def start_of_command(command: Sequence[str]) -> StartedNode | None:
-    """Of a running process, by its command line; ``None`` for what is not a program of an ament package."""
+    """Return the start of a running process by its command; None for what is not a program of an ament package."""
     programs = ((place, _IN_PREFIX.match(word)) for place, word in enumerate(command[:3], 1))
     for rest, match in programs:
         if match:
@@ -56,13 +56,15 @@ def start_of_command(command: Sequence[str]) -> StartedNode | None:
 
 
 def starts_of_plan(document: Mapping[str, Any]) -> tuple[StartedNode, ...]:
-    """What a launch file starts. Raises ``KeyError`` or ``TypeError`` for a document that is not a plan."""
+    """Return what a launch file starts. Raises ``KeyError`` or ``TypeError`` for a document that is not a plan."""
     return (*map(_of_process, document["processes"]), *map(_of_component, document["components"]))
 
 
 def start_for(fqn: str, command: Sequence[str], starts: Iterable[StartedNode]) -> tuple[StartedNode, ...]:
-    """The starts that may be those of the node ``fqn`` in the process of ``command`` (empty: not known); several when
-    nothing tells them apart."""
+    """Return the starts that may be those of the node ``fqn`` in the process of ``command`` (empty: not known).
+
+    Several are returned if nothing distinguishes them.
+    """
     known = [each for each in starts if not each.command or not command or _within(each.command, command)]
     named = [each for each in known if each.fqn == fqn]
     if named:
@@ -129,7 +131,7 @@ def _of_component(fields: Mapping[str, Any]) -> StartedNode:
 
 
 def _ros_words(words: Sequence[str]) -> tuple[tuple[str, ...], dict[str, object], tuple[str, ...]]:
-    """Rules, parameters and the words that are not ROS's, of what follows the program (rcl ``arguments.c``)."""
+    """Return rules, parameters and the words that are not ROS's, of what follows the program (rcl ``arguments.c``)."""
     found = [(flag, word) for flag, word in flags(words) if word or not flag]
     rules = tuple(word for flag, word in found if flag in REMAP)
     given = (word.partition(":=") for flag, word in found if flag in PARAMETER)

@@ -8,14 +8,14 @@ from nodl.graph.model import Attribution, Graph, GraphProcess, SeenInterface
 
 
 def graph_text(graph: Graph) -> str:
-    """One block for each process: who it is, its nodes, and what they have."""
+    """Return one block for each process: who it is, its nodes, and what they have."""
     blocks = ["\n".join(_process(process)) for process in graph.processes]
     nodes = sum(1 for _ in graph.nodes)
     return "\n\n".join([*blocks, f"{len(graph.processes)} participants, {nodes} nodes"]) + "\n"
 
 
 def participant_text(process: GraphProcess) -> str:
-    """How a participant is called in messages."""
+    """Return how a participant is called in messages."""
     seen = process.participant
     words = [f"process {seen.pid}" if seen.pid is not None else f"participant {seen.prefix}"]
     if seen.program:

@@ -26,8 +26,10 @@ class UdpPorts:
     """As they are when first asked."""
 
     def pid(self, locators: Iterable[str]) -> int | None:
-        """Of the one process that receives at one of ``locators``, such as ``udp/192.0.2.2:7411@4``; ``None`` where
-        they are of another machine, or no process or several are found."""
+        """Return the one process that receives at one of ``locators``, such as ``udp/192.0.2.2:7411@4``.
+
+        Returns None if they are of another machine, or no process or several are found.
+        """
         addresses = [
             (match[1], int(match[2])) for each in locators if (match := _LOCATOR.match(each.strip()))
         ]
@@ -43,7 +45,7 @@ class UdpPorts:
 
     @cached_property
     def _sockets(self) -> dict[int, list[tuple[str, str]]]:
-        """Port → the addresses it is bound at, and the sockets' inodes."""
+        """Map each port to the addresses it is bound at, and the sockets' inodes."""
         found: dict[int, list[tuple[str, str]]] = {}
         for name, size in _FORMATS.items():
             for fields in _rows(Path("/proc/net", name)):
@@ -70,7 +72,7 @@ def _rows(path: Path) -> Iterator[list[str]]:
 
 
 def _address(digits: str, size: int) -> str:
-    """The kernel prints words of 32 bits in the machine's own order (proc(5))."""
+    """Read an address: the kernel prints words of 32 bits in the machine's own order (proc(5))."""
     raw = bytes.fromhex(digits)
     words = (raw[at : at + 4] for at in range(0, size, 4))
     return str(ip_address(b"".join(w[::-1] if sys.byteorder == "little" else w for w in words)))
@@ -85,7 +87,7 @@ def _sockets_of(process: str) -> Iterator[str]:
 
 
 def _is_ours(address: str) -> bool:
-    """Whether this machine (this network namespace) has the address: nobody else can bind it."""
+    """Return True if this machine (this network namespace) has the address: nobody else can bind it."""
     family = socket.AF_INET6 if ":" in address else socket.AF_INET
     try:
         with socket.socket(family, socket.SOCK_DGRAM) as probe:

@@ -55,7 +55,10 @@ class Part(NamedTuple):
 
 
 def part_of(topic: str, type_name: str, *, writes: bool) -> Part | None:
-    """``None`` for the middleware's own topic, and for what is not ROS: neither prefix and suffix fit, nor a name."""
+    """Return the part of a name, None for the middleware's own topic and for what is not ROS.
+
+    Those fit neither prefix and suffix nor the rules of names.
+    """
     prefix, slash, rest = topic.partition("/")
     name = slash + rest
     if prefix == "rt":
@@ -70,8 +73,11 @@ def part_of(topic: str, type_name: str, *, writes: bool) -> Part | None:
 
 
 def ros_type(type_name: str) -> str:
-    """``std_msgs::msg::dds_::String_`` → ``std_msgs/msg/String``; requests and the like as their service or action.
-    What is not a name of rosidl stays as it is."""
+    """Return ``std_msgs/msg/String`` for ``std_msgs::msg::dds_::String_``; requests and the like as their service or
+    action.
+
+    What is not a name of rosidl stays as it is.
+    """
     match = _TYPE.match(type_name)
     if not match:
         return type_name

@@ -26,7 +26,10 @@ from nodl.yaml_text import YamlValue, parse_yaml
 
 
 def read_configuration(kind: str, file: str, situation: Situation, place: SourceRef) -> Configured:
-    """What ``file`` (or the command line in ``situation``) asks for. ``place``: the document that says it is read."""
+    """Read what ``file`` (or the command line in ``situation``) asks for.
+
+    ``place``: the document that says it is read.
+    """
     if kind == "ros_gz_bridge arguments":
         return of_arguments(situation.words, place)
     if kind == "ros2_control":
@@ -49,7 +52,7 @@ def read_configuration(kind: str, file: str, situation: Situation, place: Source
 
 
 def _read(file: str) -> YamlValue:
-    """Raises ``InvalidNoDLError``, also for a file that is not there."""
+    """Read the file. Raises ``InvalidNoDLError``, also for a file that is not there."""
     try:
         if not os.path.isfile(file):
             raise InvalidNoDLError.at(SourceRef(file), "there is no such file")

@@ -84,7 +84,7 @@ _MODELS = ("Action", "Condition", "Decorator", "Control")  # elements whose attr
 
 
 def of_tree(file: str) -> Configured:
-    """What the tree in ``file`` uses."""
+    """Return what the tree in ``file`` uses."""
     place = SourceRef(file)
     try:
         root = parse_xml(read_bytes(file, _MAX_BYTES), file)

@@ -20,7 +20,7 @@ class Configured(NamedTuple):
 
 
 def collected(parts: Iterable[Endpoint | Gap]) -> Configured:
-    """Each once, in their order."""
+    """Return each once, in their order."""
     found = list(dict.fromkeys(parts))
     endpoints = tuple(part for part in found if isinstance(part, Endpoint))
     return Configured(endpoints, tuple(part for part in found if isinstance(part, Gap)))
@@ -29,7 +29,7 @@ def collected(parts: Iterable[Endpoint | Gap]) -> Configured:
 def endpoint_named(
     kind: EndpointKind, name: str, type_name: str, place: SourceRef, note: str
 ) -> Endpoint | InvalidNameError:
-    """The endpoint that a tool makes under the ``name`` in its file, or why there can be none of that name."""
+    """Return the endpoint that a tool makes under the ``name`` in its file, or why there can be none of that name."""
     try:
         validate_written_name(name)
     except InvalidNameError as error:

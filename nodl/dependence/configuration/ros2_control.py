@@ -14,7 +14,7 @@ from nodl.xml_text import parse_xml
 
 
 def of_robot_description(text: str, place: SourceRef) -> Configured:
-    """``text``: URDF, as a node of the launch publishes it; empty when no node of the launch has one."""
+    """Return what the hardware in ``text`` needs: URDF, as a node of the launch publishes it; empty if none has one."""
     if not text:
         why = (
             "no node of this launch has a robot_description, which names the nodes of the hardware components"

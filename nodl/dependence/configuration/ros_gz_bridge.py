@@ -23,14 +23,14 @@ _SEPARATORS = {"@": "BIDIRECTIONAL", "[": "GZ_TO_ROS", "]": "ROS_TO_GZ"}
 
 
 def of_configuration(root: YamlValue) -> Configured:
-    """The entries of a ``config_file``."""
+    """Return the entries of a ``config_file``."""
     if not isinstance(root, YamlList):
         return Configured(gaps=(Gap(root.source, "a bridge configuration must be a list of entries"),))
     return collected(part for entry in root.items for part in _entry(entry))
 
 
 def of_arguments(words: Sequence[str], place: SourceRef) -> Configured:
-    """``TOPIC@ROS_TYPE{@,[,]}GZ_TYPE`` and ``SERVICE@ROS_SRV_TYPE[@...]``, one a word."""
+    """Read ``TOPIC@ROS_TYPE{@,[,]}GZ_TYPE`` and ``SERVICE@ROS_SRV_TYPE[@...]``, one a word."""
     return collected(part for word in words for part in _word(word, place))
 
 

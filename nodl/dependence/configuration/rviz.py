@@ -58,7 +58,7 @@ _SILENT_TOOLS = ("FocusCamera", "Interact", "Measure", "MoveCamera", "Select")
 
 
 def of_file(root: YamlValue, distro: str) -> Configured:
-    """What rviz2 needs for the configuration ``root``."""
+    """Return what rviz2 needs for the configuration ``root``."""
     reading = _Reading(distro)
     manager = _get(root, "Visualization Manager")
     for display in _listed(manager, "Displays"):
@@ -154,7 +154,7 @@ class _Reading:
         self._topic(_SUBSCRIBE, name, display.source, "std_msgs/msg/String", "display of efforts")
 
     def _camera_info(self, image: str, place: SourceRef) -> None:
-        """``image_transport::getCameraInfoTopic``: beside the image."""
+        """Add the name beside the image, as ``image_transport::getCameraInfoTopic`` does."""
         if image:
             beside = f"{image.rpartition('/')[0]}/camera_info" if "/" in image else "camera_info"
             self._topic(_SUBSCRIBE, beside, place, "sensor_msgs/msg/CameraInfo", "camera of a display")
@@ -190,7 +190,7 @@ def _text(value: YamlMap, key: str) -> str:
 
 
 def _topic(display: YamlMap, key: str) -> tuple[str, SourceRef]:
-    """A topic property is a mapping with ``Value`` (and QoS); older files have the name itself."""
+    """Return the name in a topic property: a mapping with ``Value`` (and QoS), or in older files the name itself."""
     found = _get(display, key)
     if isinstance(found, YamlMap):
         return _text(found, "Value"), found.source
