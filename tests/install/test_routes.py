@@ -113,7 +113,7 @@ def test_colcon_build(clone: Path, tools: Path, tmp_path: Path, option: list[str
         "-c",
         '. install/setup.bash && echo "$AMENT_PREFIX_PATH|$PATH|$PYTHONPATH"',
         cwd=workspace,
-        **more,
+        more=more,
     )
     prefixes, path, modules = sourced.strip().splitlines()[-1].split("|")
     assert str(workspace / "install" / "enclave_launch") in prefixes
