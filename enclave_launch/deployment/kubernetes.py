@@ -165,10 +165,9 @@ def _mounts(process: DeployedProcess) -> Iterator[dict[str, Any]]:
 
 def _volumes(process: DeployedProcess) -> Iterator[dict[str, Any]]:
     if process.enclave is not None:
-        yield {
-            "name": "enclave",
-            "secret": {"secretName": secret_name(process.enclave), "defaultMode": 0o440},
-        }
+        # podman 4.3 reads "optional" whether it is there or not, and crashes.
+        secret = {"secretName": secret_name(process.enclave), "defaultMode": 0o440, "optional": False}
+        yield {"name": "enclave", "secret": secret}
     if process.parameter_files:
         yield {"name": "parameters", "configMap": {"name": _parameters_name(process)}}
     yield {"name": "tmp", "emptyDir": {"medium": "Memory", "sizeLimit": "64Mi"}}

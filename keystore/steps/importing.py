@@ -53,8 +53,8 @@ class Restart(str, Enum):
 
     NOBODY = "nobody"
     CHANGED = "the changed enclaves, one after the other"
-    ALL = "every enclave, one after the other (the CRL changed)"
-    TOGETHER = "every enclave of all hosts, together (a CA or the governance changed)"
+    ALL = "every enclave, one after the other (the CRL or the trusted CAs changed)"
+    TOGETHER = "every enclave of all hosts, together (a CA in use or the governance changed)"
 
 
 @dataclass(frozen=True, slots=True)
@@ -365,9 +365,13 @@ def _differences(manifest: Manifest, present: Manifest | None) -> tuple[tuple[st
 def _restart(manifest: Manifest, present: Manifest | None, changed: Iterable[str]) -> Restart:
     if present is None:
         return Restart.CHANGED
-    common = {name: digest for name, digest in manifest.files.items() if name == layout.GOVERNANCE}
-    if manifest.authorities != present.authorities or not common.items() <= present.files.items():
+    in_use = [[one.authorities[role][:1] for role in Role] for one in (manifest, present)]
+    if in_use[0] != in_use[1] or _file_differs(layout.GOVERNANCE, manifest, present):
         return Restart.TOGETHER
-    if manifest.files.get(layout.CRL) != present.files.get(layout.CRL):
+    if manifest.authorities != present.authorities or _file_differs(layout.CRL, manifest, present):
         return Restart.ALL
     return Restart.CHANGED if any(changed) else Restart.NOBODY
+
+
+def _file_differs(name: str, manifest: Manifest, present: Manifest) -> bool:
+    return manifest.files.get(name) != present.files.get(name)

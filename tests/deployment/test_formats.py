@@ -262,7 +262,7 @@ def test_a_pod_sees_its_enclave(tmp_path: Path) -> None:
     pod = objects(made("kubernetes", tmp_path), "Deployment")["ear"]["spec"]["template"]["spec"]
     assert pod["volumes"][0] == {
         "name": "enclave",
-        "secret": {"secretName": "enclave-ear", "defaultMode": 0o440},
+        "secret": {"secretName": "enclave-ear", "defaultMode": 0o440, "optional": False},
     }
     assert pod["containers"][0]["volumeMounts"][0]["mountPath"] == "/keystore/enclaves/ear"
 
