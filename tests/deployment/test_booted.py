@@ -156,7 +156,7 @@ def test_a_ca_is_rolled_over_and_the_units_that_were_exported_before_start(runni
     until(lambda: running.hears(EAR), lambda: running.machine.journal(EAR))
 
 
-def test_a_revoked_listener_is_refused_by_units_that_were_exported_before_any_revocation(
+def test_a_revoked_listener_is_refused_by_units_from_before_any_revocation_and_a_new_ca_follows(
     running: Host,
 ) -> None:
     """Its host took no part: it goes on with the keystore that it had."""
@@ -179,14 +179,14 @@ def test_a_revoked_listener_is_refused_by_units_that_were_exported_before_any_re
     assert not running.hears("spy"), "who is not revoked has heard the speaker since"
     machine.run("systemctl", "stop", "spy")
 
-
-def test_after_a_revocation_a_new_ca_drops_the_crl_and_the_units_start(running: Host) -> None:
-    assert running.machine.run("ls", f"{KS}/public").split().count("crl.pem") == 1
+    assert "crl.pem" in machine.run("ls", f"{KS}/public").split()
     for step in (Step.START, Step.SWITCH, Step.FINISH):
         roll_over(running.ca, step, tuple(Role), options=options())
         assert {SPEAKER, EAR} <= set(up(running.take()))
-    assert "crl.pem" not in running.machine.run("ls", f"{KS}/public").split()
-    until(lambda: running.hears(EAR), lambda: running.machine.journal(EAR))
+    assert "crl.pem" not in machine.run("ls", f"{KS}/public").split(), (
+        "it was the old CA's, and units start without"
+    )
+    until(lambda: running.hears(EAR), lambda: machine.journal(EAR))
 
 
 def test_a_node_that_leaves_the_launch_file_is_stopped_and_a_new_one_is_started(running: Host) -> None:
@@ -227,24 +227,21 @@ def test_a_process_is_respawned_as_often_as_the_launch_file_says_however_often_i
     until(lambda: running.machine.property(name, "ActiveState") == "failed", said)
     assert running.machine.property(name, "NRestarts") == "3", "two tries more, then one that only says so"
 
-
-def test_a_restart_stops_at_the_first_that_does_not_stay_up_and_says_how_to_go_on(running: Host) -> None:
     printed = running.keystore("units", "restart", "flaky", "ros-robot", status=1)
-    assert up(printed) == [], "flaky.target is the first by name"
+    assert up(printed) == [], "flaky.target is the first by name, and nothing after it is touched"
     assert "error: flaky-false.service is" in printed
-    assert f"go on with\n    secure-keystore units restart flaky-false.service {SPEAKER} {EAR}" in printed
+    left = f"go on with\n    secure-keystore units restart flaky-false.service {SPEAKER} {EAR}"
+    assert left in printed
     assert "flaky-false.service is" in running.keystore("units", "status", status=1)
     running.keystore("units", "remove", "flaky")
-    assert f"{EAR}: runs" in running.keystore("units", "status")
+    assert f"{EAR}: runs" in running.keystore("units", "status", "/ear")
 
 
 def test_a_unit_waits_for_a_clock_that_is_earlier_than_the_import(running: Host) -> None:
     """As on a board without a battery; here the import lies in the future."""
     machine = running.machine
-    machine.run("touch", "--date=+4 seconds", f"{KS}/enclaves/speaker/cert.pem")
-    began = time.monotonic()
+    machine.run("touch", "--date=+6 seconds", f"{KS}/enclaves/speaker/cert.pem")
     machine.run("systemctl", "restart", SPEAKER)
-    assert time.monotonic() - began > 2
     assert "waiting until it is set" in machine.journal(SPEAKER)
     assert machine.property(SPEAKER, "ActiveState") == "active"
 
