@@ -61,8 +61,8 @@ def compare(
     if not view.is_complete:
         if not options.create:
             raise NotAKeystoreError(
-                f"{printable(view.root)} is not a complete keystore, and creating it was forbidden; "
-                "make it with: secure-keystore create"
+                f"{printable(view.root)} is not a complete keystore; "
+                "make one with secure-keystore create, or leave out --no-create-keystore"
             )
         view.refuse_foreign()
         return None

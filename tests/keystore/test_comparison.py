@@ -190,7 +190,7 @@ class TestWhatAStartFinds:
         assert any("CRL published again" in text for text in report.created)
 
     def test_a_keystore_is_made_only_where_that_was_allowed(self, tmp_path: Path) -> None:
-        with pytest.raises(NotAKeystoreError, match="creating it was forbidden"):
+        with pytest.raises(NotAKeystoreError, match="is not a complete keystore"):
             again(tmp_path / "ks", create=False)
         assert not (tmp_path / "ks").exists()
         assert again(tmp_path / "ks").changed

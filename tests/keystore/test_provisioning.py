@@ -262,7 +262,7 @@ def test_a_new_domain_extends_the_governance(tmp_path: Path) -> None:
 
 
 def test_creating_can_be_forbidden(tmp_path: Path) -> None:
-    with pytest.raises(NotAKeystoreError, match="creating it was forbidden"):
+    with pytest.raises(NotAKeystoreError, match="is not a complete keystore"):
         provision(tmp_path / "ks", [policy("/a")], options=options(create=False))
     assert not (tmp_path / "ks").exists()
 
