@@ -77,7 +77,10 @@ def _export_hosts(arguments: argparse.Namespace) -> int:
     if arguments.hosts and not arguments.host:
         _report_hosts_that_left(arguments, assigned)
     pins = " ".join(f"--require-ca {one}" for one in pinned(made[0].manifest))
-    print(f"for the first import on a host, pass these fingerprints; send them separately from the bundle: {pins}", file=sys.stderr)
+    print(
+        f"for the first import on a host, pass these fingerprints; send them separately from the bundle: {pins}",
+        file=sys.stderr,
+    )
     return 0
 
 
