@@ -11,6 +11,7 @@ import errno
 import functools
 import os
 import re
+import sys
 import warnings
 from collections.abc import Iterable
 
@@ -197,7 +198,8 @@ def _parse(path: str, name: str) -> SourceModule:
             tree = ast.parse(data, path)
         text = source_text(data)
     except SyntaxError as error:
-        why = f"is not valid Python 3: {error.msg}"
+        version = ".".join(map(str, sys.version_info[:2]))
+        why = f"is not valid Python {version}: {error.msg}"
         return SourceModule(name, path, empty, "", is_package, why, error.lineno or 0)
     except (ValueError, RecursionError, MemoryError) as error:
         return SourceModule(name, path, empty, "", is_package, f"cannot be parsed: {error}")

@@ -211,7 +211,7 @@ class FunctionValue:
     """A function with what it closes over. ``owner`` is the class whose body defines it."""
 
     __slots__ = (
-        "attributes", "cached", "closure", "defaults", "kw_defaults", "module", "name", "node", "owner", "shared",
+        "cached", "closure", "defaults", "kw_defaults", "module", "name", "node", "owner", "shared",
     )  # fmt: skip
 
     def __init__(
@@ -229,7 +229,6 @@ class FunctionValue:
         self.owner = owner
         self.defaults: tuple[Value, ...] = ()
         self.kw_defaults: tuple[Value | None, ...] = ()
-        self.attributes: Cells = {}
         self.cached = False  # by functools.cache
         self.shared = False  # it stands for several, made at the same place
 

@@ -18,7 +18,6 @@ from nodl.infer.values import (
     ClassValue,
     Dictionary,
     External,
-    FunctionValue,
     Instance,
     Items,
     Key,
@@ -55,10 +54,7 @@ def store_attribute(run: Run, owners: Value, name: str, value: Value, node: ast.
     for owner in owners:
         if isinstance(owner, Instance) and _set_by_property(run, owner, name, value, node, frame):
             continue
-        if isinstance(owner, FunctionValue):
-            kept = BOTTOM if certain and not owner.shared else owner.attributes.get(name, BOTTOM)
-            run.state.write(owner.attributes, name, join(kept, value))
-        elif isinstance(owner, (Instance, ClassValue, ModuleValue)):
+        if isinstance(owner, (Instance, ClassValue, ModuleValue)):
             kept = BOTTOM if certain else owner.cells.get(name, BOTTOM)
             run.state.store(owner, name, join(kept, value))
         else:

@@ -209,8 +209,7 @@ def _of_native(run: Run, atom: object, name: str, node: ast.AST, frame: Frame) -
 def _of_function(run: Run, atom: FunctionValue, name: str, node: ast.AST, frame: Frame) -> Value:
     if name in ("__name__", "__qualname__"):
         return (atom.name,) if atom.name else unknown("the name of a wrapped function")
-    held = atom.attributes.get(name)
-    return held if held else unknown(f"attribute {name} of a function")
+    return unknown(f"attribute {name} of a function")
 
 
 def _of_unknown(run: Run, atom: Unknown, name: str, node: ast.AST, frame: Frame) -> Value:

@@ -18,7 +18,6 @@ from nodl.infer.values import (
     BOTTOM,
     RESULT,
     ClassValue,
-    Dictionary,
     External,
     Instance,
     Items,
@@ -125,42 +124,27 @@ def percent(left: Value, right: Value) -> Value:
     return text_value(results) or ANY
 
 
-_DIRECTIVE = re.compile(r"%(?:\((?P<key>[^)]{0,200})\))?(?P<flags>[#0\- +]*\d*(?:\.\d+)?)(?P<type>[a-zA-Z%])")
+_DIRECTIVE = re.compile(r"%(?P<flags>[#0\- +]*\d*(?:\.\d+)?)(?P<type>[a-zA-Z%])")
 
 
 def _percent_one(template: str, right: Value) -> list[TextAtom]:
     atom = sole(right)
-    positional: tuple[Value, ...] | None = (right,)
-    if isinstance(atom, Sequence) and atom.kind == "tuple":
-        positional = atom.items.exact
+    whole = not (isinstance(atom, Sequence) and atom.kind == "tuple")
+    given = iter((right,) if whole or not isinstance(atom, Sequence) else atom.items.exact or ())
     operands: list[Sequences[TextAtom]] = []
-    position = used = 0
+    position = 0
     for match in _DIRECTIVE.finditer(template):
         operands.append([template[position : match.start()]])
         position = match.end()
-        if match["type"] == "%":
-            operands.append(["%"])
-            continue
-        if match["key"] is not None:
-            value = _mapping_item(atom, match["key"])
-        elif positional is not None and used < len(positional):
-            value = positional[used]
-        else:
-            value = ANY
-        used += 1
-        operands.append(_percent_text(match, value))
+        operands.append(["%"] if match["type"] == "%" else _percent_text(match, next(given, ANY)))
     operands.append([template[position:]])
-    return concatenations(operands)
+    return [_hole("a format with names")] if "%(" in template else concatenations(operands)
 
 
 def _percent_text(match: re.Match[str], value: Value) -> list[TextAtom]:
     if match["type"] == "s" and not match["flags"]:
         return as_texts(value)
     return _each_formatted(value, match["flags"], lambda atom: f"%{match['flags']}{match['type']}" % atom)
-
-
-def _mapping_item(atom: object, key: str) -> Value:
-    return (atom.held(key)[0] or ANY) if isinstance(atom, Dictionary) else ANY
 
 
 def str_format(template: TextAtom, args: Arguments) -> list[TextAtom]:

@@ -6,7 +6,6 @@ import ast
 import operator
 from collections.abc import Callable
 
-from nodl.infer.interpreter.assign import copy_dictionary
 from nodl.infer.interpreter.formatting import as_texts, percent
 from nodl.infer.interpreter.frames import Frame
 from nodl.infer.interpreter.run import Run
@@ -39,6 +38,7 @@ _ARITHMETIC: dict[type, Callable[[object, object], object]] = {
     ast.BitAnd: operator.and_,
     ast.BitXor: operator.xor,
 }
+_COMBINING = (ast.BitOr, ast.BitAnd, ast.BitXor, ast.Sub)
 _NUMBERS = (int, float)
 _LARGE = 1 << 40
 
@@ -56,18 +56,13 @@ def binary_operation(
     """``left op right``; ``ANY`` where nothing is known."""
     if _has_own(left) or _has_own(right):
         return ANY  # by a special method, which is called from outside
-    if isinstance(op, ast.BitOr) and len(left) == len(right) == 1 and isinstance(left[0], Dictionary):
-        merged = run.allocate(node, "merged", Dictionary)
-        copy_dictionary(run, merged, left)
-        copy_dictionary(run, merged, right)
-        return (merged,)
-    sets = [atom for atom in (*left, *right) if isinstance(atom, Sequence) and atom.kind == "set"]
-    if isinstance(op, ast.BitOr) and len(left) == len(right) == 1 and len(sets) == 2:
-        return _added_sequences(run, node, left, right, sets)
     if isinstance(op, ast.Add):
         return _add(run, node, left, right)
     if isinstance(op, ast.Mod) and any(isinstance(atom, str | Text) for atom in left):
         return percent(left, right)
+    if type(op) in _COMBINING and any(isinstance(atom, Sequence | Dictionary) for atom in (*left, *right)):
+        run.escape_value((*left, *right))  # dictionaries or sets: what is in them may be called
+        return ANY
     if type(op) in _ARITHMETIC and len(left) * len(right) <= 16:
         return _arithmetic(run, node, left, op, right)
     return ANY

@@ -307,13 +307,12 @@ def _dynamic_code(run: Run, call: Call) -> Value:
 
 
 def import_dynamic(run: Run, call: Call) -> Value:
-    """``import_module(name)`` and ``__import__``: the modules it may be; a gap when a name is not known."""
-    given = call.args.at(0) or ANY
-    names = constant_strings(given)
-    if len(names) < len(given) or any(name.startswith(".") for name in names):
-        run.gap(call.node, call.frame, "a module whose name is made at run time is not analysed")
-    found = join_all(import_module(run, name, call.frame) for name in names if not name.startswith("."))
-    return found or unknown("a module whose name is made at run time")
+    """``import_module(name)`` and ``__import__``: the module; a gap if its name is not known."""
+    name = sole(call.args.at(0))
+    if isinstance(name, str) and not name.startswith("."):
+        return import_module(run, name, call.frame)
+    run.gap(call.node, call.frame, "a module whose name is made at run time is not analysed")
+    return unknown("a module whose name is made at run time")
 
 
 def _variables(run: Run, call: Call) -> Value:

@@ -76,10 +76,13 @@ def library_node(path: str) -> LibraryNode | None:
 _MAKES_NOTHING = frozenset({
     "ros2_numpy", "tf_transformations", "sensor_msgs_py", "image_geometry", "cv_bridge", "rclpy_message_converter",
     "ament_index_python", "ament_copyright", "ament_flake8", "ament_pep257", "rosidl_runtime_py", "rosidl_parser",
-    "tf2_geometry_msgs", "tf2_py", "tf2_ros", "launch", "launch_ros", "rclpy", "rospkg", "ros2cli", "rosbags",
+    "tf2_geometry_msgs", "tf2_py", "launch", "launch_ros", "rclpy", "rospkg", "ros2cli", "rosbags",
     "diagnostic_updater", "message_filters", "interactive_markers",
 })  # fmt: skip
-_MAKERS = {"rosbag2_py": frozenset({"Recorder", "Player"})}  # of a package that else makes nothing
+_MAKERS = {
+    "rosbag2_py": frozenset({"Recorder", "Player"}),
+    "tf2_ros": frozenset({"BufferClient"}),
+}  # of a package that else makes nothing
 _ROS_NAME = re.compile(
     r"(?:^|_)(?:ros\d?|ros2\w*|rcl\w*|nav2|moveit\w*|turtlebot\w*|tf2|rosbag\w*|rosbridge|rqt|irobot|controller_manager|"
     r"ament|launch|clearpath|webots_ros2|nao|spot_utilities)(?:_|$)"

@@ -22,7 +22,6 @@ from nodl.infer.models.ros_nodes import (
     strings_in,
 )
 from nodl.infer.models.signatures import (
-    ACTION_CLIENT,
     CLIENT,
     ENDPOINT_CALLS,
     HELPERS,
@@ -43,10 +42,8 @@ from nodl.infer.values import (
     Instance,
     Unknown,
     Value,
-    constant_strings,
     external,
     join,
-    join_all,
     unknown,
 )
 
@@ -140,8 +137,7 @@ def _endpoint_method(name: str) -> NodeMethod:
     def method(run: Run, record: NodeRecord, call: Call) -> Value:
         made = NODE_ENDPOINTS[name]
         add_endpoints(run, made, [record], call)
-        types = types_of(argument(call, made.type) or ANY)
-        return endpoint_object(run, made.kind, record, argument(call, made.name) or ANY, types, call)
+        return endpoint_object(run, made.kind, record, argument(call, made.name) or ANY, call)
 
     return method
 
@@ -255,37 +251,20 @@ def _parameter_client(run: Run, path: str, call: Call) -> Value:
     return _object_of(run, path, call)
 
 
-def _interface_by_name(run: Run, path: str, call: Call) -> Value:
-    """``rosidl_runtime_py.utilities.get_message('std_msgs/msg/String')``."""
-    names = constant_strings(call.args.at(0) or ANY)
-    return join_all(external(name.replace("/", ".")) for name in names) or ANY
-
-
-def _buffer_client(run: Run, path: str, call: Call) -> Value:
-    names = call.args.at(1, "ns") or ANY
-    for record in records_of(run, call.args.at(0, "node"), call):
-        for name in names_of(names):
-            record.add_endpoint(ACTION_CLIENT, name, "tf2_msgs/action/LookupTransform", call.source)
-    return _object_of(run, path, call)
-
-
 def _node_class(run: Run, path: str, call: Call) -> Value:
     return create_node(run, LIFECYCLE_CLASS if is_lifecycle(path) else NODE_CLASS, call)
 
 
-_BY_NAME = tuple(("rosidl_runtime_py", f"get_{kind}") for kind in ("message", "service", "action"))
 _FUNCTIONS: dict[tuple[str, str], Callable[[Run, str, Call], Value]] = {
     **{("rclpy", name): _node_class for name in ("create_node", "Node", "LifecycleNode")},
     ("nav2_simple_commander", "BasicNavigator"): lambda run, path, call: create_node(run, path, call),
     ("rclpy", "init"): _init,
     ("rclpy", "Parameter"): _parameter,
     ("rclpy", "AsyncParameterClient"): _parameter_client,
-    **dict.fromkeys(_BY_NAME, _interface_by_name),
-    ("tf2_ros", "BufferClient"): _buffer_client,
 }
 
 
-_MAKING = frozenset(_FUNCTIONS) - {("rclpy", "init"), ("rclpy", "Parameter"), *_BY_NAME}
+_MAKING = frozenset(_FUNCTIONS) - {("rclpy", "init"), ("rclpy", "Parameter")}
 
 
 CREATING_NAMES = frozenset(name for _, name in (*ENDPOINT_CALLS, *HELPERS, *_MAKING))

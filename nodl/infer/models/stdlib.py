@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from nodl.infer.interpreter.elements import elements
 from nodl.infer.interpreter.formatting import as_texts, text_value
-from nodl.infer.interpreter.frames import Arguments, Call
+from nodl.infer.interpreter.frames import Call
 from nodl.infer.interpreter.run import Model, Run
 from nodl.infer.models import builtin, options
 from nodl.infer.text import Input, concatenations, make_text
@@ -17,12 +17,12 @@ from nodl.infer.values import (
     BOTTOM,
     COMMAND_LINE,
     NONE,
+    ClassValue,
     Dictionary,
     External,
     Instance,
     Items,
     Partial,
-    Sequence,
     Value,
     constant_strings,
     join,
@@ -73,11 +73,6 @@ def _path_join(run: Run, call: Call) -> Value:
     return text_value(concatenations(separated)) if separated else ANY
 
 
-def _base_name(run: Run, call: Call) -> Value:
-    atom = sole(call.args.at(0))
-    return (os.path.basename(atom),) if isinstance(atom, str) else unknown("the name of a file")
-
-
 # --- callables ----------------------------------------------------------------------------------------------
 
 
@@ -122,12 +117,6 @@ def _thread_init(run: Run, thread: Instance, call: Call) -> Value:
     return NONE
 
 
-def _registered(run: Run, call: Call) -> Value:
-    """The library calls what it is given, and leaves containers alone."""
-    run.escape(call.args, opened=False)
-    return ANY
-
-
 # --- containers ---------------------------------------------------------------------------------------------
 
 
@@ -138,15 +127,12 @@ def _default_dict(run: Run, call: Call) -> Value:
 
 
 def _copy(run: Run, call: Call) -> Value:
-    """Containers get a copy of their own; what is inside is shared, as if it were ``copy.copy``."""
-    result: Value = BOTTOM
-    for atom in call.args.at(0) or ANY:
-        if isinstance(atom, Sequence | Dictionary):
-            method = run.attribute((atom,), "copy", call.node, call.frame)
-            result = join(result, run.call(method, Arguments(), call.node, call.frame))
-        else:
-            result = join(result, (atom,))
-    return result
+    """``copy`` and ``deepcopy`` give something unknown; a copy of an object of the program is a gap."""
+    given = call.args.at(0) or ANY
+    run.escape_value(given, opened=False, objects=False)
+    if any(isinstance(atom, Instance) and isinstance(atom.cls, ClassValue) for atom in given):
+        run.gap(call.node, call.frame, "an object of the program is copied, which is not followed")
+    return unknown("a copy")
 
 
 def _patched(run: Run, call: Call) -> Value:
@@ -162,9 +148,7 @@ FUNCTIONS: dict[str, Model] = {
     "os.environ.setdefault": _set_default_environment,
     **dict.fromkeys(("os.environ.update", "os.environ.pop", "os.putenv"), _change_environment),
     "os.path.join": _path_join,
-    "os.path.basename": _base_name,
     "functools.partial": _partial,
-    "functools.reduce": _registered,
     **{f"threading.{name}": _lock for name in ("Lock", "RLock", "Condition", "Semaphore", "Event")},
     "threading.Thread": _thread,
     "threading.Timer": _timer,
@@ -172,10 +156,9 @@ FUNCTIONS: dict[str, Model] = {
     "collections.defaultdict": _default_dict,
     "collections.OrderedDict": builtin.FUNCTIONS["builtins.dict"],
     "collections.deque": builtin.FUNCTIONS["builtins.list"],
-    "copy.copy": _copy,
+    **dict.fromkeys(("copy.copy", "copy.deepcopy"), _copy),
     "random.choice": builtin.FUNCTIONS["builtins.next"],
     "importlib.import_module": builtin.import_dynamic,
-    "atexit.register": _registered,
     **dict.fromkeys(
         ("yaml.safe_load", "yaml.load", "json.load", "json.loads"), lambda run, call: unknown(CONTENTS)
     ),

@@ -16,7 +16,7 @@ Infer = Callable[..., InferredSystem]
 @pytest.fixture(autouse=True)
 def kept_answers(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The folder of kept answers, one for all tests; not that of whoever runs them."""
-    folder = tmp_path_factory.getbasetemp() / "kept-answers"
+    folder = tmp_path_factory.getbasetemp() / "cached-answers"
     monkeypatch.setenv("XDG_CACHE_HOME", str(folder))
     return folder
 

@@ -45,7 +45,7 @@ _SETS = """
     class N(Node):
         def __init__(self, names):
             super().__init__('n')
-            for name in names | {'x', 'y'}:
+            for name in {*names, 'x', 'y'}:
                 self.create_publisher(String, name + '/state', 10)
                 self.create_publisher(String, self.declare_parameter(name, name).value, 10)
     N({'front', 'rear', 'left', 'right'})

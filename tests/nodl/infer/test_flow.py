@@ -17,7 +17,7 @@ CASES: dict[str, tuple[str, list[str]]] = {
     "f-string with a width": ("self.P(f'a{1:02d}')", ["a01"]),
     "format": ("self.P('{}/{n}'.format('a', n='b'))", ["a/b"]),
     "percent": ("self.P('%s_%02d' % ('a', 3))", ["a_03"]),
-    "percent with a mapping": ("self.P('%(x)s' % {'x': 'a'})", ["a"]),
+    "percent with a mapping": ("self.P('%(x)s' % {'x': 'a'})", ["?"]),
     "join": ("self.P('/'.join(['a', 'b']))", ["a/b"]),
     "str and int": ("self.P('a' + str(1))", ["a1"]),
     "methods of str": ("self.P('/A/'.strip('/').lower().replace('a', 'b'))", ["b"]),

@@ -57,9 +57,7 @@ CALLS = {
         ("publisher", "t", "std_msgs/msg/String")
     ],
     "from rosidl_runtime_py.utilities import get_message\n"
-    "node.create_publisher(get_message('std_msgs/msg/String'), 't', 1)": [
-        ("publisher", "t", "std_msgs/msg/String")
-    ],
+    "node.create_publisher(get_message('std_msgs/msg/String'), 't', 1)": [("publisher", "t", "")],
 }
 
 
