@@ -12,6 +12,7 @@ from nodl.infer.cpp.reading.names import hidden
 from nodl.infer.cpp.reading.type_names import NO_TYPE, Type
 from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.values import Obj
+from nodl.infer.cpp.running.variables import declared_type
 from nodl.infer.cpp.syntax import Node, callee_name, field_of, template_arguments, text, unwrapped
 
 
@@ -59,8 +60,6 @@ def seen_class(run: Machine, node: Node | None, frame: Frame) -> Class | None:
 
 def seen_type(run: Machine, node: Node | None, frame: Frame) -> Type:
     """Return the type of a variable, a member or an element; ``NO_TYPE`` for all else."""
-    from nodl.infer.cpp.running.variables import declared_type
-
     node = unwrapped(node)
     if node is None:
         return NO_TYPE

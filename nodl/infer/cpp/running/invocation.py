@@ -427,3 +427,32 @@ def write_back(
         value = left[parameter.name]
         if value is not None and value != run.evaluate(target, frame):
             assign(run, target, value, frame)
+
+
+# --- operators of the program's own classes -----------------------------------------------------------------------
+
+
+def pointed_to(run: Machine, value: Value, operator: str, node: Node, frame: Frame) -> Value:
+    """Return what ``x->`` or ``*x`` gives: by the operator of its class if it has one, else ``x`` itself."""
+    found: list[Value] = []
+    for atom in value:
+        own = run.methods_of(atom, operator)
+        found.append(
+            call_methods(run, own, atom, [], node, frame, ()) if own and isinstance(atom, Obj) else (atom,)
+        )
+    return join(*found)
+
+
+def by_operator(
+    run: Machine, sign: str, left: Value, right: Sequence[Value], node: Node, frame: Frame
+) -> Value | None:
+    """Return what an operator that the program defines gives; ``None`` if it defines none for these operands."""
+    if not any(isinstance(a, Obj) and a.cls is not None for value in (left, *right) for a in value):
+        return None
+    name, this = f"operator{sign}", left[0] if len(left) == 1 else None
+    if isinstance(this, Obj) and (own := chosen(run.methods_of(this, name), right)):
+        return call_methods(run, [own], this, right, node, frame, ())
+    free = run.names.find_functions(name, frame.scope, frame.file)
+    if not chosen(free, [left, *right]):
+        return None
+    return call_functions(run, free, [left, *right], node, frame, ())

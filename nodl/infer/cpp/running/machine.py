@@ -249,7 +249,7 @@ class Machine:
             return fresh
         known.bindings, known.conditions, known.depth = fresh.bindings, fresh.conditions, fresh.depth
         known.returned, known.finished = BOTTOM, False
-        known.exits, known.exit_values, known.loops = [], [], []
+        known.exits, known.loops = [], []
         return known
 
     # --- what is found ------------------------------------------------------------------------------------
@@ -381,7 +381,6 @@ class Frame:
     names: set[str] = field(default_factory=set)
     returned: Value = BOTTOM
     exits: list[Changes] = field(default_factory=list)
-    exit_values: list[Value] = field(default_factory=list)
     mark: int = 0
     loops: list[Loop] = field(default_factory=list)
     blocks: list[dict[str, tuple[bool, Value, str | None, Node | None]]] = field(default_factory=list)

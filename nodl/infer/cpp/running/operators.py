@@ -10,10 +10,10 @@ from nodl.infer.cpp.running.arithmetic import added, arithmetic
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.contents import items_of
 from nodl.infer.cpp.running.hiding import class_of_member, seen_type
+from nodl.infer.cpp.running.invocation import by_operator, pointed_to
 from nodl.infer.cpp.running.launch_values import settled_text, text_of
 from nodl.infer.cpp.running.machine import NEXT, Frame, Machine, expression
 from nodl.infer.cpp.running.objects import default_value
-from nodl.infer.cpp.running.own_operators import by_operator, pointed_to
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     END,

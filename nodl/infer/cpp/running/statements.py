@@ -103,7 +103,6 @@ def return_statement(run: Machine, node: Node, frame: Frame) -> int:
     for child in children(node):
         value = run.evaluate(child, frame)
     frame.returned = join(frame.returned, value)
-    frame.exit_values.append(value)
     frame.exits.append(run.store.changes(frame.mark))
     return RETURN
 
@@ -126,16 +125,9 @@ def break_statement(run: Machine, node: Node, frame: Frame) -> int:
 
 @statement("goto_statement")
 def goto_statement(run: Machine, node: Node, frame: Frame) -> int:
-    """Goes on as if it were not there; a gap where it jumps back in a function that could make interfaces."""
-    function, name = frame.function, text(field_of(node, "label"))
-    labels = walk(function.node) if function is not None else ()
-    back = any(
-        each.type == "labeled_statement" and text(field_of(each, "label")) == name
-        for each in labels
-        if each.start_byte < node.start_byte
-    )
-    if function is None or (back and run.makes_interfaces(function)):
-        run.gap(node, frame, f"goto {name}: what runs again behind the label is not followed")
+    """Go on as if it were not there; a gap in a function that could make interfaces."""
+    if frame.function is None or run.makes_interfaces(frame.function):
+        run.gap(node, frame, f"{text(node).rstrip(';')}: what runs behind the label is not followed")
     return NEXT
 
 
