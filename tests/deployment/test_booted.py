@@ -189,6 +189,16 @@ def test_a_revoked_listener_is_refused_by_units_from_before_any_revocation_and_a
     until(lambda: running.hears(EAR), lambda: machine.journal(EAR))
 
 
+def test_the_target_that_a_boot_wants_starts_and_stops_all(running: Host) -> None:
+    machine = running.machine
+    machine.run("systemctl", "stop", "ros-robot.target")
+    until(lambda: machine.property(EAR, "ActiveState") == "inactive", lambda: machine.journal(EAR))
+    machine.run("systemctl", "start", "multi-user.target")
+    until(lambda: machine.property(EAR, "ActiveState") == "active", lambda: machine.journal(EAR))
+    until(lambda: running.hears(EAR), lambda: machine.journal(EAR))
+    assert machine.property("ros-robot-expiry.timer", "ActiveState") == "active"
+
+
 def test_a_node_that_leaves_the_launch_file_is_stopped_and_a_new_one_is_started(running: Host) -> None:
     units = running.launch(robot(*TALKING[:2], node("listener", "new")))
     running.take()
