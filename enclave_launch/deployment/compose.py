@@ -1,4 +1,4 @@
-"""A deployment as a Compose file: one service for each process, with the files of its enclave and no others. Pure.
+"""A deployment as a Compose file: one service for each process, with the files of its enclave and no others.
 
 ``secure-keystore import --owner`` writes each enclave once more, as a directory that stands alone and belongs to the
 containers' user. A service mounts that directory, read-only, so what an enclave holds is read when the service starts.

@@ -1,4 +1,4 @@
-"""What the writers of all engines take: the processes of one host, their enclaves' files, what to say of both. Pure."""
+"""The input of the writers for all engines: the processes of one host and the files of their enclaves."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def one_line(text: str) -> str:
 
 
 class File(NamedTuple):
-    """A generated file. ``mode``: 0600 where it holds keys."""
+    """A generated file; ``mode`` is 0600 if it holds keys."""
 
     text: str
     mode: int = 0o644

@@ -1,4 +1,4 @@
-"""A deployment as Kubernetes objects: one Deployment for each process, the files of its enclave in a Secret. Pure.
+"""A deployment as Kubernetes objects: one Deployment for each process, the files of its enclave in a Secret.
 
 Names of Secrets stay the same, so new material changes the enclave's Secret and no workload; the process reads it at
 its next start (``kubectl rollout restart``). Multicast does not cross most networks of clusters, so peers are named

@@ -1,4 +1,4 @@
-"""Which process belongs on which host, what flows between hosts, and in which order to restart. Pure."""
+"""Assign processes to hosts, find what flows between hosts, and order restarts."""
 
 from __future__ import annotations
 
@@ -12,22 +12,27 @@ from keystore.errors import InvalidInputError
 from keystore.formats.hosts import Hosts, refuse_host_name
 
 ONLY_HOST = "host"
-"""Where nobody says anything about hosts."""
+"""The name of the host if neither the hosts file nor the launch file names one."""
 
 
 class Placement(NamedTuple):
-    """``hosts``: host -> its processes, in launch order. ``nowhere``: processes that nothing places, though others are.
-    ``shared``: enclave -> the hosts on which it would have to live, and with it its private key."""
+    """The processes of each host.
+
+    Attributes:
+        hosts: Host -> its processes, in launch order.
+        nowhere: Processes that nothing places, although others are placed.
+    """
 
     hosts: Mapping[str, tuple[DeployedProcess, ...]]
     nowhere: tuple[DeployedProcess, ...] = ()
 
     @property
     def shared(self) -> dict[str, tuple[str, ...]]:
+        """Return the enclaves, and so private keys, that would be on several hosts -> those hosts."""
         return {path: hosts for path, hosts in self.homes().items() if len(hosts) > 1}
 
     def homes(self) -> dict[str, tuple[str, ...]]:
-        """Enclave -> hosts."""
+        """Return enclave -> hosts."""
         found: dict[str, dict[str, None]] = {}
         for host, processes in self.hosts.items():
             for process in processes:
@@ -37,9 +42,12 @@ class Placement(NamedTuple):
 
 
 def place(processes: Iterable[DeployedProcess], hosts: Hosts) -> Placement:
-    """By the hosts file (a node's name before its enclave), else by the ``machine`` of the launch file.
+    """Place each process by the hosts file (its node before its enclave), else by ``machine`` of the launch file.
 
-    Without either all are on one host. Raises ``UsageError`` for what belongs to several hosts.
+    If neither names a host, all are on ``ONLY_HOST``.
+
+    Raises:
+        UsageError: A process belongs to several hosts, or its host has no valid name.
     """
     listed = list(processes)
     found: dict[str, list[DeployedProcess]] = {name: [] for name in hosts.names}
@@ -67,7 +75,7 @@ def _host_of(process: DeployedProcess, hosts: Hosts) -> str | None:
 
 
 def flows_between_hosts(placement: Placement, graph: FlowGraph) -> Iterator[tuple[str, str, FlowStep]]:
-    """(host, other host, what flows), in the order of the hosts: what the network between them must carry."""
+    """Yield (host, other host, what flows) for what the network between hosts must carry, in the order of the hosts."""
     homes = placement.homes()
     order = list(placement.hosts)
     found = [
@@ -82,16 +90,13 @@ def flows_between_hosts(placement: Placement, graph: FlowGraph) -> Iterator[tupl
 
 
 def restart_order(enclaves: Iterable[str], graph: FlowGraph) -> list[str]:
-    """Sources before what they influence, so that who comes back finds what it needs: one at a time, in this order.
-
-    Enclaves that influence each other in a circle stand together, by name.
-    """
+    """Sort enclaves so that each comes before what it influences; those in a circle stand together, by name."""
     # Who reaches more stands before: along a flow the set of what is reached can only shrink.
     return sorted(enclaves, key=lambda one: (-len(reached_from(graph, one)), one))
 
 
 def in_restart_order(processes: Sequence[DeployedProcess], graph: FlowGraph) -> tuple[DeployedProcess, ...]:
-    """The processes by the order of their enclaves, those of one enclave as launched; without an enclave last."""
+    """Sort processes by the order of their enclaves, those of one enclave as launched; those without one come last."""
     order = restart_order({one.enclave for one in processes if one.enclave is not None}, graph)
     place_of = {path: number for number, path in enumerate(order)}
     return tuple(sorted(processes, key=lambda one: place_of.get(one.enclave or "", len(order))))

@@ -1,7 +1,7 @@
-"""The processes of a plan as an engine runs them. Pure.
+"""The processes of a plan as an engine runs them.
 
-Takes the dry run's JSON document, so that a saved plan and a launch file are the same thing. What is left to the writer
-of an engine is how to say it, and where the enclave's files are.
+They are read from the dry run's JSON document, so a saved plan and a launch file give the same. The writer for an
+engine adds its syntax and the place of the enclave's files.
 """
 
 from __future__ import annotations
@@ -24,8 +24,16 @@ _SECURITY = (ENABLE, KEYSTORE, OVERRIDE, STRATEGY)
 
 
 class DeployedProcess(NamedTuple):
-    """``name``: unique in the launch, a DNS label. ``command`` holds ``--enclave`` where rcl reads it from there;
-    ``parameter_files``: placeholder in the command -> YAML. ``place``: file:line of its element."""
+    """A process of the plan.
+
+    Attributes:
+        name: Unique in the launch, a DNS label.
+        fqn: The fully qualified name of its node, None for an executable.
+        command: Includes ``--enclave`` if rcl reads it from there.
+        parameter_files: Placeholder in the command -> YAML.
+        place: file:line of its element.
+        nodes: Its node and the components that are loaded into it.
+    """
 
     name: str
     process: str
@@ -45,14 +53,14 @@ class DeployedProcess(NamedTuple):
     needs: Needs = Needs()
 
     def security(self, keystore: str) -> Mapping[str, str]:
-        """The variables that rcl reads; Enforce, whatever the plan was saved with."""
+        """Return the variables that rcl reads; always Enforce, whatever the plan was saved with."""
         if self.enclave is None:
             return {ENABLE: "true", STRATEGY: "Enforce", KEYSTORE: NO_KEYSTORE}
         override = {OVERRIDE: self.enclave} if self.fqn is None else {}
         return {ENABLE: "true", STRATEGY: "Enforce", KEYSTORE: keystore, **override}
 
     def variables(self, keystore: str) -> dict[str, str]:
-        """All that the process needs in its environment apart from what the installation sets up, sorted."""
+        """Return the environment of the process apart from what the installation sets up, sorted."""
         found = {
             "ROS_DOMAIN_ID": str(self.domain),
             "RMW_IMPLEMENTATION": self.middleware,
@@ -65,19 +73,19 @@ class DeployedProcess(NamedTuple):
         return dict(sorted(found.items()))
 
     def words(self, folder: str) -> tuple[str, ...]:
-        """The command with its generated parameter files below ``folder``; launch gives a shell the words joined."""
+        """Return the command with its parameter files below ``folder``; a shell gets the words joined, as by launch."""
         names = dict(zip(self.parameter_files, self.parameter_texts(), strict=True))
         words = tuple(f"{folder}/{names[word]}" if word in names else word for word in self.command)
         return ("/bin/sh", "-c", " ".join(words)) if self.shell else words
 
     def parameter_texts(self) -> dict[str, str]:
-        """File name -> content of each of ``parameter_files``, in their order."""
+        """Return file name -> content of each of ``parameter_files``, in their order."""
         texts = self.parameter_files.values()
         return {f"{self.name}-{number}.yaml": text for number, text in enumerate(texts, 1)}
 
 
 def deployed_processes(document: Mapping[str, Any]) -> tuple[DeployedProcess, ...]:
-    """What the launch itself starts; what only events or timers start is told by ``semantics``."""
+    """Return the processes that the launch starts; those that only events or timers start are in ``semantics``."""
     listed = [entry for entry in document["processes"] if entry["on_event"] is None]
     names = engine_names([_final_name(entry) or _stem(entry) for entry in listed])
     nodes = _nodes_of(document)
@@ -85,7 +93,7 @@ def deployed_processes(document: Mapping[str, Any]) -> tuple[DeployedProcess, ..
 
 
 def _nodes_of(document: Mapping[str, Any]) -> Mapping[str, tuple[str, ...]]:
-    """Container -> names of its components."""
+    """Return container -> names of its components."""
     found: dict[str, tuple[str, ...]] = {}
     for entry in document["components"]:
         container = "/" + entry["container"].lstrip("/")
@@ -116,8 +124,10 @@ def _process(entry: Mapping[str, Any], name: str, nodes: Mapping[str, tuple[str,
 
 
 def _final_name(entry: Mapping[str, Any]) -> str | None:
-    """As rcl resolves it: without a namespace in the root, without a name by the program's own, which is taken to be
-    that of the executable. None for executables."""
+    """Return the name as rcl resolves it, None for executables.
+
+    Without a namespace it is in the root; without a name it has the program's own, assumed to be the executable's.
+    """
     fqn: str | None = entry["fqn"]
     if fqn is None:
         return None
@@ -126,7 +136,7 @@ def _final_name(entry: Mapping[str, Any]) -> str | None:
 
 
 def _secured(entry: Mapping[str, Any]) -> tuple[str, ...]:
-    """Node commands end inside their ``--ros-args``, so the enclave simply follows, unless it is there."""
+    """Append ``--enclave`` to the command of a node, which ends inside its ``--ros-args``, unless it is there."""
     command = tuple(entry["cmd"])
     if entry["fqn"] is None or entry["enclave"] is None:
         return command
@@ -137,14 +147,14 @@ def _secured(entry: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _stem(entry: Mapping[str, Any]) -> str:
-    """``rviz2`` of ``rviz2-3``."""
+    """Return ``rviz2`` for ``rviz2-3``."""
     return str(entry.get("process") or entry["executable"]).rpartition("/")[2].rpartition("-")[0] or "process"
 
 
 def engine_names(subjects: Iterable[str]) -> list[str]:
-    """A DNS label for each, the same whenever the same subject comes: one more process renames no other.
+    """Return a DNS label for each subject, independent of the other subjects.
 
-    Where the label does not say all (capitals, ``_``, length) a hash of the subject follows; equal subjects are
+    If the label alone would be ambiguous (capitals, ``_``, length) a hash of the subject follows; equal subjects are
     numbered in their order.
     """
     listed = [label(subject) for subject in subjects]
@@ -157,7 +167,7 @@ def engine_names(subjects: Iterable[str]) -> list[str]:
 
 
 def label(subject: str) -> str:
-    """``/front/speaker`` as ``front-speaker``, ``/front_left`` as ``front-left-3f2a90``."""
+    """Return ``front-speaker`` for ``/front/speaker``, ``front-left-3f2a90`` for ``/front_left``."""
     plain = subject.strip("/").replace("/", "-")
     name = re.sub(r"[^a-z0-9]+", "-", plain.lower()).strip("-")[:LONGEST_NAME].strip("-")
     if name == plain and name:

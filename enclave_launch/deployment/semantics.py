@@ -1,4 +1,4 @@
-"""What of a launch file an engine cannot express: named, so that nobody finds out on the robot. Pure.
+"""Find what of a launch file an engine cannot express, so that nobody finds out on the robot.
 
 An engine starts processes, restarts them and ends them. What launch itself does meanwhile (handlers, timers, loading
 components, changing states) has nobody to do it there.
@@ -15,7 +15,7 @@ from enclave_launch.diagnostics import Code
 
 
 class Engine(str, Enum):
-    """What runs the processes."""
+    """Program that runs the processes."""
 
     SYSTEMD = "systemd"
     COMPOSE = "compose"
@@ -33,7 +33,7 @@ class Unexpressed(NamedTuple):
 
 
 def unexpressed(document: Mapping[str, Any], engine: Engine) -> tuple[Unexpressed, ...]:
-    """Everything that would be lost, in the order of the launch file's processes, components and reactions."""
+    """Return everything that would be lost, in the order of the launch file's processes, components and reactions."""
     found = (
         *_late_processes(document),
         *_components(document),
@@ -45,8 +45,10 @@ def unexpressed(document: Mapping[str, Any], engine: Engine) -> tuple[Unexpresse
 
 
 def unexpressed_needs(processes: Iterable[DeployedProcess], engine: Engine) -> tuple[Unexpressed, ...]:
-    """What the hosts file says that a process needs and ``engine`` cannot be told by one object: on Kubernetes devices
-    come from a device plugin, and real-time scheduling from the node's configuration."""
+    """Return the needs of processes that ``engine`` cannot express.
+
+    On Kubernetes devices come from a device plugin, and real-time scheduling from the node's configuration.
+    """
     if engine is not Engine.KUBERNETES:
         return ()
     wanted = [
@@ -61,12 +63,12 @@ def unexpressed_needs(processes: Iterable[DeployedProcess], engine: Engine) -> t
 
 
 def ends_launch(document: Mapping[str, Any]) -> frozenset[str]:
-    """Processes at whose end the whole launch ends."""
+    """Return the processes whose exit ends the whole launch."""
     return frozenset(one["ends_with"] for one in document.get("reactions", ()) if one["ends_with"])
 
 
 def differences(document: Mapping[str, Any], engine: Engine) -> tuple[str, ...]:
-    """What works, but otherwise than launch does it: for a person to know, nothing to refuse."""
+    """Return what works, but not as in launch: to be reported, not refused."""
     started = [one for one in document["processes"] if one["on_event"] is None]
     respawned = [one for one in started if one.get("respawn")]
     told = []
@@ -99,7 +101,7 @@ def _calls(document: Mapping[str, Any]) -> Iterator[Unexpressed]:
 
 
 def _reactions(document: Mapping[str, Any], engine: Engine) -> Iterator[Unexpressed]:
-    """The end of a process that ends the launch: systemd can say it, unless it is started again."""
+    """Yield reactions to exits. systemd can express that an exit ends the launch, unless the process is respawned."""
     respawned = {one.get("process") for one in document["processes"] if one.get("respawn")}
     for one in document.get("reactions", ()):
         if one["ends_with"] and engine is Engine.SYSTEMD and one["ends_with"] not in respawned:

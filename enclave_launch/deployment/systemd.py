@@ -1,4 +1,4 @@
-"""A deployment as systemd units: one service for each process, one target for all. Pure.
+"""A deployment as systemd units: one service for each process, one target for all.
 
 A unit names where its enclave is; what is there is read at each start. Each service runs as a user of its own and gets
 the files of its enclave as credentials (systemd.exec(5)): copied by the manager into memory that only this user reads,

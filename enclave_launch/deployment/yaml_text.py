@@ -1,4 +1,4 @@
-"""Plain values as YAML that people read: in the given order, long texts as blocks, always the same bytes. Pure."""
+"""Dump plain values as YAML that people read: in the given order, long texts as blocks, always the same bytes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import yaml
 
 
 class _Dumper(yaml.SafeDumper):
-    """Without aliases, which readers stumble over."""
+    """A dumper without aliases."""
 
     def ignore_aliases(self, data: Any) -> bool:
         return True
@@ -26,11 +26,11 @@ _Dumper.add_representer(str, _text)
 
 
 def yaml_text(content: Any) -> str:
-    """One document."""
+    """Return ``content`` as one document."""
     text: str = yaml.dump(content, Dumper=_Dumper, sort_keys=False, width=110, allow_unicode=True)
     return text
 
 
 def yaml_documents(contents: Iterable[Any]) -> str:
-    """Several, each behind ``---``."""
+    """Return several documents, each behind ``---``."""
     return "".join(f"---\n{yaml_text(content)}" for content in contents)

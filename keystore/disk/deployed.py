@@ -1,4 +1,4 @@
-"""An imported keystore held against the signed manifest that came with it: every file has its hash there."""
+"""Compare an imported keystore with the signed manifest that came with it, which has the hash of every file."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from keystore.signing.public_key import fingerprint
 
 
 def deployed_manifest(view: KeystoreView) -> Manifest | None:
-    """Returns the manifest of an imported keystore, signed by its permissions CA; None where nothing was imported.
+    """Return the manifest of an imported keystore, signed by its permissions CA; None where nothing was imported.
 
     Raises DamagedKeystoreError.
     """
@@ -30,7 +30,7 @@ def deployed_manifest(view: KeystoreView) -> Manifest | None:
 def differing_files(
     view: KeystoreView, manifest: Manifest, enclaves: Iterable[str] | None = None
 ) -> Iterator[tuple[str, str]]:
-    """Yields each file that is not as the manifest has it, and what is wrong with it.
+    """Yield each file that is not as the manifest has it, and what is wrong with it.
 
     ``enclaves``: look only at what these read; None for all.
     """
@@ -48,7 +48,7 @@ def differing_files(
 
 
 def deployment_problem(view: KeystoreView, enclaves: Iterable[str]) -> str | None:
-    """Says why what these enclaves read is not what was imported; None where it is, or where nothing was imported."""
+    """Return why what these enclaves read is not what was imported; None if it is, or if nothing was imported."""
     try:
         manifest = deployed_manifest(view)
     except DamagedKeystoreError as error:
@@ -60,7 +60,7 @@ def deployment_problem(view: KeystoreView, enclaves: Iterable[str]) -> str | Non
 
 
 def refuse_changed_deployment(view: KeystoreView, enclaves: Iterable[str]) -> None:
-    """Raises DamagedKeystoreError where an imported keystore is not as its bundle left it."""
+    """Raise DamagedKeystoreError if an imported keystore is not as its bundle left it."""
     if (problem := deployment_problem(view, enclaves)) is not None:
         raise DamagedKeystoreError(
             f"{problem}. Import the bundle again, which restores it: secure-keystore import KEYSTORE HOST.bundle"
@@ -68,7 +68,7 @@ def refuse_changed_deployment(view: KeystoreView, enclaves: Iterable[str]) -> No
 
 
 def find_differences(view: KeystoreView) -> list[tuple[str, str]]:
-    """Returns what differs in an imported keystore, including a manifest that cannot be trusted; nothing elsewhere."""
+    """Return what differs in an imported keystore, including a manifest that cannot be trusted; nothing elsewhere."""
     try:
         manifest = deployed_manifest(view)
         return list(differing_files(view, manifest)) if manifest is not None else []

@@ -1,4 +1,4 @@
-"""Which file lives where, as SROS2 lays it out (ros2/sros2 keystore package, ros2/rcl security.c). Pure.
+"""Which file lives where, as SROS2 lays it out (ros2/sros2 keystore package, ros2/rcl security.c).
 
     <keystore>/public/{identity,permissions}_ca.cert.pem      trust anchors; SROS2: links to ca.cert.pem
                private/{identity,permissions}_ca.key.pem      CA keys, mode 0600 in a 0700 directory

@@ -1,4 +1,4 @@
-"""What a generated systemd unit says of itself, and how it is read back. Pure.
+"""What a generated systemd unit says of itself, and how it is read back.
 
 systemd ignores settings that begin with ``X-`` (systemd.unit(5)).
 """

@@ -1,11 +1,11 @@
-"""A keystore that was imported: versions beside each other, and one link that says which counts.
+"""An imported keystore: versions beside each other, and one link to the version in force.
 
     /etc/ros/keystore        -> keystore.d/1763774400      what ROS_SECURITY_KEYSTORE names
     /etc/ros/keystore.d/1763774400/                        a whole keystore without private/
     /etc/ros/keystore.d/pending/                           keys made here that wait for their certificates
 
 A version is written aside, made durable, and put in force by one rename of the link: whoever looks at any moment sees
-the old one or the new one, whole. What a dead run left is never seen and cleared by the next.
+the old one or the new one, whole. What an interrupted run left is never seen, and the next run removes it.
 """
 
 from __future__ import annotations
@@ -42,16 +42,17 @@ class Versions:
 
     @property
     def current(self) -> Path | None:
-        """The version in force; None before the first import."""
+        """Return the version in force, None before the first import."""
         return self.folder / os.readlink(self.root).rpartition("/")[2] if self.root.is_symlink() else None
 
     @property
     def pending(self) -> Path:
+        """Return the directory of keys that wait for their certificates."""
         return self.folder / PENDING
 
     @contextmanager
     def opened(self, timeout: float = lock.DEFAULT_TIMEOUT) -> Iterator[None]:
-        """Under the lock of whoever imports or makes keys here; what a dead run left is cleared first."""
+        """Hold the lock of imports and requests; what an interrupted run left is removed first."""
         create_root(self.folder)
         safe_files.refuse_unsafe_directory(self.folder)
         with lock.exclusive(self.folder, timeout):
@@ -59,7 +60,7 @@ class Versions:
             yield
 
     def stage(self, entries: Mapping[str, Content | Link]) -> Path:
-        """Write a version aside; its place, for ``switch``. Raises StorageError."""
+        """Write a version aside and return its place, for ``switch``. Raises StorageError."""
         staging = self.folder / _STAGING
         try:
             write_tree(staging, entries)
@@ -89,7 +90,7 @@ class Versions:
             raise StorageError.of(error, "putting the bundle in force") from None
 
     def discard(self) -> None:
-        """Forget what was staged."""
+        """Delete what was staged."""
         shutil.rmtree(self.folder / _STAGING, ignore_errors=True)
 
     def _is_ours(self) -> bool:
@@ -121,7 +122,7 @@ class Versions:
 
 
 def write_tree(root: Path, entries: Mapping[str, Content | Link], *, durable: bool = False) -> None:
-    """A new directory with these files, by their paths below it."""
+    """Make a new directory with these files, by their paths below it."""
     os.mkdir(root, 0o700)
     os.chmod(root, 0o755)
     for relative, entry in entries.items():
@@ -133,7 +134,7 @@ def write_tree(root: Path, entries: Mapping[str, Content | Link], *, durable: bo
 
 
 def write_new(path: Path, data: bytes, mode: int, *, durable: bool = False) -> None:
-    """A file that was not there, private from its first byte, with exactly this mode; on the disk when ``durable``."""
+    """Write a new file, private from its first byte, with exactly this mode; synced to disk if ``durable``."""
     descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, mode)
     with os.fdopen(descriptor, "wb") as stream:
         os.fchmod(descriptor, mode)
@@ -144,9 +145,9 @@ def write_new(path: Path, data: bytes, mode: int, *, durable: bool = False) -> N
 
 
 def make_directories(root: Path, relative: str) -> None:
-    """Those above ``relative``, below ``root``, that are not there yet.
+    """Make the missing directories above ``relative``, below ``root``.
 
-    Modes are ours, whatever the umask: who can write in a directory can replace the key in it.
+    Their modes do not depend on the umask: who can write in a directory can replace the key in it.
     """
     for parent in reversed(list(parents(relative))):
         if not (root / parent).is_dir():

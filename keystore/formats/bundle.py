@@ -1,4 +1,4 @@
-"""What a bundle for one host says about itself: the manifest, signed by the permissions CA. Pure.
+"""What a bundle for one host says about itself: the manifest, signed by the permissions CA.
 
     bundle.p7s      the manifest, as S/MIME like governance and permissions
     public/...      trust anchors and CRL          enclaves/...    governance and each enclave's files
@@ -28,7 +28,7 @@ _VERSION = 1
 
 
 def refuse_host_name(name: str, where: str) -> None:
-    """Raises InvalidInputError for what cannot name a file, a Compose service and a Kubernetes node."""
+    """Raise InvalidInputError if ``name`` cannot name a file, a Compose service and a Kubernetes node."""
     if not _HOST.match(name):
         raise InvalidInputError(
             f"{where}: {printable(name)} is not a host name: 1 to 63 of letters, digits, '.', '_' and '-', "
@@ -37,8 +37,13 @@ def refuse_host_name(name: str, where: str) -> None:
 
 
 class BundledEnclave(NamedTuple):
-    """``key`` and ``document`` are the register's: SHA-256 of the public key and of the signed permissions.
-    ``has_key``: the private key lies in the bundle; otherwise it was made on the host and never left it."""
+    """An enclave in a manifest.
+
+    Attributes:
+        key: SHA-256 of the public key, as in the register.
+        document: SHA-256 of the signed permissions, as in the register.
+        has_key: True if the private key is in the bundle; otherwise it was made on the host and never left it.
+    """
 
     enclave: str
     serial: int
@@ -50,7 +55,13 @@ class BundledEnclave(NamedTuple):
 
 
 class Manifest(NamedTuple):
-    """``authorities``: SHA-256 of each trusted CA certificate. ``ends``: when the first thing in it ends."""
+    """The signed contents of a bundle.
+
+    Attributes:
+        authorities: SHA-256 of each trusted CA certificate, the one in use first.
+        files: Path -> SHA-256.
+        ends: When the first of its contents expires.
+    """
 
     host: str
     number: int
@@ -61,16 +72,17 @@ class Manifest(NamedTuple):
     ends: datetime
 
     def same_content(self, other: Manifest) -> bool:
-        """Whether both say the same apart from their numbers."""
+        """Return True if both are the same apart from their numbers."""
         return self == other._replace(number=self.number)
 
     @property
     def names(self) -> tuple[str, ...]:
+        """Return the names of the enclaves."""
         return tuple(one.enclave for one in self.enclaves)
 
 
 def manifest_json(manifest: Manifest) -> bytes:
-    """One line for each enclave and file: differences between two can be read."""
+    """Return the manifest as JSON, one line for each enclave and file, so that a diff can be read."""
     head = {
         "type": TYPE,
         "version": _VERSION,
@@ -90,7 +102,7 @@ def _row(one: BundledEnclave) -> list[Any]:
 
 
 def parse_manifest(text: bytes, place: str) -> Manifest:
-    """Raises DamagedKeystoreError for anything but what ``manifest_json`` writes."""
+    """Read what ``manifest_json`` writes. Raises DamagedKeystoreError for anything else."""
     try:
         content: Any = json.loads(text)
         if content["type"] != TYPE or content["version"] != _VERSION:
@@ -115,14 +127,15 @@ _ROLES = {"identity": Role.IDENTITY, "permissions": Role.PERMISSIONS}
 
 
 def pin(role: Role, digest: str) -> str:
-    """Writes which CA may do what: ``identity=SHA256`` or ``permissions=SHA256``."""
+    """Return which CA may do what: ``identity=SHA256`` or ``permissions=SHA256``."""
     return f"{role.value.removesuffix('_ca')}={digest}"
 
 
 def pins_of(named: Iterable[str]) -> dict[Role, frozenset[str]]:
-    """Reads what ``pin`` writes; colons and capitals, as openssl writes them, are taken too.
+    """Read what ``pin`` writes, and fingerprints with colons and capitals as openssl prints them.
 
-    Raises InvalidInputError for a fingerprint without a role, and for a role without a CA.
+    Raises:
+        InvalidInputError: A fingerprint has no role, or a role no CA.
     """
     found: dict[Role, set[str]] = {role: set() for role in Role}
     for one in named:

@@ -1,8 +1,8 @@
-"""One signed bundle for each host: its enclaves, no CA key, and a manifest that the host can hold everything against.
+"""Write one signed bundle for each host: its enclaves, no CA key, and a manifest with the hash of every file.
 
-The same keystore and the same enclaves give the same bytes: what was signed last for a host is kept in
-``private/bundles`` and used again while it is true. A new manifest gets a higher number, by which the host tells an
-earlier bundle.
+The same keystore and the same enclaves give the same bytes: the manifest signed last for a host is stored in
+``private/bundles`` and used again if nothing changed. A new manifest gets a higher number, by which the host recognises
+an earlier bundle.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ SUFFIX = ".bundle"
 
 @dataclass(frozen=True, slots=True)
 class BundleOptions(ChangeOptions):
-    """``accept_shared``: enclaves that live on several hosts, whose keys are then on all of them."""
+    """How to export. ``accept_shared``: accept enclaves on several hosts, whose keys are then on all of them."""
 
     accept_exposures: bool = False
     accept_shared: bool = False
@@ -47,7 +47,7 @@ class BundleOptions(ChangeOptions):
 
 @dataclass(frozen=True, slots=True)
 class HostBundle:
-    """What was written for one host. ``is_new`` False: it is the bundle of the last time, byte by byte."""
+    """What was written for one host; if ``is_new`` is False, the same bytes as last time."""
 
     path: Path
     manifest: Manifest
@@ -55,7 +55,7 @@ class HostBundle:
 
 
 def enclaves_of_hosts(enclaves: Iterable[str], hosts: Hosts) -> dict[str, list[str]]:
-    """Host -> its enclaves; those that no pattern names are on none. Raises InvalidInputError."""
+    """Return host -> its enclaves; those that no pattern names are on none. Raises InvalidInputError."""
     found: dict[str, list[str]] = {host: [] for host in hosts.names}
     for enclave in enclaves:
         host = hosts.of_enclave(enclave)
@@ -73,8 +73,10 @@ def export_hosts(
 ) -> tuple[HostBundle, ...]:
     """Write ``output``/HOST.bundle for each host of ``assigned`` (host -> enclave names or patterns).
 
-    Raises InvalidInputError for a host without enclaves and for an enclave on several hosts, DamagedKeystoreError for
-    what ``verify`` calls an error of these enclaves, SigningUnavailableError without the permissions CA's key.
+    Raises:
+        InvalidInputError: A host has no enclave, or an enclave is on several hosts.
+        DamagedKeystoreError: ``verify`` finds an error in these enclaves.
+        SigningUnavailableError: The permissions CA's key is not here.
     """
     chosen = options or BundleOptions()
     view = keystore_at(keystore)
@@ -135,7 +137,7 @@ def _export(
 
 
 def last_signed(view: KeystoreView, host: str) -> tuple[Manifest, bytes] | None:
-    """The manifest signed last for ``host`` and its file; None when there is none by the permissions CA in use."""
+    """Return the manifest signed last for ``host`` and its file, None if there is none."""
     relative = layout.signed_bundle(host)
     signed = safe_files.read_if_there(view.root, relative)
     if signed is None:
@@ -192,7 +194,7 @@ def _manifest(view: KeystoreView, host: str, names: list[str], files: Mapping[st
 
 
 def _bundled(enclave: str, files: Mapping[str, Content]) -> BundledEnclave:
-    """From the very bytes that are exported; they were checked to be what the register holds."""
+    """Return the manifest's row for ``enclave``, from the very bytes that are exported."""
     directory = layout.enclave_directory(enclave)
     cert = read_certificate(files[f"{directory}/{layout.CERT}"].data, f"{directory}/{layout.CERT}")
     signed = smime.read(files[f"{directory}/{layout.PERMISSIONS}"].data, f"{directory}/{layout.PERMISSIONS}")
@@ -209,7 +211,7 @@ def _bundled(enclave: str, files: Mapping[str, Content]) -> BundledEnclave:
 
 
 def _write(output: Path, host: str, content: bytes, root: Path) -> Path:
-    """Replaces the bundle of before: complete or as it was."""
+    """Replace the previous bundle atomically."""
     target = output / f"{host}{SUFFIX}"
     if Path(os.path.realpath(output)).is_relative_to(root):
         raise InvalidInputError(f"{printable(output)} lies in the keystore; choose another place")
@@ -226,5 +228,5 @@ def _write(output: Path, host: str, content: bytes, root: Path) -> Path:
 
 
 def pinned(manifest: Manifest) -> tuple[str, ...]:
-    """Returns what the first import wants to be told: which CA may do what."""
+    """Return the pins for the first import: which CA may do what."""
     return tuple(pin(role, one) for role in Role for one in manifest.authorities[role])

@@ -1,4 +1,4 @@
-"""A bundle put in force on its host: everything is checked in memory and aside, then one rename changes all.
+"""Import a bundle on its host: everything is checked in memory and aside, then one rename changes all.
 
 Needs neither a network nor a CA key. Refused: what the pinned permissions CA did not sign, another host's bundle, an
 earlier one, one that is cut off or has a file more, less or changed, an earlier CRL, an enclave that was revoked, a
@@ -49,7 +49,7 @@ from keystore.verification.governance import weaknesses
 
 
 class Restart(str, Enum):
-    """Who must be started anew: participants read their files once, when they are created."""
+    """Who must be restarted: participants read their files once, when they are created."""
 
     NOBODY = "nobody"
     CHANGED = "the changed enclaves, one after the other"
@@ -59,10 +59,14 @@ class Restart(str, Enum):
 
 @dataclass(frozen=True, slots=True)
 class ImportOptions:
-    """``host``: which one this is; needed unless the bundle's name for it is taken from an earlier import.
+    """How to import.
 
-    ``authorities``: which CA may do what, as ``identity=SHA256`` and ``permissions=SHA256``; for the first import, and
-    to pin others by hand. ``accept_weaker``: attributes of the governance that may be weaker than the default.
+    Attributes:
+        host: Which host this is; None if an earlier import said so.
+        authorities: Which CA may do what, as ``identity=SHA256`` and ``permissions=SHA256``; for the first import, and
+            to pin others by hand.
+        accept_weaker: Attributes of the governance that may be weaker than the default.
+        owner: Of the copies for containers; None for the previous one.
     """
 
     host: str | None = None
@@ -74,7 +78,7 @@ class ImportOptions:
 
 
 class ImportReport(NamedTuple):
-    """``changed``: enclaves that are new or have other files. ``notes`` are for a person."""
+    """What an import changed. ``changed``: enclaves that are new or have other files; ``notes`` are for a person."""
 
     keystore: Path
     manifest: Manifest
@@ -93,10 +97,13 @@ class _Bundle(NamedTuple):
 def import_bundle(
     keystore: Path | str, bundle: Path | str, *, options: ImportOptions | None = None
 ) -> ImportReport:
-    """Put ``bundle`` in force at ``keystore``, a link that this makes and owns; the same one again changes nothing.
+    """Put ``bundle`` in force at ``keystore``, a link that this makes and owns; importing it again changes nothing.
 
-    Raises DamagedKeystoreError (cut off, changed, not fit), UnsafeKeystoreError (not signed by the pinned CA, for
-    another host, earlier, with what is revoked), InvalidInputError, StorageError.
+    Raises:
+        DamagedKeystoreError: It is cut off, changed, or not fit for use.
+        UnsafeKeystoreError: It is not signed by the pinned CA, for another host, earlier, or weaker than the default.
+        InvalidInputError: Host or pins are not given as they should be.
+        StorageError: It cannot be written; what was in force still is.
     """
     chosen = options or ImportOptions()
     versions = Versions(keystore)
@@ -131,7 +138,7 @@ def parse_owner(text: str) -> ContainerUser:
 
 
 def _present(version: Path | None) -> Manifest | None:
-    """What is in force. Its signature was checked when it was imported; ``verify`` checks it again."""
+    """Return the manifest in force. Its signature was checked when it was imported; ``verify`` checks it again."""
     if version is None:
         return None
     place = printable(version / layout.BUNDLE)
@@ -162,7 +169,7 @@ def _checked(
 
 
 def _pins(present: Manifest | None, options: ImportOptions) -> dict[Role, frozenset[str]]:
-    """The CAs named by hand, else those of what is in force. Raises UnsafeKeystoreError without either."""
+    """Return the CAs named by hand, else those in force. Raises UnsafeKeystoreError if there are neither."""
     if options.authorities:
         return pins_of(options.authorities)
     if present is None:
@@ -229,7 +236,7 @@ def _refuse_other_host(
 
 
 def _check_files(found: _Bundle) -> None:
-    """Exactly the files of the manifest, each with its hash; and only such that a bundle can have."""
+    """Raise unless the files are exactly those of the manifest, with their hashes, and such that a bundle can have."""
     manifest, place = found.manifest, found.place
     enclaves = [(one.enclave, one.has_key) for one in manifest.enclaves]
     expected = layout.bundle_files(
@@ -247,7 +254,7 @@ def _check_files(found: _Bundle) -> None:
 
 
 def _check_authorities(found: _Bundle, options: ImportOptions) -> None:
-    """The trust files hold the CAs that the manifest names; with pins by hand, each only those of its role."""
+    """Raise unless the trust files hold the CAs of the manifest; with pins by hand, each only those of its role."""
     pins = pins_of(options.authorities) if options.authorities else None
     for role in Role:
         name = layout.ca_cert(role)
@@ -261,7 +268,7 @@ def _check_authorities(found: _Bundle, options: ImportOptions) -> None:
 
 
 def _refuse_earlier(found: _Bundle, present: Manifest) -> None:
-    """CRL numbers belong to their issuer: another identity CA in use begins a new series."""
+    """Raise for an earlier bundle or CRL. CRL numbers belong to their issuer: another CA in use begins a new series."""
     if found.manifest.number <= present.number:
         raise UnsafeKeystoreError(
             f"{found.place} is number {found.manifest.number}, but {present.number} is in force here: an earlier "
@@ -275,7 +282,7 @@ def _refuse_earlier(found: _Bundle, present: Manifest) -> None:
 
 
 def _refuse_weaker(found: _Bundle, present: Manifest | None, accepted: Iterable[str]) -> None:
-    """Raises UnsafeKeystoreError for a governance weaker than the default that this host has not accepted yet."""
+    """Raise UnsafeKeystoreError if the governance is weaker than the default and this host has not accepted it yet."""
     if (
         present is not None
         and present.files.get(layout.GOVERNANCE) == found.manifest.files[layout.GOVERNANCE]
@@ -299,7 +306,7 @@ def _put_in_force(
     differing: Collection[str],
     owner: ContainerUser | None,
 ) -> ImportReport:
-    """``differing``: files that are not as the same bundle left them, and are restored."""
+    """Write and switch to a version. ``differing``: files that are not as this bundle left them, and are restored."""
     keys = {one.enclave: find_key(versions, one) for one in found.manifest.enclaves if not one.has_key}
     entries = _entries(found, keys)
     copies = container_entries(found.manifest.names, entries) if owner is not None else {}
@@ -320,7 +327,7 @@ def _put_in_force(
 
 
 def _without(present: Manifest | None, differing: Collection[str]) -> Manifest | None:
-    """What was really in force: without the files that were not as they should be, and the enclaves they are of."""
+    """Return what was really in force: without the differing files and the enclaves that they belong to."""
     if present is None:
         return None
     files = {name: digest for name, digest in present.files.items() if name not in differing}
@@ -330,7 +337,7 @@ def _without(present: Manifest | None, differing: Collection[str]) -> Manifest |
 
 
 def _entries(found: _Bundle, keys: Mapping[str, HostKey]) -> dict[str, Content | Link]:
-    """The files of the version: those of the bundle, the keys that were made here, and the usual links."""
+    """Return the files of the version: those of the bundle, the keys that were made here, and the usual links."""
     entries: dict[str, Content | Link] = {
         name: Content(data, store.PRIVATE_MODE if name.endswith(f"/{layout.KEY}") else store.PUBLIC_MODE)
         for name, data in found.files.items()
@@ -345,7 +352,7 @@ def _entries(found: _Bundle, keys: Mapping[str, HostKey]) -> dict[str, Content |
 
 
 def _refuse_unfit(staged: Path, place: str, now: datetime) -> list[str]:
-    """What ``verify`` finds in the version itself; what stands around it is the host's business and only told."""
+    """Raise for what ``verify`` calls an error of the version; return its other findings."""
     notes = []
     for finding in verify(staged, now=now).findings:
         text = f"{finding.place}: {finding.message} [{finding.code}]"
