@@ -72,8 +72,9 @@ class Audit(Listener):
         need, asked = found
         self._checked += 1
         if need not in self._asked:
-            self._asked.add(need)
-            if not self._grants.permits(need):
+            granted = self._grants.granted(node, line, need)
+            self._asked.update((need, *granted))
+            if not granted:
                 described = self._grants.described(process, node)
                 short = described.text if described.missing is None else "nobody"
                 who, by = _by(described.text, line), _by(short, line)

@@ -159,7 +159,8 @@ class Explainer(Listener):
         if found is None or found[0] in self._told:
             return
         need, asked = found
-        granted, described = self._grants.permits(need), self._grants.described(process, node)
+        granted = bool(self._grants.granted(node, line, need))
+        described = self._grants.described(process, node)
         if silent and granted:
             return
         self._told.add(need)

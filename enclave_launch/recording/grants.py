@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from itertools import takewhile
 from typing import NamedTuple
 
 from enclave_launch.plan import (
@@ -20,7 +21,7 @@ from keystore.formats.permissions import DdsRules, dds_rules
 from keystore.formats.permissions_names import dds_topics, full_name
 from keystore.formats.permissions_patterns import covers, has_wildcard
 from keystore.formats.policy import Operation, Qualifier, Rule
-from nodl.record.asked import Asked, asked_endpoint
+from nodl.record.asked import Asked, EndpointRole, asked_endpoint, role_of
 from nodl.record.assembly import RecordedNode, RecordedProcess
 from nodl.record.lines import EndpointMade
 
@@ -95,6 +96,18 @@ class PlannedGrants:
             return None
         return Need(enclave, node.fqn, OPERATIONS[asked.kind], asked.final), asked
 
+    def granted(self, node: RecordedNode, line: EndpointMade, need: Need) -> tuple[Need, ...]:
+        """Return what the plan grants of ``need``: itself, or each part of an action that rules have moved apart.
+
+        Empty if ``need`` is not granted.
+        """
+        if self.permits(need):
+            return (need,)
+        parts = tuple(
+            Need(need.enclave, need.node, OPERATIONS[part.kind], part.final) for part in _parts(node, line)
+        )
+        return parts if all(map(self.permits, parts)) else ()
+
     def permits(self, need: Need) -> bool:
         """Return True if the plan grants ``need``."""
         rules = self._rules.get(need.enclave)
@@ -144,6 +157,19 @@ class PlannedGrants:
                 if same and any(each.fqn == node.fqn for each in item.nodes):
                     return item
         return self._processes.get(process.started.process) if process.started else None
+
+
+def _parts(node: RecordedNode, line: EndpointMade) -> list[EndpointMade]:
+    """Return the parts of the action ``line``, which come before it."""
+    parts: list[EndpointMade] = []
+    if line.kind.family != "action":
+        return parts
+    for each in takewhile(lambda each: each is not line, node.endpoints):
+        if role_of(each) is EndpointRole.PART_OF_ACTION:
+            parts.append(each)
+        elif each.kind.family == "action":
+            parts.clear()
+    return parts
 
 
 def permits(rules: DdsRules, need: Need) -> bool:

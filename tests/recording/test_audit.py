@@ -124,3 +124,19 @@ def test_a_library_of_the_launch_file_stays_beside_the_recorder(stand_in: Path, 
 def test_an_audit_is_unsecured_and_says_so_when_it_is_asked_for_both(stand_in: Path, tmp_path: Path) -> None:
     status, output, _ = audit(make_workspace(tmp_path, stand_in, [FIT]), "--secure")
     assert status == 2 and "--audit runs the launch unsecured" in output
+
+
+def test_an_action_of_which_a_rule_moves_a_part_is_granted_part_by_part(
+    stand_in: Path, tmp_path: Path
+) -> None:
+    """jazzy remaps the names below an action one by one; beside it an action that nobody was granted."""
+    server = ("action_server", "go")
+    program = Program(
+        "mover",
+        f"node mover\n{asks([server, ('action_server', 'other')])}",
+        (server,),
+        inside='<remap from="go/_action/send_goal" to="start"/>',
+    )
+    _, _, report = audit(make_workspace(tmp_path, stand_in, [program]))
+    assert [each["name"] for each in report["would_be_refused"]] == ["/other"]
+    assert report["never_asked_for"] == []
