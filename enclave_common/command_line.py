@@ -185,7 +185,8 @@ def guarded(program: str, work: Callable[[], int], *mistakes: type[Exception]) -
     """
     try:
         status = work()
-        sys.stdout.flush()
+        if sys.stdout is not None:  # closed by whoever started us
+            sys.stdout.flush()
         return status
     except mistakes as error:
         print(f"{program}: error: {error}", file=sys.stderr)

@@ -3,10 +3,9 @@ ends in one line as it does later."""
 
 from __future__ import annotations
 
-import sys
 from importlib import import_module
 
-from enclave_common.dependencies import missing_dependency
+from enclave_common.command_line import guarded
 
 
 def secure_launch() -> int:
@@ -30,14 +29,4 @@ def secure_nodl() -> int:
 
 
 def _run(command: str, module: str) -> int:
-    try:
-        return int(import_module(module).main())
-    except ImportError as error:
-        text = missing_dependency(error)
-        if text is None:
-            raise
-        print(f"{command}: error: {text}", file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        print(f"{command}: interrupted", file=sys.stderr)
-        return 130
+    return guarded(command, lambda: int(import_module(module).main()))

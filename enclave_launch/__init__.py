@@ -6,10 +6,8 @@ Each public name is imported when it is first used: a dry run loads neither ``cr
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import Any
-
 from enclave_common import VERSION
+from enclave_common.lazy_names import lazy_names
 
 __version__ = VERSION
 
@@ -49,19 +47,4 @@ _MODULES = {
     "enclave_launch.secured": ("ProvisionedLaunch",),
 }
 """The public names of each module. ``__init__.pyi`` says the same to type checkers; a test compares the two."""
-_MODULE_OF = {name: module for module, names in _MODULES.items() for name in names}
-__all__ = sorted(_MODULE_OF)
-
-
-def __getattr__(name: str) -> Any:
-    """Import a public name when it is first used (PEP 562)."""
-    if name not in _MODULE_OF:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(_MODULE_OF[name]), name)
-    globals()[name] = value
-    return value
-
-
-def __dir__() -> list[str]:
-    """List the public names."""
-    return __all__
+__all__, __getattr__, __dir__ = lazy_names(__name__, _MODULES)
