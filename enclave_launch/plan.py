@@ -1,7 +1,7 @@
 """The plan of a launch: everything decided, nothing done.
 
 The values: ``planner`` makes a ``LaunchPlan``, which the dry run prints, ``provision`` turns into a keystore and
-``run`` carries out. Pure.
+``run`` carries out. Performs no I/O.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Which DDS domains the permissions of each enclave are for: those of its own processes.
 
-Takes a plan, gives the keystore's options; what cannot be served is refused with both places named. Pure.
+Takes a plan, gives the keystore's options; what cannot be served is refused with both places named. Performs no I/O.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Which middlewares read enclaves, and which two cannot authenticate each other. Pure.
+"""Which middlewares read enclaves, and which two cannot authenticate each other. Performs no I/O.
 
 rcl hands every middleware the path of the enclave; what it does with it is its own business.
 

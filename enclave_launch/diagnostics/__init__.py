@@ -2,7 +2,7 @@
 
 A ``Diagnostic`` is a value like any other: reports print it, programs ask for its ``code`` and ``location`` (JSON,
 SARIF), tests compare it. Whether it stops ``--secure`` is said by the list it stands in (``LaunchPlan.problems`` or
-``warnings``). Pure.
+``warnings``). Performs no I/O.
 """
 
 from __future__ import annotations

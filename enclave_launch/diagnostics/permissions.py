@@ -1,4 +1,4 @@
-"""What is told of interfaces, and of the permissions that follow from them. Pure."""
+"""What is told of interfaces, and of the permissions that follow from them. Performs no I/O."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The dry run's JSON → what the plan expects to run in one DDS domain. Pure."""
+"""The dry run's JSON → what the plan expects to run in one DDS domain. Performs no I/O."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """The smallest policy that lets every node of a launch work, with a reason for each permission.
 
-Takes the running nodes, gives a ``DerivedPolicy``; next are the plan, the reports and the keystore. Pure.
+Takes the running nodes, gives a ``DerivedPolicy``; next are the plan, the reports and the keystore. Performs no I/O.
 All nodes of one enclave are united (that is what DDS enforces), each keeps its own profile (that is what
 a person reviews). Sorted and free of repetitions: the same launch gives the same bytes, and taking a node
 away takes exactly its permissions away. Time is linear in nodes and interfaces.

@@ -1,6 +1,6 @@
 """What one running node needs: each of its names, final, with the reason.
 
-Takes a ``RunningNode``, gives ``NodePermissions``; ``derivation`` collects them by enclave. Pure.
+Takes a ``RunningNode``, gives ``NodePermissions``; ``derivation`` collects them by enclave. Performs no I/O.
 Order of things as in rcl: the name's parameters are filled in, it is expanded under the node's final name
 and namespace, then the first matching remap rule replaces it (``nodl.remap``).
 """

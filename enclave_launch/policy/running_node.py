@@ -1,7 +1,7 @@
 """A node as it will run: its interface under the final name, in its enclave.
 
 Takes a ``NodeInterface`` and the process or component that launch starts; gives a ``RunningNode``; next is the
-derivation of the policy. Pure.
+derivation of the policy. Performs no I/O.
 
 Final names follow rcl (``rcl/src/rcl/remap.c``, ``node.c``): the program's own name and namespace, then the first
 ``__node`` and ``__ns`` rule that applies. A component has its own rule list from the load request and does not see

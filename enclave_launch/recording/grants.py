@@ -1,4 +1,4 @@
-"""What the plan grants, asked by what was recorded: in DDS's own terms, as the signed permissions will say it. Pure."""
+"""What the plan grants, asked by what was recorded: in DDS's own terms, as the signed permissions will say it."""
 
 from __future__ import annotations
 

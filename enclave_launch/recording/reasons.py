@@ -1,4 +1,4 @@
-"""Why a participant was not made, from rcl's texts and from what the middleware prints; as advice for a person. Pure.
+"""Why a participant was not made, from rcl's texts and from what the middleware prints; as advice for a person.
 
 The lines were measured on Cyclone DDS 0.10 and Fast DDS 2.9 and 2.14, each with its fault injected.
 """

@@ -1,4 +1,4 @@
-"""Which enclave can influence which, directly and over others. Pure.
+"""Which enclave can influence which, directly and over others. Performs no I/O.
 
 The question of the design article "ROS 2 Security Enclaves" and of the paper's future work: a permission says what one
 participant may do, but a message that it reads can change what it writes. So influence is transitive: whoever publishes

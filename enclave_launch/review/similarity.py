@@ -1,4 +1,4 @@
-"""Enclaves that could be one, and enclaves that should be several: the paper's question of similar policies. Pure.
+"""Enclaves that could be one, and enclaves that should be several: the paper's question of similar policies.
 
 One enclave less is one key, one certificate and one signed document less to renew; the price is that each process in it
 may then do what the others may (the excess). The same number, the other way round, is what a split saves.

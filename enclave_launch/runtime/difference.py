@@ -1,4 +1,4 @@
-"""In words: what was planned, what came instead, and why that can be. Pure."""
+"""In words: what was planned, what came instead, and why that can be. Performs no I/O."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """Which options make sense together: one that would have no effect is wrong usage, never passed over.
 
-Somebody who writes ``--keystore`` believes that the robot starts secured. Pure.
+Somebody who writes ``--keystore`` believes that the robot starts secured. Performs no I/O.
 """
 
 from __future__ import annotations

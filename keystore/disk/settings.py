@@ -1,4 +1,4 @@
-"""What a keystore remembers about itself: ``secure-keystore.json``, beside what SROS2 knows. Pure.
+"""What a keystore remembers about itself: ``secure-keystore.json``, beside what SROS2 knows. Performs no I/O.
 
 Absent in keystores made by SROS2; then the defaults hold. It also marks a directory as a keystore in the
 making, so that an interrupted ``create`` can be completed while a foreign directory is left alone.

@@ -1,4 +1,4 @@
-"""The governance of a keystore: what is protected how, one document for all enclaves. Pure.
+"""The governance of a keystore: what is protected how, one document for all enclaves. Performs no I/O.
 
     Governance (plain values) <-> governance.xml        YAML is ``keystore.formats.governance_yaml``
 

@@ -1,4 +1,4 @@
-"""What one enclave may do -> its DDS-Security permissions document, ready to be signed. Pure.
+"""What one enclave may do -> its DDS-Security permissions document, ready to be signed. Performs no I/O.
 
 Exactly the grants that ``ros2 security create_permission`` would write for the same policy, in a form
 that Cyclone DDS and Fast DDS both read, and without what breaks either of them:

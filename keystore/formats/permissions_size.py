@@ -1,4 +1,4 @@
-"""How large a permissions document may be: Fast DDS sends it whole in a handshake message. Pure.
+"""How large a permissions document may be: Fast DDS sends it whole in a handshake message. Performs no I/O.
 
 Measured on Fast DDS 2.9.1: a signed document of 62,830 bytes works; with 63,976 bytes no peer ever
 matches. Cyclone DDS 0.10.2 handles 140 kB.

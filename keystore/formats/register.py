@@ -1,4 +1,4 @@
-"""The register of a keystore: what was issued, to whom, until when, and what of it was revoked. Pure.
+"""The register of a keystore: what was issued, to whom, until when, and what of it was revoked. Performs no I/O.
 
 ``private/register.json``, written before a certificate or document leaves the CA. What stands elsewhere in the
 keystore can be put back from a backup or copied in; the register says whether it is what was issued last.

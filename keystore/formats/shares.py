@@ -1,4 +1,4 @@
-"""The shares of an enclave's permissions: what each launch asks for, and all of it together. Pure.
+"""The shares of an enclave's permissions: what each launch asks for, and all of it together. Performs no I/O.
 
 Several launch files may run on one keystore and meet in an enclave (with the default scope all use ``/``). Each owns
 its share; the enclave is granted the union. ``owner`` names the launch: the path of its launch file.

@@ -1,4 +1,4 @@
-"""Enclave name -> subject of its certificate and grant, what of it can be borrowed, where it sorts. Pure.
+"""Enclave name -> subject of its certificate and grant, what of it can be borrowed, where it sorts. Performs no I/O.
 
 Cyclone DDS compares subjects as bags: it cuts both names at ``, / |``, and a grant fits an identity when
 every piece of the identity occurs in the grant (access_control_utils.c, unchanged on master). With SROS2's

@@ -1,4 +1,4 @@
-"""From when until when a certificate and its permissions hold: one value for both. Pure.
+"""From when until when a certificate and its permissions hold: one value for both. Performs no I/O.
 
 The DDS implementations disagree about permissions dates: Cyclone DDS reads UTC, Fast DDS the local time of
 the process, in every release inspected. Hence the back-dating floor of 14 hours (the most easterly offset),

@@ -1,4 +1,4 @@
-"""``ManifestNode`` -> the text of a NoDL document, v1 or v2, sorted as it was read. Pure.
+"""``ManifestNode`` -> the text of a NoDL document, v1 or v2, sorted as it was read. Performs no I/O.
 
 What one version cannot say is returned as a list of notes, never dropped in silence.
 """

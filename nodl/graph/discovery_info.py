@@ -1,4 +1,4 @@
-"""Messages of ``ros_discovery_info``: which node of a participant owns which endpoint. Pure.
+"""Messages of ``ros_discovery_info``: which node of a participant owns which endpoint. Performs no I/O.
 
 Source: ros2/rmw_dds_common, ``ParticipantEntitiesInfo.msg``. Identifiers have 24 bytes up to Humble and 16 since Iron;
 a reader generated for 16 takes a message of 24 for one without nodes, so the bytes are read here, strictly.

@@ -1,4 +1,4 @@
-"""What DDS discovery announced (claims of whoever sent them) → processes, nodes and their interfaces. Pure.
+"""What DDS discovery announced (claims of whoever sent them) → processes, nodes and their interfaces. Performs no I/O.
 
 Which node owns an endpoint is told by ``ros_discovery_info`` only. Where its list is missing, a participant with one
 node owns its endpoints, and parameter services tell the names of nodes (programs that publish no list, or one that this

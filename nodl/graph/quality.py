@@ -1,4 +1,4 @@
-"""Quality of service of an endpoint, and whether a writer and a reader can meet. Pure.
+"""Quality of service of an endpoint, and whether a writer and a reader can meet. Performs no I/O.
 
 Rules of request and offer: DDS 1.4, 2.2.3, the table of policies with "RxO = yes". Words as NoDL v2 has them.
 """

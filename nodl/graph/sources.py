@@ -1,4 +1,4 @@
-"""Observed runs → what a manifest of each program says. Pure.
+"""Observed runs → what a manifest of each program says. Performs no I/O.
 
 A final name becomes what the source writes (``inverse``). Where several spellings lead to it, those stay that explain
 the most runs; what is still undecided then is written under the likeliest and told. Merging and parameters are those of

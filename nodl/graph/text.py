@@ -1,4 +1,4 @@
-"""An observed graph for a person. Pure."""
+"""An observed graph for a person. Performs no I/O."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The table of what the library knows, how that is known, and what is left open: docs/library-contents.md. Pure.
+"""The table of what the library knows, how that is known, and what is left open: docs/library-contents.md.
 
 ``secure-nodl library table`` prints it; a test holds the document to it.
 """

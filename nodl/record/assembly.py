@@ -1,4 +1,4 @@
-"""Lines of a record → processes, their nodes and endpoints, and what the launch started there. Pure.
+"""Lines of a record → processes, their nodes and endpoints, and what the launch started there. Performs no I/O.
 
 A process of the record belongs to the process that the supervisor started if it is in its session, or if one of its
 parents is: a shell or ``nice`` has another pid than the node behind it. Nodes of a container belong to the components

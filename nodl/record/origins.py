@@ -1,4 +1,4 @@
-"""Which parameter or argument a recorded name came from, over all observations of one node. Pure.
+"""Which parameter or argument a recorded name came from, over all observations of one node. Performs no I/O.
 
 Measured on nine stacks with ordinary and with hostile values: a name that comes from a parameter is its value
 verbatim, or one entry of it where it is a list, or below every entry of a list (``node_names`` of nav2's

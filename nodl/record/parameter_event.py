@@ -1,4 +1,4 @@
-"""The texts in a rcl_interfaces/msg/ParameterEvent as it goes over the wire: the parameters that a node declares. Pure.
+"""The texts in a rcl_interfaces/msg/ParameterEvent as it goes over the wire: the parameters that a node declares.
 
 Classic CDR (DDSI-RTPS, 10.2): each number stands at a multiple of its size, counted behind the four bytes that say how
 the rest is written; texts and lists have their length before them.

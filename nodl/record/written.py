@@ -1,4 +1,4 @@
-"""A written and a final name → the name as the source means it; a final name → what the source may write. Pure.
+"""A written and a final name → the name as the source means it; a final name → what the source may write.
 
 rcl gets most names as the source writes them. Some programs build theirs from the node's name (``get_name() + "/x"``):
 in one run that looks like a literal, and means ``~/x``. Measured over 277 names of 64 programs that ran under two node

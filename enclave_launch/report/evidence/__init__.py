@@ -1,4 +1,4 @@
-"""Evidence about a launch for those who must sign for a product: what was decided, checked, and not checked. Pure.
+"""Evidence about a launch for those who must sign for a product: what was decided, checked, and not checked.
 
 requirements.py   which part supports which requirement of the Cyber Resilience Act, IEC 62443 and ISO 10218
 matrix.py         who may do what, and why

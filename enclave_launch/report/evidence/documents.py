@@ -1,4 +1,4 @@
-"""All files of the evidence, from values: file name -> bytes. The same values give the same bytes. Pure.
+"""All files of the evidence, from values: file name -> bytes. The same values give the same bytes. Performs no I/O.
 
 Source of the statement about them: in-toto attestation framework, spec v1 (statement.md, resource_descriptor.md) and
 its predicate ``test-result`` v0.1: the files are the subjects, the checks the tests.

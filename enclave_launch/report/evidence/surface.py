@@ -1,4 +1,4 @@
-"""What can be reached: from other enclaves, from outside of the launch, and by programs that nothing confines. Pure."""
+"""What can be reached: from other enclaves, from outside of the launch, and by programs that nothing confines."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What enclaves hold: more than their nodes ask for, and more than one node should. Pure."""
+"""What enclaves hold: more than their nodes ask for, and more than one node should. Performs no I/O."""
 
 from __future__ import annotations
 

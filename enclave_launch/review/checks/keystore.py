@@ -1,4 +1,4 @@
-"""A plan held against a keystore: what is missing there, granted beyond it or less, and what ends. Pure."""
+"""A plan held against a keystore: what is missing there, granted beyond it or less, and what ends. Performs no I/O."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a launch file gives to its processes and components: rules, parameters, variables. Pure."""
+"""What a launch file gives to its processes and components: rules, parameters, variables. Performs no I/O."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Ends that should meet: topics, services and actions whose other end is missing, misspelt or of another kind. Pure."""
+"""Ends that should meet: topics, services and actions whose other end is missing, misspelt or of another kind."""
 
 from __future__ import annotations
 

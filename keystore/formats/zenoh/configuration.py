@@ -1,4 +1,4 @@
-"""Zenoh's configuration: of one enclave's processes, of the router, and where that is. Pure.
+"""Zenoh's configuration: of one enclave's processes, of the router, and where that is. Performs no I/O.
 
 Processes (``ZENOH_SESSION_CONFIG_URI``): ``client`` mode, so that nothing goes past the router; only TLS, with the
 enclave's own certificate; the router must be who it says it is. A custom file replaces that of rmw_zenoh as a whole, so

@@ -1,4 +1,4 @@
-"""What a message on a key is about, in ROS words: ``key_expressions`` and ``rules`` the other way round. Pure.
+"""What a message on a key is about, in ROS words: ``key_expressions`` and ``rules`` the other way round.
 
 For whoever reads a router's rules or its log. A key is untrusted text: what is not shaped as ROS makes it has no
 meaning, which is told as it is.

@@ -1,4 +1,4 @@
-"""The access-control rules of one enclave, as the router sees its sessions. Pure.
+"""The access-control rules of one enclave, as the router sees its sessions. Performs no I/O.
 
 Each message stands here because something planned fails without it; the table is measured, one message removed at
 a time (tests/zenoh). All rules allow: denials do not hold. ``ingress`` arrives at the router, ``egress`` leaves it.

@@ -1,4 +1,4 @@
-"""The types of what an enclave talks about, as far as its launches know them. Pure.
+"""The types of what an enclave talks about, as far as its launches know them. Performs no I/O.
 
 DDS permissions name no types; a key expression can. A name is bound to its types only where everybody who asks for it
 knows them: whoever does not may be right with another one.
