@@ -204,12 +204,10 @@ def _element(run: Machine, node: Node, inner: Type, frame: Frame, value: Value |
 
 
 def as_set(items: Sequence[Value]) -> Seq:
-    """Each element once, in order; in any order, any number of times where one is not known."""
-    known = [plain(item[0]) if len(item) == 1 else None for item in items]
-    if None in known or (len(set(known)) > 1 and not all(isinstance(item[0], Text) for item in items)):
-        return open_sequence(items)
-    by_text = {str(text): item for text, item in zip(known, items, strict=True)}
-    return Seq(tuple(by_text[text] for text in sorted(by_text)))
+    """Return each element once, in order; in any order, any number of times if one is not a known text."""
+    known = [plain(item[0]) if len(item) == 1 and isinstance(item[0], Text) else None for item in items]
+    by_text = {text: item for text, item in zip(known, items, strict=True) if text is not None}
+    return open_sequence(items) if None in known else Seq(tuple(by_text[text] for text in sorted(by_text)))
 
 
 def cast(run: Machine, kind: Type, value: Value) -> Value:
