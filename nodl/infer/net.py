@@ -121,8 +121,8 @@ def _literals(tree: ast.AST) -> Constants:
     stores: dict[str, int] = {}
     for part in ast.walk(tree):
         names: list[str] = []
-        if isinstance(part, ast.Name | ast.Attribute) and not isinstance(part.ctx, ast.Load):
-            names = [last_name(part)]
+        if isinstance(part, (ast.Name, ast.Attribute)):
+            names = [] if isinstance(part.ctx, ast.Load) else [last_name(part)]
         elif isinstance(part, ast.arg):
             names = [part.arg]
         elif isinstance(part, ast.Global | ast.Nonlocal):
@@ -153,6 +153,19 @@ class _Reader:
                 return
 
     def visit(self, node: ast.AST, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
+        if isinstance(node, ast.Name):
+            if isinstance(node.ctx, ast.Load):
+                scope.names.add(node.id)
+            return
+        if isinstance(node, ast.Attribute):
+            if isinstance(node.ctx, ast.Load):
+                scope.attributes.add(node.attr)
+            self.visit(node.value, scope, (*around, node))
+            return
+        if isinstance(node, ast.Constant):
+            if isinstance(node.value, str) and node.value.isidentifier():
+                scope.attributes.add(node.value)
+            return
         if isinstance(node, Function):
             self._function(node, scope, around)
             return
@@ -174,10 +187,6 @@ class _Reader:
             inside += [node.func] if not isinstance(node.func, ast.Attribute | ast.Name) else []
             self._each([*inside, *node.args, *node.keywords], scope, (*around, node))
             return
-        elif isinstance(node, ast.Name | ast.Attribute) and isinstance(node.ctx, ast.Load):
-            (scope.names if isinstance(node, ast.Name) else scope.attributes).add(last_name(node))
-        elif isinstance(node, ast.Constant) and isinstance(node.value, str) and node.value.isidentifier():
-            scope.attributes.add(node.value)
         elif isinstance(node, ast.Assign) and any(last_name(each) == "__all__" for each in node.targets):
             return
         elif isinstance(node, ast.AnnAssign):
