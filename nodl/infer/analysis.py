@@ -135,7 +135,7 @@ def _analyse_rest(run: Run, called: set[ast.AST], instantiated: set[ast.AST]) ->
 
 
 def is_node(cls: ClassValue) -> bool:
-    """Whether rclpy's node classes are among its bases."""
+    """Return True if rclpy's node classes are among its bases."""
     return any(isinstance(base, External) and is_node_class(base.path) for base in linearized(cls))
 
 
@@ -150,12 +150,12 @@ def _creates(run: Run, node: ast.stmt, cls: ClassValue | None) -> bool:
 
 @functools.lru_cache(maxsize=4)
 def _creating_lines(module: SourceModule) -> list[int]:
-    """The numbers of the lines with one of ``_CREATING``, in order."""
+    """Return the numbers of the lines with one of ``_CREATING``, in order."""
     return module.lines_with(_CREATING)
 
 
 def _defaults_only(function: FunctionValue) -> Arguments:
-    """An entry function gets no arguments; parameters without a default are unknown."""
+    """Return the arguments of an entry function: none; parameters without a default are unknown."""
     count = len(function.node.args.args) - len(function.defaults)
     return Arguments([ANY] * max(0, count))
 

@@ -40,7 +40,7 @@ def infer_executable(
     start_of: Start | None = None,
     compiled_only: bool = False,
 ) -> InferredExecutable:
-    """The nodes that ``executable`` of an installed package creates; gaps are attached to them.
+    """Return the nodes that ``executable`` of an installed package creates; gaps are attached to them.
 
     Compiled programs and components are read from ``sources``, in the light of what launch gives them (``start_of``);
     ``compiled_only``: those of Python, which are read anew each time, are left alone.

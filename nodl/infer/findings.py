@@ -84,7 +84,7 @@ class Findings:
 
     @property
     def is_open(self) -> bool:
-        """Whether there is a gap already, or a name of which nothing is known."""
+        """Return True if there is a gap already, or a name of which nothing is known."""
         unknown = any(type(each.name) is Unknown for record in self.nodes for each in record.endpoints)
         return unknown or bool(self.gaps) or any(record.gaps for record in self.nodes)
 
@@ -96,7 +96,7 @@ class Findings:
         self.gaps.setdefault((source, why))
 
     def unknown_node(self, source: SourceRef) -> NodeRecord:
-        """The node of endpoints that are created on something the analysis could not identify."""
+        """Return the node of endpoints that are created on something the analysis could not identify."""
         if self.homeless is None:
             self.homeless = self.add_node(NodeRecord(source))
         return self.homeless

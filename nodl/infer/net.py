@@ -38,7 +38,7 @@ _LOST = "may be called from somewhere that the analysis did not follow, and woul
 
 
 def may_make_interfaces(program: Program, main: SourceModule) -> bool:
-    """Whether running this file could: it, or a file of the program that it imports, says so or runs other code.
+    """Return True if running this file could: it, or a file of the program that it imports, says so or runs other code.
 
     A file that cannot be parsed could do anything.
     """
@@ -58,7 +58,7 @@ def may_make_interfaces(program: Program, main: SourceModule) -> bool:
 
 
 def _imported(node: ast.AST, module: SourceModule) -> Iterator[str]:
-    """The modules that an import statement may mean, with the packages around them."""
+    """Return the modules that an import statement may mean, with the packages around them."""
     names: list[str] = []
     if isinstance(node, ast.Import):
         names = [alias.name for alias in node.names]
@@ -295,7 +295,7 @@ class _Net:
     # --- which names reach an interface ---------------------------------------------------------------------
 
     def _reaching(self) -> set[str]:
-        """The names of functions and classes whose text reaches an interface, by names."""
+        """Return the names of functions and classes whose text reaches an interface, by names."""
         classes = self._class_makers(set())
         self._node_classes = frozenset(classes)
         makers = set(CREATING_NAMES) | classes
@@ -474,7 +474,7 @@ class _Net:
         return constants
 
     def _is_plain(self, entry: ast.Call) -> bool:
-        """Whether its arguments are those of the function: no ``*``, no ``partial`` or thread between the two."""
+        """Return True if its arguments are those of the function: no ``*``, no ``partial`` or thread in between."""
         starred = any(isinstance(each, ast.Starred) for each in entry.args)
         starred = starred or any(each.arg is None for each in entry.keywords)
         return not starred and last_name(entry.func) in self._makers
@@ -495,7 +495,7 @@ def _is_static(function: Function) -> bool:
 
 
 def is_dead(around: tuple[ast.AST, ...], constants: Constants) -> bool:
-    """Whether a test of literals keeps control from the last of ``around``."""
+    """Return True if a test of literals keeps control from the last of ``around``."""
     for outer, inner in itertools.pairwise(around):
         if isinstance(outer, ast.If | ast.While | ast.IfExp):
             outcome = _decided(outer.test, constants)
@@ -514,7 +514,7 @@ def is_dead(around: tuple[ast.AST, ...], constants: Constants) -> bool:
 
 
 def _decided(test: ast.expr, constants: Constants) -> bool | None:
-    """The truth of a test of literals; ``None`` for all others."""
+    """Return the truth of a test of literals; ``None`` for all others."""
     if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not):
         outcome = _decided(test.operand, constants)
         return None if outcome is None else not outcome

@@ -41,7 +41,7 @@ class Package(NamedTuple):
 
 
 def find_package(file: str) -> Package | None:
-    """The package that ``file`` belongs to: the nearest folder above with a ``package.xml``."""
+    """Return the package that ``file`` belongs to: the nearest folder above with a ``package.xml``."""
     for folder in Path(file).parents:
         if (folder / "package.xml").is_file():
             return read_package(str(folder))
@@ -52,7 +52,7 @@ def find_package(file: str) -> Package | None:
 
 @lru_cache(maxsize=512)
 def read_package(folder: str) -> Package:
-    """What the files in ``folder`` tell; the folder's name stands in where package.xml gives none."""
+    """Return what the files in ``folder`` tell; the folder's name stands in where package.xml gives none."""
     base = Path(folder)
     manifest = text_or_nothing(base / "package.xml")
     match = _NAME.search(manifest)

@@ -32,7 +32,7 @@ class Decisions:
         self.taken = 0
 
     def next(self, condition: Condition) -> bool:
-        """The outcome of the next test. Raises ``TooManyPaths``."""
+        """Return the outcome of the next test. Raises ``TooManyPaths``."""
         if self.taken == MAX_FORKS:
             raise TooManyPaths
         if self.taken == len(self.outcomes):
@@ -83,7 +83,7 @@ def _paths(follow: Follow) -> Iterator[Path]:
 
 
 def _merged(paths: list[Path]) -> Findings:
-    """All that some path found; endpoints that not every path makes carry the conditions of theirs."""
+    """Return all that some path found; endpoints that not every path makes carry the conditions of theirs."""
     merged = Findings()
     merged.by_path = True
     found: dict[object, set[Guards]] = {}
@@ -106,7 +106,7 @@ def _merged(paths: list[Path]) -> Findings:
 
 
 def _identity(record: NodeRecord, endpoint: FoundEndpoint) -> object:
-    """The same on all paths, though each has node records of its own."""
+    """Return a key that is the same on all paths, though each has node records of its own."""
     name = endpoint.name
     if isinstance(name, Text):
         name = tuple((p.name, p.item, p.edits) if isinstance(p, Input) else p for p in name.pieces)
@@ -122,7 +122,7 @@ def _guards(decisions: Decisions) -> Guards:
 
 
 def _simplified(alternatives: set[Guards]) -> list[Guards]:
-    """The same alternatives without a condition that may hold or not: (a and b) or (a and not b) is a."""
+    """Return the same alternatives without a condition that may hold or not: (a and b) or (a and not b) is a."""
     left = set(alternatives)
     for one in sorted(alternatives, key=sorted):
         for guard in sorted(one):

@@ -58,7 +58,7 @@ class SourceModule:
         return "yield" in self.text
 
     def lines_with(self, pattern: re.Pattern[str]) -> list[int]:
-        """The numbers of the lines where ``pattern`` is found, in order; it does not span lines."""
+        """Return the numbers of the lines where ``pattern`` is found, in order; it does not span lines."""
         lines: list[int] = []
         line, counted = 1, 0
         for found in pattern.finditer(self.text):
@@ -90,7 +90,7 @@ class Program:
             self._found.clear()
 
     def load(self, path: str, name: str | None = None) -> SourceModule:
-        """The module in file ``path``; its name is derived from the ``__init__.py`` files above it."""
+        """Return the module in file ``path``; its name is derived from the ``__init__.py`` files above it."""
         path = os.path.abspath(path)
         module = self._by_path.get(path)
         if module is None:
@@ -99,7 +99,7 @@ class Program:
         return module
 
     def ask(self, kind: str, what: str) -> str:
-        """A digest of a ``file``'s content or a ``folder``'s names; remembered.
+        """Return a digest of a ``file``'s content or a ``folder``'s names; remembered.
 
         To be asked before a file is read: what changes in between is then found to have changed.
         """
@@ -119,14 +119,14 @@ class Program:
         return ".".join(names) or base.removesuffix(".py")
 
     def top_folder(self, path: str) -> str:
-        """The folder that would have to be on ``sys.path`` for the module in ``path``."""
+        """Return the folder that would have to be on ``sys.path`` for the module in ``path``."""
         folder = os.path.dirname(os.path.abspath(path))
         while "__init__.py" in self._listing(folder):
             folder = os.path.dirname(folder)
         return folder
 
     def find(self, name: str, beside: str) -> str | None:
-        """The file of module ``name`` for a program started in folder ``beside``; ``None``: foreign."""
+        """Return the file of module ``name`` for a program started in folder ``beside``; ``None``: foreign."""
         key = (name, beside)
         if key not in self._found:
             self._found[key] = self._search(name, beside)
@@ -159,7 +159,7 @@ class Program:
         return None
 
     def has_namespace_package(self, name: str, beside: str) -> bool:
-        """A folder without ``__init__.py`` but with Python files, as implicit packages are."""
+        """Return True if there is such a folder without ``__init__.py`` but with Python files, an implicit package."""
         key = (name + ".", beside)
         if key not in self._found:
             folders = (os.path.join(root, *name.split(".")) for root in (beside, *self.roots))

@@ -43,7 +43,7 @@ class ProgramTarget(NamedTuple):
 def infer_python(
     path: str, package: str, executable: str, prefixes: Sequence[str]
 ) -> tuple[tuple[NodeInterface, ...], str]:
-    """The nodes that the program at ``path`` creates, with its gaps; without any, why none was found.
+    """Return the nodes that the program at ``path`` creates, with its gaps; without any, why none was found.
 
     The answer of an earlier run is taken where nothing that it was made from has changed.
     """

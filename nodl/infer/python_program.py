@@ -16,7 +16,7 @@ from nodl.source_ref import SourceRef
 def infer_program(
     program: Program, target: ProgramTarget, path: str, origin: LaunchKey
 ) -> tuple[tuple[NodeInterface, ...], str]:
-    """The nodes that the program behind ``path`` creates, with its gaps; without any, why none was found."""
+    """Return the nodes that the program behind ``path`` creates, with its gaps; without any, why none was found."""
     try:
         with without_collector():
             run = _run(program, target, path)

@@ -17,7 +17,7 @@ MAX_ALTERNATIVES = 16
 
 
 def interfaces_of(findings: Findings, origin: LaunchKey) -> list[NodeInterface]:
-    """One interface for each node (and each name it may have), in the order they were found."""
+    """Return one interface for each node (and each name it may have), in the order they were found."""
     interfaces: list[NodeInterface] = []
     for record in findings.nodes:
         if record.created or record.endpoints:
@@ -26,7 +26,7 @@ def interfaces_of(findings: Findings, origin: LaunchKey) -> list[NodeInterface]:
 
 
 def _united(interfaces: list[NodeInterface]) -> list[NodeInterface]:
-    """One interface for what is the same node on several paths."""
+    """Return one interface for what is the same node on several paths."""
     united: dict[object, NodeInterface] = {}
     for each in interfaces:
         key = each._replace(endpoints=(), gaps=(), parameters=())
@@ -79,7 +79,7 @@ def _interfaces_of_node(record: NodeRecord, findings: Findings, origin: LaunchKe
 
 
 def _made_of(value: Value) -> str:
-    """The inputs in ``value``, for the reader."""
+    """Return the inputs in ``value``, for the reader."""
     shown = [str(template) for atom in value if isinstance(atom, Text) for template in templates(atom)]
     return f": {', '.join(dict.fromkeys(shown))}" if shown else ""
 
@@ -97,7 +97,7 @@ def _namespaces(record: NodeRecord) -> list[str | None]:
 
 
 def _plain_texts(value: Value) -> list[str]:
-    """The texts of ``value`` with defaults filled in; what stays unknown is left out."""
+    """Return the texts of ``value`` with defaults filled in; what stays unknown is left out."""
     filled = (template.fill({}) for atom in value for template in templates(atom))
     return list(dict.fromkeys(each.text for each in filled if each.is_literal))
 
@@ -130,7 +130,7 @@ def certainty_of(template: NameTemplate) -> Certainty:
 
 
 def templates(name: object) -> list[NameTemplate]:
-    """The templates of one possible name: several when a parameter has several defaults."""
+    """Return the templates of one possible name: several when a parameter has several defaults."""
     if isinstance(name, str):
         return [NameTemplate.literal(name)]
     if isinstance(name, Text):
@@ -163,7 +163,7 @@ def _parts(piece: Piece, first: bool) -> list[Part]:
 
 
 def _input_parts(piece: Input) -> list[Part]:
-    """The symbolic part once per default."""
+    """Return the symbolic part once per default."""
     assert isinstance(piece.owner, NodeRecord | OptionDefaults)
     declared = piece.owner.default(piece.name)
     if piece.item == "each" and declared and all(_is_empty_list(atom) for atom in declared):

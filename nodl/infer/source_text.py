@@ -20,7 +20,7 @@ class HidingEncodingError(ValueError):
 
 
 def source_text(data: bytes) -> str:
-    """The text of a file that could be parsed. Raises ``HidingEncodingError``."""
+    """Return the text of a file that could be parsed. Raises ``HidingEncodingError``."""
     encoding = "utf-8"
     if any(b"coding" in line for line in data.split(b"\n", 2)[:2]):  # PEP 263: in one of the first two
         import tokenize

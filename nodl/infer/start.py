@@ -18,7 +18,7 @@ class Start(Protocol):
     """Nodes are told by the name that the source gives them; ``None`` for one whose name is not known."""
 
     def parameters(self, node: str | None) -> Mapping[str, object]:
-        """What launch sets for that node."""
+        """Return what launch sets for that node."""
         ...
 
     def final_name(self, node: str | None) -> tuple[str | None, str | None]:

@@ -83,7 +83,7 @@ class ProgramState:
         self.branches((action, lambda: True))
 
     def each(self, alternatives: Iterable[Callable[[], Value]]) -> list[Value]:
-        """What each of ``alternatives`` gives, run as ``branches`` of which every one falls through."""
+        """Return what each of ``alternatives`` gives, run as ``branches`` of which every one falls through."""
         given: list[Value] = []
 
         def noted(make: Callable[[], Value]) -> Alternative:
@@ -97,7 +97,7 @@ class ProgramState:
         return given
 
     def perhaps(self, make: Callable[[], Value]) -> Value:
-        """What ``make`` gives, run as something that may happen or not."""
+        """Return what ``make`` gives, run as something that may happen or not."""
         given: list[Value] = []
 
         def run() -> bool:
@@ -210,7 +210,7 @@ def _same(old: Value, new: Value) -> bool:
 
 
 def _absent(cells: Cells) -> Value:
-    """What a cell that was never written holds: a field may then be found in the class."""
+    """Return what a cell that was never written holds: a field may then be found in the class."""
     return ABSENT if isinstance(cells, FieldCells) else BOTTOM
 
 
@@ -241,7 +241,7 @@ class Allocations:
         return previous
 
     def allocate(self, node: ast.AST, kind: str, make: Callable[[], Made]) -> Made:
-        """The object made at ``node`` in this calling context; made twice it stands for all of them."""
+        """Return the object made at ``node`` in this calling context; made twice it stands for all of them."""
         key = (self.context, id(node), kind)
         found: Made | None = self._allocated.get(key)
         if found is None:
@@ -252,7 +252,7 @@ class Allocations:
         return found
 
     def tuple_of(self, parts: tuple[Value, ...]) -> Value:
-        """A tuple; it never changes, so equal ones are one object and need no allocation site."""
+        """Return a tuple; it never changes, so equal ones are one object and need no allocation site."""
         key = (parts, tuple(type(part[0]) if part else None for part in parts))
         found = self._tuples.get(key)
         if found is None:

@@ -36,7 +36,7 @@ class InferredSystem(NamedTuple):
 
 
 def infer_paths(paths: Iterable[str | Path]) -> InferredSystem:
-    """All nodes that the Python and C++ files in ``paths`` (files, or folders with everything below) may create.
+    """Return all nodes that the Python and C++ files in ``paths`` (files, or folders with everything below) may create.
 
     Raises ``FileNotFoundError`` for a path that does not exist. A file that cannot be parsed is a gap.
     """
@@ -70,7 +70,7 @@ def infer_paths(paths: Iterable[str | Path]) -> InferredSystem:
 
 
 def _attempted(analyse: Callable[[], Iterable[Found]], file: str, failed: list[Gap]) -> list[Found]:
-    """What ``analyse`` finds in a program; nothing, and a gap in ``failed``, where we fail at it."""
+    """Return what ``analyse`` finds in a program; nothing, and a gap in ``failed``, where we fail at it."""
     try:
         return list(analyse())
     except Exception as error:

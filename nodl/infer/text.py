@@ -75,7 +75,7 @@ _texts: dict[tuple[Piece, ...], Text] = {}
 
 
 def make_text(pieces: tuple[Piece, ...]) -> Text:
-    """The one ``Text`` of these pieces (which are not empty, and not a single literal)."""
+    """Return the one ``Text`` of these pieces (which are not empty, and not a single literal)."""
     text = _texts.get(pieces)
     if text is None:
         text = _texts[pieces] = Text(pieces)
@@ -83,7 +83,7 @@ def make_text(pieces: tuple[Piece, ...]) -> Text:
 
 
 def text_of(pieces: Iterable[Piece]) -> TextAtom:
-    """The text made of ``pieces``; neighbouring literals and holes melt together."""
+    """Return the text made of ``pieces``; neighbouring literals and holes melt together."""
     merged: list[Piece] = []
     last: Piece | None = None
     for piece in pieces:
@@ -111,12 +111,12 @@ def text_of(pieces: Iterable[Piece]) -> TextAtom:
 
 
 def _is_one_of_several(piece: Input) -> bool:
-    """Whether it stands for several texts: an element of a list, a part of a text that is split, a number."""
+    """Return True if it stands for several texts: an element of a list, a part of a text that is split, a number."""
     return piece.item == "each" or any(method in ("split", "range", "key") for method, _ in piece.edits)
 
 
 def pieces_of(text: TextAtom) -> tuple[Piece, ...]:
-    """The pieces of a text; a ``str`` is a single one."""
+    """Return the pieces of a text; a ``str`` is a single one."""
     return text.pieces if isinstance(text, Text) else (text,)
 
 
@@ -142,7 +142,7 @@ def _is_long(text: TextAtom) -> bool:
 
 
 def concatenations(operands: Sequence[Sequence[TextAtom]]) -> list[TextAtom]:
-    """All texts made of one alternative of each operand.
+    """Return all texts made of one alternative of each operand.
 
     Where two have alternatives, nobody knows which of them go together: but for the first these become a pattern.
     """
@@ -165,7 +165,7 @@ def concatenations(operands: Sequence[Sequence[TextAtom]]) -> list[TextAtom]:
 
 
 def common_text(texts: Sequence[TextAtom], why: str) -> Text:
-    """The common literal prefix and suffix of ``texts`` around a hole."""
+    """Return the common literal prefix and suffix of ``texts`` around a hole."""
     heads = [_literal_end(text, 0) for text in texts]
     tails = [_literal_end(text, -1)[::-1] for text in texts]
     prefix = _common_prefix(heads)
@@ -209,7 +209,7 @@ def edited(text: Text, method: str, arguments: tuple[str, ...]) -> TextAtom | No
 
 
 def input_of(text: object) -> Input | None:
-    """The input that ``text`` is as a whole."""
+    """Return the input that ``text`` is as a whole."""
     if not isinstance(text, Text) or len(text.pieces) != 1:
         return None
     piece = text.pieces[0]
@@ -217,5 +217,5 @@ def input_of(text: object) -> Input | None:
 
 
 def with_edit(piece: Input, method: str, arguments: tuple[str, ...]) -> Text:
-    """The input after one more edit."""
+    """Return the input after one more edit."""
     return make_text((piece._replace(edits=(*piece.edits, (method, arguments))),))

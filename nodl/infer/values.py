@@ -50,7 +50,7 @@ _unknowns: dict[str, Value] = {}
 
 
 def unknown(why: str) -> Value:
-    """The value "anything", one shared object per reason."""
+    """Return the value "anything", one shared object per reason."""
     value = _unknowns.get(why)
     if value is None:
         value = _unknowns[why] = (Unknown(why),)
@@ -88,7 +88,7 @@ _externals: dict[str, Value] = {}
 
 
 def external(path: str) -> Value:
-    """The value of a library's name, one shared object per path."""
+    """Return the value of a library's name, one shared object per path."""
     value = _externals.get(path)
     if value is None:
         value = _externals[path] = (External(path),)
@@ -99,7 +99,7 @@ RESULT = ".()"
 
 
 def result_of(path: str) -> Value:
-    """What a library gives that keeps its hands off the program's objects: one value for each such library."""
+    """Return what a library gives that keeps its hands off the program's objects: one value for each such library."""
     return external(path.partition(".")[0] + RESULT)
 
 
@@ -191,7 +191,7 @@ class Dictionary(HeapObject):
         ]
 
     def held(self, constant: object) -> tuple[Value, bool]:
-        """What a key may hold, and whether it is certainly there."""
+        """Return what a key may hold, and whether it is certainly there."""
         value = self.cells.get(Key(constant), BOTTOM)
         return present(value), bool(value) and not self.summary and ABSENT[0] not in value
 
@@ -267,7 +267,7 @@ _COMPARED_IN_C = frozenset({
 
 
 def join(left: Value, right: Value) -> Value:
-    """What may be ``left`` or ``right``. Returns ``left`` itself when ``right`` adds nothing."""
+    """Return what may be ``left`` or ``right``. Returns ``left`` itself when ``right`` adds nothing."""
     if left is right or not right:
         return left
     if not left:
@@ -280,7 +280,7 @@ def join(left: Value, right: Value) -> Value:
 
 
 def join_all(values: Iterable[Value]) -> Value:
-    """What may be any of ``values``; ``BOTTOM`` when there are none."""
+    """Return what may be any of ``values``; ``BOTTOM`` when there are none."""
     result: Value = BOTTOM
     for value in values:
         result = join(result, value)
@@ -288,7 +288,7 @@ def join_all(values: Iterable[Value]) -> Value:
 
 
 def contains(value: Value, atom: object) -> bool:
-    """Whether ``atom`` is one of ``value``: ``1`` is not ``True``, and unknown is unknown."""
+    """Return True if ``atom`` is one of ``value``: ``1`` is not ``True``, and unknown is unknown."""
     kind = type(atom)
     if kind in _COMPARED_IN_C:
         return atom in value
@@ -315,7 +315,7 @@ def _limited(value: Value) -> Value:
 
 
 def widened_texts(texts: list[str | Text]) -> object:
-    """One pattern for all ``texts``: common prefix and suffix around a hole; ``Unknown`` without either."""
+    """Return one pattern for all ``texts``: common prefix and suffix around a hole; ``Unknown`` without either."""
     text = common_text(texts, "too many possible names")
     return text if not text.is_hole else unknown("too many possible names")[0]
 
@@ -337,17 +337,17 @@ def present(value: Value) -> Value:
 
 
 def boolean(outcome: bool | None) -> Value:
-    """The value of a test; ``None``: it may have either outcome."""
+    """Return the value of a test; ``None``: it may have either outcome."""
     return BOOLEAN if outcome is None else (outcome,)
 
 
 def constant_strings(value: Value) -> list[str]:
-    """The strings among the alternatives that are known in full."""
+    """Return the strings among the alternatives that are known in full."""
     return [atom for atom in value if isinstance(atom, str)]
 
 
 def sole(value: Value | None) -> object:
-    """The single atom of ``value``, or ``Unknown`` when there is not exactly one."""
+    """Return the single atom of ``value``, or ``Unknown`` when there is not exactly one."""
     return value[0] if value is not None and len(value) == 1 else ANY[0]
 
 
@@ -436,7 +436,7 @@ class PropertyValue(NamedTuple):
     cached: bool = False
 
     def with_accessor(self, name: str, function: Value) -> PropertyValue:
-        """The property after ``@x.setter``, ``@x.deleter`` or ``@x.getter``."""
+        """Return the property after ``@x.setter``, ``@x.deleter`` or ``@x.getter``."""
         if name == "getter":
             return self._replace(getter=function)
         return self._replace(setter=function) if name == "setter" else self._replace(deleter=function)

@@ -75,7 +75,7 @@ def _patched(run: Run, owner: External, name: str, node: ast.AST, frame: Frame) 
 
 
 def _set_by_property(run: Run, owner: Instance, name: str, value: Value, node: ast.AST, frame: Frame) -> bool:
-    """Whether a setter of the program certainly took the value."""
+    """Return True if a setter of the program certainly took the value."""
     classes = program_classes(owner.cls) if isinstance(owner.cls, ClassValue) else []
     held = next((each.cells[name] for each in classes if each.cells.get(name)), BOTTOM)
     setters = [atom for atom in held if isinstance(atom, PropertyValue) and not atom.cached]

@@ -67,7 +67,7 @@ def _of_instance(run: Run, obj: Instance, name: str, node: ast.AST, frame: Frame
 def _class_attribute(
     run: Run, obj: Instance, order: tuple[object, ...], name: str, node: ast.AST, frame: Frame
 ) -> Value | None:
-    """What the classes in ``order`` hold under ``name``, bound to ``obj``; ``None``: nothing."""
+    """Return what the classes in ``order`` hold under ``name``, bound to ``obj``; ``None``: nothing."""
     for base in order:
         if isinstance(base, ClassValue):
             value = base.cells.get(name)

@@ -33,7 +33,7 @@ LATER = unknown("what a generator gives later")
 
 
 def call_function(run: Run, function: FunctionValue, call: Call) -> Value:
-    """What a call gives: nothing if no path comes back, unknown (and a gap) if calls nest too deep."""
+    """Return what a call gives: nothing if no path comes back, unknown (and a gap) if calls nest too deep."""
     node = function.node
     if len(run.stack) >= MAX_DEPTH:
         run.gap(call.node, call.frame, "calls are nested too deep to be followed")
@@ -52,7 +52,7 @@ def call_function(run: Run, function: FunctionValue, call: Call) -> Value:
 
 
 def is_generator(function: FunctionValue) -> bool:
-    """Whether a function's own body has a ``yield``."""
+    """Return True if a function's own body has a ``yield``."""
     return function.module.source.has_yield and _is_generator(function.node)
 
 
@@ -78,7 +78,7 @@ class Recursion:
 
 
 def _recursive(run: Run, function: FunctionValue, cells: LocalCells, call: Call) -> Value:
-    """A call inside of a call of the same function: all of them are one, run until nothing new comes."""
+    """Follow a call inside of a call of the same function: all of them are one, run until nothing new comes."""
     outer = run.recursions.get(function.node)
     if outer is not None:
         for name, value in cells.items():
@@ -169,7 +169,7 @@ def call_bound(run: Run, method: BoundMethod, call: Call) -> Value:
 
 
 def bind(run: Run, function: FunctionValue, call: Call) -> LocalCells:
-    """The parameters' values; what the caller does not give takes its default."""
+    """Return the parameters' values; what the caller does not give takes its default."""
     given, parameters = call.args, function.node.args
     names = [parameter.arg for parameter in (*parameters.posonlyargs, *parameters.args)]
     cells = LocalCells()

@@ -155,7 +155,7 @@ def _asked(run: Run, node: ast.expr, frame: Frame) -> tuple[Input | None, Value]
 
 
 def is_plain_parameter(asked: Input) -> bool:
-    """Whether it is the whole value of a ROS parameter, as launch gives it."""
+    """Return True if it is the whole value of a ROS parameter, as launch gives it."""
     return not asked.edits and asked.item is None and not asked.name.startswith(("-", "<", "$"))
 
 
@@ -197,7 +197,7 @@ def only_if(condition: Condition, text: TextAtom) -> Text:
 
 
 def compare(run: Run, node: ast.Compare, frame: Frame) -> Value:
-    """A comparison: certain for constants, else either."""
+    """Compare: certain for constants, else either."""
     left = run.evaluate(node.left, frame)
     results: set[bool | None] = set()
     for op, comparator in zip(node.ops, node.comparators, strict=True):
@@ -210,7 +210,7 @@ def compare(run: Run, node: ast.Compare, frame: Frame) -> Value:
 
 
 def compare_values(op: ast.cmpop, left: Value, right: Value) -> bool | None:
-    """The outcome of comparing all pairs if they agree; ``None``: not known, or more than 16 pairs."""
+    """Return the outcome of comparing all pairs if they agree; ``None``: not known, or more than 16 pairs."""
     if len(left) * len(right) > 16 or not left or not right:
         return None
     outcomes = {_compare_atoms(op, a, b) for a in left for b in right}
@@ -239,7 +239,7 @@ _NEVER_NONE = (Instance, FunctionValue, ClassValue, ModuleValue, Sequence, Dicti
 
 
 def _is_member(atom: object) -> bool:
-    """A member of an enumeration whose members are equal to themselves only."""
+    """Return True for a member of an enumeration whose members are equal to themselves only."""
     if not isinstance(atom, Instance) or "_value_" not in atom.cells or not isinstance(atom.cls, ClassValue):
         return False
     bases = [base for base in atom.cls.linear or () if isinstance(base, External)]

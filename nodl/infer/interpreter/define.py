@@ -43,7 +43,7 @@ _DATACLASSES = frozenset(
 
 
 def make_function(run: Run, node: FunctionNode, name: str, frame: Frame) -> FunctionValue:
-    """A ``def`` or ``lambda`` with its defaults; made again in one context it is one ``shared`` value."""
+    """Return a ``def`` or ``lambda`` with its defaults; made again in one context it is one ``shared`` value."""
     closure = frame.closure if frame.is_class else frame
     if not frame.is_class:
         frame.capture()
@@ -185,7 +185,7 @@ def _decorated_class(run: Run, value: Value, cls: ClassValue, decorator: ast.exp
 
 
 def _fields(run: Run, cls: ClassValue, frame: Frame) -> list[tuple[str, Value | None]]:
-    """The fields of a dataclass in the order of its constructor, with their defaults."""
+    """Return the fields of a dataclass in the order of its constructor, with their defaults."""
     fields: dict[str, Value | None] = {}
     for base in reversed(program_classes(cls)[1:]):
         fields.update(base.fields or ())
@@ -215,7 +215,7 @@ def _field_default(run: Run, default: ast.expr | None, frame: Frame, cls: ClassV
 
 
 def linearized(cls: ClassValue) -> tuple[object, ...]:
-    """The method resolution order: C3 as in Python, ending in ``External`` or ``Unknown`` bases."""
+    """Return the method resolution order: C3 as in Python, ending in ``External`` or ``Unknown`` bases."""
     if cls.linear is None:
         cls.linear = (cls,)  # guards against a class among its own bases
         orders = [list(linearized(base)) if isinstance(base, ClassValue) else [base] for base in cls.bases]
@@ -224,12 +224,12 @@ def linearized(cls: ClassValue) -> tuple[object, ...]:
 
 
 def program_classes(cls: ClassValue) -> list[ClassValue]:
-    """The class and its bases that are analysed, in the method resolution order."""
+    """Return the class and its bases that are analysed, in the method resolution order."""
     return [base for base in linearized(cls) if isinstance(base, ClassValue)]
 
 
 def is_enumeration(cls: ClassValue) -> bool:
-    """Whether a class of ``enum`` is among its bases."""
+    """Return True if a class of ``enum`` is among its bases."""
     return any(isinstance(base, External) and base.path.startswith("enum.") for base in linearized(cls))
 
 
@@ -246,7 +246,7 @@ def _merge(orders: list[list[object]], bases: list[object]) -> list[object]:
 
 
 def methods_in(held: Value, receiver: object, cls: ClassValue) -> Value:
-    """The functions among what a class holds under one name, bound as somebody who calls them gets them."""
+    """Return the functions among what a class holds under one name, bound as somebody who calls them gets them."""
     bound: list[object] = []
     for atom in held:
         if isinstance(atom, FunctionValue):
@@ -273,7 +273,7 @@ _NOT_CALLED = frozenset({"__init__", "__new__", "__init_subclass__", "__class_ge
 
 
 def foreign_bases(cls: ClassValue) -> list[object]:
-    """The bases that are not analysed: ``External`` or ``Unknown``; ``object`` does not count."""
+    """Return the bases that are not analysed: ``External`` or ``Unknown``; ``object`` does not count."""
     foreign = (base for base in linearized(cls) if not isinstance(base, ClassValue))
     return [base for base in foreign if not (isinstance(base, External) and base.path in _HARMLESS_BASES)]
 
@@ -287,12 +287,12 @@ def new_instance(run: Run, cls: ClassValue, call: Call) -> Instance:
 
 
 def is_constant(atom: object) -> bool:
-    """Whether ``atom`` is a constant that a dictionary can have as a key."""
+    """Return True if ``atom`` is a constant that a dictionary can have as a key."""
     return isinstance(atom, str | int | float | bool | type(None))
 
 
 def is_key(atom: object) -> bool:
-    """Whether a dictionary finds ``atom`` by what it is: a constant, tuples of such, what equals itself only."""
+    """Return True if a dictionary finds ``atom`` by what it is: a constant, tuples of such, what equals itself only."""
     if isinstance(atom, External):
         return "(" not in atom.path  # else it stands for whatever a library gives
     if isinstance(atom, Sequence):

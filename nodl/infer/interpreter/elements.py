@@ -33,7 +33,7 @@ from nodl.infer.values import (
 
 
 def subscript(run: Run, node: ast.Subscript, frame: Frame) -> Value:
-    """What ``owner[key]`` gives for each owner but ``None``; ``ANY`` when nothing comes of it."""
+    """Return what ``owner[key]`` gives for each owner but ``None``; ``ANY`` when nothing comes of it."""
     owner = run.evaluate(node.value, frame)
     key = run.evaluate(node.slice, frame) if not isinstance(node.slice, ast.Slice) else ANY
     if isinstance(node.slice, ast.Slice) and not all(isinstance(a, str | Sequence) for a in owner):
@@ -104,7 +104,7 @@ def chosen_by_parameter(obj: Dictionary, key: Value, default: Value | None = Non
 
 
 def dictionary_item(run: Run, obj: Dictionary, key: Value, node: ast.AST, frame: Frame) -> Value:
-    """What ``obj[key]`` gives; fills a ``defaultdict``."""
+    """Return what ``obj[key]`` gives; fills a ``defaultdict``."""
     chosen = chosen_by_parameter(obj, key)
     if chosen is not None:
         return chosen
@@ -159,7 +159,7 @@ def _sliced(run: Run, sequence: Sequence, node: ast.Subscript, frame: Frame) -> 
 
 
 def slice_of(run: Run, node: ast.expr, frame: Frame) -> slice | None:
-    """The slice if its bounds are known."""
+    """Return the slice if its bounds are known."""
     assert isinstance(node, ast.Slice)
     bounds: list[int | None] = []
     for bound in (node.lower, node.upper, node.step):
@@ -181,7 +181,7 @@ def _character(run: Run, text: str, key: Value, node: ast.Subscript, frame: Fram
 
 
 def elements(run: Run, value: Value, node: ast.AST, frame: Frame) -> Items:
-    """The elements of every iterable that ``value`` may be; ``None`` among others is not iterable."""
+    """Return the elements of every iterable that ``value`` may be; ``None`` among others is not iterable."""
     run.spend(len(value))
     found = [_elements_of(run, atom, node, frame) for atom in value if atom is not None]
     if not found:
@@ -217,14 +217,14 @@ def _input_items(text: Text) -> Value:
 
 
 def keys_of(obj: Dictionary) -> Items:
-    """The keys in order if all are known and certainly there; else what any key may be."""
+    """Return the keys in order if all are known and certainly there; else what any key may be."""
     return _in_order(
         obj, tuple((cell.constant,) for cell, _, _ in obj.entries()), obj.cells.get(OTHER_KEYS, ANY)
     )
 
 
 def values_of(obj: Dictionary) -> Items:
-    """The values in the order of their keys if all are known and certainly there; else what any may be."""
+    """Return the values in the order of their keys if all are known and certainly there; else what any may be."""
     return _in_order(obj, tuple(value for _, value, _ in obj.entries()), obj.cells.get(OTHER, BOTTOM))
 
 
@@ -237,7 +237,7 @@ def _in_order(obj: Dictionary, known: tuple[Value, ...], others: Value) -> Items
 
 
 def enum_members(run: Run, cls: ClassValue, node: ast.AST, frame: Frame) -> Items:
-    """What iterating over an enumeration gives: each name assigned in its body; anything without one."""
+    """Return what iterating over an enumeration gives: each name assigned in its body; anything without one."""
     names = [
         target.id
         for statement in cls.node.body

@@ -83,7 +83,7 @@ def _call(run: Run, node: ast.Call, frame: Frame) -> Value:
 
 
 def arguments_of(run: Run, node: ast.Call, frame: Frame) -> Arguments:
-    """The evaluated arguments of a call; ``*`` and ``**`` are expanded as far as their contents are known."""
+    """Return the evaluated arguments of a call; ``*`` and ``**`` are expanded as far as their contents are known."""
     args = Arguments([], {})
     for argument in node.args:
         if isinstance(argument, ast.Starred):
@@ -205,20 +205,20 @@ def _boolean(run: Run, node: ast.BoolOp, frame: Frame) -> Value:
 
 
 def _after(run: Run, operand: ast.expr, before: list[ast.expr], held: bool, frame: Frame) -> Value:
-    """What ``operand`` gives where those ``before`` it were all true, or (unless ``held``) all false."""
+    """Return what ``operand`` gives where those ``before`` it were all true, or (unless ``held``) all false."""
     for test in before:
         narrowed(run, test, held, frame)
     return run.evaluate(operand, frame)
 
 
 def _where_set(atom: object) -> object:
-    """An input in front of ``or``: where it is empty, what follows is taken."""
+    """Return an input in front of ``or``: where it is empty, what follows is taken."""
     asked = input_of(atom)
     return atom if asked is None or asked.item is not None else with_edit(asked, "unless empty", ())
 
 
 def _otherwise(before: Value, value: Value) -> Value:
-    """The right side of ``input or value``: what is taken where the input is empty."""
+    """Return the right side of ``input or value``: what is taken where the input is empty."""
     asked = input_of(before[0]) if len(before) == 1 else None
     if asked is None or asked.edits != (("unless empty", ()),):
         return value

@@ -35,7 +35,7 @@ def _hole(why: str) -> Text:
 
 
 def as_texts(value: Value) -> list[TextAtom]:
-    """The texts that formatting ``value`` may give."""
+    """Return the texts that formatting ``value`` may give."""
     texts = list(dict.fromkeys(_text_of_atom(atom) for atom in value))
     if not texts:
         return [_hole("a value that is never set")]
@@ -62,7 +62,7 @@ def _text_of_atom(atom: object) -> TextAtom:
 
 
 def text_value(texts: Iterable[TextAtom]) -> Value:
-    """A value of ``texts``; a text that is one hole is simply unknown."""
+    """Return a value of ``texts``; a text that is one hole is simply unknown."""
     result: Value = BOTTOM
     for text in texts:
         hole = text.pieces[0] if isinstance(text, Text) and text.is_hole else None
@@ -71,7 +71,7 @@ def text_value(texts: Iterable[TextAtom]) -> Value:
 
 
 def f_string(run: Run, node: ast.JoinedStr, frame: Frame) -> Value:
-    """The texts that an f-string may give, with holes for what is not known."""
+    """Return the texts that an f-string may give, with holes for what is not known."""
     operands: list[list[TextAtom]] = []
     for part in node.values:
         if isinstance(part, ast.Constant):

@@ -68,7 +68,7 @@ class Arguments:
         self.more_keywords = more_keywords
 
     def at(self, index: int, name: str | None = None) -> Value | None:
-        """The argument at ``index`` or called ``name``; ``None`` when it is not given."""
+        """Return the argument at ``index`` or called ``name``; ``None`` when it is not given."""
         if 0 <= index < len(self.positional):
             return self.positional[index]
         if name is not None and name in self.keywords:

@@ -38,7 +38,7 @@ def run_import_from(run: Run, node: ast.ImportFrom, frame: Frame) -> bool:
 
 
 def absolute_name(node: ast.ImportFrom, source: SourceModule) -> str:
-    """The absolute name of the module that ``from ... import`` names."""
+    """Return the absolute name of the module that ``from ... import`` names."""
     if not node.level:
         return node.module or ""
     package = source.package()
@@ -48,7 +48,7 @@ def absolute_name(node: ast.ImportFrom, source: SourceModule) -> str:
 
 
 def member(run: Run, module: Value, base: str, name: str, frame: Frame) -> Value:
-    """What a module holds under ``name``, or its submodule; an ``External`` where neither is found."""
+    """Return what a module holds under ``name``, or its submodule; an ``External`` where neither is found."""
     atom = module[0]
     if not isinstance(atom, ModuleValue):
         inner = f"{base}.{name}" if base else name
@@ -80,7 +80,7 @@ def _import_star(run: Run, module: Value, base: str, frame: Frame) -> None:
 
 
 def import_module(run: Run, name: str, frame: Frame) -> Value:
-    """The module called ``name``, executed if it is new; submodules execute their packages first."""
+    """Return the module called ``name``, executed if it is new; submodules execute their packages first."""
     found = _load(run, name, frame)
     return external(name) if found is None else (found,)
 
@@ -125,7 +125,7 @@ def execute_module(run: Run, source: SourceModule, name: str) -> ModuleValue:
 
 
 def import_submodule(run: Run, name: str, frame: Frame) -> ModuleValue | None:
-    """An analysed module below a folder without ``__init__.py`` (``import p.q`` where only q.py exists)."""
+    """Return an analysed module below a folder without ``__init__.py`` (``import p.q`` where only q.py exists)."""
     top = name.partition(".")[0]
     if not run.program.has_namespace_package(top, run.beside):
         return None

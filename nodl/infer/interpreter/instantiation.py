@@ -28,7 +28,7 @@ from nodl.infer.values import (
 
 
 def instantiate(run: Run, cls: ClassValue, call: Call) -> Value:
-    """A new object: its constructor is the first one in the method resolution order."""
+    """Return a new object: its constructor is the first one in the method resolution order."""
     for base in program_classes(cls):
         run.instantiated.setdefault(base.node)
     if is_enumeration(cls):
@@ -42,7 +42,7 @@ def instantiate(run: Run, cls: ClassValue, call: Call) -> Value:
 
 
 def _made_by_new(run: Run, cls: ClassValue, call: Call) -> Value | None:
-    """What the program's own ``__new__`` gives, initialised where it is an object of the class."""
+    """Return what the program's own ``__new__`` gives, initialised where it is an object of the class."""
     for base in program_classes(cls):
         if "__new__" in base.cells:
             constructors = functions_of(base.cells["__new__"])

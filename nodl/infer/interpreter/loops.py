@@ -34,7 +34,7 @@ def run_while(run: Run, node: ast.While, frame: Frame) -> bool:
 
 
 def may_unroll(run: Run, count: int) -> bool:
-    """Whether so many turns are followed one by one here."""
+    """Return True if so many turns are followed one by one here."""
     return count * run.unrolled <= (MAX_UNROLLED_AGAIN if run.repeated else MAX_UNROLLED)
 
 
@@ -74,7 +74,7 @@ def _for(run: Run, node: For, iterated: Value, frame: Frame) -> tuple[bool, bool
 
 
 def _unrolled(run: Run, node: For, exact: tuple[Value, ...], frame: Frame) -> tuple[bool, bool]:
-    """One turn after the other; can control pass the loop, and may it have run to its end?"""
+    """Run one turn after the other; can control pass the loop, and may it have run to its end?"""
     start = run.state.mark()
     broken, outcome = False, (True, True)
     run.state.depth += 1
@@ -91,7 +91,7 @@ def _unrolled(run: Run, node: For, exact: tuple[Value, ...], frame: Frame) -> tu
 
 
 def _followed(run: Run, node: For, index: int, element: Value, frame: Frame) -> tuple[bool, bool]:
-    """One turn by itself; may the next one follow, and may the loop have been left?"""
+    """Run one turn by itself; may the next one follow, and may the loop have been left?"""
     previous = run.enter((id(node), index))
     mark = run.state.mark()
     frame.jump = ""
@@ -155,7 +155,7 @@ Emit = Callable[[], None]
 
 
 def comprehension(run: Run, node: ast.ListComp | ast.SetComp | ast.GeneratorExp, frame: Frame) -> Value:
-    """A list (a set for a set comprehension), exact only where iterables and conditions are decided."""
+    """Return a list (a set for a set comprehension), exact only where iterables and conditions are decided."""
     inner = _inner_frame(run, frame)
     collected: list[Value] = []
 
@@ -169,7 +169,7 @@ def comprehension(run: Run, node: ast.ListComp | ast.SetComp | ast.GeneratorExp,
 
 
 def dict_comprehension(run: Run, node: ast.DictComp, frame: Frame) -> Value:
-    """A dictionary with the entries of all turns whose conditions are not certainly false."""
+    """Return a dictionary with the entries of all turns whose conditions are not certainly false."""
     inner = _inner_frame(run, frame)
     result = run.allocate(node, "dict", Dictionary)
 

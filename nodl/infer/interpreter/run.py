@@ -199,7 +199,7 @@ class Run(Allocations):
         return handler(self, atom, call)
 
     def library_object(self, call: Call, path: str, kind: str = "") -> Instance:
-        """The object of the library class ``path`` that ``call`` makes; ``kind`` as in ``allocate``."""
+        """Return the object of the library class ``path`` that ``call`` makes; ``kind`` as in ``allocate``."""
         return self.allocate(call.node, kind or path, lambda: Instance(External(path)))
 
     def attribute(self, owner: Value, name: str, node: ast.AST, frame: Frame) -> Value:

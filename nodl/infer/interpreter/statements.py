@@ -108,7 +108,7 @@ def _leave(run: Run, frame: Frame) -> None:
 
 
 def _raise(run: Run, node: ast.Raise, frame: Frame) -> bool:
-    """An exception ends its path; a handler of any ``try`` around it may run."""
+    """End the path; a handler of any ``try`` around it may run."""
     value = NONE if node.exc is None else run.evaluate(node.exc, frame)
     if node.cause is not None:
         run.evaluate(node.cause, frame)
@@ -198,7 +198,7 @@ def run_try(run: Run, node: Any, frame: Frame) -> bool:
 
 
 def _cannot_fail(statement: ast.stmt) -> bool:
-    """An import of Python's own library, or a constant that is given a name."""
+    """Return True for an import of Python's own library, or a constant that is given a name."""
     if isinstance(statement, ast.Import):
         return all(alias.name.partition(".")[0] in _ALWAYS_THERE for alias in statement.names)
     constant = isinstance(statement, ast.Assign) and isinstance(statement.value, ast.Constant)

@@ -82,5 +82,5 @@ TABLES = Tables(
 
 
 def new_run(program: Program, main: SourceModule) -> Run:
-    """A run of ``main`` with the handlers of all concerns; nothing is executed yet."""
+    """Return a run of ``main`` with the handlers of all concerns; nothing is executed yet."""
     return Run(program, TABLES, main)

@@ -83,13 +83,13 @@ def _len(run: Run, call: Call) -> Value:
 
 
 def _items(run: Run, call: Call, index: int = 0) -> Items:
-    """The elements of the argument at ``index``; an empty sequence when it is not given."""
+    """Return the elements of the argument at ``index``; an empty sequence when it is not given."""
     value = call.args.at(index)
     return Items(()) if value is None else elements(run, value, call.node, call.frame)
 
 
 def _range(run: Run, call: Call) -> Value:
-    """The numbers if they are known and few; else any number, tied to an input that bounds it."""
+    """Return the numbers if they are known and few; else any number, tied to an input that bounds it."""
     bounds = [sole(value) for value in call.args.positional]
     items = Items(None, unknown("a number of a loop"))
     if not bounds or call.args.more:  # range(*bounds)
@@ -110,7 +110,7 @@ def _made(kind: str) -> Model:
 
 
 def _enumerate(run: Run, call: Call) -> Value:
-    """A list of pairs; one pair stands for all if the length or the start is not known."""
+    """Return a list of pairs; one pair stands for all if the length or the start is not known."""
     items = _items(run, call)
     start = sole(call.args.at(1, "start") or (0,))
     if items.exact is not None and type(start) is int:
@@ -121,7 +121,7 @@ def _enumerate(run: Run, call: Call) -> Value:
 
 
 def _zip(run: Run, call: Call) -> Value:
-    """A list of rows, one for all if a length is not known; unknown if ``*x`` cannot be counted."""
+    """Return a list of rows, one for all if a length is not known; unknown if ``*x`` cannot be counted."""
     columns = [elements(run, value, call.node, call.frame) for value in call.args.positional]
     if call.args.more:
         return ANY
@@ -202,7 +202,7 @@ def chosen(run: Run, call: Call) -> Value:
 
 
 def _getattr(run: Run, call: Call) -> Value:
-    """The attribute, the default or either."""
+    """Return the attribute, the default or either."""
     owner, names = call.args.at(0) or ANY, call.args.at(1) or ANY
     there = _has(run, sole(owner), sole(names))
     known = constant_strings(names)
@@ -246,7 +246,7 @@ def _hasattr(run: Run, call: Call) -> Value:
 
 
 def _has(run: Run, owner: object, name: object) -> bool:
-    """Whether the attribute is certainly there."""
+    """Return True if the attribute is certainly there."""
     if not isinstance(name, str) or not isinstance(owner, Instance | ClassValue | ModuleValue):
         return False
     held = owner.cells.get(name)
@@ -292,7 +292,7 @@ _KINDS: dict[str, type] = {
 
 
 def _type(run: Run, call: Call) -> Value:
-    """The class of an object, else unknown; with three arguments, a class that is not followed."""
+    """Return the class of an object, else unknown; with three arguments, a class that is not followed."""
     if len(call.args.positional) == 3:
         run.gap(call.node, call.frame, "a class is made at run time (type)")
         run.escape(call.args)

@@ -20,7 +20,7 @@ NAMES = frozenset({"topic", "srv_name"})  # the name as the program gave it
 
 
 def endpoint_object(run: Run, kind: EndpointKind, record: NodeRecord, names: Value, call: Call) -> Value:
-    """The object of a publisher, subscription, service or client that ``record`` made."""
+    """Return the object of a publisher, subscription, service or client that ``record`` made."""
     path = _CLASS_OF[kind]
     made = run.library_object(call, path, f"{path} {id(record)}")
     run.state.store(made, "name", names)

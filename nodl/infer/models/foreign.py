@@ -80,7 +80,7 @@ _WAITS = frozenset({
 
 
 def call_external(run: Run, atom: External, call: Call) -> Value:
-    """What a call into a library gives: as its model says, else unknown, and the arguments escape."""
+    """Return what a call into a library gives: as its model says, else unknown, and the arguments escape."""
     path = atom.path
     if path.endswith(RESULT) and keeps_off(path):
         run.escape(call.args, opened=False, objects=False)
@@ -114,29 +114,29 @@ def call_external(run: Run, atom: External, call: Call) -> Value:
 
 
 def _is_exception(path: str) -> bool:
-    """Whether the path names an exception class of Python itself."""
+    """Return True if the path names an exception class of Python itself."""
     found = getattr(builtins, path.removeprefix("builtins."), None) if path.startswith("builtins.") else None
     return isinstance(found, type) and issubclass(found, BaseException)
 
 
 def is_asked_of(name: str) -> bool:
-    """A method that matters even on an object that a library made."""
+    """Return True for a method that matters even on an object that a library made."""
     return name in NODE_METHODS or name in _WAITS
 
 
 @functools.lru_cache(maxsize=4096)
 def keeps_off(path: str) -> bool:
-    """Whether the library of ``path`` leaves the program's classes and objects alone."""
+    """Return True if the library of ``path`` leaves the program's classes and objects alone."""
     return path.partition(".")[0] in _KEEPS_OFF
 
 
 def lets_through(path: str) -> bool:
-    """Whether exceptions pass the context managers of the library of ``path``."""
+    """Return True if exceptions pass the context managers of the library of ``path``."""
     return keeps_off(path) or path.partition(".")[0] in ("threading", "multiprocessing")
 
 
 def creates(atom: object) -> bool:
-    """Whether calling this function, class or method of a library makes a node or an interface."""
+    """Return True if calling this function, class or method of a library makes a node or an interface."""
     if isinstance(atom, ForeignMethod):
         return atom.name in NODE_ENDPOINTS
     return isinstance(atom, External) and _creates(atom.path)
@@ -152,7 +152,7 @@ def _creates(path: str) -> bool:
 
 @functools.lru_cache(maxsize=4096)
 def is_node_class(path: str) -> bool:
-    """Whether ``path`` is a node class of rclpy or one in the table of library nodes."""
+    """Return True if ``path`` is a node class of rclpy or one in the table of library nodes."""
     if path.startswith("rclpy."):
         return path.endswith(("Node", ".LifecycleNode"))
     return library_node(path) is not None
@@ -194,7 +194,7 @@ def _hand_over(run: Run, path: str, call: Call) -> None:
 
 
 def call_foreign_method(run: Run, method: ForeignMethod, call: Call) -> Value:
-    """A method from a library's class: as its model says, else unknown, and the arguments escape."""
+    """Call a method of a library's class: as its model says, else unknown, and the arguments escape."""
     receiver, path, name = method.receiver, method.path, method.name
     assert isinstance(receiver, Instance)
     if is_node_class(path):
@@ -258,7 +258,7 @@ def _foreign_bases(obj: Instance) -> list[str]:
 
 
 def call_native(run: Run, method: NativeMethod, call: Call) -> Value:
-    """A method of a text or container, or of something unknown that may be a node."""
+    """Call a method of a text or container, or of something unknown that may be a node."""
     receiver, name = method.receiver, method.name
     if isinstance(receiver, Unknown):
         if name in COMMON_CALLBACKS:
@@ -280,7 +280,7 @@ _PARAMETER_VALUES = frozenset({
 
 
 def instance_attribute(run: Run, obj: Instance, path: str, name: str) -> Value:
-    """An attribute of an object whose class is foreign."""
+    """Return an attribute of an object whose class is foreign."""
     if path == ros_parameters.PARAMETER_CLASS and name in _PARAMETER_VALUES:
         return obj.cells.get("value", ANY)
     if path in endpoints.CLASSES and name in endpoints.NAMES:
@@ -291,7 +291,7 @@ def instance_attribute(run: Run, obj: Instance, path: str, name: str) -> Value:
 
 
 def inherited(obj: Instance, path: str, name: str) -> Value | None:
-    """What an analysed class inherits from the foreign class ``path``; ``None``: ask the next one."""
+    """Return what an analysed class inherits from the foreign class ``path``; ``None``: ask the next one."""
     if is_node_class(path):
         return (ForeignMethod(path, obj, name),)
     if (path, name) in stdlib.METHODS or name == "__init__":
@@ -300,7 +300,7 @@ def inherited(obj: Instance, path: str, name: str) -> Value | None:
 
 
 def hooks_of(base: object) -> frozenset[str] | None:
-    """The methods that a foreign base class may call on its own; ``None``: any of them."""
+    """Return the methods that a foreign base class may call on its own; ``None``: any of them."""
     if not isinstance(base, External):
         return None
     if is_node_class(base.path):

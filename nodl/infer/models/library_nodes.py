@@ -68,7 +68,7 @@ LIBRARY_NODES: dict[tuple[str, str], LibraryNode] = {("nav2_simple_commander", "
 
 
 def library_node(path: str) -> LibraryNode | None:
-    """The node class at ``path``, by its top package and last name."""
+    """Return the node class at ``path``, by its top package and last name."""
     return LIBRARY_NODES.get((path.partition(".")[0], path.rpartition(".")[2]))
 
 
@@ -90,7 +90,7 @@ _ROS_NAME = re.compile(
 
 
 def may_make_nodes(path: str, dependencies: frozenset[str]) -> bool:
-    """Whether the class or function at ``path`` is of a ROS package of which nothing is known here.
+    """Return True if the class or function at ``path`` is of a ROS package of which nothing is known here.
 
     ``dependencies``: what the program's package names in its ``package.xml``.
     """

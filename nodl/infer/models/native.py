@@ -43,7 +43,7 @@ _SPLITS = frozenset({"split", "rsplit", "splitlines", "partition", "rpartition"}
 
 
 def call_method(run: Run, receiver: object, name: str, call: Call) -> Value:
-    """What a method of a text or container gives and, in a container, changes; unknown without a model."""
+    """Return what a method of a text or container gives and, in a container, changes; unknown without a model."""
     if isinstance(receiver, str | Text):
         return _text_method(run, receiver, name, call)
     if isinstance(receiver, Dictionary):
@@ -113,7 +113,7 @@ EDITED = "an element of a list that is edited while that is undecided"
 def _stored(
     run: Run, owner: Sequence, exact: list[Value] | None, others: Value, edited: bool = False
 ) -> Value:
-    """The new contents: element by element where they are ``exact``, else ``others``.
+    """Store the new contents: element by element where they are ``exact``, else ``others``.
 
     ``edited``: something was taken away, nobody knows what; a text among the elements may be the one.
     """

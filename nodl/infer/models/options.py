@@ -51,7 +51,7 @@ def _add_argument(run: Run, parser: Instance, call: Call) -> Value:
 
 
 def _parsed(run: Run, name: str, call: Call) -> Value:
-    """What the option holds: its text, unless it is a flag, several texts or made into something else."""
+    """Return what the option holds: its text, unless it is a flag, several texts or made into something else."""
     given = call.args.keywords
     action, nargs = sole(given.get("action", ("store",))), sole(given.get("nargs", NONE))
     if action in ("store_true", "store_false"):
@@ -93,7 +93,7 @@ def _parse_known_args(run: Run, parser: Instance, call: Call) -> Value:
 
 
 def namespace_attribute(run: Run, namespace: Instance, name: str) -> Value:
-    """What ``args.<name>`` may be; anything if no parser declares it or the program passes the arguments."""
+    """Return what ``args.<name>`` may be; anything if no parser declares it or the program passes the arguments."""
     parsers = (atom for atom in namespace.cells.get("parser", BOTTOM) if isinstance(atom, Instance))
     found = join_all(parser.cells.get("dest " + name, BOTTOM) for parser in parsers)
     if "[given]" in namespace.cells:  # not what launch writes on the command line, but a list of the program

@@ -53,7 +53,7 @@ NodeMethod = Callable[[Run, NodeRecord, Call], Value]
 
 
 def argument(call: Call, where: Argument) -> Value | None:
-    """The value of this argument of the call; ``None`` when it is not given."""
+    """Return the value of this argument of the call; ``None`` when it is not given."""
     return call.args.at(where.position, where.keyword)
 
 
@@ -80,7 +80,7 @@ def register(run: Run, callback: CallbackArgument, call: Call) -> None:
 
 
 def names_of(value: Value) -> list[object]:
-    """The names that ``value`` may be: texts and unknowns; other values are errors in the program."""
+    """Return the names that ``value`` may be: texts and unknowns; other values are errors in the program."""
     names: list[object] = []
     for atom in value:
         if isinstance(atom, str | Text | Unknown):
@@ -212,12 +212,12 @@ def call_library(run: Run, path: str, call: Call) -> Value | None:
 
 @functools.lru_cache(maxsize=4096)
 def _table_key(path: str) -> tuple[str, str]:
-    """The top package and the last name of ``path``, under which tables of libraries know it."""
+    """Return the top package and the last name of ``path``, under which tables of libraries know it."""
     return path.partition(".")[0], path.rpartition(".")[2]
 
 
 def makes_interfaces(path: str) -> bool:
-    """Whether a call of this library function or class is among those that make nodes or interfaces."""
+    """Return True if a call of this library function or class is among those that make nodes or interfaces."""
     key = _table_key(path)
     return key in ENDPOINT_CALLS or key in HELPERS or key in _MAKING
 

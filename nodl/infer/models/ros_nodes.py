@@ -32,7 +32,7 @@ LIFECYCLE_CLASS = "rclpy.lifecycle.Node"
 
 
 def is_lifecycle(path: str) -> bool:
-    """Whether the path of a node class says that its nodes are lifecycle nodes."""
+    """Return True if the path of a node class says that its nodes are lifecycle nodes."""
     return ".lifecycle" in path or path.endswith("LifecycleNode")
 
 
@@ -66,7 +66,7 @@ def initialise_node(run: Run, instance: Instance, path: str, call: Call) -> None
 
 
 def strings_in(run: Run, value: Value, call: Call) -> Value:
-    """A list of command line arguments as one atom per known list (a tuple of texts), else unknown."""
+    """Return a list of command line arguments as one atom per known list (a tuple of texts), else unknown."""
     items = elements(run, tuple(atom for atom in value if atom is not None), call.node, call.frame)
     if all(atom is None for atom in value):
         return BOTTOM
@@ -79,7 +79,7 @@ def strings_in(run: Run, value: Value, call: Call) -> Value:
 
 
 def record_of_instance(run: Run, instance: Instance, call: Call) -> NodeRecord:
-    """The node record of ``instance``; if it has none, a new one, not yet marked as created."""
+    """Return the node record of ``instance``; if it has none, a new one, not yet marked as created."""
     if instance.node is None:
         instance.node = run.findings.add_node(NodeRecord(call.source))
     return instance.node
@@ -93,7 +93,7 @@ def create_node(run: Run, path: str, call: Call) -> Value:
 
 
 def records_of(run: Run, value: Value | None, call: Call) -> list[NodeRecord]:
-    """The nodes that ``value`` may be; what is not a known node becomes a gap."""
+    """Return the nodes that ``value`` may be; what is not a known node becomes a gap."""
     records: list[NodeRecord] = []
     for atom in value or ANY:
         if isinstance(atom, Instance):

@@ -35,7 +35,7 @@ PARAMETER_CLASS = "rclpy.parameter.Parameter"
 
 
 def parameter_object(run: Run, call: Call, value: Value, key: str = "parameter") -> tuple[Instance]:
-    """An rclpy ``Parameter`` that holds ``value``; ``key`` tells those made by one call apart."""
+    """Return an rclpy ``Parameter`` that holds ``value``; ``key`` tells those made by one call apart."""
     instance = run.library_object(call, PARAMETER_CLASS, key)
     run.state.store(instance, "value", value)
     return (instance,)
@@ -58,14 +58,14 @@ def _declare_parameter(run: Run, record: NodeRecord, call: Call) -> Value:
 
 
 def _default_value(default: Value | None) -> Value:
-    """A declared default; a parameter type or ``None`` declares none."""
+    """Return a declared default; a parameter type or ``None`` declares none."""
     if default is None or all(atom is None or isinstance(atom, External) for atom in default):
         return BOTTOM
     return tuple(atom for atom in default if atom is not None)
 
 
 def _inputs(run: Run, record: NodeRecord, names: list[str]) -> Value:
-    """The values of parameters: what the program set them to, else what launch and the defaults say."""
+    """Return the values of parameters: what the program set them to, else what launch and the defaults say."""
     if not names:
         return unknown("a parameter whose name is not known")
     result: Value = BOTTOM
@@ -114,7 +114,7 @@ def _get_parameters(run: Run, record: NodeRecord, call: Call) -> Value:
 
 
 def _get_parameters_by_prefix(run: Run, record: NodeRecord, call: Call) -> Value:
-    """A dictionary of the parameters below a prefix, under the rest of their names."""
+    """Return a dictionary of the parameters below a prefix, under the rest of their names."""
     found = run.allocate(call.node, "by prefix", Dictionary)
     for prefix in constant_strings(call.args.at(0, "prefix") or ANY):
         start = f"{prefix}." if prefix else ""

@@ -88,7 +88,7 @@ def _told_once(nodes: Iterable[NodeInterface]) -> list[tuple[NodeInterface, tupl
 
 
 def _expanded(endpoint: Endpoint, node: NodeInterface) -> Iterator[tuple[ExpandedInterface | None, str]]:
-    """The interface of each name that ``endpoint`` has by default, and what is open about it."""
+    """Return the interface of each name that ``endpoint`` has by default, and what is open about it."""
     kind = endpoint.kind.value.replace("_", " ")
     filled = endpoint.name.unconditional.fill_each({})
     if not filled:
@@ -122,7 +122,7 @@ _OF_EVERY_NODE = {BuiltinCondition.ALWAYS, BuiltinCondition.PARAMETERS, BuiltinC
 
 
 def _built_in(node: NodeInterface) -> Iterator[ExpandedInterface]:
-    """What every node of a current distribution (iron and later) has, by client library."""
+    """Return what every node of a current distribution (iron and later) has, by client library."""
     base = join(node.namespace or "/", node.name or "*")
     conditions = _OF_EVERY_NODE | ({BuiltinCondition.LIFECYCLE} if node.lifecycle else set())
     for row in built_in_interfaces(DISTROS[-1], node.library, conditions):

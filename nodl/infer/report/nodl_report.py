@@ -49,7 +49,7 @@ def _v1_elements(said: dict[tuple[EndpointKind, str], str]) -> list[str]:
 
 
 def _split(node: NodeInterface) -> tuple[dict[tuple[EndpointKind, str], str], list[Endpoint]]:
-    """What a manifest can say, by kind and name, and the endpoints that it cannot."""
+    """Return what a manifest can say, by kind and name, and the endpoints that it cannot."""
     said: dict[tuple[EndpointKind, str], str] = {}
     unsaid: list[Endpoint] = []
     for endpoint in node.endpoints:

@@ -118,7 +118,7 @@ def _document(node: NodeInterface, *, listener: bool) -> str:
 
 
 def _defaults(node: NodeInterface) -> dict[str, str]:
-    """The defaults of parameters that decide whether there is an endpoint."""
+    """Return the defaults of parameters that decide whether there is an endpoint."""
     found = {name: str(default) for name, default in (node.depends.defaults if node.depends else {}).items()}
     for endpoint in node.endpoints:
         for part in endpoint.name.parts:
@@ -176,7 +176,7 @@ def _tests(when: Iterable[tuple[str, str]]) -> str:
 
 
 def _by_name(entries: Iterable[_Entry]) -> dict[tuple[EndpointKind, str], list[_Entry]]:
-    """What the document says of each listed name; QoS and type do not make a difference here."""
+    """Return what the document says of each listed name; QoS and type do not make a difference here."""
     found: dict[tuple[EndpointKind, str], dict[_Entry, None]] = {}
     for entry in entries:
         found.setdefault((entry.kind, entry.name), {})[entry._replace(type="", qos=())] = None
@@ -184,7 +184,7 @@ def _by_name(entries: Iterable[_Entry]) -> dict[tuple[EndpointKind, str], list[_
 
 
 def _is_plain(entries: list[_Entry]) -> bool:
-    """Whether the name is there in any case: nothing that it varies with matters then."""
+    """Return True if the name is there in any case: nothing that it varies with matters then."""
     return all(not entry.template for entry in entries) and any(not entry.when for entry in entries)
 
 
@@ -223,7 +223,7 @@ def _entry(endpoint: Endpoint, depends: Dependence | None = None) -> _Entry | No
 
 
 def _conditions(template: NameTemplate) -> tuple[tuple[str, str], ...] | None:
-    """The tests of parameters on which the name depends; ``None`` where a document cannot say them."""
+    """Return the tests of parameters on which the name depends; ``None`` where a document cannot say them."""
     parts = [part for part in template.parts if isinstance(part, ParameterPart) and part.is_condition]
     if len({part.name for part in parts}) < len(parts):
         return None
@@ -248,7 +248,7 @@ def _conditions(template: NameTemplate) -> tuple[tuple[str, str], ...] | None:
 
 
 def _written(template: NameTemplate) -> tuple[str, str] | None:
-    """The template in the words of docs/library.md, and the list whose entries it repeats for."""
+    """Return the template in the words of docs/library.md, and the list whose entries it repeats for."""
     parameters = [part for part in template.parts if isinstance(part, ParameterPart)]
     lists = [part for part in parameters if part.item is not None]
     if any(part.edits or not _PARAMETER.match(part.name) for part in parameters) or len(lists) > 1:

@@ -48,7 +48,7 @@ def _interface(interface: ExpandedInterface) -> dict[str, object]:
 
 
 def to_text(system: ExpandedSystem, *, built_in: bool = False) -> str:
-    """A line for each node, interface and open question; built-in interfaces only if ``built_in``."""
+    """Return a line for each node, interface and open question; built-in interfaces only if ``built_in``."""
     lines: list[str] = []
     for node in system.nodes:
         held = f" in {', '.join(node.programs)}" if node.programs else ""
