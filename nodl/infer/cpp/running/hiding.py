@@ -17,10 +17,10 @@ from nodl.infer.cpp.syntax import Node, callee_name, field_of, template_argument
 
 
 def check_hidden(run: Machine, cls: Class, node: Node, frame: Frame) -> None:
-    """Add a gap if ``cls`` has two members of one name that hold texts: which is meant is not followed."""
+    """Add a gap if ``cls`` has two members of one name that hold plain values: which is meant is not followed."""
     for name in hidden(run.names, cls):
         fields = [each.fields[name].type for each in run.names.ancestry(cls) if name in each.fields]
-        if any("string" in kind or "char" in kind for kind in fields):
+        if any(_PLAIN.search(kind) for kind in fields):
             run.gap(node, frame, f"{cls.name} hides {name} of a base: which of them is meant is not followed")
 
 
@@ -59,7 +59,7 @@ def seen_class(run: Machine, node: Node | None, frame: Frame) -> Class | None:
 
 
 def seen_type(run: Machine, node: Node | None, frame: Frame) -> Type:
-    """Return the type of a variable, a member or an element; ``NO_TYPE`` for all else."""
+    """Return the type of a variable, a member, an element or a call; ``NO_TYPE`` for all else."""
     node = unwrapped(node)
     if node is None:
         return NO_TYPE
@@ -68,13 +68,7 @@ def seen_type(run: Machine, node: Node | None, frame: Frame) -> Type:
     if node.type == "subscript_expression":
         return element_type(seen_type(run, field_of(node, "argument"), frame))
     if node.type == "call_expression":
-        callee = field_of(node, "function")
-        made = template_arguments(callee) if _MAKES.search(callee_name(callee or node)) else []
-        if made:
-            return run.type_of(text(made[0]), frame)
-        inner, name = field_of(callee, "argument"), callee_name(field_of(callee, "field") or node)
-        kind = seen_type(run, inner, frame) if name in GIVES_INNER | _GIVES_ELEMENT else NO_TYPE
-        return element_type(kind) if name in _GIVES_ELEMENT else kind
+        return _of_call(run, node, frame)
     owner = field_of(node, "argument") if node.type == "field_expression" else None
     if owner is None or owner.type == "this":
         kind, holder = declared_type(run, node, frame)[0], frame.owner_of(text(node))
@@ -88,6 +82,26 @@ def seen_type(run: Machine, node: Node | None, frame: Frame) -> Type:
     return NO_TYPE
 
 
+def _of_call(run: Machine, node: Node, frame: Frame) -> Type:
+    """Return the type of what is made, of an element, or of what the only function of that name gives."""
+    callee = unwrapped(field_of(node, "function")) or node
+    owner, name = field_of(callee, "argument"), callee_name(field_of(callee, "field") or callee)
+    made = template_arguments(callee) if _MAKES.search(name) else []
+    if made:
+        return run.type_of(text(made[0]), frame)
+    if owner is None:
+        found = run.names.find_functions(name, frame.scope, frame.file)
+        found = found or run.names.find_methods(class_around(run, frame), name)
+    else:
+        kind = seen_type(run, owner, frame)
+        if name in GIVES_INNER | _GIVES_ELEMENT:
+            return kind if name in GIVES_INNER else element_type(kind)
+        found = run.names.find_methods(run.class_of(kind, frame) if kind.name else None, name)
+    if len(found) != 1:
+        return NO_TYPE
+    return run.names.resolve(type_text(found[0].node), found[0].scope, found[0].file)
+
+
 def element_type(kind: Type) -> Type:
     """Return the type of a container's elements, of a map that of its values."""
     return kind.arguments[-1] if kind.arguments and kind.last != "array" else (*kind.arguments, NO_TYPE)[0]
@@ -95,4 +109,7 @@ def element_type(kind: Type) -> Type:
 
 GIVES_INNER = frozenset({"get", "lock", "value", "release"})
 _MAKES = re.compile(r"(?:^|::)(?:make_(?:shared|unique)|\w+_cast)$")
+_PLAIN = re.compile(
+    r"\b(?:string\w*|char|u?int(?:\d+_t)?|bool|double|float|size_t|long|vector|map|array|list|set)\b"
+)
 _GIVES_ELEMENT = frozenset({"at", "front", "back", "top"})

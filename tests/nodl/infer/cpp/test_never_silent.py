@@ -597,3 +597,24 @@ def test_a_text_that_a_derived_class_hides_is_told_and_a_pointer_that_it_hides_i
 
     assert hiding("std::string name;") == ["D hides name of a base: which of them is meant is not followed"]
     assert hiding("rclcpp::Node * node;") == []
+
+
+COPIED = {
+    "a list that a method gives": ('auto v = list(); v[0].t = "b";', "a"),
+    "an element of it": ('auto c = list()[0]; c.t = "b";', "a"),
+    "each of its elements": ('for (auto c : list()) { c.t = "b"; }', "a"),
+    "pointers that a method gives": ('for (auto p : pointers()) { p->t = "b"; }', "b"),
+    "what a pointer that a method gives points to": ("*one() = other_;", "b"),
+}
+
+
+@pytest.mark.parametrize(("body", "expected"), COPIED.values(), ids=COPIED)
+def test_what_a_call_gives_is_copied_if_it_is_no_pointer(body: str, expected: str, tmp_path: Path) -> None:
+    members = (
+        'std::vector<C> l_{C{}}; std::vector<C> & list() { return l_; } C other_{"b"}; C * one() { return &l_[0]; }'
+        "std::vector<C *> p_{&l_[0]}; std::vector<C *> & pointers() { return p_; }"
+    )
+    use = f"{body} create_publisher<{S}>(l_[0].t, 1);"
+    assert names(infer(tmp_path, in_class(use, members, before='struct C { std::string t = "a"; };\n'))) == [
+        expected
+    ]
