@@ -166,7 +166,7 @@ def _start(
         cert = f"{keystore}/{layout.source_of(process.enclave, layout.CERT)}"
         yield "TimeoutStartSec=infinity"
         yield f"ExecStartPre=+/bin/sh -c {quoted(_wait_for_the_clock(cert))}"
-        yield f"ExecStartPre=/bin/sh -c {quoted(_link_credentials(process.enclave))}"
+        yield f"ExecStartPre=/bin/sh -c {quoted(_link_credentials(process.enclave, keystore))}"
     if _retries(process.respawn) is not None:
         show = f'systemctl show --property=NRestarts --value {unit} > "$RUNTIME_DIRECTORY/restarts"'
         yield f"ExecStartPre=+/bin/sh -c {quoted(f'umask 022; {show}')}"
@@ -190,12 +190,18 @@ def _wait_for_the_clock(cert: str) -> str:
     )
 
 
-def _link_credentials(enclave: str) -> str:
-    """Make the enclave's directory; the stand-in for a CRL is none."""
+def _link_credentials(enclave: str, keystore: str) -> str:
+    """Return the script that makes the enclave's directory.
+
+    The stand-in for a CRL is left out. If the manifest of the imported bundle lists a CRL, it was removed: an error.
+    """
+    crl = f'"$place/{layout.ENCLAVE_CRL}"'
     return (
         f'place="$RUNTIME_DIRECTORY/{layout.enclave_directory(enclave)}" && mkdir -p "$place" && '
-        'ln -sf "$CREDENTIALS_DIRECTORY"/* "$place" && '
-        f'if [ "$(cat "$place/{layout.ENCLAVE_CRL}")" = {NO_CRL} ]; then rm "$place/{layout.ENCLAVE_CRL}"; fi'
+        f'ln -sf "$CREDENTIALS_DIRECTORY"/* "$place" && if [ "$(cat {crl})" = {NO_CRL} ]; then '
+        f"if grep -qs {layout.CRL} {keystore}/{layout.BUNDLE}; then "
+        f'echo "{keystore}/{layout.CRL} was imported and is missing: import the bundle again" >&2; exit 1; fi; '
+        f"rm {crl}; fi"
     )
 
 

@@ -179,7 +179,10 @@ def test_a_revoked_listener_is_refused_by_units_from_before_any_revocation_and_a
     assert not running.hears("spy"), "who is not revoked has heard the speaker since"
     machine.run("systemctl", "stop", "spy")
 
-    assert "crl.pem" in machine.run("ls", f"{KS}/public").split()
+    machine.run("mv", f"{KS}/public/crl.pem", "/root")
+    running.keystore("units", "restart", "/ear", status=1)
+    assert "was imported and is missing: import the bundle again" in machine.journal(EAR)
+    machine.run("mv", "/root/crl.pem", f"{KS}/public")
     for step in (Step.START, Step.SWITCH, Step.FINISH):
         roll_over(running.ca, step, tuple(Role), options=options())
         assert {SPEAKER, EAR} <= set(up(running.take()))
