@@ -176,8 +176,8 @@ def test_a_folder_that_cannot_be_written_is_told_before_anything_runs(stand_in: 
     (tmp_path / "file").touch()
     ran = workspace.run("--learn", str(tmp_path / "file"), *LEARN)
     assert ran.returncode == 1 and "nothing was started" in ran.stderr and "process started" not in ran.stdout
-    told = workspace.run("--learn", str(tmp_path / "learnt"), "--learn-for", "10")
-    assert told.returncode == 2 and "write for example 10s or 2m" in told.stderr
+    told = workspace.run("--learn", str(tmp_path / "learnt"), "--learn-for", "ten")
+    assert told.returncode == 2 and "not a time such as 20s" in told.stderr
 
 
 def test_the_value_of_an_option_is_an_input_as_a_parameter_is(stand_in: Path, tmp_path: Path) -> None:
