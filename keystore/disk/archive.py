@@ -1,4 +1,4 @@
-"""Files of a keystore as one tar archive, and back: the same files give the same bytes, and nothing strange is read.
+"""Write and read files of a keystore as a tar archive: the same files give the same bytes, nothing strange is read.
 
 An archive from elsewhere may name paths outside of the keystore, links, devices, one file twice, or never end. Only its
 regular files are taken, by name, into memory; what is written from them is decided by whoever knows the manifest.
@@ -24,7 +24,7 @@ MAX_ENTRY = 8_000_000
 
 
 def archive_bytes(files: Mapping[str, Content | Link], *, compressed: bool = False) -> bytes:
-    """``files`` by their path in the archive: sorted, without times and owners."""
+    """Return ``files`` (path -> content) as a tar archive: sorted, without times and owners."""
     buffer = io.BytesIO()
     with tarfile.open(fileobj=buffer, mode="w", format=tarfile.GNU_FORMAT) as archive:
         for directory in sorted({parent for path in files for parent in parents(path)}):
@@ -42,7 +42,7 @@ def archive_bytes(files: Mapping[str, Content | Link], *, compressed: bool = Fal
 
 
 def read_bundle(bundle: Path) -> dict[str, bytes]:
-    """As ``read_archive``, from a file. Raises StorageError, too."""
+    """Return what ``read_archive`` returns, from a file. Raises StorageError, too."""
     try:
         content = read_bytes(bundle, MAX_ARCHIVE)
     except OSError as error:
@@ -51,7 +51,7 @@ def read_bundle(bundle: Path) -> dict[str, bytes]:
 
 
 def read_archive(content: bytes, place: str) -> dict[str, bytes]:
-    """Returns name -> bytes of each regular file.
+    """Return name -> bytes of each regular file.
 
     All names and sizes are checked before the content of any file is taken. Raises DamagedKeystoreError for what is cut
     off, names a file twice, or holds anything but plain files and directories.
@@ -67,7 +67,7 @@ def read_archive(content: bytes, place: str) -> dict[str, bytes]:
 
 
 def _plain_files(archive: tarfile.TarFile, available: int, place: str) -> dict[str, tarfile.TarInfo]:
-    """Every entry but directories, by name. A sparse file is not plain: some bytes stand for any size."""
+    """Return every entry but directories, by name. A sparse file is not plain: a few bytes can stand for any size."""
     found: dict[str, tarfile.TarInfo] = {}
     for entry in archive:
         if entry.isdir():
@@ -83,7 +83,7 @@ def _plain_files(archive: tarfile.TarFile, available: int, place: str) -> dict[s
 
 
 def parents(path: str) -> Iterator[str]:
-    """The directories above a relative path, the innermost first."""
+    """Yield the directories above a relative path, the innermost first."""
     while path := os.path.dirname(path):
         yield path
 

@@ -19,13 +19,13 @@ from keystore.formats.validity import Validity
 
 
 def crl_validity(view: KeystoreView) -> Validity:
-    """Returns thisUpdate and nextUpdate of the CRL (RFC 5280 section 5.1). Raises DamagedKeystoreError."""
+    """Return thisUpdate and nextUpdate of the CRL (RFC 5280 section 5.1). Raises DamagedKeystoreError."""
     crl = load_crl(view)
     return Validity(moment(crl, "last_update"), moment(crl, "next_update"))
 
 
 def crl_number(view: KeystoreView) -> int:
-    """Returns the CRLNumber (RFC 5280 section 5.2.3), 0 without one. Raises DamagedKeystoreError."""
+    """Return the CRLNumber (RFC 5280 section 5.2.3), 0 without one. Raises DamagedKeystoreError."""
     try:
         return load_crl(view).extensions.get_extension_for_class(x509.CRLNumber).value.crl_number
     except x509.ExtensionNotFound:
@@ -33,7 +33,7 @@ def crl_number(view: KeystoreView) -> int:
 
 
 def crl_problem(view: KeystoreView, register: Register | None, now: datetime) -> str | None:
-    """Says why the CRL on disk is not the one to use; None when it is, or when there is rightly none.
+    """Return why the CRL on disk is not the one to use; None if it is, or if there should be none.
 
     Without a register (a host that signs nothing) it only has to be whole, signed, and of today.
     """
@@ -54,21 +54,21 @@ def crl_problem(view: KeystoreView, register: Register | None, now: datetime) ->
 
 
 def revoked_serials(view: KeystoreView) -> dict[int, datetime]:
-    """Returns serial -> date of revocation, from a CRL whose signature was checked; empty without one."""
+    """Return serial -> date of revocation, from a CRL whose signature was checked; empty without one."""
     if not view.has_crl:
         return {}
     return {entry.serial_number: moment(entry, "revocation_date") for entry in load_crl(view)}
 
 
 def load_crl(view: KeystoreView) -> x509.CertificateRevocationList:
-    """Reads the CRL; raises DamagedKeystoreError unless the file is exactly a CRL that the identity CA signed."""
+    """Read the CRL. Raises DamagedKeystoreError unless the file is exactly a CRL that the identity CA signed."""
     return read_crl(
         safe_files.read(view.root, layout.CRL), view.ca(Role.IDENTITY), printable(view.root / layout.CRL)
     )
 
 
 def read_crl(pem: bytes, ca: CertificateFacts, place: str) -> x509.CertificateRevocationList:
-    """Reads a file that holds one CRL by ``ca`` with an end, and nothing else. Raises DamagedKeystoreError."""
+    """Read a file that holds one CRL by ``ca`` with a nextUpdate, and nothing else. Raises DamagedKeystoreError."""
     crl = _parsed(pem)
     if crl is None:
         raise DamagedKeystoreError(f"{place} is not a readable CRL; remove it and revoke again")
@@ -80,14 +80,14 @@ def read_crl(pem: bytes, ca: CertificateFacts, place: str) -> x509.CertificateRe
 
 
 def is_crl(pem: bytes) -> bool:
-    """Returns whether a file is exactly one CRL, by whomever."""
+    """Return True if a file is exactly one CRL, by any CA."""
     crl = _parsed(pem)
     return crl is not None and crl.public_bytes(Encoding.PEM) == pem
 
 
 @lru_cache(maxsize=4)  # a launch asks for the same file before each of its processes
 def _parsed(pem: bytes) -> x509.CertificateRevocationList | None:
-    """A CRL with all that is asked of it; None for anything else."""
+    """Return the CRL if it has all required fields, None otherwise."""
     try:
         crl = x509.load_pem_x509_crl(pem)
         _ = crl.issuer, crl.extensions, moment(crl, "last_update"), moment(crl, "next_update")

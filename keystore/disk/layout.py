@@ -1,4 +1,4 @@
-"""Which file lives where, as SROS2 lays it out (ros2/sros2 keystore package, ros2/rcl security.c).
+"""Paths of a keystore's files, as SROS2 lays them out (ros2/sros2 keystore package, ros2/rcl security.c).
 
     <keystore>/public/{identity,permissions}_ca.cert.pem      trust anchors; SROS2: links to ca.cert.pem
                private/{identity,permissions}_ca.key.pem      CA keys, mode 0600 in a 0700 directory
@@ -73,42 +73,42 @@ RUNTIME_FILES = (
 
 
 def ca_cert(role: Role) -> str:
-    """The certificate of the CA for ``role``."""
+    """Return the path of the certificate of the CA for ``role``."""
     return f"{PUBLIC}/{role.value}.cert.pem"
 
 
 def ca_key(role: Role) -> str:
-    """The private key of the CA for ``role``."""
+    """Return the path of the private key of the CA for ``role``."""
     return f"{PRIVATE}/{role.value}.key.pem"
 
 
 def ca_key_uri(role: Role) -> str:
-    """Instead of a key file: the ``pkcs11:`` URI of a key in a token, named as rcl names such files."""
+    """Return the path of a file with the ``pkcs11:`` URI of a key in a token, named as rcl names such files."""
     return f"{PRIVATE}/{role.value}.key.p11"
 
 
 def enclave_directory(enclave: str) -> str:
-    """``enclaves/a/b``; raises InvalidEnclaveNameError, so that no path is ever built from an unchecked name."""
+    """Return ``enclaves/a/b``. Raises InvalidEnclaveNameError, so no path is built from an unchecked name."""
     return "/".join((ENCLAVES, *segments(validate_enclave_name(enclave))))
 
 
 def shares(enclave: str) -> str:
-    """Whose permissions meet in ``enclave``, remembered."""
+    """Return the path of the record of launches that share ``enclave``."""
     return f"{SHARES}/{flat_name(enclave)}.json"
 
 
 def request(enclave: str) -> str:
-    """The certificate signing request of ``enclave``, for an identity CA elsewhere."""
+    """Return the path of the certificate signing request of ``enclave``, for an identity CA elsewhere."""
     return f"{REQUESTS}/{flat_name(enclave)}.csr"
 
 
 def flat_name(enclave: str) -> str:
-    """``e.front.camera``; ``.`` cannot occur in a name."""
+    """Return ``e.front.camera``; ``.`` cannot occur in a name."""
     return "e" + "".join(f".{part}" for part in segments(validate_enclave_name(enclave)))
 
 
 def enclave_links(enclave: str, *, crl: bool = False) -> dict[str, str]:
-    """Link name -> relative target of an enclave directory; the root enclave shares ``governance.p7s``.
+    """Return link name -> relative target of an enclave directory; the root enclave shares ``governance.p7s``.
 
     ``crl``: with the link that each enclave has once the keystore revokes something.
     """
@@ -128,7 +128,7 @@ def _links(depth: int) -> Mapping[str, str]:
 
 
 def crl_link(enclave: str) -> str:
-    """What the CRL link of ``enclave`` points to, relative to its directory."""
+    """Return the target of the CRL link of ``enclave``, relative to its directory."""
     return _links(len(segments(enclave)))[ENCLAVE_CRL]
 
 
@@ -138,7 +138,7 @@ def container_directory(enclave: str) -> str:
 
 
 def link_source(name: str) -> str:
-    """The keystore file that an enclave's link called ``name`` stands for."""
+    """Return the keystore file that an enclave's link called ``name`` points to."""
     if name == ENCLAVE_CRL:
         return CRL
     return GOVERNANCE if name == ENCLAVE_GOVERNANCE else f"{PUBLIC}/{name}"
@@ -159,7 +159,7 @@ CA_LINKS = {
 
 
 def signed_bundle(host: str) -> str:
-    """Where the manifest lies that was signed last for ``host``, an already checked name."""
+    """Return the path of the manifest signed last for ``host``, an already checked name."""
     return f"{BUNDLES}/{host}.p7s"
 
 

@@ -1,4 +1,4 @@
-"""Which host an enclave or a node belongs to: a small YAML file, read strictly. Pure but for reading it.
+"""Read the hosts file, which says to which host an enclave or a node belongs.
 
     version: 1
     hosts:
@@ -15,8 +15,8 @@
         writable_code: false               # makes code while it runs (JIT compilers)
         memory: 256Mi                      # limit
 
-A name that is written out counts before any pattern. Two hosts whose patterns both fit, or whose files both write a
-name out, is an error: nobody should have to know which line wins.
+A name that is written out takes precedence over patterns. If the patterns of two hosts match, or both write a name out,
+that is an error: nobody should have to know which line wins.
 """
 
 from __future__ import annotations
@@ -48,7 +48,12 @@ class HostPatterns(NamedTuple):
 
 
 class Needs(NamedTuple):
-    """What a process needs of its host beyond the network. ``memory``: its limit, such as ``256Mi``, if it has one."""
+    """What a process needs of its host beyond the network.
+
+    Attributes:
+        memory: Its limit, such as ``256Mi``.
+        groups: Names or numbers of supplementary groups, such as those of the devices.
+    """
 
     devices: tuple[str, ...] = ()
     realtime: bool = False
@@ -65,7 +70,7 @@ class NodeNeeds(NamedTuple):
 
 
 class Hosts(NamedTuple):
-    """``where`` names the file in errors."""
+    """The contents of a hosts file. ``where`` names it in errors."""
 
     hosts: tuple[HostPatterns, ...] = ()
     needs: tuple[NodeNeeds, ...] = ()
@@ -73,18 +78,19 @@ class Hosts(NamedTuple):
 
     @property
     def names(self) -> tuple[str, ...]:
+        """Return the names of the hosts."""
         return tuple(host.name for host in self.hosts)
 
     def of_enclave(self, enclave: str) -> str | None:
-        """Raises InvalidInputError when patterns of several hosts fit."""
+        """Return the host of ``enclave``, None if there is none. Raises InvalidInputError if there are several."""
         return self._of("enclave", enclave, {host.name: host.enclaves for host in self.hosts})
 
     def of_node(self, node: str) -> str | None:
-        """As ``of_enclave``, for a node's fully qualified name."""
+        """Return the host of a fully qualified node name, as ``of_enclave`` does."""
         return self._of("node", node, {host.name: host.nodes for host in self.hosts})
 
     def needs_of(self, nodes: Iterable[str]) -> Needs:
-        """All that the nodes of one process need together; of ``memory`` the last entry that fits counts."""
+        """Return what the nodes of one process need together; the last matching ``memory`` counts."""
         names = list(nodes)
         found = [
             entry.needs
@@ -133,12 +139,12 @@ class _Document(StrictDocument):
 
 
 def load_hosts(path: Path) -> Hosts:
-    """Raises InvalidInputError naming the file and the line or the entry."""
+    """Read a hosts file. Raises InvalidInputError naming the file and the line or the entry."""
     return parse_hosts(read_given(path), str(path))
 
 
 def parse_hosts(text: bytes, where: str) -> Hosts:
-    """As ``load_hosts``, from the file's content."""
+    """Return what ``load_hosts`` returns, from the file's content."""
     document = parse_strict(_Document, text, where)
     for name in document.hosts:
         refuse_host_name(name, where)

@@ -30,13 +30,13 @@ _BACKDATE = timedelta(days=1)
 
 
 def can_revoke(view: KeystoreView) -> bool:
-    """Whether participants would accept a CRL of the identity CA: its key usage has cRLSign, or is absent."""
+    """Return True if participants would accept a CRL of the identity CA: its key usage has cRLSign, or is absent."""
     usage = view.ca(Role.IDENTITY).extension(x509.KeyUsage)
     return usage is None or usage.crl_sign
 
 
 def revocable(view: KeystoreView, register: Register, enclaves: Iterable[str]) -> list[IssuedCertificate]:
-    """What these enclaves have or had of the identity CA in use, as far as it is not revoked yet."""
+    """Return the certificates of these enclaves, past ones too, by the identity CA in use that are not revoked yet."""
     issuer = fingerprint(view.ca(Role.IDENTITY).der)
     return [
         one
@@ -87,7 +87,7 @@ def link_crl(opened: Store, names: Iterable[str]) -> None:
 def restore_crl(
     opened: Store, access: CaAccess, now: datetime, within: timedelta = timedelta(0)
 ) -> list[str]:
-    """Publish the CRL anew when it is not the one to use, or ends within ``within``; what was done, in words.
+    """Publish the CRL again if it is not the one to use, or expires within ``within``; return what was done, in words.
 
     Raises DamagedKeystoreError for a CRL that this keystore did not publish: it may be all that says who was revoked.
     """
@@ -110,7 +110,7 @@ def restore_crl(
 
 
 def drop_crl(opened: Store) -> None:
-    """After a change of the identity CA: what the old one revoked is not trusted any more."""
+    """Remove the CRL after a change of the identity CA: what the old one revoked is not trusted any more."""
     for name in KeystoreView(opened.root).enclaves():
         opened.remove(f"{layout.enclave_directory(name)}/{layout.ENCLAVE_CRL}")
     opened.remove(layout.CRL)

@@ -1,4 +1,4 @@
-"""A fleet from its bundles: who has what until when, who still trusts an old CA, who carries a revoked enclave.
+"""Report the state of a fleet: who has what until when, who still trusts an old CA, who carries a revoked enclave.
 
 Reads manifests only, of bundle files and of imported keystores, from wherever they were collected. Their signatures are
 checked where the CA's own keystore is at hand; the register there also says what was revoked and signed last.
@@ -32,7 +32,7 @@ from keystore.steps.host_bundles import SUFFIX, last_signed
 
 
 class HostStatus(NamedTuple):
-    """``found`` is what a person must look at, in words; ``place`` where the manifest was read."""
+    """The state of one host. ``found`` is what a person must look at; ``place`` is where the manifest was read."""
 
     place: Path
     manifest: Manifest
@@ -42,7 +42,7 @@ class HostStatus(NamedTuple):
 
 
 class FleetReport(NamedTuple):
-    """``hosts``: the latest of each host, by name; ``unreadable``: place and why."""
+    """The state of a fleet. ``hosts``: the latest of each host, by name; ``unreadable``: place and reason."""
 
     now: datetime
     hosts: tuple[HostStatus, ...]
@@ -55,7 +55,7 @@ class FleetReport(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Reference:
-    """What the CA's own keystore knows. ``latest``: host -> number signed last."""
+    """What the CA's own keystore knows."""
 
     authorities: frozenset[str]
     revoked: frozenset[int]
@@ -71,7 +71,7 @@ def fleet_status(
     within: timedelta = timedelta(days=30),
     now: datetime | None = None,
 ) -> FleetReport:
-    """``places``: bundle files, imported keystores, and directories of either. ``keystore``: the CA's.
+    """Read the manifests in ``places`` (bundle files, imported keystores, directories of either) and compare them.
 
     Raises InvalidInputError when there is nothing to read, and a KeystoreError for a keystore that cannot be used.
     """
@@ -110,7 +110,7 @@ def _reference(root: Path) -> Reference:
 
 
 def _sources(places: Iterable[Path | str]) -> Iterator[Path]:
-    """Bundles and imported keystores, each directory searched one level deep."""
+    """Yield bundles and imported keystores; each directory is searched one level deep."""
     for place in map(Path, places):
         if place.is_file() or (place / layout.BUNDLE).is_file():
             yield place
@@ -163,7 +163,7 @@ def _ends(manifest: Manifest, now: datetime, limit: datetime) -> Iterator[str]:
 
 
 def _changed(place: Path) -> Iterator[str]:
-    """An imported keystore whose files are not those of its manifest, or a bundle file of which that is true."""
+    """Yield what in an imported keystore or a bundle file is not as its manifest has it."""
     if place.is_file():
         content = read_bundle(place)
         manifest = smime.read(content[layout.BUNDLE], printable(place)).document

@@ -1,4 +1,4 @@
-"""Keys that are made where they are used: the host makes them and asks, the CA signs, the private key never travels.
+"""Make keys where they are used: the host makes them and requests, the CA signs, the private key never travels.
 
     request         on the host: a key (in a file, or in a PKCS#11 token) and a certificate request for each enclave
     sign_requests   where the CA is: the enclave's certificate for that key; no private key is kept there
@@ -46,7 +46,7 @@ _BLOCK = re.compile(
 
 
 class HostKey(NamedTuple):
-    """``name``: key.pem or key.p11; ``data``: the file's bytes."""
+    """A private key of this host. ``name``: key.pem or key.p11; ``data``: the file's bytes."""
 
     name: str
     data: bytes
@@ -56,7 +56,7 @@ class HostKey(NamedTuple):
 
 
 class Request(NamedTuple):
-    """``key`` is the SHA-256 of the public key, as the register has it; ``pem`` the PKCS#10 request."""
+    """A certificate request. ``key``: SHA-256 of the public key, as in the register; ``pem``: the PKCS#10 request."""
 
     enclave: str
     key: str
@@ -65,7 +65,7 @@ class Request(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class RequestOptions:
-    """``token``: the ``pkcs11:`` URI of a key that exists in a token; one for each enclave, so for one enclave only."""
+    """How to request. ``token``: ``pkcs11:`` URI of an existing key in a token, for one enclave only."""
 
     token: str | None = None
     access: CaAccess = field(default_factory=CaAccess)
@@ -129,12 +129,12 @@ def _make_private(folder: Path) -> None:
 
 
 def requests_text(requests: Iterable[Request]) -> bytes:
-    """The file that goes to the CA. Each block is a PEM request that openssl reads, too."""
+    """Return the file that goes to the CA. Each block is a PEM request that openssl reads, too."""
     return b"".join(b"enclave: %s\n%s" % (one.enclave.encode(), one.pem) for one in requests)
 
 
 def parse_requests(text: bytes, place: str) -> tuple[Request, ...]:
-    """Raises DamagedKeystoreError, also when a request is not signed by its own key."""
+    """Read the file of requests. Raises DamagedKeystoreError, also if a request is not signed by its own key."""
     found = [
         Request(
             validate_enclave_name(name.decode("utf-8", "replace")),
@@ -151,7 +151,7 @@ def parse_requests(text: bytes, place: str) -> tuple[Request, ...]:
 
 
 def find_key(versions: Versions, wanted: BundledEnclave) -> HostKey:
-    """The key that the certificate of ``wanted`` was issued for: it waits here, or is in use already.
+    """Return the key that the certificate of ``wanted`` was issued for: it waits here, or is in use already.
 
     Raises UnsafeKeystoreError when it is not on this host.
     """
@@ -167,7 +167,7 @@ def find_key(versions: Versions, wanted: BundledEnclave) -> HostKey:
 
 
 def _candidates(versions: Versions, enclave: str) -> Iterator[tuple[Path, Path]]:
-    """Where a key may be, and beside it what tells its public half."""
+    """Yield where a key may be, and the file beside it with its public key."""
     waiting = versions.pending / layout.flat_name(enclave)
     yield waiting, waiting / layout.REQUEST
     if versions.current is not None:
@@ -182,7 +182,7 @@ def _private(folder: Path, name: str) -> bytes | None:
 
 
 def _belongs(name: str, data: bytes, public: Path, wanted: BundledEnclave) -> bool:
-    """A key in a file is asked itself; of one in a token the request or certificate beside it tells."""
+    """Return the public key: of a key in a file from itself, of one in a token from the request or certificate."""
     if name == layout.KEY:
         try:
             key = FileSigner(load_private_key(data, None, name)).public_key()
@@ -199,7 +199,7 @@ def _belongs(name: str, data: bytes, public: Path, wanted: BundledEnclave) -> bo
 
 
 def forget_pending(versions: Versions, used: Mapping[str, HostKey]) -> None:
-    """Keys that a bundle put in force wait no more."""
+    """Delete the waiting copies of keys that a bundle put in force."""
     for enclave, key in used.items():
         place = versions.pending / layout.flat_name(enclave)
         if place.is_dir() and _private(place, key.name) == key.data:

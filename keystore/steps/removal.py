@@ -1,4 +1,4 @@
-"""Enclaves taken out for good: their certificates revoked, their files deleted.
+"""Remove enclaves: revoke their certificates, delete their files.
 
 Which implementations look at the CRL (``crl.pem`` in each enclave directory, there only after a
 revocation): rmw_cyclonedds_cpp passes it as ``org.eclipse.cyclonedds.sec.auth.crl``, rmw_fastrtps_* as
@@ -40,7 +40,7 @@ _DELETE_ORDER = (
 
 @dataclass(frozen=True, slots=True)
 class RemoveOptions(ChangeOptions):
-    """``revoke`` False only deletes: copies of the enclave elsewhere stay valid until they expire."""
+    """How to remove. ``revoke`` False only deletes: copies of the enclave elsewhere stay valid until they expire."""
 
     revoke: bool = True
 
@@ -58,8 +58,9 @@ class RemoveReport:
 def remove(
     keystore: Path | str, names: Iterable[str], *, options: RemoveOptions | None = None
 ) -> RemoveReport:
-    """Revoke what they have and had, publish the CRL to all remaining enclaves, then delete. Repeating completes an
-    interrupted run.
+    """Revoke all certificates of these enclaves, publish the CRL to the others, then delete the enclaves.
+
+    Repeating completes an interrupted run.
 
     Enclaves below a removed one stay. One whose files are lost is revoked as the register knows it.
     Raises InvalidInputError for an enclave that was never there.
@@ -87,7 +88,7 @@ def remove(
 
 
 def _strike(opened: Store, names: list[str], options: RemoveOptions, now: datetime) -> list[str]:
-    """Take the enclaves off the register; with ``revoke`` everything they have and had onto the CRL."""
+    """Take the enclaves off the register; with ``revoke`` put all their certificates onto the CRL."""
     view = KeystoreView(opened.root)
     found = revocable(view, opened.register, names) if options.revoke else []
     struck = opened.register.without_enclaves(names)
@@ -108,7 +109,7 @@ def _strike(opened: Store, names: list[str], options: RemoveOptions, now: dateti
 
 
 def revoke_replaced(opened: Store, names: Iterable[str], access: CaAccess, now: datetime) -> int:
-    """Revoke what these enclaves had before, not what they have now; how many certificates that adds."""
+    """Revoke the past certificates of these enclaves, not the present ones; return how many."""
     found = revocable(KeystoreView(opened.root), opened.register, names)
     serials = {one.serial for one in found if not one.in_force}
     if serials:
@@ -117,7 +118,7 @@ def revoke_replaced(opened: Store, names: Iterable[str], access: CaAccess, now: 
 
 
 def _delete(opened: Store, name: str) -> None:
-    """Exactly the files of this enclave; the root's governance belongs to the keystore."""
+    """Delete exactly the files of this enclave; the root's governance belongs to the keystore."""
     directory = layout.enclave_directory(name)
     for file in _DELETE_ORDER:
         if not (name == "/" and file == layout.ENCLAVE_GOVERNANCE):
