@@ -216,8 +216,6 @@ def _member_name(name: str) -> str:
 def _bases(
     run: Machine, this: Obj, cls: Class, given: dict[str, Node], arguments: Sequence[Value], node: Node, inner: Frame
 ) -> None:  # fmt: skip
-    if cls.virtual_base:
-        run.gap(node, inner, f"{cls.name} has a virtual base: who makes it is not followed")
     for written in cls.bases:
         kind = run.names.resolve(written, cls.scope, cls.file, this.bindings.get(cls))
         where = given.get(_member_name(written)) or given.get(kind.last)
@@ -225,6 +223,8 @@ def _bases(
         if where is not None:
             run.handle(where, inner)
             values = [run.evaluate(each, inner) for each in children(where)]
+            if cls.virtual_base and values:
+                run.gap(where, inner, f"{cls.name} has a virtual base: who makes it is not followed")
         else:
             values = list(arguments) if cls.inherits_constructors else []
         base = run.class_of(kind, cls)
