@@ -19,7 +19,7 @@ component or plugin, in {packages} packages.
 *Agreement* is that of `secure-nodl library check` with the analysis of the sources named here, at that version: {agree}
 documents agree, {differ} differ, each with a reason (`secure-nodl library show`). Of those that agree {inferred} were
 written from that analysis in the first place, all others by a reader of the source. Plugins and further nodes have no
-node of their own in the source to compare with. *Left open* is what the document does not say: a gap is told when a
+node of their own in the source to compare with. *Left open* is what the document does not say: a gap is reported when a
 launch needs it, and refused by `--secure`.
 
 | package | executable, component or class | holds for | known from | agreement | left open |
