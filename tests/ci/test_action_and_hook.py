@@ -51,7 +51,7 @@ def step(name: str, folder: Path, commands: str = COMMANDS, **inputs: str) -> Ra
     """The step's own script, in the shell and with the options that GitHub gives it."""
     given = {key: str(value.get("default", "")) for key, value in ACTION["inputs"].items()}
     given.update(
-        {"options": f"--prefix {PREFIX}", **{key.replace("_", "-"): value for key, value in inputs.items()}}
+        {"options": f"--prefix\n{PREFIX}", **{key.replace("_", "-"): value for key, value in inputs.items()}}
     )
     environment = {
         key: re.sub(r"\$\{\{ inputs\.([a-z-]+) \}\}", lambda match: given[match[1]], value)

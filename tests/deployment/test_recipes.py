@@ -6,7 +6,6 @@ import os
 import re
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -21,6 +20,7 @@ from keystore.verification import verify
 from tests.deployment.kit import TALK, made, tool
 from tests.keystore.kit import filled, openssl, options, policy
 from tests.keystore.test_external_ca import ExternalCa
+from tests.programs import PYTHON
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "docs/deployment.md").read_text(encoding="utf-8")
@@ -35,7 +35,7 @@ def follow(name: str, folder: Path, **environment: str) -> str:
     """What the recipe prints, run in ``folder`` with our commands on PATH."""
     programs = folder / "programs"
     programs.mkdir()
-    (programs / "secure-keystore").write_text(f'#!/bin/sh\nexec {sys.executable} -m keystore.verb "$@"\n')
+    (programs / "secure-keystore").write_text(f'#!/bin/sh\nexec {PYTHON} -m keystore.verb "$@"\n')
     (programs / "secure-keystore").chmod(0o755)
     env = {**os.environ, "PATH": f"{programs}:{os.environ['PATH']}", "PYTHONPATH": str(ROOT), **environment}
     done = subprocess.run(

@@ -15,9 +15,11 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+from tests.programs import python_program
+
 _BLOCK = re.compile(r"^( *)```(\w+)(?: file=(\S+))?\n(.*?)^ *```$", re.S | re.M)
 _STATUS = re.compile(r"  # exit status (\d+)$")
-_COLCON = """#!{python}
+_COLCON = """
 # As colcon would place this workspace's packages, from their install rules.
 from pathlib import Path
 from shutil import rmtree
@@ -25,7 +27,7 @@ from enclave_launch.verb.secure_plan.source_prefix import install_sources
 rmtree("install", ignore_errors=True)
 prefixes = install_sources(Path("src"), Path("install"))
 listed = ":".join(str(prefix.resolve()) for prefix in prefixes.values())
-Path("install/setup.sh").write_text(f"export AMENT_PREFIX_PATH={{listed}}:$UNDERLAY\\n")
+Path("install/setup.sh").write_text(f"export AMENT_PREFIX_PATH={listed}:$UNDERLAY\\n")
 print("Summary:", len(prefixes), "packages finished")
 """
 
@@ -85,7 +87,7 @@ def read_aloud(page: Path, folder: Path, environment: dict[str, str]) -> None:
 def make_colcon(folder: Path) -> None:
     """Put a ``colcon`` into ``folder`` that installs Python packages from their sources."""
     colcon = folder / "colcon"
-    colcon.write_text(_COLCON.format(python=sys.executable))
+    colcon.write_text(python_program(_COLCON))
     colcon.chmod(0o755)
 
 

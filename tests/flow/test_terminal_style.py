@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import os
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -20,6 +21,7 @@ from enclave_launch.options import ResolveOptions
 from enclave_launch.plan import LaunchPlan
 from enclave_launch.report.terminal_style import TerminalStyle, terminal_style_of
 from enclave_launch.report.tree import plan_tree
+from tests.programs import PYTHON, python_program
 
 DEMO = Path(__file__).parents[2] / "fixtures" / "demo_ws"
 MANY = [f"/robot/sensor_{number}/points" for number in range(40)]
@@ -120,11 +122,11 @@ def in_a_terminal(tmp_path: Path, command: str, *capture: str, keys: tuple[str, 
         subprocess.run([*tmux, "kill-server"], check=False)
 
 
-LAUNCH = f"-m enclave_launch --dry-run --prefix {DEMO} demo_nodes talker_listener_remap.launch.xml"
+LAUNCH = f"-m enclave_launch --dry-run --prefix {shlex.quote(str(DEMO))} demo_nodes talker_listener_remap.launch.xml"
 
 
 def test_recorded_in_a_real_terminal(tmp_path: Path) -> None:
-    command = f"sh -c '{sys.executable} {LAUNCH}; echo DONE; sleep 60'"
+    command = f"sh -c {shlex.quote(f'{PYTHON} {LAUNCH}; echo DONE; sleep 60')}"
     shown = in_a_terminal(tmp_path, command, "-e")
     assert "\033[1m" in shown and "listener-2" in shown
     plain = in_a_terminal(tmp_path, f"env NO_COLOR=1 {command}", "-e")
@@ -164,12 +166,13 @@ def test_tab_completes_in_a_real_bash(tmp_path: Path) -> None:
     """Package, launch file and argument, each after Tab, as a person would type them."""
     program = tmp_path / "secure-launch"
     main = "import sys\nfrom enclave_launch.verb.secure_launch import main\nsys.exit(main())\n"
-    program.write_text(f"#!{sys.executable}\n{main}")
+    program.write_text(python_program(main))
     program.chmod(0o755)
     register = Path(sys.executable).parent / "register-python-argcomplete"
-    setting = f"PATH={tmp_path}:$PATH AMENT_PREFIX_PATH={DEMO} PYTHONPATH={DEMO.parents[1]}"
+    setting = f"PATH={tmp_path}:$PATH AMENT_PREFIX_PATH='{DEMO}' PYTHONPATH='{DEMO.parents[1]}'"
     (tmp_path / "rc").write_text(
-        f'export {setting}\neval "$({register} secure-launch)"\nPS1="READY "\n', encoding="utf-8"
+        f'export {setting}\neval "$({shlex.quote(str(register))} secure-launch)"\nPS1="READY "\n',
+        encoding="utf-8",
     )
     words = ("secure-launch --dry", "demo_n", "talker_listener_r", "cou")
     keys = [key for word in words for key in (word, "Tab")]

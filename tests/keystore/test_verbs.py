@@ -13,6 +13,7 @@ import pytest
 
 from keystore.verb import VERBS, main
 from tests.keystore.kit import DAY, NOW, filled, snapshot
+from tests.programs import PYTHON
 
 POLICY = """<policy version="0.2.0"><enclaves><enclave path="/talker"><profiles><profile ns="/" node="talker">
 <topics publish="ALLOW"><topic>chatter</topic></topics></profile></profiles></enclave></enclaves></policy>"""
@@ -135,7 +136,7 @@ def test_every_verb_has_help(verb: str, capsys: pytest.CaptureFixture[str]) -> N
 
 
 def test_a_reader_that_leaves_is_no_traceback(root: Path) -> None:
-    command = f"{sys.executable} -m keystore.verb status --all --format json {root} | head -c 1"
+    command = f"{PYTHON} -m keystore.verb status --all --format json {root} | head -c 1"
     done = subprocess.run(["sh", "-c", command], capture_output=True, text=True)
     assert done.stdout == "{" and "Traceback" not in done.stderr
 

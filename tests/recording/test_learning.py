@@ -25,6 +25,7 @@ from nodl.name_template import NameTemplate, ParameterPart
 from nodl.record.asked import all_asked
 from nodl.record.assembly import Record, read_record
 from nodl.verb import main as secure_nodl
+from tests.programs import python_program
 from tests.recording.conftest import ROOT, rclpy_python
 
 WORKSPACE = ROOT / "fixtures" / "rclpy_ws"
@@ -239,8 +240,7 @@ def test_with_marker_values_the_plan_of_another_launch_is_its_live_graph(
     assert all(each.code is not Code.RECORD_UNDECIDED for each in plan.warnings)
 
 
-LAZY = """#!{python}
-import rclpy
+LAZY = """import rclpy
 from rclpy.node import Node
 from std_msgs.msg import String
 
@@ -269,7 +269,7 @@ def test_what_was_never_seen_and_the_source_makes_is_told_when_learning_ends(tmp
     for file in (program, marker):
         file.parent.mkdir(parents=True)
     marker.touch()
-    program.write_text(LAZY.format(python=rclpy_python("jazzy")))
+    program.write_text(python_program(LAZY, rclpy_python("jazzy")))
     program.chmod(0o755)
     launch_file = tmp_path / "lazy.launch.xml"
     launch_file.write_text('<launch><node pkg="lazy_nodes" exec="lazy"/></launch>')

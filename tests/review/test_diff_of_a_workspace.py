@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import json
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from enclave_launch.verb.secure_plan import main
+from tests.programs import PYTHON
 
 LAUNCH = """<launch>
   <node pkg="robot_cpp" exec="driver" name="driver"/>
@@ -226,7 +226,7 @@ def test_a_build_of_the_revision_is_compared_with_what_is_installed(
         "(share / 'robot_bringup/launch').mkdir(parents=True)\n"
         "(share / 'robot_bringup/launch/robot.launch.xml').write_text('<launch/>')\n",
     )
-    command = f"{sys.executable} {build}"
+    command = f"{PYTHON} {build}"
     status = main(["diff", "main:", "--build", command, "--allow-missing-packages", *NAMED])
     out = capsys.readouterr().out
     assert status == 1 and "+ node /driver" in out

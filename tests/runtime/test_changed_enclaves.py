@@ -120,9 +120,9 @@ CHANGES: dict[str, tuple[Callable[[Path], object], str]] = {
     "key removed": (lambda keystore: (keystore / "enclaves/key.pem").unlink(), "no private key"),
     "governance removed": (
         lambda keystore: (keystore / "enclaves/governance.p7s").unlink(),
-        "cannot be looked at any more, .* not a complete keystore",
+        "can no longer be read, .* not a complete keystore",
     ),
-    "keystore removed": (shutil.rmtree, "cannot be looked at any more, .* no keystore"),
+    "keystore removed": (shutil.rmtree, "can no longer be read, .* no keystore"),
 }
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import shlex
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -18,11 +19,12 @@ from enclave_launch.runtime.environment_watch import (
     unplanned,
 )
 from enclave_launch.runtime.warden import children_by_parent
+from tests.programs import PYTHON
 
 pytestmark = pytest.mark.skipif(not Path("/proc/self/environ").exists(), reason="there is no /proc")
 
 PLANNED = {"ROS_SECURITY_ENABLE": "true", "ROS_SECURITY_KEYSTORE": "/ks"}
-SLEEP = f"{sys.executable} -c 'import time; print(1, flush=True); time.sleep(60)'"
+SLEEP = f"{PYTHON} -c 'import time; print(1, flush=True); time.sleep(60)'"
 Start = Callable[..., Watched]
 
 
@@ -80,9 +82,11 @@ def test_a_descendant_matters_once_it_speaks_dds(start: Start, tmp_path: Path) -
         f"file = open({str(library)!r}, 'rb')\nheld = mmap.mmap(file.fileno(), 0, prot=mmap.PROT_READ)\n"
         "print(1, flush=True)\ntime.sleep(60)\n"
     )
-    node = f"{sys.executable} {program}; true"
-    assert found(start(f"sh -c 'env -u ROS_SECURITY_ENABLE {node}'")) == ["ROS_SECURITY_ENABLE is not set"]
-    assert found(start(f"sh -c '{node}'")) == []
+    node = f"{PYTHON} {program}; true"
+    assert found(start(f"sh -c {shlex.quote(f'env -u ROS_SECURITY_ENABLE {node}')}")) == [
+        "ROS_SECURITY_ENABLE is not set"
+    ]
+    assert found(start(f"sh -c {shlex.quote(node)}")) == []
 
 
 def test_a_process_that_wrote_over_its_environment_is_left_alone(start: Start) -> None:
@@ -94,7 +98,7 @@ def test_a_process_that_wrote_over_its_environment_is_left_alone(start: Start) -
         "begin, end = int(stat[47]), int(stat[48]); ctypes.memset(begin, 120, end - begin - 1); "
         "print(1, flush=True); time.sleep(60)"
     )
-    watched = start(f"{sys.executable} -c '{code}'")
+    watched = start(f"{PYTHON} -c '{code}'")
     assert environment_of(watched.pid) is None and found(watched) == []
 
 

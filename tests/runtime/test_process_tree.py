@@ -17,6 +17,7 @@ import pytest
 from enclave_launch.runtime.process_tree import Child, ProcessSpec, ProcessTree, Stream
 from enclave_launch.runtime.survivors import own_cgroup
 from enclave_launch.runtime.warden import children_by_parent
+from tests.programs import PYTHON
 from tests.runtime.conftest import alive, descriptors, eventually, read_pid, require_descriptors
 
 Body = Callable[[ProcessTree], Awaitable[None]]
@@ -424,7 +425,7 @@ def test_in_a_delegated_cgroup_the_launch_has_one_of_its_own_and_leaves_none(tmp
         os.setxattr(delegated, "user.delegate", b"1")
         program = tmp_path / "program.py"
         program.write_text(IN_A_CGROUP.format(delegated=delegated))
-        script = f"echo $$ > {delegated}/cgroup.procs; exec {sys.executable} {program}"
+        script = f"echo $$ > {delegated}/cgroup.procs; exec {PYTHON} {program}"
         result = subprocess.run(["sh", "-c", script], capture_output=True, text=True)
         assert f"/{delegated.name}/enclave-launch-" in result.stdout, result
         assert result.stdout.splitlines()[-1] == "[]"

@@ -10,6 +10,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+from tests.programs import python_program
 from tests.zenoh import kit
 
 ROUTER = """
@@ -87,7 +88,7 @@ def install_program(prefix: Path, package: str, name: str, text: str) -> None:
         f'<package format="3"><name>{package}</name><version>0.0.0</version></package>'
     )
     program = prefix / "lib" / package / name
-    program.write_text(f"#!{sys.executable}\n{text}")
+    program.write_text(python_program(text))
     program.chmod(0o755)
 
 
