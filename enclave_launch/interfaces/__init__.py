@@ -20,6 +20,7 @@ from enclave_launch.interfaces.started_program import StartedProgram
 from enclave_launch.options import ResolveOptions
 from enclave_launch.plan import Found, InterfaceOrigin, Missing
 from enclave_launch.policy.node_permissions import UNSEEN
+from enclave_launch.policy.running_node import UnknownNodeName
 from enclave_launch.process import Evaluation, ResolvedComponent, ResolvedProcess
 from nodl.errors import ConflictingNoDLError, NoDLError
 from nodl.lookup import Lookup, ManifestLookup
@@ -102,12 +103,22 @@ class InterfaceFinder:
                     self._known[subject] = known
             if not known.descriptions:
                 return Missing(str(subject), "; ".join(known.searched))
-            applied = [
-                each._replace(interfaces=self._library.complete(each.interfaces, started, container))
-                for each in known.descriptions
-            ]
+            applied = [self._applied(each, started, container) for each in known.descriptions]
             start = ProgramStart(started, container, self._distro)
             return meeting(applied, start, also_unseen=UNSEEN in self._options.also)
+
+    def _applied(
+        self,
+        description: ProgramDescription,
+        started: ResolvedProcess | ResolvedComponent,
+        container: ResolvedProcess | None,
+    ) -> ProgramDescription:
+        """Return the description under this start; one with a node of unknown name as it is, which the plan reports."""
+        try:
+            interfaces = self._library.complete(description.interfaces, started, container)
+        except UnknownNodeName:
+            return description
+        return description._replace(interfaces=interfaces)
 
     def _look_up(self, subject: _Subject, started: StartedProgram) -> _Known:
         """Collect every description of ``subject``, in the order of ``InterfaceOrigin``.

@@ -50,7 +50,7 @@ def test_a_ros_program_without_one_cannot_join(
     """A secured talker makes the keystore have ``/``, where such a program used to join."""
     monkeypatch.setenv("ROS_SECURITY_ENCLAVE_OVERRIDE", "/")
     file = write(
-        f'<executable cmd="{TALKER}"/>\n'
+        f"<executable cmd=\"'{TALKER}'\"/>\n"
         '<node pkg="demo_nodes" exec="talker" name="n"><param name="seconds" value="2"/></node>'
     )
     run = secure_launch("--secure", "--keystore", "ks", "--strategy", strategy, file)

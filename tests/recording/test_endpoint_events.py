@@ -165,7 +165,7 @@ def test_real_rclpy_on_asyncio(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     file = tmp_path / "py.launch.xml"
     arguments = "--ros-args -r __node:=renamed -r __ns:=/robot"
     file.write_text(
-        f'<launch><executable name="py" cmd="{python} {script} {arguments}" output="screen"/></launch>'
+        f"<launch><executable name='py' cmd=\"'{python}' {script} {arguments}\" output='screen'/></launch>"
     )
 
     async def main() -> int:

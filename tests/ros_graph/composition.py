@@ -26,7 +26,7 @@ generate(package_name=sys.argv[1], interface_files=[sys.argv[2] + ":srv/LoadNode
 """
 HEADERS = """
 import numpy, sysconfig
-print(sysconfig.get_paths()["include"], numpy.get_include(), sysconfig.get_config_var("EXT_SUFFIX"))
+print(sysconfig.get_paths()["include"], numpy.get_include(), sysconfig.get_config_var("EXT_SUFFIX"), sep="\\n")
 """
 
 
@@ -47,7 +47,7 @@ def composition_interfaces(python: Path, folder: Path) -> dict[str, str]:
 
 class _Compiler:
     def __init__(self, python: Path, folder: Path, sources: Path, package: Path) -> None:
-        python_headers, numpy_headers, self._suffix = _run(python, "-c", HEADERS).split()
+        python_headers, numpy_headers, self._suffix = _run(python, "-c", HEADERS).splitlines()
         self._library_folder = _made(folder / "lib")
         self._sources, self._package = sources, package
         prefix = python.parent.parent
