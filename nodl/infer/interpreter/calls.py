@@ -116,7 +116,9 @@ def _remembered(run: Run, function: FunctionValue, cells: LocalCells, call: Call
     if known is not None and known[0] == version:
         return known[1]
     result = _run_body(run, function, cells, call)
-    if run.state.version() == version:
+    if (
+        run.state.version() == version and not run.recursions
+    ):  # whose result grows without a change of the state
         run.memo[key] = (version, result)
     return result
 
