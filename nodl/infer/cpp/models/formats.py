@@ -1,17 +1,18 @@
-"""Texts by a format: ``snprintf`` and its kin."""
+"""Texts by a format: ``snprintf`` and its kin, ``fmt::format``, ``std::format``."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from nodl.infer.cpp.libraries import Call, library_function
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.machine import Machine
-from nodl.infer.cpp.running.values import BOTTOM, Value, concatenated, literal, plain, unknown
+from nodl.infer.cpp.running.values import Value, concatenated, literal, plain, unknown
 from nodl.infer.cpp.syntax import unwrapped
 
 _PERCENT = re.compile(r"%(?P<flags>0?\d*)(?:hh|h|ll|l|z|j|t)?(?P<kind>[diusc%])|%")
+_BRACES = re.compile(r"\{\{|\}\}|\{(?P<index>\d*)\}|[{}]")
 
 
 @library_function("snprintf", "std::snprintf", "sprintf", "std::sprintf")
@@ -38,21 +39,15 @@ def _fits(written: Value, size: Value) -> bool:
 
 
 def _percent(form: Value, values: Sequence[Value]) -> Value:
-    """Return ``"topic_%02d"`` with its values; a conversion that is not followed makes a part that is not known."""
-    written = plain(form[0]) if len(form) == 1 else None
-    if written is None:
-        return unknown("a text by a format that is not known")
-    pieces, waiting, position = [], list(values), 0
-    for match in _PERCENT.finditer(written):
-        pieces.append(literal(written[position : match.start()]))
-        position = match.end()
-        value = literal("%") if match[0] == "%%" else BOTTOM
-        if not value:
-            value = _converted(
-                match, waiting.pop(0) if waiting else unknown("a value that a format asks for")
-            )
-        pieces.append(value)
-    return concatenated(*pieces, literal(written[position:]))
+    """``"topic_%02d"`` with its values; a conversion that is not followed makes a part that is not known."""
+    pieces, waiting = [], list(values)
+    for piece, match in _pieces(form, _PERCENT):
+        if match is None or match[0] == "%%":
+            pieces.append(literal(piece if match is None else "%"))
+        else:
+            value = waiting.pop(0) if waiting else unknown("a value that a format asks for")
+            pieces.append(_converted(match, value))
+    return concatenated(*pieces) if pieces else unknown("a text by a format that is not known")
 
 
 def _converted(match: re.Match[str], value: Value) -> Value:
@@ -61,3 +56,36 @@ def _converted(match: re.Match[str], value: Value) -> Value:
         is_number = isinstance(atom, int) and not isinstance(atom, bool)
         return literal(f"%{match['flags']}d" % atom) if is_number else unknown("a number by a format")
     return value if match["kind"] == "s" and not match["flags"] else unknown("a text by a format")
+
+
+@library_function("fmt::format", "std::format")
+def _formatted(run: Machine, call: Call) -> Value:
+    """(format, ...): ``{}`` and ``{0}`` are filled in; other fields make a part that is not known."""
+    pieces, position = [], 0
+    for piece, match in _pieces(call.value(0), _BRACES):
+        if match is None or match[0] in ("{{", "}}"):
+            pieces.append(literal(piece[:1] if match is not None else piece))
+            continue
+        index = int(match["index"]) if match["index"] else position
+        position += 1
+        known = match["index"] is not None and index + 1 < len(call.values)
+        pieces.append(_shown(call.values[index + 1]) if known else unknown("a field of a format"))
+    return concatenated(*pieces) if pieces else unknown("a text by a format that is not known")
+
+
+def _shown(value: Value) -> Value:
+    is_float = any(isinstance(atom, float | bool) for atom in value)
+    return unknown("a number by a format") if is_float else value
+
+
+def _pieces(form: Value, pattern: re.Pattern[str]) -> Iterator[tuple[str, re.Match[str] | None]]:
+    """The parts of a format that is one known text: as written, or with what asks for a value."""
+    written = plain(form[0]) if len(form) == 1 else None
+    position = 0
+    for match in pattern.finditer(written or ""):
+        if match.start() > position:
+            yield (written or "")[position : match.start()], None
+        yield match[0], match
+        position = match.end()
+    if written is not None:
+        yield written[position:], None

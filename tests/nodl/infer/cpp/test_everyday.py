@@ -81,6 +81,8 @@ FOUND = {
         f'char b[32]; snprintf(b, sizeof(b), "t%02d/%s", 3, "x"); {PUB}(b, 1);', "", ["t03/x"]
     ),
     "a text that may be cut off": (f'char b[4]; snprintf(b, 4, "%s", "long"); {PUB}(b, 1);', "", ["?"]),
+    "a text by fmt": (f'{PUB}(fmt::format("{{}}/{{}}", "x", 2), 1);', "", ["x/2"]),
+    "a format that is not followed": (f'{PUB}(fmt::format("{{:>4}}", "x"), 1);', "", ["?:>4?"]),
 }  # fmt: skip
 
 
