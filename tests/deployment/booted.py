@@ -124,7 +124,7 @@ def booted(folder: Path, shared: Path) -> Iterator[Machine]:
     try:
         machine = Machine(_first_process(outer, log))
         _wait_until_up(machine, log)
-        _show_interpreter(machine)
+        _show_repository(machine)
         yield machine
     finally:
         outer.send_signal(signal.SIGKILL)  # --kill-child: and with it the first process of the machine
@@ -153,12 +153,14 @@ def _folders() -> list[str]:
     return [one for one in below if not any(one.startswith(f"{other}/") for other in below)]
 
 
-def _show_interpreter(machine: Machine) -> None:
-    """An interpreter below a home directory is one of developers: services see it here all the same."""
-    if sys.base_prefix.startswith(("/root/", "/home/")):
+def _show_repository(machine: Machine) -> None:
+    """Let services see what of a developer's machine is below a home directory or /tmp, which units hide."""
+    hidden = [one for one in _folders() if one.startswith(("/root/", "/home/", "/tmp/", "/var/tmp/"))]
+    if hidden:
         machine.run("mkdir", "/etc/systemd/system/service.d")
-        text = f"[Service]\nProtectHome=tmpfs\nBindReadOnlyPaths={sys.base_prefix}\n"
-        machine.write("/etc/systemd/system/service.d/interpreter.conf", text)
+        homes = "ProtectHome=tmpfs\n" if any(one.startswith(("/root/", "/home/")) for one in hidden) else ""
+        text = f"[Service]\n{homes}BindReadOnlyPaths={' '.join(hidden)}\n"
+        machine.write("/etc/systemd/system/service.d/repository.conf", text)
 
 
 def _first_process(outer: subprocess.Popen[bytes], log: Path) -> int:

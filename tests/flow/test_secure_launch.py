@@ -172,7 +172,7 @@ BAD_WORDS = {
     "a bad margin": (["--secure", "--keystore", "{tmp}/ks", "--warn-expiry", "soon"], 2, "not a duration"),
     "a bad filter": (["--launch-prefix", "gdb", "--launch-prefix-filter", "("], 2, "not a regular expression"),
     "a policy that is not there": (["--dry-run", "--policy", "{tmp}/nosuch.xml"], 2, "nosuch.xml"),
-    "a manifest that is not there": (["--dry-run", "--nodl", "{tmp}/nosuch.nodl.xml"], 1, "nosuch.nodl.xml"),
+    "a manifest that is not there": (["--dry-run", "--nodl", "{tmp}/nosuch.nodl.xml"], 2, "nosuch.nodl.xml"),
     "an unknown subject to explain": (["--explain", "/nosuch"], 2, "'/nosuch' is not an enclave"),
 }  # fmt: skip
 
