@@ -35,7 +35,7 @@ def test_a_launch_of_real_nodes_is_as_planned_until_somebody_joins(
     def drift() -> tuple[int, dict[str, Any]]:
         command = [sys.executable, "-m", "enclave_launch.verb.secure_plan", "drift", "--prefix", str(prefix)]
         ran = subprocess.run(
-            [*command, str(file), "--for", str(LONGEST_SECONDS), "--settle", "2", "--format", "json"],
+            [*command, str(file), "--for", str(LONGEST_SECONDS), "--settle", "5", "--format", "json"],
             env=environment, capture_output=True, text=True, timeout=180,
         )  # fmt: skip
         assert ran.stdout, ran.stderr

@@ -43,7 +43,8 @@ def test_a_running_system_becomes_a_graph_a_policy_and_manifests(
     }  # fmt: skip
     plan.write_text(json.dumps({"processes": [process], "components": []}))
     kept = tmp_path / "run.json"
-    seen = observe(domain_id, "--settle", "2", "--save", str(kept), "--launch", str(plan))
+    # Longer than the period after which Fast DDS repeats an endpoint's announcement that was lost, 3 s.
+    seen = observe(domain_id, "--settle", "8", "--save", str(kept), "--launch", str(plan))
     assert "/r1/talker\n" in seen.stdout and "publisher /r1/chatter [std_msgs/msg/String]" in seen.stdout
     policy = tmp_path / "policy.xml"
     policy.write_text(observe(domain_id, str(kept), "--merge-only", "--format", "policy").stdout)
