@@ -8,7 +8,7 @@ import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 from enclave_common import VERSION
 from enclave_common.dependencies import missing_dependency
@@ -68,13 +68,89 @@ def add_options(group: argparse._ActionsContainer, options: Iterable[Option]) ->
         group.add_argument(*flags, **{**metavar, **kind, "help": text})
 
 
+class VerbHead(NamedTuple):
+    """The docstring of a verb's module as its help: ``help`` for the list of verbs; ``epilog`` has examples and exit
+    status."""
+
+    help: str
+    description: str
+    epilog: str | None
+
+
+def verb_head(docstring: str | None) -> VerbHead:
+    """Split the docstring of a verb's module, whose first line is a sentence."""
+    text = (docstring or "").strip()
+    description, mark, status = text.partition("exit status")
+    return VerbHead(text.partition("\n")[0], description.rstrip(), f"{mark}{status}" if mark else None)
+
+
+class HelpText(argparse.HelpFormatter):
+    """Paragraphs are filled; those with an indented line (examples, tables) stay as they are written."""
+
+    def _fill_text(self, text: str, width: int, indent: str) -> str:
+        paragraphs = re.split(r"\n\s*\n", text.strip("\n"))
+        return "\n\n".join(
+            each.strip("\n")
+            if re.search(r"^ ", each, re.M)
+            else super(HelpText, self)._fill_text(each, width, indent)
+            for each in paragraphs
+        )
+
+
 class CommandParser(argparse.ArgumentParser):
     """Options are written out, since an abbreviation can mean another option after an update; what is mistyped is
-    answered with what was probably meant."""
+    answered with what was probably meant.
+
+    The help has one form: the usage on one line, then what belongs to the command itself, last a list of the options
+    that another help describes (``fold``)."""
 
     def __init__(self, **settings: Any):
         settings.setdefault("allow_abbrev", False)
+        settings.setdefault("formatter_class", HelpText)
         super().__init__(**settings)
+        self._positionals.title = "arguments"
+        self._folded: list[argparse.Action] = []
+        self._described_in = ""
+
+    def fold(self, options: Iterable[Option], described_in: str) -> None:
+        """Let the help only name those of ``options`` that were added; ``described_in`` describes them."""
+        flags = {word for written, *_ in options for word in written.split() if word.startswith("-")}
+        self._folded = [each for each in self._actions if flags.intersection(each.option_strings)]
+        self._described_in = described_in
+
+    def format_usage(self) -> str:
+        """Return the usage on one line; options are in the help."""
+        return f"usage: {self.usage or self._one_usage()}\n"
+
+    def format_help(self) -> str:
+        """Return the help."""
+        formatter = self._get_formatter()
+        formatter.add_text(self.description)
+        for group in self._action_groups:
+            formatter.start_section(group.title)
+            formatter.add_text(group.description)
+            formatter.add_arguments(each for each in group._group_actions if each not in self._folded)
+            formatter.end_section()
+        if self._folded:
+            formatter.start_section(f"options described by {self._described_in}")
+            formatter.add_text(", ".join(max(each.option_strings, key=len) for each in self._folded))
+            formatter.end_section()
+        formatter.add_text(self.epilog)
+        return f"{self.format_usage()}\n{formatter.format_help()}"
+
+    def _one_usage(self) -> str:
+        """Return the command with the options that it cannot do without, and its arguments."""
+        required = [
+            f"{each.option_strings[0]} {_in_usage(each)}"
+            for each in self._actions
+            if each.option_strings and each.required
+        ]
+        arguments = [
+            _in_usage(each)
+            for each in self._actions
+            if not each.option_strings and each.help != argparse.SUPPRESS
+        ]
+        return " ".join((self.prog, *required, "[options]", *arguments))
 
     def error(self, message: str) -> NoReturn:
         """Usage, message and exit status 2, as argparse."""
@@ -92,6 +168,20 @@ class CommandParser(argparse.ArgumentParser):
     def _choices(self) -> Iterator[object]:
         for action in self._actions:
             yield from action.choices or ()
+
+
+def _in_usage(action: argparse.Action) -> str:
+    if isinstance(action, argparse._SubParsersAction):
+        return f"{action.metavar} ..."
+    metavar = action.metavar or action.dest.upper()
+    if not isinstance(metavar, str):
+        return f"{metavar[0]} [{metavar[1]} ...]"
+    if action.choices is not None and action.metavar is None:
+        metavar = "{" + ",".join(map(str, action.choices)) + "}"
+    if " " in metavar:  # it says by itself what may be repeated
+        return metavar
+    forms = {"?": f"[{metavar}]", "*": f"[{metavar} ...]", "+": f"{metavar} ..."}
+    return forms.get(str(action.nargs), metavar)
 
 
 def parsers(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
@@ -149,9 +239,9 @@ def add_verbosity(parser: argparse.ArgumentParser) -> None:
             "-q",
             "--quiet",
             action="store_true",
-            help="no warnings and remarks; errors, and what was asked for",
+            help="only errors and the answer; no warnings",
         )
-        group.add_argument("-v", "--verbose", action="store_true", help="everything, nothing summed up")
+        group.add_argument("-v", "--verbose", action="store_true", help="list everything instead of counts")
 
 
 def add_absent_verb(

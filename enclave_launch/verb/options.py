@@ -133,11 +133,11 @@ RUNNING: tuple[Option, ...] = (
     ("-n --noninteractive", FLAG, "the launch has no terminal"),
     ("-d --debug", FLAG, "more output from the launcher itself"),
     ("--restart-expiring", FLAG,
-     "shortly before a certificate or permissions end: stop the launch, renew them, start it again"),
+     "shortly before a certificate or permissions expire: stop the launch, renew them, start it again"),
     ("--watch", FLAG, "observe the DDS domain during the launch and report what differs from the plan"),
     ("--watch-report FILE", PATH, "write the findings of --watch as JSON lines, too"),
     ("--watch-accept NODE", TEXTS,
-     "with --watch: may run beside the plan, such as '/_ros2cli*' (repeatable)"),
+     "with --watch: a node that may run beside the plan, such as '/_ros2cli*' (repeatable)"),
     ("--log-limit SIZE", {"type": size_in_bytes},
      "start a new log file at this size (such as 100M; the previous one becomes <name>.1); default: no limit"),
     ("-a --show-all-subprocesses-output", FLAG,
@@ -167,14 +167,11 @@ def build_parser() -> argparse.ArgumentParser:
     """Build the parser, its options grouped by the question they answer."""
     parser = CommandParser(
         prog="secure-launch",
-        usage="secure-launch [options] PACKAGE LAUNCH_FILE [name:=value ...]\n"
-        "       secure-launch [options] PATH/TO/FILE.launch.{xml,yaml,py} [name:=value ...]",
         description=DESCRIPTION,
         epilog=EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     words = "PACKAGE LAUNCH_FILE | PATH [name:=value ...]"
-    parser.add_argument("words", nargs="*", metavar=words, help=argparse.SUPPRESS)
+    parser.add_argument("words", nargs="*", metavar=words, help="a launch file, and its launch arguments")
     add_version(parser)
     add_verbosity(parser)
     add_security_options(parser.add_argument_group("security"))

@@ -20,10 +20,11 @@ from enclave_common.command_line import (
     complete_with,
     guarded,
     parsers,
+    verb_head,
 )
 from enclave_common.terminal import safe_output
 from keystore.errors import KeystoreError
-from keystore.verb.common import add_table
+from keystore.verb.common import FOLDED, add_table
 
 VERBS = (
     "create", "create-enclave", "apply-policy", "list", "status", "verify", "renew", "remove", "export",
@@ -74,10 +75,11 @@ def build_parser() -> argparse.ArgumentParser:
         except ModuleNotFoundError as error:
             add_absent_verb(verbs, name, error)
             continue
-        summary = (module.__doc__ or "").strip()
-        settings = getattr(module, "SETTINGS", {})
-        verb = verbs.add_parser(name, help=summary.splitlines()[0], description=summary, **settings)
+        settings = {**verb_head(module.__doc__)._asdict(), **getattr(module, "SETTINGS", {})}
+        verb = verbs.add_parser(name, **settings)
         add_table(verb, module.OPTIONS)
+        if name != "create":
+            verb.fold(FOLDED, "secure-keystore create --help")
         verb.set_defaults(run=module.run)
     add_verbosity(parser)
     return parser

@@ -1,6 +1,6 @@
 """Give every enclave of an SROS2 policy file exactly its permissions, creating enclaves that are missing.
 
-Enclaves that the policy does not have stay, and are told; --prune revokes and removes them. Those of tools stay.
+Enclaves that the policy does not have stay, and are reported; --prune revokes and removes them. Those of tools stay.
 """
 
 from __future__ import annotations

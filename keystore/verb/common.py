@@ -45,19 +45,20 @@ DOMAINS: Option = ("--domain-id IDS", TEXT, "domains of the permissions (default
 """Read by ``domains``."""
 REVOKE_OLD: Option = ("--revoke-old", FLAG, "also revoke the certificates these enclaves had before")
 ENCRYPTION: Option = ("--encrypt-ca-keys", FLAG, "encrypt new CA keys with the passphrase")
+BACKDATE: Option = ("--backdate TIME", TEXT, "begin this much earlier, for clocks that lag (1d)")
 VALIDITY: Table = (
     ("--valid-for TIME", TEXT, "90d, 12h, 10y from now, or until an ISO date (default: the keystore's)"),
-    ("--backdate TIME", TEXT, "begin this much earlier, for clocks that lag (1d)"),
+    BACKDATE,
 )
 """How long certificates and permissions hold; read by ``span``."""
-SUBJECTS: Table = (
+SUBJECTS: tuple[Option, ...] = (
     ("--compatible-subjects", FLAG,
      "CN=/path as SROS2 writes it, for use with 'ros2 security create_permission'; on Cyclone DDS "
      "some enclaves could then use the permissions of others: such names are refused"),
     ("--allow-subject-overlap", FLAG, "with compatible subjects: accept such names"),
 )  # fmt: skip
 """How certificate subjects are written."""
-SIGNING: Table = (
+SIGNING: tuple[SecretOptions, ...] = (
     SecretOptions((
         ("--passphrase-file FILE", PATH, "file with the CA keys' passphrase"),
         ("--passphrase-fd N", {"type": int}, "open descriptor to read it from"),
@@ -69,25 +70,29 @@ SIGNING: Table = (
     )),
 )  # fmt: skip
 """Read by ``access``."""
-CHANGE: Table = (
-    *SIGNING,
-    LOCK,
-    (
-        "--accept-clock",
-        FLAG,
-        "go on though the clock is far from the time at which the keystore was changed last",
-    ),
-)
+CLOCK: Option = (
+    "--accept-clock", FLAG,
+    "go on although the clock is far from the time of the keystore's last change",
+)  # fmt: skip
+CHANGE: Table = (*SIGNING, LOCK, CLOCK)
 """Of each verb that signs and writes; read by ``change``."""
 PROVISIONING: Table = (
     *VALIDITY,
     ("--no-revoke", FLAG,
-     "where rights are taken away or a life is shortened: do not revoke the certificate of before; copies "
-     "of it can then be used until it ends"),
+     "if rights are removed or a validity is shortened: do not revoke the previous certificate (it is "
+     "usable until it expires)"),
     *SUBJECTS,
     *CHANGE,
 )  # fmt: skip
 """Of each verb that issues certificates for enclaves; read by ``provision_options``."""
+FOLDED: tuple[Option, ...] = (
+    BACKDATE,
+    *SUBJECTS,
+    *(option for secret in SIGNING for option in secret.options),
+    LOCK,
+    CLOCK,
+)
+"""Described by ``create --help`` alone."""
 
 
 def add_table(parser: argparse.ArgumentParser, table: Table) -> None:

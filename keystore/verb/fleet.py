@@ -1,9 +1,11 @@
-"""Show what a fleet has, from its bundles and imported keystores: secure-keystore fleet status DIR...
+"""Show the state of a fleet from its bundles and imported keystores.
 
-Who has which enclaves until when, who is behind, who still trusts an old CA, who carries a revoked enclave. With
---keystore, the CA's, signatures are checked and its register is asked.
+  secure-keystore fleet status DIR...
 
-exit status: 0 all well, 1 something to look at (or unreadable), 3 something ends within the margin, 4 has ended
+Prints which host has which enclaves until when, is out of date, still trusts an old CA, or carries a revoked enclave.
+With --keystore, that of the CA, signatures are checked and compared with its register.
+
+exit status: 0 all well, 1 something to look at (or unreadable), 3 something expires within the margin, 4 has expired
 """
 
 from __future__ import annotations
@@ -24,7 +26,7 @@ if TYPE_CHECKING:
 
 
 OPTIONS: common.Table = (
-    ("what status", {"choices": ("status",)}, ""),
+    ("what status", {"choices": ("status",)}, "the only one there is"),
     ("places DIR", {"nargs": "+", **PATH}, "bundles, or directories of them"),
     ("--keystore KEYSTORE", PATH, "the CA's own, to compare with"),
     common.WITHIN,

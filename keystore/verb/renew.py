@@ -1,6 +1,6 @@
-"""Renew what ends soon, repair what is exposed, or replace the CAs.
+"""Renew what expires soon, repair what is exposed, or replace the CAs.
 
-Without enclaves: all certificates that end within --within, with their permissions, the CRL, and the
+Without enclaves: all certificates that expire within --within, with their permissions, the CRL, and the
 repairs that verify names. With enclaves: those. --ca start|switch|finish replaces CAs in three steps, to
 be deployed one after the other. Fast DDS then trusts old and new side by side; Cyclone DDS reads only the
 first CA of a file, so its participants must take 'switch' together.
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 OPTIONS: common.Table = (
     common.KEYSTORE,
     ("enclaves ENCLAVE", {"nargs": "*"}, "enclaves to renew in any case"),
-    ("--within TIME", {"default": "30d"}, "what ends sooner is renewed (30d)"),
+    ("--within TIME", {"default": "30d"}, "what expires sooner is renewed (30d)"),
     ("--all", FLAG, "renew every enclave"),
     ("--new-keys", FLAG, "new private keys too, not only certificates"),
     common.REVOKE_OLD,

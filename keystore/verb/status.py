@@ -1,6 +1,6 @@
-"""Show what of the keystore ends when, the earliest first.
+"""Show what in the keystore expires when, the earliest first.
 
-Exit status for monitoring: 0 all well, 3 something ends within the margin, 4 something has ended.
+exit status, for monitoring: 0 nothing is due, 3 something expires within the margin, 4 something has expired
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Make an enclave for a ROS tool: what it needs on its target, for 8 hours, and how to use it.
 
-Tools: see docs/running-systems.md. Run it again for another 8 hours; secure-keystore remove takes it back at once.
+docs/running-systems.md has a table of the tools. Run it again for another 8 hours; secure-keystore remove revokes it.
 """
 
 from __future__ import annotations
@@ -15,7 +15,6 @@ from keystore.verb import common
 
 SETTINGS = {
     "usage": "secure-keystore tool-enclave KEYSTORE --for TOOL [TARGET ...] [options]",
-    "formatter_class": argparse.RawDescriptionHelpFormatter,
     "epilog": "tools:\n"
     + "".join(f"  {f'{tool.name} {tool.target.value}':20}  {tool.what}\n" for tool in TABLE),
 }

@@ -1,6 +1,6 @@
 """Install, remove, restart or look at the systemd units that secure-plan export wrote, on the host that runs them.
 
-  secure-keystore units install DIR         copy what changed, stop and remove what left the launch, enable the target
+  secure-keystore units install DIR         copy what changed, stop and remove what the launch lost, enable the target
   secure-keystore units restart [NAME...]   one after the other, sources first; stops at the first that does not stay up
   secure-keystore units status [NAME...]    what does not run
   secure-keystore units remove TARGET       stop and remove all of them

@@ -10,7 +10,6 @@ import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import Any
 
 from enclave_common.command_line import (
     TEXTS,
@@ -22,6 +21,7 @@ from enclave_common.command_line import (
     add_version,
     complete,
     guarded,
+    verb_head,
 )
 from enclave_common.terminal import printable, safe_output
 from nodl.errors import NoDLError
@@ -80,10 +80,10 @@ def add_verb(
     name: str,
     run: Callable[[argparse.Namespace], int],
     options: Iterable[Option],
-    **settings: Any,
+    docstring: str | None,
 ) -> argparse.ArgumentParser:
-    """The parser of a verb, or of what a verb does; ``settings`` as of ``add_subparsers().add_parser``."""
-    parser = verbs.add_parser(name, **settings)
+    """Add the parser of a verb, or of an action of a verb; ``docstring`` becomes its help."""
+    parser = verbs.add_parser(name, **verb_head(docstring)._asdict())
     add_options(parser, options)
     parser.set_defaults(run=run)
     return parser

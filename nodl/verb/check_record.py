@@ -1,4 +1,9 @@
-"""Hold manifests, inference and the library against records of what nodes asked for (secure-launch --learn)."""
+"""Compare manifests, inference and the library with records of nodes that ran.
+
+secure-launch --learn writes the records.
+
+exit status: 0 nothing is missing or wrong, 1 something is, 2 a record cannot be used
+"""
 
 from __future__ import annotations
 
@@ -33,19 +38,17 @@ OPTIONS: tuple[Option, ...] = (
     ("records RECORD", {**PATH, "nargs": "+"}, "files *.record, or folders"),
     ("--nodl FILE|DIR", PATHS, "manifests to judge"),
     ("--judge", {"choices": (*JUDGED, "all"), "default": "all"},
-     "what to hold against the records: manifests, inference from source, the library, or each that speaks"),
+     "what to compare: manifests, inference from source, the library, or all that describe the node"),
     ("--source DIR", PATHS,
      "sources of compiled nodes, for inference (repeatable; default: the workspaces of the prefixes)"),
-    ("--format", one_of("text", "json"), ""),
+    ("--format", one_of("text", "json"), "how to print (text)"),
     PREFIX,
 )  # fmt: skip
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add ``secure-nodl check-record``."""
-    text = "hold manifests, inference and the library against recorded nodes"
-    status = "exit status: 0 nothing is missing or wrong, 1 something is, 2 a record cannot be used"
-    add_verb(subparsers, "check-record", run, OPTIONS, help=text, description=__doc__, epilog=status)
+    add_verb(subparsers, "check-record", run, OPTIONS, docstring=__doc__)
 
 
 class Judgement(NamedTuple):

@@ -26,8 +26,7 @@ OPTIONS: tuple[Option, ...] = (
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add ``secure-nodl convert``."""
-    text = "v1 to v2 or v2 to v1; what gets lost is told"
-    add_verb(subparsers, "convert", run, OPTIONS, help=text, description=__doc__)
+    add_verb(subparsers, "convert", run, OPTIONS, docstring=__doc__)
 
 
 def run(arguments: argparse.Namespace) -> int:

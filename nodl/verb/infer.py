@@ -39,8 +39,7 @@ OPTIONS: tuple[Option, ...] = (
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add ``secure-nodl infer``."""
-    text = "infer nodes and their interfaces from source, without running it"
-    add_verb(subparsers, "infer", run, OPTIONS, help=text, description=__doc__)
+    add_verb(subparsers, "infer", run, OPTIONS, docstring=__doc__)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -1,4 +1,4 @@
-"""The library of manifests that ships with us: what it has, what it says, and whether sources agree with it."""
+"""Look into the library of manifests of widely used packages: list, show, find, check."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import argparse
 import sys
 from collections.abc import Iterable, Iterator
 
-from enclave_common.command_line import FLAG, TEXT, TEXTS, Option
+from enclave_common.command_line import FLAG, TEXT, TEXTS, Option, verb_head
 from enclave_common.terminal import printable
 from nodl.ament_index import package_version, search_prefixes
 from nodl.library import SHIPPED, Hit, Library
@@ -20,35 +20,35 @@ from nodl.verb.show import description_lines
 LIBRARY: Option = ("--library DIR", TEXTS, "documents of your own, which come first")
 LIST: tuple[Option, ...] = (("packages PACKAGE", {"nargs": "*"}, "only these"), LIBRARY)
 PROGRAM: tuple[Option, ...] = (
-    ("package PACKAGE", TEXT, ""),
-    ("name EXECUTABLE|PLUGIN", TEXT, ""),
+    ("package PACKAGE", TEXT, "its package"),
+    ("name EXECUTABLE|PLUGIN", TEXT, "the program or the class of a component"),
     ("--distro", {"default": ""}, "ROS distribution (default: any)"),
     PREFIX,
     LIBRARY,
 )
 CHECK: tuple[Option, ...] = (
     ("sources DIR", TEXT, "a folder with packages, such as a workspace's src"),
-    ("--keep", FLAG, "note the verdicts beside the shipped documents (for its keepers)"),
+    ("--keep", FLAG, "write the verdicts beside the shipped documents (for maintainers)"),
     LIBRARY,
 )
-INDEX: tuple[Option, ...] = (("folder DIR", {"nargs": "?", "default": SHIPPED}, ""),)
+INDEX: tuple[Option, ...] = (
+    ("folder DIR", {"nargs": "?", "default": SHIPPED}, "default: the one that ships with us"),
+)
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add ``secure-nodl library``."""
-    parser = subparsers.add_parser(
-        "library", help="the manifests of widely used packages: list, show, where, check", description=__doc__
-    )
-    actions = parser.add_subparsers(dest="action", required=True, metavar="ACTION")
+    parser = subparsers.add_parser("library", **verb_head(__doc__)._asdict())
+    actions = parser.add_subparsers(dest="action", title="verbs", required=True, metavar="VERB")
     for name, action, options, text in (
-        ("list", _list, LIST, "every document: what it describes, for which versions"),
-        ("show", _show, PROGRAM, "what a document says, and how that is known"),
-        ("where", _where, PROGRAM, "the file that would be used"),
-        ("check", _check, CHECK, "hold the documents against sources in a folder"),
-        ("table", _table, (), "all documents as a table in Markdown: docs/library-contents.md"),
-        ("index", _index, INDEX, "write the index of a folder of documents anew"),
+        ("list", _list, LIST, "List the documents: what each describes, for which versions."),
+        ("show", _show, PROGRAM, "Print what a document says, and where that comes from."),
+        ("where", _where, PROGRAM, "Print the path of the document that would be used."),
+        ("check", _check, CHECK, "Compare the documents with the sources in a folder."),
+        ("table", _table, (), "Print all documents as a table in Markdown, as in docs/library-contents.md."),
+        ("index", _index, INDEX, "Write the index of a folder of documents again."),
     ):
-        add_verb(actions, name, action, options, help=text)
+        add_verb(actions, name, action, options, text)
 
 
 def _list(arguments: argparse.Namespace) -> int:

@@ -1,8 +1,11 @@
-"""Observe a running ROS system, whoever started it: its graph, manifests or a policy of what runs.
+"""Observe a running ROS system: its graph, or manifests or a policy of what runs.
 
-Looks at the DDS domain until nothing has changed for a while, and writes down what was seen; with -o manifests, in
-which names go back through namespace, remap rules and parameters to what the source writes. A launch file (or the JSON
-of its dry run) tells how each node was started; without one the command lines of processes on this machine do.
+Looks at the DDS domain until nothing has changed for a while, and prints what was seen. With -o it writes manifests:
+names are traced back through namespace, remap rules and parameters to what the source writes. How each node was
+started is taken from a launch file (or the JSON of its dry run), else from the command lines of this machine's
+processes.
+
+exit status: 0 something was seen, 1 nothing was, or the domain cannot be observed, 2 wrong usage
 """
 
 from __future__ import annotations
@@ -66,7 +69,7 @@ SECURITY: tuple[Option, ...] = (
 WRITING: tuple[Option, ...] = (
     ("--launch WORD", {"nargs": "+", "default": []},
      "how the nodes were started: PLAN.json, or PACKAGE LAUNCH_FILE | PATH [name:=value ...]"),
-    ("--save RUN.json", PATH, "keep this observation, to merge it later"),
+    ("--save RUN.json", PATH, "save this observation, to merge it later"),
     ("--format", {"choices": ("text", "json", "policy", "v2")}, "text (default); with -o: v2, NoDL manifests"),
     ("-o --output DIR", PATH, "write files into DIR"),
 )  # fmt: skip
@@ -79,10 +82,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
         "observe",
         run,
         RUNS,
-        help="observe a running system: its graph, manifests or a policy of what runs",
-        description=__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        epilog="exit status: 0 something was seen, 1 nothing was, or the domain cannot be observed, 2 wrong usage",
+        docstring=__doc__,
     )
     add_options(parser.add_argument_group("what to observe"), LOOKING)
     add_options(parser.add_argument_group("a secured system"), SECURITY)

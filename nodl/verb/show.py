@@ -26,17 +26,16 @@ _LABELS = {
 
 
 OPTIONS: tuple[Option, ...] = (
-    ("subject PACKAGE|FILE", TEXT, ""),
+    ("subject PACKAGE|FILE", TEXT, "an installed package or a document"),
     ("names EXECUTABLE|PLUGIN", {"nargs": "*"}, "only these of the package"),
-    ("--format", one_of("text", "json"), ""),
+    ("--format", one_of("text", "json"), "how to print (text)"),
     PREFIX,
 )
 
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add ``secure-nodl show``."""
-    text = "print the interfaces of a document, package or executable"
-    add_verb(subparsers, "show", run, OPTIONS, help=text, description=__doc__)
+    add_verb(subparsers, "show", run, OPTIONS, docstring=__doc__)
 
 
 def run(arguments: argparse.Namespace) -> int:

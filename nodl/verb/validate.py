@@ -21,8 +21,7 @@ OPTIONS: tuple[Option, ...] = (
 
 def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
     """Add ``secure-nodl validate``."""
-    text = "check documents; errors come with file and line"
-    add_verb(subparsers, "validate", run, OPTIONS, help=text, description=__doc__)
+    add_verb(subparsers, "validate", run, OPTIONS, docstring=__doc__)
 
 
 def run(arguments: argparse.Namespace) -> int:

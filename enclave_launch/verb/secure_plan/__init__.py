@@ -15,6 +15,7 @@ from enclave_common.command_line import (
     add_version,
     complete,
     guarded,
+    verb_head,
 )
 from enclave_common.terminal import safe_output
 from enclave_launch.errors import EnclaveLaunchError
@@ -22,8 +23,8 @@ from enclave_launch.verb.completion import offer_launches
 from enclave_launch.verb.options import EVALUATION, POLICY
 from enclave_launch.verb.secure_plan.plans import WORDS
 
-PLAN: tuple[Option, ...] = (("words", {"nargs": "+", "metavar": WORDS}, ""),)
-RESOLVING = (("permissions", POLICY), ("evaluating the launch file", EVALUATION))
+PLAN: tuple[Option, ...] = (("words", {"nargs": "+", "metavar": WORDS}, "a plan or what to plan"),)
+RESOLVING = (*POLICY, *EVALUATION)
 """As of ``secure-launch``; without effect on a saved plan."""
 VERBS = ("show", "check", "diff", "drift", "flow", "hosts", "export", "suggest", "report", "evidence")
 DESCRIPTION = """\
@@ -36,21 +37,21 @@ A plan is a launch file, given as to secure-launch, or the JSON that secure-laun
 
 def build_parser() -> argparse.ArgumentParser:
     """Build the parser: a subparser for each verb, described by the head of its file."""
-    raw = argparse.RawDescriptionHelpFormatter
-    parser = CommandParser(prog="secure-plan", description=DESCRIPTION, formatter_class=raw)
+    parser = CommandParser(prog="secure-plan", description=DESCRIPTION)
     add_version(parser)
-    verbs = parser.add_subparsers(metavar="VERB", required=True)
+    verbs = parser.add_subparsers(title="verbs", metavar="VERB", required=True)
     for name in VERBS:
         try:
             verb = import_module(f"enclave_launch.verb.secure_plan.{name}")
         except ModuleNotFoundError as error:
             add_absent_verb(verbs, name, error, "verb")
             continue
-        head = verb.__doc__ or ""
-        below = verbs.add_parser(name, help=head.partition("\n")[0], description=head, formatter_class=raw)
+        below = verbs.add_parser(name, **verb_head(verb.__doc__)._asdict())
         add_options(below, getattr(verb, "WORDS", PLAN))
-        for title, options in (*RESOLVING, *verb.OPTIONS.items()):
+        for title, options in verb.OPTIONS.items():
             add_options(below.add_argument_group(title) if title else below, options)
+        add_options(below, RESOLVING)
+        below.fold(RESOLVING, "secure-launch --help")
         # A launch prefix is only of use where something is started.
         below.set_defaults(verb=verb.run, launch_prefix=None, launch_prefix_filter=None)
     add_verbosity(parser)

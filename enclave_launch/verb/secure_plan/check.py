@@ -1,9 +1,9 @@
-"""Check the plan, for CI: what planning tells, and what only a whole plan shows.
+"""Check the plan, for CI: report what is wrong or worth a look.
 
-Findings that somebody accepted with a reason, and flows that must never be, stand in enclaves.review.yaml in the
-working directory, or in the file of --expect (docs/secure-plan.md).
+Accepted findings, with their reasons, and forbidden flows are listed in enclaves.review.yaml in the working directory,
+or in the file of --expect (docs/secure-plan.md). docs/checks.md explains each finding.
 
-exit status: 0 nothing (left) to mend, 1 errors, with --strict also warnings, 2 wrong usage
+exit status: 0 no errors, 1 errors, with --strict also warnings, 2 wrong usage
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from enclave_launch.verb.secure_plan.plans import read_plan
 
 OPTIONS = {
     "": (
-        ("--format", one_of("text", "json", "sarif"), ""),
+        ("--format", one_of("text", "json", "sarif"), "how to print (text)"),
         ("--strict", FLAG, "warnings count as errors"),
-        ("--keystore DIR", PATH, "hold the plan against it; reads only"),
+        ("--keystore DIR", PATH, "compare the plan with it; it is only read"),
         WITHIN,
         EXPECT,
     )

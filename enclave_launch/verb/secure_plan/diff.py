@@ -7,9 +7,9 @@
   secure-plan diff KEYSTORE PACKAGE LAUNCH_FILE              what a keystore has signed, and what the plan asks for
   secure-plan diff KEYSTORE OTHER_KEYSTORE                   what two keystores let each enclave do
 
-With a revision, the packages of the repository are taken from their sources, there and in the work tree (or --build
-COMMAND builds the revision, and what is installed is compared with it). Other packages are taken as they are installed
-now; the answer names them.
+With a revision, the packages of the repository are planned from their sources, in the revision and in the work tree;
+with --build COMMAND the revision is built instead, and compared with what is installed. Other packages are taken as
+they are installed now; the answer names them.
 
 exit status: 0 no enclave may do more than before, 1 rights grew, 2 wrong usage
 """
@@ -39,7 +39,7 @@ WORDS: tuple[Option, ...] = (
 )
 OPTIONS = {
     "": (
-        ("--format", one_of("text", "json", "markdown"), ""),
+        ("--format", one_of("text", "json", "markdown"), "how to print (text)"),
         ("--build COMMAND", TEXT, "build the revision with it, in a copy; leaves install/"),
     )
 }

@@ -1,10 +1,10 @@
-"""Hold a running system against the plan: what runs and is not planned, what is planned and does not run.
+"""Compare a running system with the plan: what runs unplanned, and what is planned and does not run.
 
-Looks at the DDS domain, with Cyclone DDS's Python binding or rclpy. A secured system needs --keystore and --enclave
+Observes the DDS domain with Cyclone DDS's Python binding or rclpy. A secured system needs --keystore and --enclave
 (secure-keystore tool-enclave KEYSTORE --for observe makes one). docs/running-systems.md lists the findings.
 
-exit status: 0 as planned, 1 alarms, 2 wrong usage, 3 the domain cannot be observed, 4 cannot tell: what the plan
-starts is out of the observer's sight
+exit status: 0 as planned, 1 alarms, 2 wrong usage, 3 the domain cannot be observed, 4 cannot tell: nothing that is
+planned is visible to the observer
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ OPTIONS = {
         ("--enclave NAME", TEXT, "the observer's own"),
         ("--for TIME", {**TIME, "dest": "longest", "default": 30.0}, "how long to wait for planned nodes (30s)"),
         ("--settle TIME", {**TIME, "default": 5.0}, "compare when nothing changed for this time (5s)"),
-        ("--with", {**one_of("auto", "cyclonedds", "rclpy"), "dest": "observer"}, ""),
+        ("--with", {**one_of("auto", "cyclonedds", "rclpy"), "dest": "observer"}, "what to observe with (auto)"),
         ("--graph RUN.json", PATH, "a file of secure-nodl observe --save, instead of observing"),
     ),
     "": (

@@ -1,8 +1,8 @@
-"""Write a folder of evidence for those who must sign: permissions with reasons, attack surface, keys, findings.
+"""Write a folder of evidence for an assessment: permissions with reasons, attack surface, keys, findings.
 
   secure-plan evidence PACKAGE LAUNCH_FILE -o evidence --keystore ks --sbom robot.cdx.json --sign-key release.pem
 
-Each part names the requirements that it supports; it claims no conformity. What was not checked is told as well. The
+Each part names the requirements that it supports; it claims no conformity. What was not checked is listed as well. The
 same input and time (--at, or SOURCE_DATE_EPOCH) give the same bytes, but for a signature.
 A key file may hold the pkcs11: URI of a token, as those of a keystore. Exit status as of check.
 """
@@ -47,7 +47,7 @@ OPTIONS = {
         ("--sign-key FILE", PATH, "sign the statement with this EC or RSA key"),
         ("--passphrase-env NAME", TEXT, "the variable with the key's passphrase"),
         ("--pin-env NAME", TEXT, "the variable with the token's PIN"),
-        ("--at TIME", TEXT, "of the examination, as 2026-11-22T10:00:00Z (default: now)"),
+        ("--at TIME", TEXT, "time of the examination, such as 2026-11-22T10:00:00Z (default: now)"),
         WITHIN,
         EXPECT,
     )

@@ -47,8 +47,8 @@ ENGINES = ("systemd", "compose", "kubernetes")
 
 OPTIONS = {
     "": (
-        ("--format", {"choices": ENGINES, "required": True}, ""),
-        ("-o --output DIR", {**PATH, "required": True}, ""),
+        ("--format", {"choices": ENGINES, "required": True}, "what runs the processes"),
+        ("-o --output DIR", {**PATH, "required": True}, "where the files are written"),
         ("--keystore DIR", {"required": True}, "where the plan is provisioned: what its enclaves hold"),
         HOSTS,
         ("--name", TEXT, "of target, project or namespace (default: ros- and the launch file's name)"),

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 LARGEST_PLAN = 256 << 20  # bytes
 WORDS = "PLAN.json | PACKAGE LAUNCH_FILE | PATH [name:=value ...]"
-FORM: Option = ("--format", one_of("text", "json"), "")
+FORM: Option = ("--format", one_of("text", "json"), "how to print (text)")
 
 
 def read_plan(words: Sequence[str], options: argparse.Namespace) -> Mapping[str, Any]:

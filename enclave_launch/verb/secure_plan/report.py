@@ -3,8 +3,8 @@
   secure-plan report PACKAGE LAUNCH_FILE -o report.html             one file; it needs no network
   secure-plan report plan.json --format mermaid                     the graph alone; or dot
 
-Findings are those of check, with what enclaves.review.yaml accepts. --keystore adds where it differs
-and what ends when.
+Findings are those of check, less those that enclaves.review.yaml accepts. --keystore adds how it
+differs from the plan and what expires when.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from enclave_launch.verb.secure_plan.plans import read_plan
 
 OPTIONS = {
     "": (
-        ("--format", one_of("html", "markdown", "dot", "mermaid"), ""),
+        ("--format", one_of("html", "markdown", "dot", "mermaid"), "what to write (html)"),
         ("-o --output FILE", PATH, "default: standard output"),
         ("--keystore DIR", PATH, "report how it differs, and what expires"),
         EXPECT,

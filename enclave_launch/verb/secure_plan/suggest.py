@@ -1,4 +1,4 @@
-"""Name enclaves that could be merged, with what that costs, and enclaves to split, with what that saves."""
+"""Suggest enclaves to merge, with the permissions in excess, and enclaves to split, with what that saves."""
 
 from __future__ import annotations
 
