@@ -1,4 +1,5 @@
-"""For all tests: which of them one runs while working (``./dev test --fast``), and how properties are tried.
+"""For all tests: which of them one runs while working (``./dev test --fast``), how properties are tried, and what
+the end of a run says of real launch.
 
 A property is about values, never about how fast a busy machine makes them.
 """
@@ -53,3 +54,15 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             continue
         if file.parts[0] in FAST or item.path.parent == tests:
             item.add_marker(pytest.mark.fast)
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
+    """Name the tests against ROS's own launch that did not run on one line, not each among the skipped ones."""
+    skipped = terminalreporter.stats.get("skipped", [])
+    without_sources = [report for report in skipped if "real_launch" in report.keywords]
+    if without_sources:
+        terminalreporter.stats["skipped"] = [each for each in skipped if each not in without_sources]
+        terminalreporter.write_line(
+            f"not run: {len(without_sources)} tests that compare with ROS's own launch. Its sources are neither on "
+            "PyPI nor in Debian; CONTRIBUTING.md says how to name a checkout."
+        )
