@@ -1,6 +1,7 @@
 """A machine with a systemd of its own, booted in namespaces of this one: no virtual machine, no image, no network.
 
-Its root is a new tmpfs with this machine's programs and this repository, read-only; /etc is a copy that can be written.
+Its root has this machine's programs and this repository, read-only; /etc is a copy that can be written. What is
+written there is there again when the same root is booted once more.
 Needs root and the permission to make namespaces and mounts.
 """
 
@@ -23,12 +24,13 @@ _TOOLS = ("nsenter", "--mount", "--uts", "--ipc", "--net", "--pid", "--cgroup", 
 _SETUP = """
 set -eu
 root=$1; shift
+target=$1; shift
 mount --make-rprivate /
-mount -t tmpfs -o mode=755 tmpfs "$root"
+mount --bind "$root" "$root"
 for name in bin lib lib32 lib64 libx32 sbin usr opt; do
-    if [ -L "/$name" ]; then cp -P "/$name" "$root/$name"
+    if [ -L "/$name" ]; then ln -sfn "$(readlink "/$name")" "$root/$name"
     elif [ -d "/$name" ]; then
-        mkdir "$root/$name"
+        mkdir -p "$root/$name"
         mount --rbind "/$name" "$root/$name"
         mount -o remount,bind,ro "$root/$name"
     fi
@@ -36,11 +38,11 @@ done
 for name in proc sys dev run tmp srv root var/log etc/systemd/system; do mkdir -p "$root/$name"; done
 chmod 1777 "$root/tmp"
 for name in passwd group nsswitch.conf ld.so.cache ld.so.conf ld.so.conf.d alternatives ssl; do
-    [ ! -e "/etc/$name" ] || cp -a "/etc/$name" "$root/etc/$name"
+    [ -e "$root/etc/$name" ] || [ ! -e "/etc/$name" ] || cp -a "/etc/$name" "$root/etc/$name"
 done
 echo booted > "$root/etc/hostname"
 printf '%s\\n' ID=test VERSION_ID=1 > "$root/etc/os-release"
-systemd-id128 new > "$root/etc/machine-id"
+[ -e "$root/etc/machine-id" ] || systemd-id128 new > "$root/etc/machine-id"
 mount -t proc proc "$root/proc"
 mount -t sysfs sysfs "$root/sys"
 mount -t cgroup2 cgroup2 "$root/sys/fs/cgroup"
@@ -54,7 +56,7 @@ mount -t tmpfs -o mode=755 tmpfs "$root/run"
 for folder; do mkdir -p "$root$folder"; mount --rbind "$folder" "$root$folder"; done
 mount --bind "$1" "$root/srv"
 ip link set lo up
-printf '[Unit]\\nRequires=basic.target\\nAfter=basic.target\\n' > "$root/etc/systemd/system/test.target"
+printf '[Unit]\\nRequires=%s\\nAfter=%s\\n' "$target" "$target" > "$root/etc/systemd/system/test.target"
 # In a container systemd leaves this to who made it; without it credentials do not reach the units.
 mount --make-rshared "$root"
 cd "$root"
@@ -90,6 +92,22 @@ class Machine:
             )
         return done.stdout
 
+    def cable(self, other: Machine) -> None:
+        """Join the networks of the two: 10.77.0.1 here, 10.77.0.2 there, each on ``eth``.
+
+        Here it is a bridge, so that it stays when the other machine is switched off, as a network card does.
+        """
+        enter = ("nsenter", f"--target={self._pid}", "--net", "ip")
+        if "eth:" not in self.run("ip", "link"):
+            subprocess.run(
+                [*enter, *"link add eth type bridge mcast_snooping 0".split()], check=True, timeout=30
+            )
+            _configure(self, "10.77.0.1")
+        pair = ("link", "add", "port", "type", "veth", "peer", "name", "eth", "netns", str(other._pid))
+        subprocess.run([*enter, *pair], check=True, timeout=30)
+        self.run("ip", "link", "set", "port", "master", "eth", "up")
+        _configure(other, "10.77.0.2")
+
     def write(self, path: str, text: str) -> None:
         """Write a file there."""
         self.run("sh", "-c", 'printf %s "$2" > "$1"', "sh", path, text)
@@ -107,18 +125,28 @@ class Machine:
         return self.run("systemctl", "show", f"--property={name}", "--value", unit).strip()
 
 
+def _configure(machine: Machine, address: str) -> None:
+    machine.run("ip", "address", "add", f"{address}/24", "dev", "eth")
+    machine.run("ip", "link", "set", "eth", "up")
+
+
 @contextlib.contextmanager
-def booted(folder: Path, shared: Path) -> Iterator[Machine]:
+def booted(folder: Path, shared: Path, target: str = "basic.target") -> Iterator[Machine]:
     """Boot systemd with its root at ``folder``; ``shared`` is at the same path there, and for services at /srv.
+
+    Args:
+        folder: A new one, or that of a machine that was booted before and is off.
+        shared: That this machine and the booted one both see.
+        target: That the boot brings up.
 
     Raises:
         NotPermitted: This machine cannot; says what is missing.
     """
     _refuse_impossible()
-    folder.mkdir()
+    folder.mkdir(exist_ok=True)
     log = folder.with_suffix(".log")
     command = ("unshare", "--mount", "--pid", "--fork", "--kill-child", "--uts", "--ipc", "--net", "--cgroup")
-    script = ("sh", "-c", _SETUP, "sh", str(folder), str(shared), *_folders())
+    script = ("sh", "-c", _SETUP, "sh", str(folder), target, str(shared), *repository_folders())
     with log.open("w") as stream:
         outer = subprocess.Popen([*command, *script], stdin=subprocess.DEVNULL, stdout=stream, stderr=stream)
     try:
@@ -145,7 +173,7 @@ def _refuse_impossible() -> None:
         raise NotPermitted(f"namespaces and a cgroup2 mount (CAP_SYS_ADMIN): {tried.stderr.strip()}")
 
 
-def _folders() -> list[str]:
+def repository_folders() -> list[str]:
     """Where this repository, its interpreter and Cyclone DDS are, as far as that is not below /usr."""
     named = [str(ROOT), sys.prefix, sys.base_prefix, os.environ.get("CYCLONEDDS_HOME", str(ROOT))]
     real = dict.fromkeys(os.path.realpath(one) for one in named)
@@ -155,9 +183,11 @@ def _folders() -> list[str]:
 
 def _show_repository(machine: Machine) -> None:
     """Let services see what of a developer's machine is below a home directory or /tmp, which units hide."""
-    hidden = [one for one in _folders() if one.startswith(("/root/", "/home/", "/tmp/", "/var/tmp/"))]
+    hidden = [
+        one for one in repository_folders() if one.startswith(("/root/", "/home/", "/tmp/", "/var/tmp/"))
+    ]
     if hidden:
-        machine.run("mkdir", "/etc/systemd/system/service.d")
+        machine.run("mkdir", "-p", "/etc/systemd/system/service.d")
         homes = "ProtectHome=tmpfs\n" if any(one.startswith(("/root/", "/home/")) for one in hidden) else ""
         text = f"[Service]\n{homes}BindReadOnlyPaths={' '.join(hidden)}\n"
         machine.write("/etc/systemd/system/service.d/repository.conf", text)

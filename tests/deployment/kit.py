@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import shutil
 import sys
 from pathlib import Path
@@ -56,10 +57,10 @@ def made(engine: str, folder: Path, text: str = TALK, *words: str) -> Path:
     return folder / "out"
 
 
-def tool(name: str, how: str) -> str:
+def tool(name: str, how: str, path: str | None = None) -> str:
     """Its path; without it the test is skipped, or fails where nothing may be missing."""
     beside = Path(sys.executable).parent / name
-    found = str(beside) if beside.exists() else shutil.which(name)
+    found = str(beside) if beside.exists() else shutil.which(name, path=path)
     if found is None:
         if os.environ.get("CI") == "true":
             pytest.fail(f"{name} is not available: {how}")
@@ -75,3 +76,14 @@ def fleet_of_fifty() -> str:
         for number in range(25)
     )
     return f"<launch>{pairs}</launch>"
+
+
+def set_up_ros(folder: Path) -> str:
+    """What /opt/ros/.../setup.sh is on a robot. It tries to take security away, as a careless one might."""
+    file = folder / "setup.sh"
+    path = f"{Path(sys.executable).parent}:$PATH"
+    lines = [f'export PATH="{path}"', "export ROS_SECURITY_ENABLE=false ROS_SECURITY_ENCLAVE_OVERRIDE=/other"]
+    if home := os.environ.get("CYCLONEDDS_HOME"):
+        lines.append(f"export CYCLONEDDS_HOME={shlex.quote(home)}")
+    file.write_text("\n".join(lines) + "\n")
+    return str(file)

@@ -6,48 +6,24 @@ Units are exported once, at the beginning, and never again unless a node comes o
 from __future__ import annotations
 
 import os
-import sys
-import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from datetime import timedelta
-from pathlib import Path
 
 import pytest
 
 from keystore.formats.role import Role
-from keystore.steps.host_bundles import BundleOptions, HostBundle, export_hosts, pinned
+from keystore.steps.host_bundles import pinned
 from keystore.steps.removal import RemoveOptions, remove
 from keystore.steps.renewal import RenewOptions, renew
 from keystore.steps.rollover import Step, roll_over
-from tests.deployment.booted import Machine, NotPermitted, booted
-from tests.deployment.kit import export, launch_file, provisioned
-from tests.deployment.networks import LOOPBACK
-from tests.deployment.test_units_run import set_up_ros
+from tests.deployment.booted import NotPermitted, booted
+from tests.deployment.robot import KS, Host, node, robot, until, up
 from tests.keystore.kit import options
 
 pytestmark = pytest.mark.dds
 
-LONGEST = 30.0  # seconds; only what hangs takes so long
 DAY = timedelta(days=1)
-KS = "/etc/ros/keystore"
 SPEAKER, EAR, SPY = (f"ros-robot-{name}.service" for name in ("speaker", "ear", "spy"))
-HEARD = "I heard: [Hello World: "
-
-
-def node(executable: str, name: str, more: str = "") -> str:
-    uri = LOOPBACK.cyclonedds_uri.replace('"', "&quot;").replace("<", "&lt;")
-    return (
-        f'<node pkg="demo_nodes" exec="{executable}" name="{name}"><env name="CYCLONEDDS_URI" value="{uri}"/>'
-        f'<param name="rate" value="10"/><param name="seconds" value="600"/>{more}'
-        '<remap from="chatter" to="/talk"/></node>'
-    )
-
-
-def robot(*nodes: str) -> str:
-    return f"""<launch>
-      <set_env name="RMW_IMPLEMENTATION" value="rmw_cyclonedds_cpp"/>
-      {"".join(nodes)}
-    </launch>"""
 
 
 TALKING = (node("talker", "speaker"), node("listener", "ear"), node("listener", "spy"))
@@ -55,54 +31,6 @@ GIVEN_UP = "respawned 2 times, as respawn_max_retries allows"
 RESPAWNED = (
     '<executable cmd="false" enclave="/flaky" respawn="true" respawn_max_retries="2" respawn_delay="0.1"/>'
 )
-
-
-class Host:
-    """A booted machine, the CA that makes its bundles, and the launch that it runs."""
-
-    def __init__(self, machine: Machine, folder: Path):
-        self.machine = machine
-        self.ca = folder / "ca"
-        self._folder = folder
-        self._number = 0
-        self._setup = "/srv/" + Path(set_up_ros(folder)).name
-
-    def launch(self, text: str, *words: str) -> Path:
-        """Provision ``text`` and export its units; where they are."""
-        out = self._folder / f"units{len(words)}"
-        file = launch_file(self._folder, text)
-        provisioned(file, self.ca)
-        assert export("systemd", file, self.ca, out, "--setup", self._setup, *words) == 0
-        return out
-
-    def bundle(self) -> HostBundle:
-        self._number += 1
-        output = self._folder / f"bundle{self._number}"
-        return export_hosts(self.ca, output, {"robot": ["*"]}, options=BundleOptions(durable=False))[0]
-
-    def keystore(self, *words: str | Path, status: int | None = 0) -> str:
-        """Run secure-keystore there; no process is watched for longer than is needed here."""
-        more = ("--settle", "0.3") if words[0] in ("import", "units") else ()
-        command = (Path(sys.executable).parent / "secure-keystore", *words, *more)
-        try:
-            return self.machine.run("env", f"PATH={os.environ['PATH']}", *command, status=status)
-        except AssertionError as error:
-            log = self.machine.run("journalctl", "--no-pager", "--unit=ros-*", "--lines=40", status=None)
-            raise AssertionError(f"{error}\n{log}") from None
-
-    def take(self, *words: str | Path, status: int = 0) -> str:
-        """Bring what the CA has now to the host, and restart what has to be."""
-        return self.keystore("import", KS, self.bundle().path, "--restart", *words, status=status)
-
-    def hears(self, unit: str) -> bool:
-        return HEARD in self.machine.journal(unit)
-
-
-def until(what: Callable[[], bool], told: Callable[[], str]) -> None:
-    end = time.monotonic() + LONGEST
-    while not what():
-        assert time.monotonic() < end, told()
-        time.sleep(0.2)
 
 
 @pytest.fixture(scope="module")
@@ -123,10 +51,7 @@ def running(host: Host) -> Host:
     """Day one: units exported from a keystore without a CRL, installed, and a bundle imported."""
     units = host.launch(robot(*TALKING))
     host.keystore("units", "install", units)
-    bundle = host.bundle()
-    pins = [word for pin in pinned(bundle.manifest) for word in ("--require-ca", pin)]
-    host.machine.run("mkdir", "-p", "/etc/ros")
-    host.keystore("import", KS, bundle.path, "--host", "robot", *pins)
+    host.first_import()
     for name in (SPEAKER, EAR, SPY):
         assert f"{name}: up" in host.keystore("units", "restart", name)
     until(lambda: host.hears(EAR) and host.hears(SPY), lambda: host.machine.journal(EAR))
@@ -143,10 +68,6 @@ def test_a_renewal_restarts_the_unit_of_the_renewed_enclave_and_no_other(running
     renew(running.ca, ["/speaker"], options=RenewOptions(provisioning=options()))
     assert up(running.take()) == [SPEAKER]
     assert {name: running.machine.property(name, "MainPID") for name in others} == others
-
-
-def up(printed: str) -> list[str]:
-    return [line.removesuffix(": up") for line in printed.splitlines() if line.endswith(": up")]
 
 
 def test_a_ca_is_rolled_over_and_the_units_that_were_exported_before_start(running: Host) -> None:

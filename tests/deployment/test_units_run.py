@@ -6,9 +6,7 @@ Each host has a network namespace of its own where the machine permits it; what 
 from __future__ import annotations
 
 import os
-import shlex
 import signal
-import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -23,7 +21,7 @@ from tests.dds.conftest import cyclone as cyclone
 from tests.dds.conftest import domain_id as domain_id
 from tests.dds.conftest import fastdds as fastdds
 from tests.dds.probe import Participant, Probe
-from tests.deployment.kit import export, launch_file, provisioned, secure_plan
+from tests.deployment.kit import export, launch_file, provisioned, secure_plan, set_up_ros
 from tests.deployment.networks import Network, two_networks
 from tests.deployment.systemd_stand_in import StandIn, Unit
 
@@ -52,17 +50,6 @@ def robot(domain: int, networks: dict[str, Network]) -> str:
       {node("talker", 'name="speaker" namespace="front"', "base", talk)}
       {node("listener", 'name="ear" on_exit="shutdown"', "arm", talk + '<param name="count" value="3"/>')}
     </launch>"""
-
-
-def set_up_ros(folder: Path) -> str:
-    """What /opt/ros/.../setup.sh is on a robot. It tries to take security away, as a careless one might."""
-    file = folder / "setup.sh"
-    path = f"{Path(sys.executable).parent}:$PATH"
-    lines = [f'export PATH="{path}"', "export ROS_SECURITY_ENABLE=false ROS_SECURITY_ENCLAVE_OVERRIDE=/other"]
-    if home := os.environ.get("CYCLONEDDS_HOME"):
-        lines.append(f"export CYCLONEDDS_HOME={shlex.quote(home)}")
-    file.write_text("\n".join(lines) + "\n")
-    return str(file)
 
 
 def deployed(tmp_path: Path, text: str) -> dict[str, Path]:
