@@ -99,9 +99,8 @@ class Machine:
         """
         enter = ("nsenter", f"--target={self._pid}", "--net", "ip")
         if "eth:" not in self.run("ip", "link"):
-            subprocess.run(
-                [*enter, *"link add eth type bridge mcast_snooping 0".split()], check=True, timeout=30
-            )
+            bridge = ("link", "add", "eth", "type", "bridge", "mcast_snooping", "0")
+            subprocess.run([*enter, *bridge], check=True, timeout=30)
             _configure(self, "10.77.0.1")
         pair = ("link", "add", "port", "type", "veth", "peer", "name", "eth", "netns", str(other._pid))
         subprocess.run([*enter, *pair], check=True, timeout=30)
