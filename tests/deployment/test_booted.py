@@ -150,11 +150,17 @@ def test_a_process_is_respawned_as_often_as_the_launch_file_says_however_often_i
         # By its identifier: of a process that is gone already the journal may not find out the unit.
         return running.machine.run("journalctl", "--no-pager", "--identifier=false", status=None)
 
+    machine = running.machine
+    machine.write("/etc/systemd/system/alarm.service", "[Service]\nType=oneshot\nExecStart=echo alarmed\n")
+    machine.run("mkdir", "/etc/systemd/system/flaky-.service.d")
+    machine.write("/etc/systemd/system/flaky-.service.d/alarm.conf", "[Unit]\nOnFailure=alarm.service\n")
+    machine.run("systemctl", "daemon-reload")
     printed = running.keystore("units", "restart", name, status=1)
     assert "its enclave is not in the keystore" in printed, "and it is not started again and again, in vain"
     assert running.machine.property(name, "ActiveState") == "inactive"
     running.take(status=1)
     until(lambda: running.machine.property(name, "ActiveState") == "failed", said)
+    until(lambda: "alarmed" in machine.journal("alarm.service"), said)
     before = said().count(GIVEN_UP)
     running.machine.run("systemctl", "start", name, status=None)
     until(lambda: said().count(GIVEN_UP) > before, said)
