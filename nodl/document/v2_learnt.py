@@ -14,7 +14,8 @@ the source's name where NoDL v2 cannot hold it, ``introspection`` says that the 
 
 A coincidence of values is not a rule: with ``proof: one run`` the name may as well be fixed, and ``seen`` lists further
 names that came from the same parameter. Where several parameters had the value, ``candidates`` lists them beside the
-fixed name. Until another run decides all readings hold.
+fixed name; ``readings`` are what the source may write as well for a name that begins with the node's name or namespace.
+Until another run decides all hold.
 """
 
 from __future__ import annotations
@@ -128,6 +129,8 @@ def _readings(fields: _Fields, row: YamlMap) -> Iterator[NameTemplate]:
         yield _fixed(str(fields.get("written") or fields["name"]), row)
         for name in _texts(row.items.get("seen")):
             yield _fixed(name, row)
+    for name in _texts(row.items.get("readings")):
+        yield _fixed(name, row)
     candidates = row.items.get("candidates")
     for each in candidates.items if isinstance(candidates, YamlList) else ():
         if isinstance(each, YamlMap):

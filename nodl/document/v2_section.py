@@ -97,6 +97,7 @@ _LEARNT_ENDPOINT = map_of(
         "default": text_of(),
         "proof": text_of(),
         "undecided": _TEXTS,
+        "readings": _TEXTS,
         "seen": _TEXTS,
         "candidates": list_of(
             map_of(

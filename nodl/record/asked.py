@@ -45,7 +45,8 @@ class Asked(NamedTuple):
     ``written`` as rcl got it, ``name`` as the source means it (``~/x`` for a name made from the node's own),
     ``final`` after expansion and remapping; for an action that of its parts. ``moved``: rules that the program
     itself holds made ``final`` of it, not those of the launch. ``introspected``: its service events are published.
-    ``spellings``: what the source may write as well, where only ``final`` was observed.
+    ``spellings``: what the source may write as well, where only ``final`` was observed; ``readings``: what it may mean
+    as well by a name that begins with the node's own place.
     """
 
     kind: EndpointKind
@@ -60,6 +61,7 @@ class Asked(NamedTuple):
     introspected: bool = False
     at: int = 0
     spellings: tuple[str, ...] = ()
+    readings: tuple[str, ...] = ()
 
     @property
     def granted(self) -> bool:

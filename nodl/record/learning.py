@@ -15,6 +15,7 @@ from nodl.record.asked import Asked, AskedNode, all_asked
 from nodl.record.assembly import Record
 from nodl.record.lines import RecordedRun
 from nodl.record.origins import FIXED, MARKER, Name, NameOrigin, Observation, arguments_as_inputs, origins_of
+from nodl.record.readings import with_readings
 
 _NUMBERED = re.compile(r"(.+?)_((?:0x)?(?=[0-9a-f]*[0-9])[0-9a-f]{6,}|[0-9]{3,})\Z")
 _TF_LISTENER = "transform_listener_impl_*"
@@ -30,7 +31,8 @@ OBSERVED = "observed"
 class LearntEndpoint(NamedTuple):
     """One name of a node. ``written`` where the manifest cannot hold it as a plain name; ``moved``: rules of the
     program itself made it of what the source writes, so that it is held as the final name; ``spellings``: what else the
-    source may write, as far as the runs can tell; ``seen``: further names from the same parameter."""
+    source may write, as far as the runs can tell; ``readings``: what it may mean, all of which hold; ``seen``: further
+    names from the same parameter."""
 
     kind: EndpointKind
     name: str
@@ -41,6 +43,7 @@ class LearntEndpoint(NamedTuple):
     introspected: bool = False
     moved_from: str = ""
     spellings: tuple[str, ...] = ()
+    readings: tuple[str, ...] = ()
     seen: tuple[str, ...] = ()
 
 
@@ -146,6 +149,8 @@ def _key(node: AskedNode) -> ProgramKey:
 
 def _learnt(key: ProgramKey, seen: Sequence[_Seen]) -> LearntNode:
     lifecycle = any(each.node.lifecycle for each in seen)
+    read = with_readings([each.node for each in seen])
+    seen = [each._replace(node=node) for each, node in zip(seen, read, strict=True)]
     entries = tuple(_entries(seen))
     libraries = [each.node.library for each in seen if each.node.library is not ClientLibrary.UNKNOWN]
     return LearntNode(
@@ -178,6 +183,9 @@ def _notes(entries: Iterable[LearntEndpoint], seen: Sequence[_Seen]) -> Iterable
         if entry.spellings:
             others = ", ".join(entry.spellings)
             yield f"{entry.name}: or {others}: the runs do not tell; one under another namespace and node name does"
+        if entry.readings:
+            others = ", ".join(entry.readings)
+            yield f"{entry.name}: or {others}: both are granted until a run under another name or namespace decides"
         if entry.moved_from:
             yield f"{entry.name}: the program writes {entry.moved_from} and remaps it itself"
     bad = {(e.written, e.rc) for each in seen for e in each.node.endpoints if e.rc not in (0, 1)}
@@ -217,6 +225,7 @@ def _entry(name: Name, origin: NameOrigin, names: set[Name], seen: Sequence[_See
         introspected,
         moved_from,
         () if origin.source else first.spellings,
+        () if origin.source else first.readings,
         tuple(sorted(each.name for each in names if each != name and each[::2] == name[::2])),
     )
 

@@ -132,8 +132,9 @@ def _about(entry: LearntEndpoint) -> dict[str, Any]:
         fields["default"] = origin.default
         fields["proof"] = "another value was followed" if origin.proven else ONE_RUN
         fields["seen"] = [] if origin.proven else list(entry.seen)
-    if origin.undecided or entry.spellings:
-        fields["undecided"] = [*map(str, origin.candidates), *entry.spellings]
+    if origin.undecided or entry.spellings or entry.readings:
+        fields["undecided"] = [*map(str, origin.candidates), *entry.spellings, *entry.readings]
+    fields["readings"] = list(entry.readings)
     fields["candidates"] = [
         {name: value for name, value in each._asdict().items() if value} for each in origin.candidates
     ]

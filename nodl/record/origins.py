@@ -2,9 +2,9 @@
 
 Measured on nine stacks with ordinary and with hostile values: a name that comes from a parameter is its value
 verbatim, or one entry of it where it is a list, or below every entry of a list (``node_names`` of nav2's
-lifecycle_manager). A name below any other value was a coincidence each time there; as programs that build names so
-exist, the value is a candidate. Parameters whose name ends in ``frame``, ``frame_id`` or ``type`` were never the source
-of a name.
+lifecycle_manager). A name that holds any other value was a coincidence each time there; as programs that build names
+so exist (``/fleet/<fleet>/orders``, ``<prefix>_0``), the value is a candidate. Parameters whose name ends in
+``frame``, ``frame_id`` or ``type`` were never the source of a name.
 
 One observation gives candidates. A second one with another value decides: the name followed the value (proven), or
 it did not (fixed). Until then both hold: the name that was seen, and the value of each candidate.
@@ -21,7 +21,7 @@ from typing import NamedTuple
 from nodl.node_interface import EndpointKind
 
 _NEVER = re.compile(r"(frame|frame_id|type)\Z")
-_BEFORE = ("", "/", "~/")
+_SEPARATORS = "/_"
 _PREFERRED = re.compile(r"(topic|topic_name)\Z")
 
 MARKER = "enclave_launch_marker_"
@@ -129,7 +129,7 @@ def possible_sources(name: Name, seen: Observation) -> tuple[Source, ...]:
     A program that declares what stands on its command line copied it from there (topic_tools).
     """
     copied = any(value == name.name for key, value in seen.inputs.items() if key[0] in "<-")
-    found = (*candidates(name.name, seen.inputs if copied else seen.values), *_names_below(name, seen))
+    found = (*candidates(name.name, seen.inputs if copied else seen.values), *_names_of_entries(name, seen))
     return found or tuple(_texts_within(name, seen))
 
 
@@ -165,12 +165,12 @@ def _all_sources(name: Name, seen: Observation) -> Iterable[Source]:
         source = _source(parameter, value, name.name)
         if source is not None:
             yield source
-    yield from _names_below(name, seen)
+    yield from _names_of_entries(name, seen)
     yield from _texts_within(name, seen)
 
 
-def _names_below(name: Name, seen: Observation) -> Iterable[Source]:
-    """Yield lists of which every entry has a name like this one below it."""
+def _names_of_entries(name: Name, seen: Observation) -> Iterable[Source]:
+    """Yield lists of which every entry has a name like this one."""
     for parameter, value in sorted(seen.inputs.items()):
         entries = _entries(value)
         for source in (each for entry in entries for each in _within(name.name, parameter, entry, each=True)):
@@ -180,24 +180,31 @@ def _names_below(name: Name, seen: Observation) -> Iterable[Source]:
 
 
 def _texts_within(name: Name, seen: Observation) -> Iterable[Source]:
-    """Yield texts below which the name is: by chance more often than not, so that another run has to decide."""
+    """Yield texts that the name holds: by chance more often than not, so that another run has to decide."""
     for parameter, value in sorted(seen.values.items()):
         if isinstance(value, str):
             yield from _within(name.name, parameter, value, each=False)
 
 
 def _within(name: str, parameter: str, entry: str, *, each: bool) -> Iterable[Source]:
+    """Yield what stands before and after ``entry`` in ``name``, for each place where it is a word of the name."""
     if not entry or _NEVER.search(parameter):
         return
-    for prefix in _BEFORE:
-        suffix = name.removeprefix(prefix + entry)
-        if suffix != name and suffix.startswith("/"):
+    for place in range(len(name) - len(entry) + 1):
+        prefix, suffix = name[:place], name[place + len(entry) :]
+        if (
+            name.startswith(entry, place)
+            and (prefix or suffix)
+            and (not prefix or prefix[-1] in _SEPARATORS)
+            and (not suffix or suffix[0] in _SEPARATORS)
+        ):
             yield Source(parameter, each, suffix, prefix)
 
 
 def _is_telling(source: Source, seen: Observation) -> bool:
-    """Return True if one run is enough: what is below the one entry of a list, or a text, may be so by chance."""
-    return not source.suffix or len(_entries(seen.inputs.get(source.parameter))) > 1
+    """Return True if one run is enough: a name that holds the one entry of a list, or a text, may do so by chance."""
+    is_the_value = not source.prefix and not source.suffix
+    return is_the_value or len(_entries(seen.inputs.get(source.parameter))) > 1
 
 
 def _entries(value: object) -> frozenset[str]:

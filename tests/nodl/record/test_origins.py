@@ -82,8 +82,21 @@ def test_a_second_run_decides_between_several() -> None:
     assert origin("odom", first, second) == NameOrigin(Source("odom0"), proven=True)
 
 
-def test_a_value_in_the_middle_of_a_name_is_a_coincidence() -> None:
-    assert origin("front/scan2", seen({"b": "scan", "c": "scan2", "d": "fro"}, "front/scan2")) == FIXED
+def test_a_value_in_the_middle_of_a_word_is_a_coincidence() -> None:
+    assert origin("front/scan2", seen({"b": "scan", "c": "can2", "d": "fro"}, "front/scan2")) == FIXED
+
+
+@pytest.mark.parametrize(
+    ("prefix", "suffix"), [("/fleet/", "/orders"), ("front/", ""), ("", "_0"), ("part_", "_0"), ("/", "")]
+)
+def test_a_name_that_holds_a_value_as_a_word_is_decided_by_another_run(prefix: str, suffix: str) -> None:
+    source = Source("fleet", suffix=suffix, prefix=prefix)
+    first = seen({"fleet": "alpha"}, f"{prefix}alpha{suffix}")
+    assert origin(f"{prefix}alpha{suffix}", first) == NameOrigin(candidates=(source,))
+    followed = seen({"fleet": "beta"}, f"{prefix}beta{suffix}")
+    assert origin(f"{prefix}alpha{suffix}", first, followed) == NameOrigin(source, proven=True)
+    stayed = seen({"fleet": "beta"}, f"{prefix}alpha{suffix}")
+    assert origin(f"{prefix}alpha{suffix}", first, stayed) == FIXED
 
 
 @pytest.mark.parametrize("before", ["", "/", "~/"])
@@ -105,7 +118,7 @@ def test_names_below_every_entry_of_a_list_may_be_absolute() -> None:
 
 def test_values_are_names_verbatim() -> None:
     assert origin("~/p", seen({"a": "~/p"}, "~/p")) == NameOrigin(Source("a"))
-    assert origin("/p", seen({"a": "p"}, "/p")) == FIXED
+    assert origin("/p", seen({"a": "p"}, "/p")).source is None
 
 
 def test_each_entry_of_a_list() -> None:

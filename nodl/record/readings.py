@@ -1,0 +1,74 @@
+"""What the source may mean by a recorded name that begins with the node's own place. Performs no I/O.
+
+A name below the node's name is private (``nodl.record.written``), unless a parameter has that text as its value, too.
+An absolute name below the node's namespace is made from it (``resolve_topic_name``, ``get_namespace``) or stands so in
+the source. Each reading holds until a run under another name or namespace decides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from nodl.names import split_fqn
+from nodl.record.asked import Asked, AskedNode
+
+
+def with_readings(nodes: Sequence[AskedNode]) -> list[AskedNode]:
+    """Return ``nodes``, all of one program, whose endpoints have the likeliest name and the others as ``readings``."""
+    found = [[_readings(asked, node) for asked in node.endpoints] for node in nodes]
+    return [
+        node._replace(
+            endpoints=tuple(
+                _read_as(asked, _left(readings, node, nodes, found))
+                for asked, readings in zip(node.endpoints, of_node, strict=True)
+            )
+        )
+        for node, of_node in zip(nodes, found, strict=True)
+    ]
+
+
+def _read_as(asked: Asked, readings: Sequence[str]) -> Asked:
+    return asked._replace(name=readings[0], readings=tuple(readings[1:]))
+
+
+def _readings(asked: Asked, node: AskedNode) -> tuple[str, ...]:
+    """Return what the source may write, the likeliest first."""
+    namespace, own_name = split_fqn(node.fqn)
+    texts = set(_texts(node))
+    if asked.moved or asked.spellings or asked.name in texts:
+        return (asked.name,)
+    if asked.name.startswith("~/") and asked.written.startswith(f"{own_name}/") and own_name in texts:
+        return asked.written, asked.name
+    below = asked.name.removeprefix(f"{namespace}/")
+    if namespace == "/" or below == asked.name or asked.name != asked.written or node.namespace:
+        return (asked.name,)
+    named_by_a_value = not texts.isdisjoint(namespace.split("/"))
+    return (asked.name, below) if named_by_a_value else (below, asked.name)
+
+
+def _texts(node: AskedNode) -> Iterable[str]:
+    """Yield the texts that the node could read."""
+    for value in (*node.parameters.values(), *node.declared.values()):
+        yield from (
+            each for each in (value if isinstance(value, list | tuple) else (value,)) if isinstance(each, str)
+        )
+    yield from node.arguments
+
+
+def _left(
+    readings: tuple[str, ...],
+    node: AskedNode,
+    nodes: Sequence[AskedNode],
+    found: Sequence[Sequence[tuple[str, ...]]],
+) -> tuple[str, ...]:
+    """Return those of ``readings`` that also hold in another place, if one does."""
+    if len(readings) == 1:
+        return readings
+    elsewhere = {
+        reading
+        for other, of_other in zip(nodes, found, strict=True)
+        if other.fqn != node.fqn
+        for each in of_other
+        for reading in each
+    }
+    return tuple(each for each in readings if each in elsewhere) or readings
