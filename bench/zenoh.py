@@ -19,12 +19,12 @@ from typing import Any
 
 from keystore.formats.domains import Domains
 from keystore.formats.policy import EnclavePolicy, Operation, Profile, Qualifier, Rule
-from keystore.formats.zenoh.grants import grants_of_policy
-from keystore.formats.zenoh.rules import access_rules
 from keystore.steps.creation import CreateOptions, create_keystore
 from keystore.steps.options import ProvisionOptions
 from keystore.steps.provisioning import provision
-from keystore.steps.zenoh_configuration import write_zenoh
+from keystore.zenoh.grants import grants_of_policy
+from keystore.zenoh.rules import access_rules
+from keystore.zenoh.writing import write_zenoh
 
 _OPERATIONS = tuple(Operation)
 _MESSAGES = 20_000

@@ -1,8 +1,8 @@
 """What is not installed, in one line that says how to get it: a Python package, or a room of ours.
 
 The main job (evaluate, assign enclaves, look manifests up, derive the policy, provision, run) works without the
-add-ons: inference, recording, observation, review and reports, deployment. A distribution may leave them out. Whoever
-needs one imports it where it is requested; ``installed`` says whether it is there.
+add-ons: inference, recording, observation, review and reports, deployment, Zenoh. A distribution may leave them out.
+Whoever needs one imports it where it is requested; ``installed`` says whether it is there.
 """
 
 from __future__ import annotations
@@ -30,9 +30,10 @@ def require(*packages: str) -> None:
 
 def missing_dependency(error: ImportError) -> str | None:
     """Return what to do about ``error``, or None if it is about another package than those we need."""
-    name = (error.name or "").partition(".")[0]
+    module = error.name or ""
+    name = module.partition(".")[0]
     if name in _OURS and isinstance(error, ModuleNotFoundError):
-        return f"{error.name} is not part of this installation; install the whole of enclave-launch"
+        return absence(module)
     if name not in _APT_AND_PIP:
         return None
     apt, pip = _APT_AND_PIP[name]
@@ -55,6 +56,15 @@ def ros_import_failure() -> str:
                 "packages: pipx install --system-site-packages, or python3 -m venv --system-site-packages"
             )
     return ""
+
+
+def absence(room: str) -> str:
+    """Return what to do about ``room``, an add-on, if it is not part of this installation; empty if it is."""
+    return (
+        ""
+        if installed(room)
+        else f"{room} is not part of this installation; install the whole of enclave-launch"
+    )
 
 
 def installed(module: str) -> bool:

@@ -16,6 +16,7 @@ import os
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from enclave_launch.add_ons import zenoh_planning
 from enclave_launch.admission.middleware import halves, middleware_of, why_not
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.diagnostics.enclaves import middleware_refused
@@ -27,7 +28,6 @@ from enclave_launch.host.plan_host import PlanHost
 from enclave_launch.host.protocol import MISSING_PREFIX
 from enclave_launch.host.user_code_results import RecordedResults
 from enclave_launch.interfaces import InterfaceFinder
-from enclave_launch.middlewares import middleware_notes, middleware_problems
 from enclave_launch.options import ResolveOptions, RunSettings, SecurityOptions
 from enclave_launch.plan import EvaluatedLaunch, LaunchPlan, LaunchSource, mixed_enclaves, on_zenoh
 from enclave_launch.planner import Planner
@@ -79,14 +79,9 @@ def resolve(
         problems=(*plan.problems, *_launcher_refusals(plan)),
         warnings=(*plan.warnings, *_missing_programs(evaluated.evaluation)),
     )
-    return _with_middleware_notes(plan) if on_zenoh(plan, os.environ) else plan
-
-
-def _with_middleware_notes(plan: LaunchPlan) -> LaunchPlan:
-    return plan._replace(
-        problems=(*plan.problems, *middleware_problems(plan, os.environ)),
-        warnings=(*plan.warnings, *middleware_notes(plan)),
-    )
+    if on_zenoh(plan, os.environ) and (zenoh := zenoh_planning()):
+        return zenoh.report(plan, os.environ)
+    return plan
 
 
 def _launcher_refusals(plan: LaunchPlan) -> list[Diagnostic]:
@@ -164,8 +159,7 @@ def provision(
     from enclave_launch.secured import (  # cryptography
         ProvisionedLaunch,
         launch_owner,
-        provision_policies,
-        provision_with_zenoh,
+        provision_plan,
     )
 
     if plan.problems:
@@ -175,11 +169,7 @@ def provision(
     asked = chosen.keystore or ProvisionOptions()
     asked = asked._replace(launch=asked.launch or LaunchHold(settings.keystore, launch_owner(plan)))
     asked = asked._replace(guid_halves=halves(mixed_enclaves(plan.processes)))
-    wanted = with_domains(plan, asked, os.environ)
-    if not on_zenoh(plan, os.environ):
-        report = provision_policies(settings, plan, wanted)
-        return ProvisionedLaunch(plan, settings, report, wanted, asked)
-    wanted, report, zenoh = provision_with_zenoh(settings, plan, wanted)
+    wanted, report, zenoh = provision_plan(settings, plan, with_domains(plan, asked, os.environ))
     return ProvisionedLaunch(plan, settings, report, wanted, asked, zenoh)
 
 

@@ -25,7 +25,7 @@ from enclave_launch.runtime.live_launch import LiveLaunch, run_launch
 from enclave_launch.runtime.run_events import Observer
 from enclave_launch.runtime.running_launch import RunningLaunch
 from enclave_launch.runtime.warden_process import WardenProcess
-from enclave_launch.secured import PlanProvider, ProvisionedLaunch, zenoh_router
+from enclave_launch.secured import PlanProvider, ProvisionedLaunch
 
 Launch = Union[LaunchSource, EvaluatedLaunch, LaunchPlan, "ProvisionedLaunch"]
 _UNSECURED = (LaunchSource, EvaluatedLaunch, LaunchPlan)
@@ -88,11 +88,7 @@ def _expiry_watch(launch: Launch) -> AbstractContextManager[None]:
 
 
 def _zenoh_router(launch: Launch) -> AbstractContextManager[object]:
-    """Before the first process, where one is on Zenoh."""
-    if isinstance(launch, _UNSECURED) or launch.zenoh is None:
-        return nullcontext()
-
-    return zenoh_router(launch, warn)
+    return nullcontext() if isinstance(launch, _UNSECURED) else launch.serve_router(warn)
 
 
 def _check_programs(launch: Launch) -> None:

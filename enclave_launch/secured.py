@@ -7,21 +7,20 @@ what was provisioned (a few file reads) and hands out the arguments and variable
 from __future__ import annotations
 
 import os
-import socket
 import sys
 from collections.abc import Callable, Mapping
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import NamedTuple
 
+from enclave_launch.add_ons import LaunchRouter, zenoh_start
 from enclave_launch.admission.middleware import failing, middleware_of
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.diagnostics.enclaves import enclave_of_several_launches, handshake_fails
-from enclave_launch.errors import ProvisionError, RuntimeFailure, keystore_errors
-from enclave_launch.middlewares import zenoh_enclaves
+from enclave_launch.errors import ProvisionError, keystore_errors
 from enclave_launch.plan import LaunchPlan, PlannedProcess, mixed_enclaves, on_zenoh
 from enclave_launch.process import ResolvedProcess
 from enclave_launch.runtime.gate import StartAdditions, identity
-from enclave_launch.runtime.zenoh_router import RouterPlace, ZenohRouter, find_router, missing_router
 from enclave_launch.security_environment import (
     OVERRIDE,
     SecuritySettings,
@@ -30,27 +29,14 @@ from enclave_launch.security_environment import (
     secured_environment,
 )
 from enclave_launch.served_domains import places, with_domains
-from keystore.disk import layout
 from keystore.disk.view import KeystoreView
-from keystore.disk.zenoh_files import present_address
 from keystore.errors import KeystoreError
 from keystore.formats.governance import NoGovernanceRuleError
 from keystore.formats.policy import EnclavePolicy
-from keystore.formats.role import Role
-from keystore.formats.zenoh.configuration import RouterAddress
-from keystore.formats.zenoh.types import types_text
 from keystore.steps.comparison import differences
 from keystore.steps.options import ProvisionOptions, ProvisionReport
 from keystore.steps.provisioning import provision
 from keystore.steps.sharing import shared_enclaves
-from keystore.steps.zenoh_configuration import (
-    ZenohReport,
-    router_differences,
-    session_differences,
-    write_zenoh,
-)
-from keystore.steps.zenoh_denials import RouterLogExplainer
-from nodl.ament_index import search_prefixes
 
 
 class ProvisionedLaunch(NamedTuple):
@@ -62,8 +48,8 @@ class ProvisionedLaunch(NamedTuple):
     report: ProvisionReport
     options: ProvisionOptions
     asked: ProvisionOptions
-    zenoh: ZenohReport | None = None
-    """Where processes are on Zenoh: its configuration."""
+    zenoh: LaunchRouter | None = None
+    """The router of processes on Zenoh."""
 
     @property
     def handshakes(self) -> tuple[Diagnostic, ...]:
@@ -81,6 +67,15 @@ class ProvisionedLaunch(NamedTuple):
         given = (self.options.access.passphrase, self.options.access.pin)
         return frozenset(secret.variable for secret in given if secret is not None and secret.variable)
 
+    def serve_router(self, say: Callable[[str], None]) -> AbstractContextManager[object]:
+        """Return a context within which the router of processes on Zenoh answers; without any it does nothing.
+
+        :raises RuntimeFailure: on entering, if no router answers and none can be started."""
+        if self.zenoh is None:
+            return nullcontext()
+        secret = self.secret_variables
+        return self.zenoh.serve({name: os.environ[name] for name in os.environ if name not in secret}, say)
+
 
 def provision_policies(
     settings: SecuritySettings, plan: LaunchPlan, options: ProvisionOptions, only: EnclavePolicy | None = None
@@ -97,16 +92,20 @@ def provision_policies(
             raise ProvisionError(f"{error} ({places(plan, error.domains)})") from error
 
 
-def provision_with_zenoh(
+def provision_plan(
     settings: SecuritySettings, plan: LaunchPlan, options: ProvisionOptions
-) -> tuple[ProvisionOptions, ProvisionReport, ZenohReport]:
-    """Provision as ``provision_policies`` does and write the configuration of what is on Zenoh; return the options
-    used, too."""
-    wanted = zenoh_enclaves(plan, os.environ)
-    options = options._replace(types={path: types_text(types) for path, types in wanted.items()})
+) -> tuple[ProvisionOptions, ProvisionReport, LaunchRouter | None]:
+    """Provision all enclaves of ``plan``, and the router of those on Zenoh; return the options used, too.
+
+    :raises ProvisionError: as ``provision_policies``."""
+    enclaves = on_zenoh(plan, os.environ)
+    if not enclaves:
+        return options, provision_policies(settings, plan, options), None
+    zenoh = zenoh_start()
+    options = options._replace(types=zenoh.types(plan, enclaves))
     report = provision_policies(settings, plan, options)
     with keystore_errors():
-        return options, report, write_zenoh(settings.keystore, wanted, options=options)
+        return options, report, zenoh.configure(plan, settings.keystore, enclaves, options)
 
 
 def launch_owner(plan: LaunchPlan) -> str:
@@ -122,62 +121,6 @@ def with_shares_reported(plan: LaunchPlan, keystore: str) -> LaunchPlan:
     with keystore_errors():
         found = list(shared_enclaves(keystore, launch_owner(plan), plan.derived.policy.enclaves))
     return plan._replace(warnings=(*plan.warnings, *(enclave_of_several_launches(*one) for one in found)))
-
-
-def zenoh_router(launch: ProvisionedLaunch, say: Callable[[str], None]) -> ZenohRouter:
-    """Return the router of a launch with processes on Zenoh; entering it starts or finds one."""
-    zenoh = launch.zenoh
-    assert zenoh is not None, "only called if processes are on Zenoh"
-
-    def refusals() -> tuple[str, ...]:
-        try:
-            return router_differences(zenoh.keystore)
-        except KeystoreError as error:
-            return (str(error),)
-
-    place = RouterPlace(
-        (zenoh.router.host, zenoh.router.port),
-        str(zenoh.keystore / layout.ZENOH_ROUTER),
-        str(zenoh.keystore / layout.ZENOH_ROUTER_CERT),
-        str(zenoh.keystore / layout.ca_cert(Role.IDENTITY)),
-        refusals,
-    )
-    program = (
-        find_router(search_prefixes(launch.plan.planner.source.prefixes)) if zenoh.router.is_here else None
-    )
-    environment = {name: value for name, value in os.environ.items() if name not in launch.secret_variables}
-    return ZenohRouter(place, program, environment, say, _explained(zenoh.keystore, environment, say))
-
-
-def _explained(
-    keystore: Path, environment: Mapping[str, str], say: Callable[[str], None]
-) -> Callable[[str], bool]:
-    """Reads what the router traces of its access control, where the user asked it to, and says what it means: the trace
-    has two lines for each message that passes, too."""
-    if "interceptor" not in environment.get("RUST_LOG", ""):
-        return lambda line: False
-
-    explainer = RouterLogExplainer(keystore)
-
-    def heard(line: str) -> bool:
-        if (said := explainer.read(line)) is not None:
-            say("\n".join(said.lines))
-        return "zenoh::net::routing::interceptor" in line
-
-    return heard
-
-
-def check_router(plan: LaunchPlan, keystore: str) -> None:
-    """Before keys are made. Raises ``RuntimeFailure`` where no router is installed and nobody answers in its place."""
-    if not on_zenoh(plan, os.environ) or find_router(search_prefixes(plan.planner.source.prefixes)):
-        return
-    with keystore_errors():
-        address = present_address(KeystoreView(Path(keystore))) or RouterAddress()
-    try:
-        socket.create_connection((address.host, address.port), timeout=5.0).close()
-    except OSError:
-        file = os.path.join(keystore, layout.ZENOH_ROUTER)
-        raise RuntimeFailure(missing_router((address.host, address.port), file)) from None
 
 
 class PlanProvider:
@@ -256,8 +199,9 @@ class PlanProvider:
             raise ProvisionError(
                 f"{process.process_name} is the first process on Zenoh, and no router was started: the plan had none"
             )
-        _, _, zenoh = provision_with_zenoh(self._launch.settings, self._plan, self._options)
-        zenoh_router(self._launch._replace(zenoh=zenoh), lambda _: None).wait()
+        _, _, router = provision_plan(self._launch.settings, self._plan, self._options)
+        assert router is not None, "the process is on Zenoh"
+        router.wait()
 
     def launcher(self) -> StartAdditions | None:
         launcher, settings = self._plan.launcher, self._launch.settings
@@ -274,8 +218,8 @@ class PlanProvider:
         enclave, keystore = policy.path, self._launch.settings.keystore
         try:
             wrong = differences(keystore, policy, options=self._options)
-            if (zenoh := self._launch.zenoh) is not None and enclave in self._on_zenoh:
-                wrong = (*wrong, *session_differences(keystore, enclave, zenoh.router))
+            if (router := self._launch.zenoh) is not None and enclave in self._on_zenoh:
+                wrong = (*wrong, *router.differences(enclave))
         except KeystoreError as error:
             raise ProvisionError(
                 f"enclave {enclave} can no longer be read, though it was provisioned for this launch: {error}"

@@ -68,7 +68,7 @@ def enclave_environment(enclave: str, middleware: str, settings: SecuritySetting
     enclave only."""
     if middleware != ZENOH:
         return launcher_environment(settings)
-    file = f"{settings.keystore}/{layout.enclave_directory(enclave)}/{layout.ENCLAVE_ZENOH}"
+    file = f"{settings.keystore}/{layout.zenoh_session(enclave)}"
     return {**launcher_environment(settings), ZENOH_SESSION: file, **dict.fromkeys(ZENOH_CLEARED, "")}
 
 

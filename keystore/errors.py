@@ -6,6 +6,7 @@
     ├── NotAKeystoreError            the caller: the path is something else
     ├── UnsafeKeystoreError          the owner of the files: links, owners or modes that let others in
     ├── DamagedKeystoreError         the operator: a file is missing, unreadable or not what it should be
+    ├── NotInstalledError            the installer: an add-on is not part of this installation
     ├── SigningUnavailableError      the holder of the CA key: no key here, no passphrase, a token that refuses
     ├── KeystoreBusyError            another run holds the lock
     └── StorageError                 the system: disk full, read-only, no permission
@@ -58,6 +59,10 @@ class UnsafeKeystoreError(KeystoreError):
 
 class DamagedKeystoreError(KeystoreError):
     """A file of the keystore is missing, unreadable or not what it should be."""
+
+
+class NotInstalledError(KeystoreError):
+    """An add-on that the keystore needs is not part of this installation."""
 
 
 class SigningUnavailableError(KeystoreError):

@@ -24,11 +24,23 @@ ADD_ONS: dict[str, tuple[str, ...]] = {
     "observation": ("nodl/graph", "enclave_launch/drift", "enclave_launch/drift_watch.py"),
     "review": ("enclave_launch/review", *(f"enclave_launch/report/{each}" for each in REPORTS.split())),
     "deployment": ("enclave_launch/deployment",),
+    "zenoh": (
+        "enclave_launch/zenoh",
+        "keystore/zenoh",
+        "keystore/verb/zenoh.py",
+        "keystore/verb/denials.py",
+    ),
 }
 REMOVALS = {**ADD_ONS, "all": tuple(path for paths in ADD_ONS.values() for path in paths)}
 
 DRY_RUN = ("enclave_launch", "--dry-run", "--prefix", str(ROOT / "fixtures/demo_ws"), "demo_nodes")
-CORE_TESTS = ("tests/admission", "tests/policy/test_derivation.py", "tests/test_enclave_assignment.py")
+OF_ZENOH = "--ignore=tests/admission/test_zenoh.py"
+CORE_TESTS = (
+    OF_ZENOH,
+    "tests/admission",
+    "tests/policy/test_derivation.py",
+    "tests/test_enclave_assignment.py",
+)
 MANIFEST = ROOT / "fixtures/demo_ws/share/demo_nodes/demo_nodes.nodl.xml"
 TALKER = "talker_listener.launch.xml"
 
@@ -39,6 +51,7 @@ NEEDS: dict[str, tuple[str, ...]] = {
     "observation": ("nodl.verb", "observe", "--for", "1s"),
     "review": ("enclave_launch.verb.secure_plan", "check", "demo_nodes", "talker_listener.launch.xml"),
     "deployment": ("enclave_launch.verb.secure_plan", "export", "demo_nodes", "talker_listener.launch.xml"),
+    "zenoh": ("keystore.verb", "zenoh", "ks"),
 }
 
 
@@ -92,6 +105,42 @@ def test_a_verb_of_an_add_on_that_is_not_installed_says_so(add_on: str, tmp_path
         assert ran.returncode == 1
         assert "is not part of this installation" in ran.stderr
         assert ran.stderr.count("\n") == 1, ran.stderr
+
+
+@pytest.mark.parametrize("removed", ["enclave_launch/zenoh", "keystore/zenoh"])
+def test_a_process_on_zenoh_is_refused_without_that_add_on(
+    removed: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("RMW_IMPLEMENTATION", "rmw_zenoh_cpp")
+    folder = copy_without((removed,), tmp_path)
+    shown = python(folder, *DRY_RUN, TALKER)
+    assert (
+        shown.returncode == 0
+        and f"{removed.replace('/', '.')} is not part of this installation" in shown.stdout
+    )
+    ran = python(folder, "enclave_launch", "--secure", "--keystore", "ks", *DRY_RUN[2:], TALKER)
+    assert ran.returncode == 1 and "nothing was started or written" in ran.stderr, ran.stderr
+    assert "Traceback" not in ran.stderr and not (folder / "ks").exists()
+
+
+def test_a_keystore_with_a_zenoh_router_says_that_its_rules_do_not_follow_without_that_add_on(
+    tmp_path: Path,
+) -> None:
+    whole, folder = copy_without((), tmp_path / "whole"), copy_without(ADD_ONS["zenoh"], tmp_path / "part")
+    keystore = str(tmp_path / "ks")
+    for words in (("create", keystore), ("create-enclave", keystore, "/a"), ("zenoh", keystore)):
+        assert python(whole, "keystore.verb", *words).returncode == 0
+    rules = (tmp_path / "ks/zenoh/router.json5").read_bytes()
+    added = python(folder, "keystore.verb", "create-enclave", keystore, "/b")
+    assert added.returncode == 0 and "the Zenoh router enforces what it was before" in added.stderr
+    verified = python(folder, "keystore.verb", "verify", keystore)
+    assert (
+        verified.returncode == 1
+        and "'zenoh/router.json5': not checked: keystore.zenoh is not" in verified.stdout
+    )
+    assert (tmp_path / "ks/zenoh/router.json5").read_bytes() == rules
+    assert python(whole, "keystore.verb", "zenoh", keystore).returncode == 0
+    assert python(whole, "keystore.verb", "verify", keystore).returncode == 0
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Which middlewares read enclaves, and which two cannot authenticate each other. Performs no I/O.
+"""Which middlewares read enclaves, and which two cannot authenticate each other.
 
 rcl hands every middleware the path of the enclave; what it does with it is its own business.
 
@@ -17,6 +17,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from enum import Enum
 from typing import NamedTuple
 
+from enclave_launch.add_ons import zenoh_absence
 from keystore.formats.subject import Half, guid_prefix
 
 VARIABLE = "RMW_IMPLEMENTATION"
@@ -60,8 +61,10 @@ def vendor_of(middleware: str) -> Vendor | None:
 
 def why_not(middleware: str, accepted: Collection[str] = ()) -> str | None:
     """Return why a process with ``middleware`` must not start in an enclave, None if it may."""
-    if middleware in HONOURS_ENCLAVES or middleware == ZENOH:
+    if middleware in HONOURS_ENCLAVES:
         return None
+    if middleware == ZENOH:
+        return zenoh_absence() or None
     if middleware in _NO_ENCLAVES:
         return _NO_ENCLAVES[middleware]
     return None if middleware in accepted else "it is not known to read enclaves"

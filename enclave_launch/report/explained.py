@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from enclave_launch.add_ons import zenoh_planning
 from enclave_launch.admission.middleware import ZENOH
 from enclave_launch.plan import LaunchPlan, PlannedComponent, PlannedProcess
 from enclave_launch.policy.explanation import explain
-from enclave_launch.report.on_zenoh import zenoh_lines
 from enclave_launch.report.tree import origin_text
 from enclave_launch.report.unknown import UNKNOWN, is_unknown, label, shown_fqn, unknown_by_enclave
 
@@ -27,8 +27,8 @@ def explained(plan: LaunchPlan, subject: str) -> list[str]:
         lines += _descriptions(item, None if of_node else path)
         if subject.strip("[]") == label(item) or (is_unknown(item) and path == shown_fqn(item)):
             lines += _of_process(plan, item)
-    if lines and any(item.middleware == ZENOH for item in plan.processes):
-        lines += zenoh_lines(plan, path)
+    if lines and any(item.middleware == ZENOH for item in plan.processes) and (zenoh := zenoh_planning()):
+        lines += zenoh.explain(plan, path)
     return lines
 
 

@@ -4,7 +4,6 @@ document.py           a plan, fresh or read back from the dry run's JSON, as wha
 changes.py            two plans -> what was added, removed and moved, and whether rights grew
 information_flow.py   a plan -> which enclave can influence which, over any number of hops
 similarity.py         a plan -> enclaves worth merging or splitting, with what that costs
-middlewares.py        a plan -> what follows from DDS and Zenoh in one launch, as its problems and warnings
 signed.py             a plan's permissions as they come back from being signed, to compare with a keystore
 checks/               a plan -> findings, each with a code
 expectations.py       rules that a repository keeps ("the camera never reaches /cmd_vel") and accepted findings

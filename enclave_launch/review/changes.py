@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 from enclave_launch.review.document import GrantedName, PlanDocument
 from enclave_launch.review.information_flow import FlowGraph, flow_graph
+from keystore.add_ons import FileDifference
 
 
 class EnclaveChange(NamedTuple):
@@ -34,14 +35,6 @@ class Move(NamedTuple):
     after: str
 
 
-class FileChange(NamedTuple):
-    """What a configuration of Zenoh has otherwise; ``more``: it lets somebody do more, or protects less."""
-
-    file: str
-    more: bool
-    text: str
-
-
 class Changes(NamedTuple):
     """Everything sorted. ``flows_*``: pairs of enclaves of which the first can influence the second directly;
     ``middlewares``: enclaves that moved from DDS to Zenoh or back; ``files``: of two keystores, for Zenoh;
@@ -55,7 +48,7 @@ class Changes(NamedTuple):
     flows_added: tuple[tuple[str, str], ...]
     flows_removed: tuple[tuple[str, str], ...]
     middlewares: tuple[Move, ...] = ()
-    files: tuple[FileChange, ...] = ()
+    files: tuple[FileDifference, ...] = ()
     as_installed: tuple[str, ...] = ()
     unknown: tuple[str, ...] = ()
 

@@ -14,6 +14,7 @@ import atexit
 import os
 import sys
 from collections.abc import Iterable
+from contextlib import ExitStack
 from importlib.metadata import entry_points
 from typing import Any
 
@@ -30,7 +31,7 @@ from enclave_launch.process import Evaluation
 from enclave_launch.ros2 import attributes  # noqa: F401  # ``enclave=`` in the caller's own nodes
 from enclave_launch.ros2.session import EnclaveSession
 from enclave_launch.ros_rules.distro import choose_release
-from enclave_launch.secured import ProvisionedLaunch, zenoh_router
+from enclave_launch.secured import ProvisionedLaunch
 from enclave_launch.security_environment import OVERRIDE, launcher_environment
 from nodl.ament_index import search_prefixes
 
@@ -66,10 +67,11 @@ def _enclosed(
     """Put ``description`` behind actions that begin ``session`` and point every process at the keystore.
 
     :raises RuntimeFailure: processes are on Zenoh, and no router answers or can be started."""
-    if launch.zenoh is not None:
-        router = zenoh_router(launch, lambda text: print(f"enclave-launch: warning: {text}", file=sys.stderr))
-        router.__enter__()
-        atexit.register(router.__exit__)  # after the last process
+    serving = ExitStack()
+    serving.enter_context(
+        launch.serve_router(lambda text: print(f"enclave-launch: warning: {text}", file=sys.stderr))
+    )
+    atexit.register(serving.close)  # after the last process
     actions: list[Any] = [
         SetEnvironmentVariable(name, value) for name, value in launcher_environment(launch.settings).items()
     ]

@@ -11,5 +11,5 @@ warden            the small process that forks, and that leaves no orphan whatev
                   (warden_process, warden_channel: our ends of it; survivors: what is left when it is killed)
 routing, sinks    output to screen and log files; back_pressure: who waits; launch_log: launch's own, and where all are
 companion         who goes along with a launch: recorders, watches
-ros_services      calls of the launcher's own node; zenoh_router: the router of a launch on Zenoh
+ros_services      calls of the launcher's own node
 """

@@ -7,6 +7,7 @@ import os
 import sys
 
 from enclave_common.terminal import printable, warn
+from enclave_launch.add_ons import zenoh_start
 from enclave_launch.evaluation.programs import check_programs
 from enclave_launch.expiry_watch import renewal_deadline
 from enclave_launch.flow import launch_source, provision, run
@@ -14,7 +15,6 @@ from enclave_launch.options import RunSettings
 from enclave_launch.plan import LaunchPlan, on_zenoh
 from enclave_launch.runtime.companion import LaunchCompanion
 from enclave_launch.runtime.ros_services import require_rclpy
-from enclave_launch.secured import check_router
 from enclave_launch.verb.options import resolve_options
 from enclave_launch.verb.security import (
     created_notices,
@@ -118,7 +118,7 @@ def _check_before_keys_are_made(plan: LaunchPlan, keystore: str) -> None:
         return  # told first, by ``provision``
     check_programs(plan.evaluation.processes)
     if on_zenoh(plan, os.environ):
-        check_router(plan, keystore)
+        zenoh_start().check(plan, keystore)
     if plan.launcher is not None:
         require_rclpy()
 

@@ -61,7 +61,7 @@ PERMISSIONS_XML, PERMISSIONS = "permissions.xml", "permissions.p7s"
 ENCLAVE_GOVERNANCE = "governance.p7s"
 ENCLAVE_CRL = "crl.pem"
 ENCLAVE_ZENOH = "zenoh.json5"
-"""There for the enclaves that are on Zenoh: what ``ZENOH_SESSION_CONFIG_URI`` names."""
+"""There for the enclaves that are on Zenoh."""
 ENCLAVE_FILES = frozenset({
     KEY, CERT, PERMISSIONS_XML, PERMISSIONS, ENCLAVE_GOVERNANCE, ENCLAVE_CRL,
     "identity_ca.cert.pem", "permissions_ca.cert.pem",
@@ -90,6 +90,11 @@ def ca_key_uri(role: Role) -> str:
 def enclave_directory(enclave: str) -> str:
     """Return ``enclaves/a/b``. Raises InvalidEnclaveNameError, so no path is built from an unchecked name."""
     return "/".join((ENCLAVES, *segments(validate_enclave_name(enclave))))
+
+
+def zenoh_session(enclave: str) -> str:
+    """Return the path of what ``ZENOH_SESSION_CONFIG_URI`` names for processes of ``enclave``."""
+    return f"{enclave_directory(enclave)}/{ENCLAVE_ZENOH}"
 
 
 def shares(enclave: str) -> str:

@@ -141,6 +141,15 @@ class KeystoreView:
     def has_crl(self) -> bool:
         return os.path.lexists(self.root / layout.CRL)
 
+    @property
+    def has_zenoh_router(self) -> bool:
+        """True if the keystore holds a configuration for a Zenoh router."""
+        return os.path.lexists(self.root / layout.ZENOH_ROUTER)
+
+    def zenoh_enclaves(self) -> list[str]:
+        """Return the enclaves whose processes have a session configuration for Zenoh, sorted."""
+        return [name for name in self.enclaves() if os.path.lexists(self.root / layout.zenoh_session(name))]
+
     def has_request(self, enclave: str) -> bool:
         """Whether the enclave's key was made on its host: here is only the request that was signed."""
         return os.path.lexists(self.root / layout.request(enclave))

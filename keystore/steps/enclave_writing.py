@@ -10,7 +10,6 @@ from enclave_common.words import some_of
 from keystore.disk import layout, safe_files, store
 from keystore.disk.store import Batch, Content, Link, Store
 from keystore.disk.view import KeystoreView
-from keystore.disk.zenoh_files import has_router
 from keystore.errors import InvalidInputError, printable
 from keystore.formats.certificate import CertificateFacts
 from keystore.formats.permissions_size import FAST_DDS_LIMIT_BYTES, WARN_BYTES
@@ -237,7 +236,7 @@ class EnclaveWriter:
 
     def _is_revoked_on_zenoh(self, enclave: str, name: str) -> bool:
         """A Zenoh router knows no CRL and goes by names: the name of a revoked certificate is given to nobody again."""
-        return has_router(self._view) and any(
+        return self._view.has_zenoh_router and any(
             one.subject == name and (one.revoked is not None or one.serial in self._revoked)
             for one in self._register.of_enclave(enclave)
         )

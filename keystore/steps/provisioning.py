@@ -10,13 +10,13 @@ by the next one, because the comparison finds every missing step again.
 
 from __future__ import annotations
 
-import os
 import shlex
 from collections.abc import Iterable, Mapping
 from datetime import timedelta
 from pathlib import Path
 
 from enclave_common.words import counted, some_of
+from keystore.add_ons import follow
 from keystore.disk import layout, store
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.share_files import read_shares
@@ -37,7 +37,6 @@ from keystore.steps.enclave_state import PermissionsSource
 from keystore.steps.options import ProvisionOptions, ProvisionReport
 from keystore.steps.reconciliation import reconcile
 from keystore.steps.sharing import given_up, left_over, refuse_running
-from keystore.steps.zenoh_configuration import follow
 from keystore.verification.before_launch import exposures
 
 
@@ -101,14 +100,6 @@ def _distinct(enclaves: Iterable[EnclavePolicy]) -> list[EnclavePolicy]:
     return policies
 
 
-def _zenoh(root: Path, options: ProvisionOptions) -> list[str]:
-    """The router's rules follow from what was just changed."""
-    if not os.path.lexists(f"{root}/{layout.ZENOH_ROUTER}"):
-        return []
-
-    return follow(root, options)
-
-
 def bring_about(
     root: Path, wanted: Mapping[str, WantedEnclave], options: ProvisionOptions
 ) -> ProvisionReport:
@@ -116,7 +107,7 @@ def bring_about(
     now = options.now or utc_now()
     if (report := compare(root, wanted, options, now)) is None:
         report = reconcile(root, wanted, options, now)
-        report = report._replace(warnings=(*report.warnings, *_zenoh(root, options)))
+        report = report._replace(warnings=(*report.warnings, *follow(root, options)))
     return report._replace(warnings=(*report.warnings, *exposures(KeystoreView(root))))
 
 

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
+from keystore.add_ons import follow
 from keystore.disk import layout
 from keystore.disk.store import Store
 from keystore.disk.view import KeystoreView, keystore_at
@@ -28,7 +29,6 @@ from keystore.signing.public_key import fingerprint
 from keystore.steps.crl import publish_crl, restore_crl, revocable
 from keystore.steps.opening import ChangeOptions, opened_for_change
 from keystore.steps.options import ProvisionOptions
-from keystore.steps.zenoh_configuration import follow
 
 # The key first, so that nothing usable remains; the certificate last, so that a repeated run can revoke it.
 _DELETE_ORDER = (

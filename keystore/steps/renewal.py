@@ -22,7 +22,6 @@ from keystore.disk.copies import refresh_copies
 from keystore.disk.register_file import read_register
 from keystore.disk.store import Store
 from keystore.disk.view import KeystoreView, keystore_at
-from keystore.disk.zenoh_files import has_router, zenoh_enclaves
 from keystore.errors import DamagedKeystoreError, InvalidInputError, printable
 from keystore.formats.certificate import CertificateFacts, read_certificate, read_der
 from keystore.formats.enclave_name import validate_enclave_name
@@ -128,14 +127,14 @@ def _with_names_of_their_own(
     """On Zenoh, where a router goes by names: what has the name of a revoked certificate gets another one."""
     view = KeystoreView(root)
     register = read_register(root)
-    if register is None or not has_router(view):
+    if register is None or not view.has_zenoh_router:
         return report
     revoked = {
         (one.enclave, one.subject) for one in register.certificates.values() if one.revoked is not None
     }
     wanted = {
         name: WantedEnclave(keep, Reissue.CERTIFICATE)
-        for name in zenoh_enclaves(view)
+        for name in view.zenoh_enclaves()
         if (name, view.common_name(name)) in revoked
     }
     again = bring_about(root, wanted, with_domains(root, options)) if wanted else None

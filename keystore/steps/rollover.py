@@ -23,6 +23,7 @@ from datetime import datetime
 from enum import Enum
 from pathlib import Path
 
+from keystore.add_ons import follow
 from keystore.disk import layout, safe_files, store
 from keystore.disk.copies import refresh_copies
 from keystore.disk.signed_documents import governance_stands
@@ -46,7 +47,6 @@ from keystore.steps.incoming_ca import install_incoming, put_incoming
 from keystore.steps.opening import opened_for_change
 from keystore.steps.options import ProvisionOptions, ProvisionReport
 from keystore.steps.provisioning import bring_about, keep
-from keystore.steps.zenoh_configuration import follow
 
 
 class Step(str, Enum):

@@ -15,11 +15,12 @@ import os
 import signal
 import socket
 import struct
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from keystore import errors
+from keystore.add_ons import zenoh_files
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.share_files import LaunchHold
 from keystore.errors import InvalidInputError, KeystoreError, SigningUnavailableError
@@ -30,11 +31,9 @@ from keystore.formats.policy import EnclavePolicy
 from keystore.formats.shares import Share, parse_shares, shares_json
 from keystore.formats.subject import Half
 from keystore.formats.validity import Validity, iso, parse_moment
-from keystore.formats.zenoh.configuration import RouterAddress
 from keystore.signing.ca_access import Secret
 from keystore.steps.options import EnclaveReport, ProvisionOptions, ProvisionReport
 from keystore.steps.provisioning import provision
-from keystore.steps.zenoh_configuration import ZenohReport, write_zenoh
 
 _HEAD = struct.Struct("!Q")
 _PR_SET_DUMPABLE = 4
@@ -72,17 +71,9 @@ class SigningProcess:
             self._ask({"do": "provision", "enclaves": policies, **_decided(options)}, options.launch)
         )
 
-    def write_zenoh(
-        self, enclaves: Iterable[str], router: str | None, options: ProvisionOptions
-    ) -> ZenohReport:
-        """As ``zenoh_configuration.write_zenoh``, in the other process. Raises what that raises."""
-        found = self._ask(
-            {"do": "zenoh", "enclaves": list(enclaves), "router": router, **_decided(options)}, None
-        )
-        return ZenohReport(
-            Path(found["keystore"]), RouterAddress.parse(found["router"]), tuple(found["written"]),
-            tuple(found["enclaves"]), tuple(found["gaps"]), found["restart"],
-        )  # fmt: skip
+    def request(self, action: str, content: dict[str, Any], options: ProvisionOptions) -> Any:
+        """Have ``action`` done in the other process. Raises what that raises."""
+        return self._ask({"do": action, **content, **_decided(options)}, None)
 
     def _ask(self, request: dict[str, Any], hold: LaunchHold | None) -> Any:
         descriptor = hold.descriptor if hold is not None else None
@@ -196,12 +187,10 @@ def _provision(root: Path, options: ProvisionOptions, request: Any) -> Any:
 
 
 def _zenoh(root: Path, options: ProvisionOptions, request: Any) -> Any:
-    names = [validate_enclave_name(name) for name in request["enclaves"]]
-    report = write_zenoh(root, names, router=request["router"], options=options)
-    return {**report._asdict(), "keystore": str(report.keystore), "router": str(report.router)}
+    return zenoh_files().sign(root, options, request)
 
 
-_ACTIONS: dict[str, Callable[[Path, ProvisionOptions, Any], Any]] = {"provision": _provision, "zenoh": _zenoh}
+_ACTIONS = {"provision": _provision, "zenoh": _zenoh}
 
 
 # Between them

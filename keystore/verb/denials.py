@@ -17,8 +17,8 @@ from pathlib import Path
 
 from enclave_common.command_line import PATH
 from keystore.errors import InvalidInputError, printable
-from keystore.steps.zenoh_denials import RouterLogExplainer
 from keystore.verb import common
+from keystore.zenoh.denials import RouterLogExplainer
 
 OPTIONS: common.Table = (
     common.KEYSTORE,

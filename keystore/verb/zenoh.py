@@ -13,8 +13,8 @@ import shlex
 from enclave_common.command_line import TEXT
 from keystore.disk import layout
 from keystore.steps.options import ProvisionOptions
-from keystore.steps.zenoh_configuration import RESTART, matching_enclaves, write_zenoh
 from keystore.verb import common
+from keystore.zenoh.writing import RESTART, matching_enclaves, write_zenoh
 
 OPTIONS: common.Table = (
     common.KEYSTORE,

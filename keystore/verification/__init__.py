@@ -11,11 +11,12 @@ from datetime import datetime
 from pathlib import Path
 from typing import NamedTuple
 
+from keystore.add_ons import zenoh_files
 from keystore.disk import layout
 from keystore.disk.crl_file import revoked_serials
 from keystore.disk.deployed import find_differences
 from keystore.disk.view import KeystoreView, keystore_at
-from keystore.errors import KeystoreError, StorageError
+from keystore.errors import KeystoreError, NotInstalledError, StorageError
 from keystore.formats.governance import Governance
 from keystore.formats.validity import utc_now
 from keystore.signing.ca_access import CaAccess
@@ -26,7 +27,6 @@ from keystore.verification.files import check_files, check_parents
 from keystore.verification.finding import Finding as Finding
 from keystore.verification.finding import Severity as Severity
 from keystore.verification.issued import check_anchors, check_published, load_register
-from keystore.verification.zenoh import check_zenoh
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,7 +89,15 @@ def _findings(
     except KeystoreError:
         revoked = frozenset()  # the CRL itself was reported above
     yield from check_enclaves(view, register, revoked, now)
-    yield from check_zenoh(view, now)
+    if view.has_zenoh_router:
+        yield from _check_zenoh(view, now)
+
+
+def _check_zenoh(view: KeystoreView, now: datetime) -> Iterator[Finding]:
+    try:
+        yield from zenoh_files().check(view, now)
+    except NotInstalledError as error:
+        yield Finding(Severity.ERROR, "zenoh-router", layout.ZENOH_ROUTER, f"not checked: {error}")
 
 
 def _check_deployment(view: KeystoreView) -> Iterator[Finding]:

@@ -122,7 +122,7 @@ def test_explanations_show_the_keys_of_a_permission(plan: Plan) -> None:
 
 def test_only_enclaves_on_zenoh_are_served_by_the_router(plan: Plan, tmp_path: Path) -> None:
     launch: Any = provision(plan(TALKER.format(ZENOH) + LISTENER.format("")), tmp_path / "ks")
-    assert launch.zenoh.enclaves == ("/talker",)
+    assert launch.zenoh.report.enclaves == ("/talker",)
     assert (tmp_path / "ks/enclaves/talker/zenoh.json5").exists()
     assert not (tmp_path / "ks/enclaves/listener/zenoh.json5").exists()
     assert "/listener" not in (tmp_path / "ks/zenoh/router.json5").read_text()

@@ -32,8 +32,8 @@ from keystore.steps.creation import CreateOptions
 from keystore.steps.provisioning import provision
 from keystore.steps.removal import RemoveOptions, remove
 from keystore.steps.renewal import RenewOptions, renew
-from keystore.steps.zenoh_configuration import write_zenoh
 from keystore.verification import Finding, Requirements, Severity, verify
+from keystore.zenoh.writing import write_zenoh
 from tests.keystore import kit
 
 YEAR = timedelta(days=365)

@@ -14,12 +14,12 @@ from keystore.disk.share_files import LaunchHold
 from keystore.errors import InvalidInputError
 from keystore.formats.register import UNKNOWN
 from keystore.formats.validity import utc_now
-from keystore.formats.zenoh.configuration import RouterAddress
 from keystore.steps.options import ProvisionOptions
 from keystore.steps.provisioning import provision
 from keystore.steps.rollover import Step
-from keystore.steps.zenoh_configuration import matching_enclaves, write_zenoh
 from keystore.verb import main
+from keystore.zenoh.configuration import RouterAddress
+from keystore.zenoh.writing import matching_enclaves, write_zenoh
 from tests.keystore.kit import filled, openssl, options, policy
 
 FAST = ProvisionOptions(durable=False)

@@ -8,19 +8,19 @@ import pytest
 
 from keystore.formats.domains import Domains
 from keystore.formats.policy import EnclavePolicy, Operation, Profile, Qualifier, Rule
-from keystore.formats.zenoh.configuration import (
+from keystore.zenoh.configuration import (
     Subject,
     TlsFiles,
     router_configuration,
     session_configuration,
 )
-from keystore.formats.zenoh.grants import (
+from keystore.zenoh.grants import (
     Grants,
     Types,
     Use,
     grants_of_policy,
 )
-from keystore.formats.zenoh.key_expressions import (
+from keystore.zenoh.key_expressions import (
     NotExpressible,
     cache,
     data_keys,
@@ -29,9 +29,9 @@ from keystore.formats.zenoh.key_expressions import (
     name_expressions,
     type_chunk,
 )
-from keystore.formats.zenoh.meaning import meaning
-from keystore.formats.zenoh.rules import AccessRule, access_rules
-from keystore.formats.zenoh.types import types_of_interface, united_types
+from keystore.zenoh.meaning import meaning
+from keystore.zenoh.rules import AccessRule, access_rules
+from keystore.zenoh.types import types_of_interface, united_types
 
 STRING = "std_msgs::msg::dds_::String_"
 FILES = TlsFiles("/ks/public/identity_ca.cert.pem", "/ks/x/cert.pem", "/ks/x/key.pem")

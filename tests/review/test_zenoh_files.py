@@ -9,7 +9,9 @@ from pathlib import Path
 import pytest
 
 from enclave_launch.verb.secure_plan import main
-from keystore.steps.inventory import enforced, granted
+from keystore.disk.view import keystore_at
+from keystore.steps.inventory import granted
+from keystore.zenoh.inventory import enforced
 from tests.review.test_against_a_keystore import found, make, words
 
 LAUNCH = "services_actions.launch.xml"
@@ -49,7 +51,7 @@ def edit(file: Path, old: str, new: str) -> None:
 def test_the_router_lets_each_enclave_do_what_is_signed_for_it(keystore: Path) -> None:
     """Services and actions come back from the rules as what they were."""
     signed = {enclave: frozenset(one.allowed) for enclave, one in granted(keystore).items()}
-    assert enforced(keystore) == signed and signed
+    assert enforced(keystore_at(keystore)) == signed and signed
 
 
 def test_files_as_planned_are_no_finding_and_no_difference(

@@ -13,7 +13,7 @@ from keystore import ProvisionOptions, apply_policy, create_keystore
 from keystore.formats.domains import Domains
 from keystore.formats.policy import EnclavePolicy, Operation, Policy, Profile, Qualifier, Rule
 from keystore.steps.creation import CreateOptions
-from keystore.steps.zenoh_configuration import write_zenoh
+from keystore.zenoh.writing import write_zenoh
 from tests.zenoh import kit
 
 Grants = dict[str, dict[str, tuple[str, ...]]]

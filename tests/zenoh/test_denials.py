@@ -15,10 +15,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from keystore import RenewOptions, renew
-from keystore.formats.zenoh.meaning import meaning
-from keystore.formats.zenoh.trace import RUST_LOG, RouterLog
-from keystore.steps.zenoh_denials import Explanation, RouterLogExplainer
 from keystore.verb import main
+from keystore.zenoh.denials import Explanation, RouterLogExplainer
+from keystore.zenoh.meaning import meaning
+from keystore.zenoh.trace import RUST_LOG, RouterLog
 from tests.keystore.kit import filled, options
 from tests.zenoh import kit
 from tests.zenoh.conftest import Grants, keystore_of

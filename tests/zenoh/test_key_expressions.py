@@ -8,7 +8,7 @@ import zenoh
 from hypothesis import given
 from hypothesis import strategies as st
 
-from keystore.formats.zenoh.key_expressions import (
+from keystore.zenoh.key_expressions import (
     NotExpressible,
     cache,
     data_keys,

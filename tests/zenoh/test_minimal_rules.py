@@ -15,9 +15,9 @@ from typing import Any
 import pytest
 
 from keystore.formats.domains import Domains
-from keystore.formats.zenoh.configuration import Subject, access_control
-from keystore.formats.zenoh.grants import Grants, Use
-from keystore.formats.zenoh.rules import AccessRule, access_rules
+from keystore.zenoh.configuration import Subject, access_control
+from keystore.zenoh.grants import Grants, Use
+from keystore.zenoh.rules import AccessRule, access_rules
 from tests.zenoh import kit
 from tests.zenoh.conftest import keystore_of
 from tests.zenoh.kit import Heard, topic, wait_for

@@ -10,11 +10,11 @@ from typing import Any
 import pytest
 
 from enclave_launch.errors import RuntimeFailure
-from enclave_launch.runtime.zenoh_router import RouterAnswer, RouterPlace, ZenohRouter, who_answers
+from enclave_launch.zenoh.router import RouterAnswer, RouterPlace, ZenohRouter, who_answers
 from keystore import ProvisionOptions, RemoveOptions, apply_policy, remove
 from keystore.disk.view import KeystoreView
-from keystore.disk.zenoh_files import present_address
-from keystore.steps.zenoh_configuration import router_differences
+from keystore.zenoh.files import present_address
+from keystore.zenoh.writing import router_differences
 from tests.zenoh import kit
 from tests.zenoh.conftest import Grants, keystore_of, policy_of
 from tests.zenoh.kit import Heard, passes, topic, wait_for

@@ -23,15 +23,15 @@ from collections.abc import Iterator, Mapping
 
 from enclave_common.command_line import TEXT, Option, one_of
 from enclave_common.terminal import json_text
-from enclave_launch.errors import UsageError, keystore_errors
+from enclave_launch.errors import UsageError
 from enclave_launch.report.changes import changes_document, changes_markdown, changes_text
-from enclave_launch.review.changes import FileChange, changes
+from enclave_launch.review.changes import changes
 from enclave_launch.review.document import GrantedName, PlanDocument, plan_from_document
 from enclave_launch.review.signed import keystore_as_plan, plan_as_signed
 from enclave_launch.verb.secure_plan import plans, revisions
-from enclave_launch.verb.secure_plan.keystores import enforced_grants, signed_grants
+from enclave_launch.verb.secure_plan.keystores import enforced_grants, signed_grants, zenoh_changes
 from enclave_launch.verb.secure_plan.plans import read_plan
-from keystore.steps.inventory import files_changed
+from keystore.add_ons import FileDifference
 
 WORDS: tuple[Option, ...] = (
     ("before BEFORE", TEXT, "PLAN.json | PATH | REVISION: | REVISION:PATH | KEYSTORE"),
@@ -98,12 +98,7 @@ def _keystore(keystore: str) -> PlanDocument:
     return PlanDocument(signed_grants(keystore), (), (), frozenset(enforced_grants(keystore)))
 
 
-def _files(options: argparse.Namespace) -> tuple[FileChange, ...]:
+def _files(options: argparse.Namespace) -> tuple[FileDifference, ...]:
     """Return changes of the files for Zenoh of two keystores, which hold more than names (types, domains,
     protections)."""
-    if not _two_keystores(options):
-        return ()
-
-    with keystore_errors():
-        found = files_changed(options.before, options.words[0])
-    return tuple(FileChange(file, one.more, f"{one.who} {one.text}".strip()) for file, one in found)
+    return zenoh_changes(options.before, options.words[0]) if _two_keystores(options) else ()

@@ -10,11 +10,12 @@ from enclave_launch.errors import keystore_errors
 from enclave_launch.review.checks.keystore import Ending
 from enclave_launch.review.document import GrantedName
 from enclave_launch.review.signed import grants_of_rules
+from keystore.add_ons import FileDifference, zenoh_files
+from keystore.disk.view import keystore_at
 from keystore.formats.validity import iso, parse_duration, utc_now
 from keystore.steps.expiry import status
-from keystore.steps.inventory import enforced, granted
+from keystore.steps.inventory import granted
 from keystore.verification.finding import Finding
-from keystore.verification.zenoh import check_zenoh_files
 
 DEFAULT_MARGIN = "30d"
 
@@ -28,13 +29,25 @@ def signed_grants(keystore: Path | str) -> Mapping[str, frozenset[GrantedName]]:
 def enforced_grants(keystore: Path | str) -> Mapping[str, frozenset[GrantedName]]:
     """Enclave -> what the configuration of the keystore's Zenoh router allows; empty without one."""
     with keystore_errors():
-        return {enclave: grants_of_rules(rules) for enclave, rules in enforced(keystore).items()}
+        view = keystore_at(keystore)
+        found = zenoh_files().enforced(view) if view.has_zenoh_router else {}
+        return {enclave: grants_of_rules(rules) for enclave, rules in found.items()}
 
 
 def zenoh_findings(keystore: Path | str, now: datetime | None = None) -> tuple[Finding, ...]:
     """Return what ``secure-keystore verify`` finds in the files for Zenoh."""
     with keystore_errors():
-        return check_zenoh_files(keystore, now or utc_now())
+        view = keystore_at(keystore)
+        return tuple(zenoh_files().check(view, now or utc_now())) if view.has_zenoh_router else ()
+
+
+def zenoh_changes(before: Path | str, after: Path | str) -> tuple[FileDifference, ...]:
+    """Compare the files for Zenoh of two keystores."""
+    with keystore_errors():
+        views = keystore_at(before), keystore_at(after)
+        if not any(view.has_zenoh_router or view.zenoh_enclaves() for view in views):
+            return ()
+        return tuple(zenoh_files().compare(*views))
 
 
 def endings(

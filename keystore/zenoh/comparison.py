@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 from keystore.errors import InvalidInputError
-from keystore.formats.zenoh.meaning import Meaning, meaning
+from keystore.zenoh.meaning import Meaning, meaning
 
 EVERYBODY = ""
 """Whom a subject without names matches: every client, whatever its certificate."""

@@ -12,15 +12,15 @@ from typing import NamedTuple
 from keystore.disk import layout
 from keystore.disk.register_file import read_register
 from keystore.disk.view import keystore_at
-from keystore.disk.zenoh_files import present_address, router_file, zenoh_enclaves
 from keystore.errors import KeystoreError
 from keystore.formats.permissions_patterns import can_meet
 from keystore.formats.policy import EnclavePolicy, Operation, Policy, PolicyError, Profile, Qualifier, Rule
 from keystore.formats.policy_xml import policy_xml
-from keystore.formats.zenoh.comparison import read_configuration
-from keystore.formats.zenoh.configuration import RouterAddress
-from keystore.formats.zenoh.meaning import Meaning, meaning, operation_of
-from keystore.formats.zenoh.trace import Dropped, RouterLog, TurnedAway
+from keystore.zenoh.comparison import read_configuration
+from keystore.zenoh.configuration import RouterAddress
+from keystore.zenoh.files import present_address, router_file
+from keystore.zenoh.meaning import Meaning, meaning, operation_of
+from keystore.zenoh.trace import Dropped, RouterLog, TurnedAway
 
 _WITHOUT_EFFECT = "/@adv/sub/"
 """A subscription of rmw_zenoh says there that it is one; nobody asks for that, so it is not granted."""
@@ -58,7 +58,7 @@ class RouterLogExplainer:
         self._log = RouterLog()
         self._told: set[tuple[str, ...]] = set()
         self._enclaves = {
-            name: one for one in zenoh_enclaves(self._view) if (name := self._view.common_name(one))
+            name: one for one in self._view.zenoh_enclaves() if (name := self._view.common_name(one))
         }
         self._granted: dict[str, frozenset[Meaning]] = {}
 

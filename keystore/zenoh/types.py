@@ -11,8 +11,8 @@ from collections.abc import Iterable, Iterator
 from keystore.formats.permissions_patterns import has_wildcard
 from keystore.formats.policy import EnclavePolicy, Operation
 from keystore.formats.shares import Share
-from keystore.formats.zenoh.grants import PLAIN_USES, Types, Use, grants_of_policy
-from keystore.formats.zenoh.key_expressions import type_chunk
+from keystore.zenoh.grants import PLAIN_USES, Types, Use, grants_of_policy
+from keystore.zenoh.key_expressions import type_chunk
 
 
 def types_of_interface(

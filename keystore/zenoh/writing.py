@@ -13,28 +13,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from datetime import datetime
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from keystore.disk import layout, safe_files
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.store import PRIVATE_MODE, PUBLIC_MODE, Store
 from keystore.disk.view import KeystoreView, keystore_at
-from keystore.disk.zenoh_files import (
-    RouterFile,
-    has_router,
-    identity_problem,
-    present_address,
-    router_file,
-    router_key,
-    session_content,
-    session_file,
-    zenoh_enclaves,
-)
-from keystore.errors import KeystoreError
+from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.register import UNKNOWN, IssuedCertificate
 from keystore.formats.role import Role
 from keystore.formats.validity import DEFAULT_BACKDATE, Validity, later, utc_now
-from keystore.formats.zenoh.configuration import ROUTER_NAME, RouterAddress
 from keystore.signing.authority import IdentityIssuer, new_key
 from keystore.signing.ca_access import CaAccess
 from keystore.signing.identity import public_half
@@ -42,6 +30,16 @@ from keystore.signing.records import certificate_record
 from keystore.signing.signer import key_pem
 from keystore.steps.opening import opened_for_change
 from keystore.steps.options import ProvisionOptions
+from keystore.steps.signing_process import SigningProcess
+from keystore.zenoh.configuration import ROUTER_NAME, RouterAddress
+from keystore.zenoh.files import (
+    RouterFile,
+    identity_problem,
+    present_address,
+    router_file,
+    router_key,
+    session_content,
+)
 
 
 class ZenohReport(NamedTuple):
@@ -72,11 +70,11 @@ def write_zenoh(
     """
     chosen = options or ProvisionOptions()
     if chosen.signing is not None:
-        return chosen.signing.write_zenoh(enclaves, router, chosen)
+        return _signed_elsewhere(chosen.signing, enclaves, router, chosen)
     view = keystore_at(keystore)
     asked = set(enclaves)
     view.require_enclaves(asked)
-    names = sorted({*asked, *zenoh_enclaves(view)})
+    names = sorted({*asked, *view.zenoh_enclaves()})
     address = RouterAddress.parse(router) if router is not None else present_address(view) or RouterAddress()
     if (found := _as_wanted(view, names, address, chosen)) is not None:
         return ZenohReport(view.root, address, (), found.served, found.gaps, restart=False)
@@ -90,32 +88,43 @@ def matching_enclaves(keystore: Path | str, patterns: Sequence[str] | None) -> l
     already. Raises InvalidInputError for a pattern that none matches."""
     view = keystore_at(keystore)
     if patterns is None:
-        return [] if has_router(view) else view.enclaves()
+        return [] if view.has_zenoh_router else view.enclaves()
     return view.matching(patterns)
 
 
 def follow(root: Path, options: ProvisionOptions) -> list[str]:
-    """After a change of the keystore: what was done for Zenoh, in words; nothing without a router's file."""
-    view = KeystoreView(root)
-    if not has_router(view):
-        return []
-    try:
-        report = write_zenoh(root, (), options=options)
-    except KeystoreError as error:
-        return [
-            f"{layout.ZENOH_ROUTER} is not up to date ({error}); the Zenoh router enforces what it was before"
-        ]
+    """Write the files anew after a change of the keystore; return what to report of it."""
+    report = write_zenoh(root, (), options=options)
     said = [f"the Zenoh router's configuration follows: {RESTART}"] if report.restart else []
     return [*said, *report.gaps]
+
+
+def sign(root: Path, options: ProvisionOptions, request: Any) -> Any:
+    """Answer ``write_zenoh`` of a launcher, in the signing process."""
+    names = [validate_enclave_name(name) for name in request["enclaves"]]
+    report = write_zenoh(root, names, router=request["router"], options=options)
+    return {**report._asdict(), "keystore": str(report.keystore), "router": str(report.router)}
+
+
+def _signed_elsewhere(
+    signing: SigningProcess, enclaves: Iterable[str], router: str | None, options: ProvisionOptions
+) -> ZenohReport:
+    done = signing.request("zenoh", {"enclaves": list(enclaves), "router": router}, options)
+    return ZenohReport(
+        Path(done["keystore"]), RouterAddress.parse(done["router"]), tuple(done["written"]),
+        tuple(done["enclaves"]), tuple(done["gaps"]), done["restart"],
+    )  # fmt: skip
 
 
 def session_differences(keystore: Path | str, enclave: str, address: RouterAddress) -> tuple[str, ...]:
     """Why the session file of an enclave is not what ``write_zenoh`` left; empty when it is. Cheap: asked before each
     process."""
     view = KeystoreView(resolve_root(keystore))
-    if safe_files.read_if_there(view.root, session_file(enclave)) == session_content(view, enclave, address):
+    if safe_files.read_if_there(view.root, layout.zenoh_session(enclave)) == session_content(
+        view, enclave, address
+    ):
         return ()
-    return (f"{session_file(enclave)} is not what was written for it",)
+    return (f"{layout.zenoh_session(enclave)} is not what was written for it",)
 
 
 def router_differences(keystore: Path | str) -> tuple[str, ...]:
@@ -124,7 +133,7 @@ def router_differences(keystore: Path | str) -> tuple[str, ...]:
     address = present_address(view)
     if address is None:
         return (f"{layout.ZENOH_ROUTER} is missing",)
-    wanted = router_file(view, zenoh_enclaves(view), address)
+    wanted = router_file(view, view.zenoh_enclaves(), address)
     if safe_files.read_if_there(view.root, layout.ZENOH_ROUTER) == wanted.content:
         return ()
     return (f"{layout.ZENOH_ROUTER} is not what follows from the permissions that are signed",)
@@ -151,7 +160,7 @@ def _as_wanted(
 
 
 def _stale_sessions(view: KeystoreView, names: list[str], address: RouterAddress) -> dict[str, bytes]:
-    wanted = {session_file(name): session_content(view, name, address) for name in names}
+    wanted = {layout.zenoh_session(name): session_content(view, name, address) for name in names}
     return {
         file: content
         for file, content in wanted.items()
@@ -174,7 +183,7 @@ def _write(
             wanted = router_file(view, names, address)
             changed = safe_files.read_if_there(view.root, layout.ZENOH_ROUTER) != wanted.content
             if changed or identity_problem(view, later(now, options.renew_within)) is not None:
-                restart = has_router(view)
+                restart = view.has_zenoh_router
                 record, issued = _issue(view, address, options.access, now)
                 batch.record(opened.register.with_certificates([record]))
                 files |= {**issued, layout.ZENOH_ROUTER: wanted.content}

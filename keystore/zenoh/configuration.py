@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from keystore.errors import InvalidInputError, printable
-from keystore.formats.zenoh.rules import AccessRule
+from keystore.zenoh.rules import AccessRule
 
 OPEN_TIMEOUT_MS = 30_000
 """How long a process looks for the router before it ends with an error. Zenoh's default gives up at once."""

@@ -10,9 +10,9 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Any, NamedTuple
 
 from keystore.formats.domains import Domains
-from keystore.formats.zenoh import key_expressions
-from keystore.formats.zenoh.grants import Grants, Use
-from keystore.formats.zenoh.key_expressions import cache, data_keys, domain_chunks, endpoint_tokens, history
+from keystore.zenoh import key_expressions
+from keystore.zenoh.grants import Grants, Use
+from keystore.zenoh.key_expressions import cache, data_keys, domain_chunks, endpoint_tokens, history
 
 GRAPH_KINDS = {"MP": Use.PUBLISH, "MS": Use.SUBSCRIBE, "SC": Use.CALL, "SS": Use.SERVE}
 """What a token of an endpoint says of it (liveliness_utils.cpp)."""

@@ -10,8 +10,8 @@ import re
 from typing import NamedTuple
 
 from keystore.formats.policy import Operation
-from keystore.formats.zenoh.grants import PLAIN_USES, Use
-from keystore.formats.zenoh.rules import GRAPH_KINDS
+from keystore.zenoh.grants import PLAIN_USES, Use
+from keystore.zenoh.rules import GRAPH_KINDS
 
 _TYPE = re.compile(r"([A-Za-z][A-Za-z0-9_]*)::(msg|srv|action)::dds_::([A-Za-z][A-Za-z0-9_]*)_\Z")
 _DOMAIN = re.compile(r"(?:[0-9]{1,10}|\*{1,2})\Z")

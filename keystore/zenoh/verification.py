@@ -9,44 +9,32 @@ from __future__ import annotations
 from collections.abc import Iterator
 from datetime import datetime
 from itertools import islice
-from pathlib import Path
 
 from keystore.disk import layout, safe_files
-from keystore.disk.view import KeystoreView, keystore_at
-from keystore.disk.zenoh_files import (
-    has_router,
+from keystore.disk.view import KeystoreView
+from keystore.errors import KeystoreError
+from keystore.formats.certificate import read_certificate
+from keystore.verification import repair
+from keystore.verification.finding import Finding, Severity
+from keystore.zenoh.comparison import ZenohDifference, differences, read_configuration
+from keystore.zenoh.configuration import RouterAddress
+from keystore.zenoh.files import (
     identity_problem,
     present_address,
     router_file,
     session_content,
-    session_file,
-    zenoh_enclaves,
 )
-from keystore.errors import KeystoreError
-from keystore.formats.certificate import read_certificate
-from keystore.formats.zenoh.comparison import ZenohDifference, differences, read_configuration
-from keystore.formats.zenoh.configuration import RouterAddress
-from keystore.verification import repair
-from keystore.verification.finding import Finding, Severity
 
 _TOLD = 40
 """Differences of one file, beyond which only their number is told."""
 
 
-def check_zenoh_files(keystore: Path | str, now: datetime) -> tuple[Finding, ...]:
-    """``check_zenoh`` by itself. Raises NotAKeystoreError where there is nothing to check."""
-    view = keystore_at(keystore)
-    return tuple(check_zenoh(view, now))
-
-
 def check_zenoh(view: KeystoreView, now: datetime) -> Iterator[Finding]:
-    """Nothing for a keystore without enclaves on Zenoh."""
-    if not has_router(view):
-        return
+    """Check the files of a keystore with a Zenoh router."""
     fix = repair.run(view.root, "zenoh", "--enclave", "/none", note="writes all of them anew")
     try:
         address = present_address(view)
-        assert address is not None, "asked above"
+        assert address is not None, "the keystore has a router's file"
         yield from _router(view, address, now)
         yield from _sessions(view, address)
     except KeystoreError as error:
@@ -58,7 +46,7 @@ def _again(view: KeystoreView) -> str:
 
 
 def _router(view: KeystoreView, address: RouterAddress, now: datetime) -> Iterator[Finding]:
-    wanted = router_file(view, zenoh_enclaves(view), address)
+    wanted = router_file(view, view.zenoh_enclaves(), address)
     found = safe_files.read_if_there(view.root, layout.ZENOH_ROUTER)
     if found != wanted.content:
         yield Finding(
@@ -73,8 +61,8 @@ def _router(view: KeystoreView, address: RouterAddress, now: datetime) -> Iterat
 
 
 def _sessions(view: KeystoreView, address: RouterAddress) -> Iterator[Finding]:
-    for enclave in zenoh_enclaves(view):
-        file = session_file(enclave)
+    for enclave in view.zenoh_enclaves():
+        file = layout.zenoh_session(enclave)
         wanted, found = session_content(view, enclave, address), safe_files.read_if_there(view.root, file)
         if found != wanted:
             yield Finding(

@@ -1,7 +1,7 @@
-"""Who of a plan is on DDS and who on Zenoh, and what follows from it. Pure; only reads the plan.
+"""Who of a plan is on DDS and who on Zenoh, and what follows from it. Only reads the plan.
 
-Nodes on the two never meet. What the launcher itself must call and cannot reach is refused; all else is told, since a
-bridge may stand between them.
+Nodes on the two never meet. What the launcher itself must call and cannot reach is refused; all else is reported, since
+a bridge may stand between them.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
+from enclave_launch.add_ons import ZenohPlanning
 from enclave_launch.admission.middleware import ZENOH, middleware_of
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.diagnostics.enclaves import (
@@ -18,10 +19,17 @@ from enclave_launch.diagnostics.enclaves import (
     zenoh_cannot_grant,
     zenoh_router_trusted,
 )
-from enclave_launch.plan import LaunchPlan, PlannedProcess, on_zenoh
-from enclave_launch.policy.zenoh_types import enclave_types
+from enclave_launch.plan import LaunchPlan, PlannedProcess, enclave_domains
+from enclave_launch.policy.derivation import DerivedPolicy
+from enclave_launch.policy.node_permissions import Reason
+from keystore.formats.domains import Domains
 from keystore.formats.policy import Operation, Qualifier
-from keystore.formats.zenoh.grants import Types, grants_of_policy
+from keystore.zenoh.grants import Types, grants_of_policy
+from keystore.zenoh.key_expressions import data_keys, domain_chunks
+from keystore.zenoh.types import types_of_interface, united_types
+from nodl.builtin_interfaces import TABLE
+
+_BUILT_IN = {row.name: row.type for row in TABLE}
 
 _ENDS = (
     ("topic", Operation.PUBLISH, Operation.SUBSCRIBE),
@@ -30,9 +38,14 @@ _ENDS = (
 )
 
 
-def zenoh_enclaves(plan: LaunchPlan, environment: Mapping[str, str]) -> dict[str, Types]:
-    """Enclaves on Zenoh, and the types of what they talk about. ``environment``: the launcher's own."""
-    return {path: enclave_types(plan.derived, path) for path in sorted(on_zenoh(plan, environment))}
+def report(plan: LaunchPlan, environment: Mapping[str, str]) -> LaunchPlan:
+    """Return the plan with its problems and warnings about Zenoh.
+
+    :param environment: the launcher's own"""
+    return plan._replace(
+        problems=(*plan.problems, *middleware_problems(plan, environment)),
+        warnings=(*plan.warnings, *middleware_notes(plan)),
+    )
 
 
 def middleware_problems(plan: LaunchPlan, environment: Mapping[str, str]) -> Iterator[Diagnostic]:
@@ -109,3 +122,46 @@ def _ends(plan: LaunchPlan, processes: Iterable[PlannedProcess]) -> dict[_End, s
                     end = _End(rule.operation, rule.expression, domains[reason.node])
                     found.setdefault(end, reason.node)
     return found
+
+
+def enclave_types(derived: DerivedPolicy, enclave: str) -> Types:
+    """Return the types of each name, if every node that requests it knows them.
+
+    A policy file gives no types: what it grants may have any."""
+    return united_types(
+        one
+        for rule, reasons in derived.reasons.get(enclave, {}).items()
+        if rule.qualifier is Qualifier.ALLOW
+        for reason in reasons
+        for one in types_of_interface(rule.operation, rule.expression, _type(reason))
+    )
+
+
+def _type(reason: Reason) -> str:
+    """Return the type of an interface; one that every node has carries it in the table, except for the topic of
+    introspection."""
+    if reason.origin == "built-in" and not reason.note:
+        return reason.type or _BUILT_IN.get(reason.written, "")
+    return reason.type
+
+
+def explain(plan: LaunchPlan, subject: str) -> Iterator[str]:
+    """Explain what ``subject`` means on Zenoh.
+
+    Yields all lines of an enclave, those that name a topic, service or part of an action; nothing for processes on
+    DDS."""
+    domains = enclave_domains(item for item in plan.processes if item.middleware == ZENOH)
+    for policy in plan.derived.policy.enclaves:
+        if policy.path not in domains:
+            continue
+        grants = grants_of_policy(policy, enclave_types(plan.derived, policy.path))
+        chunks = domain_chunks(Domains((number, number) for number in domains[policy.path]))
+        for use, names in grants.names.items():
+            for name in names:
+                if subject in (policy.path, name) or name.startswith(f"{subject}/_action/"):
+                    keys = " ".join(data_keys(chunks, name, grants.types_of(use, name)))
+                    yield f"  on Zenoh enclave {policy.path} may {use.value} {keys}"
+        yield from (f"  not granted on Zenoh: {gap}" for gap in grants.gaps if subject == policy.path)
+
+
+ADD_ON = ZenohPlanning(report, explain)

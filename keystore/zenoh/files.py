@@ -30,7 +30,8 @@ from keystore.formats.register import Register
 from keystore.formats.role import Role
 from keystore.formats.subject import subject_name
 from keystore.formats.validity import iso
-from keystore.formats.zenoh.configuration import (
+from keystore.signing.public_key import issued_by, key_matches
+from keystore.zenoh.configuration import (
     ROUTER_NAME,
     RouterAddress,
     Subject,
@@ -38,10 +39,9 @@ from keystore.formats.zenoh.configuration import (
     router_configuration,
     session_configuration,
 )
-from keystore.formats.zenoh.grants import grants_of_topics
-from keystore.formats.zenoh.rules import access_rules
-from keystore.formats.zenoh.types import types_of_shares
-from keystore.signing.public_key import issued_by, key_matches
+from keystore.zenoh.grants import grants_of_topics
+from keystore.zenoh.rules import access_rules
+from keystore.zenoh.types import types_of_shares
 
 _WRITTEN_BY = "secure-keystore"
 
@@ -53,21 +53,6 @@ class RouterFile(NamedTuple):
     content: bytes
     served: tuple[str, ...]
     gaps: tuple[str, ...]
-
-
-def has_router(view: KeystoreView) -> bool:
-    """Whether the keystore holds a configuration for a Zenoh router."""
-    return os.path.lexists(view.root / layout.ZENOH_ROUTER)
-
-
-def zenoh_enclaves(view: KeystoreView) -> list[str]:
-    """Enclaves whose processes have a session configuration, sorted."""
-    return [name for name in view.enclaves() if os.path.lexists(view.root / session_file(name))]
-
-
-def session_file(enclave: str) -> str:
-    """Relative to the keystore."""
-    return f"{layout.enclave_directory(enclave)}/{layout.ENCLAVE_ZENOH}"
 
 
 def session_content(view: KeystoreView, enclave: str, address: RouterAddress) -> bytes:

@@ -15,7 +15,7 @@ from keystore.formats.permissions import TopicSets, dds_rules
 from keystore.formats.permissions_names import DISCOVERY_TOPIC
 from keystore.formats.permissions_patterns import can_meet
 from keystore.formats.policy import EnclavePolicy, Operation
-from keystore.formats.zenoh.key_expressions import NotExpressible, name_expressions
+from keystore.zenoh.key_expressions import NotExpressible, name_expressions
 
 
 class Use(str, Enum):

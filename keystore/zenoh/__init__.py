@@ -1,4 +1,4 @@
-"""Zenoh's configuration from the same policy that makes DDS permissions. Performs no I/O.
+"""Zenoh's configuration from the same policy that makes DDS permissions: an add-on.
 
     grants           what an enclave may do, as topics and services     <- DDS topics of its permissions
     key_expressions  ROS names and types -> key expressions             (rmw_zenoh docs/design.md)

@@ -1,0 +1,79 @@
+"""Zenoh, an add-on: everything that the rest of the package calls of it.
+
+The middleware ``rmw_zenoh_cpp`` reads no enclaves; a router of the keystore secures it. Without the add-on a process on
+it is refused as one on any other middleware that reads no enclaves (``admission.middleware``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import AbstractContextManager
+from importlib import import_module
+from typing import TYPE_CHECKING, NamedTuple, Protocol
+
+from enclave_common.dependencies import absence
+
+if TYPE_CHECKING:
+    from enclave_launch.plan import LaunchPlan
+    from keystore.steps.options import ProvisionOptions
+
+_ROOM = "enclave_launch.zenoh"
+
+
+class LaunchRouter(Protocol):
+    """The router of a launch, as configured in its keystore."""
+
+    @property
+    def gaps(self) -> tuple[str, ...]:
+        """What it cannot grant, and which enclaves are shut out."""
+
+    def differences(self, enclave: str) -> tuple[str, ...]:
+        """Return why the session file of ``enclave`` is not what was written; empty if it is."""
+
+    def serve(
+        self, environment: Mapping[str, str], say: Callable[[str], None]
+    ) -> AbstractContextManager[object]:
+        """Return a context within which a router with the present rules answers; one is started where none does.
+
+        :raises RuntimeFailure: on entering, if none answers and none can be started."""
+
+    def wait(self) -> None:
+        """Wait until the router that serves has the present rules. Raises ``RuntimeFailure``."""
+
+
+class ZenohPlanning(NamedTuple):
+    """``report`` returns the plan with what to know of its processes on Zenoh; ``explain`` yields what a subject of
+    ``--explain`` means there. Neither performs I/O."""
+
+    report: Callable[[LaunchPlan, Mapping[str, str]], LaunchPlan]
+    explain: Callable[[LaunchPlan, str], Iterator[str]]
+
+
+class ZenohStart(NamedTuple):
+    """``check`` raises ``RuntimeFailure``, before keys are made, if no router can be started and none answers.
+
+    ``types`` returns the types of what each enclave communicates (``ProvisionOptions.types``); ``configure`` writes the
+    files of the enclaves and of their router, and raises ``KeystoreError``."""
+
+    check: Callable[[LaunchPlan, str], None]
+    types: Callable[[LaunchPlan, Collection[str]], Mapping[str, tuple[tuple[str, tuple[str, ...]], ...]]]
+    configure: Callable[[LaunchPlan, str, Collection[str], ProvisionOptions], LaunchRouter]
+
+
+def zenoh_absence() -> str:
+    """Return what to do if the add-on is not installed, empty if it is."""
+    return absence(_ROOM) or absence("keystore.zenoh")
+
+
+def zenoh_planning() -> ZenohPlanning | None:
+    """Import what the add-on knows of plans; None if it is not installed."""
+    if zenoh_absence():
+        return None
+    found: ZenohPlanning = import_module(f"{_ROOM}.planning").ADD_ON
+    return found
+
+
+def zenoh_start() -> ZenohStart:
+    """Import what the add-on does when a launch starts; only called for a plan that it reported on."""
+    found: ZenohStart = import_module(f"{_ROOM}.start").ADD_ON
+    return found

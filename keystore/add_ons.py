@@ -1,0 +1,68 @@
+"""Zenoh, an add-on: everything that the rest of the keystore calls of it.
+
+DDS enforces permissions in each process; on Zenoh a router does, whose files stand in the keystore and follow from what
+is signed. A keystore without these files never needs ``keystore.zenoh``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from datetime import datetime
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from enclave_common.dependencies import absence
+from keystore.disk import layout
+from keystore.disk.view import KeystoreView
+from keystore.errors import KeystoreError, NotInstalledError
+from keystore.formats.policy import Rule
+
+if TYPE_CHECKING:
+    from keystore.steps.options import ProvisionOptions
+    from keystore.verification.finding import Finding
+
+_ROOM = "keystore.zenoh"
+
+
+class FileDifference(NamedTuple):
+    """A difference between one file of two keystores; ``more``: it lets somebody do more, or protects less."""
+
+    file: str
+    more: bool
+    text: str
+
+
+class ZenohFiles(NamedTuple):
+    """The functions of the add-on.
+
+    ``follow`` writes the files anew after a change and returns what to report; ``check`` is its part of ``verify``;
+    ``sign`` answers a request in the signing process; ``enforced`` reads what the router's file lets each enclave do;
+    ``compare`` lists the differences of two keystores. All but ``sign`` need a keystore with a router's file.
+    """
+
+    follow: Callable[[Path, ProvisionOptions], list[str]]
+    check: Callable[[KeystoreView, datetime], Iterator[Finding]]
+    sign: Callable[[Path, ProvisionOptions, Any], Any]
+    enforced: Callable[[KeystoreView], Mapping[str, frozenset[Rule]]]
+    compare: Callable[[KeystoreView, KeystoreView], list[FileDifference]]
+
+
+def zenoh_files() -> ZenohFiles:
+    """Import the add-on. Raises NotInstalledError."""
+    if missing := absence(_ROOM):
+        raise NotInstalledError(missing)
+    found: ZenohFiles = import_module(f"{_ROOM}.add_on").ADD_ON
+    return found
+
+
+def follow(root: Path, options: ProvisionOptions) -> list[str]:
+    """Bring the router's files up to date after a change of the keystore; return what to report of it."""
+    if not KeystoreView(root).has_zenoh_router:
+        return []
+    try:
+        return zenoh_files().follow(root, options)
+    except KeystoreError as error:
+        return [
+            f"{layout.ZENOH_ROUTER} is not up to date ({error}); the Zenoh router enforces what it was before"
+        ]
