@@ -24,14 +24,9 @@ from launch.descriptions import Executable
 from launch.frontend import expose
 from launch.utilities import normalize_to_list_of_substitutions, perform_substitutions
 
-from enclave_launch.ros2.observation import observe_executable
-from enclave_launch.ros2.session import EnclaveSession
-from enclave_launch.ros_rules.namespaces import enclave_scope, push_enclave_scope
-from enclave_launch.security_environment import OVERRIDE
+from enclave_launch.ros2.observation import ATTRIBUTE, enclave_attribute, observe_executable, session_of
+from enclave_launch.ros_rules.namespaces import push_enclave_scope
 
-KEY = "enclave_launch_session"
-"""Where a secured launch is kept: in launch's own context, so that several launches in one program stay apart."""
-ATTRIBUTE = "_enclave_launch_enclave"
 GRANT = "_enclave_launch_grant"
 WRAPPED = "_enclave_launch_wrapped"
 # Renamed after humble; the old name stays as an alias.
@@ -55,23 +50,6 @@ class PushRosEnclave(Action):  # type: ignore[misc]  # untyped without ROS
 
     def execute(self, context: Any) -> None:
         push_enclave_scope(context.launch_configurations, perform_substitutions(context, self.enclave))
-
-
-def session_of(context: Any) -> EnclaveSession | None:
-    """Return the session of a launch that we secure, None for any other."""
-    session: EnclaveSession | None = context.get_locals_as_dict().get(KEY)
-    return session
-
-
-def enclave_attribute(action: Any, context: Any) -> str | None:
-    """Return the performed ``enclave`` of an action, None if the launch file gives none."""
-    enclave = getattr(action, ATTRIBUTE, None)
-    return None if enclave is None else perform_substitutions(context, enclave)
-
-
-def scope_in_force(context: Any) -> str | None:
-    """Return the enclave scope pushed last in ``context`` (absolute), None if nothing was pushed."""
-    return enclave_scope(context.launch_configurations)
 
 
 def install() -> None:
@@ -113,6 +91,8 @@ def _securing(prepare: Callable[..., None]) -> Callable[..., None]:
         prepare(self, context, action)
         session = session_of(context)
         if session is not None:
+            from enclave_launch.security_environment import OVERRIDE  # with the plan, the keystore
+
             grant = getattr(action, GRANT, None) or session.enter(observe_executable(action, context))
             self.final_env.pop(OVERRIDE, None)  # rcl lets it win over --enclave
             self.final_env.update(grant.environment)

@@ -9,7 +9,7 @@ from typing import Any
 from launch_ros.actions.node import NodeActionExtension
 
 from enclave_launch.ros2 import attributes  # accepted by the time a node is executed, too
-from enclave_launch.ros2.observation import loads_components, observe_node
+from enclave_launch.ros2.observation import loads_components, observe_node, session_of
 
 
 class EnclaveNodeActionExtension(NodeActionExtension):  # type: ignore[misc]  # untyped without ROS
@@ -21,7 +21,7 @@ class EnclaveNodeActionExtension(NodeActionExtension):  # type: ignore[misc]  # 
         """Secure a node about to start.
 
         :raises EnclaveLaunchError: it cannot be secured; launch reports that and shuts down."""
-        session = attributes.session_of(context)
+        session = session_of(context)
         if session is None:
             return [], ros_specific_arguments
         from launch.substitutions import TextSubstitution

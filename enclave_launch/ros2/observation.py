@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 import re
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import launch_ros.actions
 from launch.descriptions import executable as executable_description
@@ -24,10 +24,30 @@ from enclave_launch.process import (
     RemapRule,
     ResolvedProcess,
 )
-from enclave_launch.ros2.attributes import enclave_attribute, scope_in_force
+from enclave_launch.ros_rules.namespaces import enclave_scope
 from enclave_launch.ros_rules.rcl_parameters import resolve_parameters
 from enclave_launch.ros_rules.ros_arguments import parse_ros_arguments, words_after_program
 from enclave_launch.source_location import SourceLocation
+
+if TYPE_CHECKING:
+    from enclave_launch.ros2.session import EnclaveSession
+
+KEY = "enclave_launch_session"
+"""Where a secured launch is kept: in launch's own context, so that several launches in one program stay apart."""
+ATTRIBUTE = "_enclave_launch_enclave"
+"""Where an action keeps its ``enclave=`` (``attributes``)."""
+
+
+def session_of(context: Any) -> EnclaveSession | None:
+    """Return the session of a launch that we secure, None for any other."""
+    session: EnclaveSession | None = context.get_locals_as_dict().get(KEY)
+    return session
+
+
+def enclave_attribute(action: Any, context: Any) -> str | None:
+    """Return the performed ``enclave`` of an action, None if the launch file gives none."""
+    enclave = getattr(action, ATTRIBUTE, None)
+    return None if enclave is None else perform_substitutions(context, enclave)
 
 
 def observe_node(action: Any, context: Any, ros_specific_arguments: dict[str, Any]) -> ResolvedProcess:
@@ -58,7 +78,9 @@ def observe_node(action: Any, context: Any, ros_specific_arguments: dict[str, An
         unread_parameter_files=parameters.unread,
         environment={},
         enclave=EnclaveRequest(
-            enclave_attribute(action, context), scope_in_force(context), arguments.enclave
+            enclave_attribute(action, context),
+            enclave_scope(context.launch_configurations),
+            arguments.enclave,
         ),
         location=location_in(context, type(action).__name__),
         prefix=_prefix(action, context, cmd),
@@ -89,7 +111,9 @@ def observe_executable(action: Any, context: Any) -> ResolvedProcess:
         parameters={},
         environment={},
         enclave=EnclaveRequest(
-            enclave_attribute(action, context), scope_in_force(context), parse_ros_arguments(words).enclave
+            enclave_attribute(action, context),
+            enclave_scope(context.launch_configurations),
+            parse_ros_arguments(words).enclave,
         ),
         location=location_in(context, type(action).__name__),
         prefix=prefix,

@@ -23,20 +23,7 @@ from ros2launch.option import OptionExtension
 from enclave_common.command_line import add_options
 from enclave_common.terminal import safe_output, stdout_is_for_the_plan
 from enclave_launch.errors import EnclaveLaunchError, UsageError
-from enclave_launch.flow import resolve
 from enclave_launch.ros2 import attributes  # noqa: F401  # ``enclave=`` in Python launch files, secured or not
-from enclave_launch.verb.options import (
-    DENIALS,
-    LOOKING,
-    POLICY,
-    add_security_options,
-    build_parser,
-    resolve_options,
-)
-from enclave_launch.verb.secure_launch import show_plan
-from enclave_launch.verb.start import start
-from enclave_launch.verb.target import LaunchTarget
-from enclave_launch.verb.usage import FOR_PLAN, FOR_SECURE, CommandLine, check_needs_secure, check_views
 
 SECURE = "secure_enclaves"
 
@@ -45,6 +32,8 @@ class EnclaveOption(OptionExtension):  # type: ignore[misc]  # untyped without R
     """Adds the options of ``secure-launch`` to ``ros2 launch`` and does what they ask for."""
 
     def add_arguments(self, parser: argparse.ArgumentParser, cli_name: str, *, argv: Any = None) -> None:
+        from enclave_launch.verb.options import DENIALS, LOOKING, POLICY, add_security_options
+
         group = parser.add_argument_group("secure enclaves", conflict_handler="resolve")
         add_security_options(group)
         add_options(group, (*POLICY, *DENIALS, *LOOKING))
@@ -62,6 +51,15 @@ class EnclaveOption(OptionExtension):  # type: ignore[misc]  # untyped without R
         """Plan and secure the launch.
 
         :raises RuntimeError: ros2 shows its message without a traceback."""
+        from enclave_launch.verb.options import build_parser
+        from enclave_launch.verb.usage import (
+            FOR_PLAN,
+            FOR_SECURE,
+            CommandLine,
+            check_needs_secure,
+            check_views,
+        )
+
         try:
             keystore = getattr(args, SECURE)
             if isinstance(keystore, str):
@@ -99,6 +97,10 @@ def names_keystore(words: Sequence[str]) -> bool:
 
 def _looked_at(args: argparse.Namespace) -> int:
     """Print the plan as ``secure-launch --dry-run`` and similar options do, start nothing, return the exit status."""
+    from enclave_launch.flow import resolve
+    from enclave_launch.verb.options import resolve_options
+    from enclave_launch.verb.secure_launch import show_plan
+
     path, arguments = target_of(args)
     keystore = os.path.abspath(args.keystore) if getattr(args, SECURE) and args.keystore else None
     with stdout_is_for_the_plan():
@@ -108,6 +110,9 @@ def _looked_at(args: argparse.Namespace) -> int:
 
 def _launched(description: Any, args: argparse.Namespace) -> int:
     """Plan, sign and run as ``secure-launch --secure`` does; return the exit status."""
+    from enclave_launch.verb.start import start
+    from enclave_launch.verb.target import LaunchTarget
+
     if args.keystore is None:
         raise UsageError(
             "--secure needs a keystore: give --keystore DIR or set ROS_SECURITY_KEYSTORE; for one that nobody keeps, "

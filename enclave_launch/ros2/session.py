@@ -10,7 +10,7 @@ from typing import Any, NoReturn
 
 from enclave_launch.errors import ProvisionError
 from enclave_launch.process import ResolvedProcess
-from enclave_launch.ros2.attributes import KEY
+from enclave_launch.ros2.observation import KEY
 from enclave_launch.runtime.gate import StartAdditions
 from enclave_launch.secured import PlanProvider, ProvisionedLaunch
 

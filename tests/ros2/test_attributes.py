@@ -20,7 +20,7 @@ stand_ins.install()
 import launch, launch.actions
 from launch.launch_description_sources import AnyLaunchDescriptionSource
 import enclave_launch.ros2.attributes as attributes
-from enclave_launch.ros2.attributes import KEY
+from enclave_launch.ros2.observation import KEY
 from enclave_launch.ros2.node_action import EnclaveNodeActionExtension
 from enclave_launch.ros2.observation import observe_node
 from enclave_launch.runtime.gate import StartAdditions
@@ -193,7 +193,7 @@ include = IncludeLaunchDescription(AnyLaunchDescriptionSource(sys.argv[1]))
 service.include_launch_description(launch.LaunchDescription([include, OpaqueFunction(function=configurations)]))
 assert service.run() == 0
 ours = {name for name in sys.modules if name.split(".")[0] in ("enclave_launch", "nodl", "keystore")}
-heavy = {"enclave_launch.plan", "enclave_launch.flow", "enclave_launch.secured", "nodl.lookup", "keystore"}
+heavy = {"enclave_launch.plan", "enclave_launch.flow", "enclave_launch.secured", "nodl.lookup", "cryptography"}
 print("HEAVY", sorted(ours & heavy))
 """
 
@@ -223,7 +223,7 @@ import launch
 from launch_ros.actions import ComposableNodeContainer
 from launch_ros.descriptions import ComposableNode
 import enclave_launch.ros2.attributes
-from enclave_launch.ros2.attributes import KEY
+from enclave_launch.ros2.observation import KEY
 from enclave_launch.ros2.node_action import EnclaveNodeActionExtension
 from enclave_launch.runtime.gate import StartAdditions
 
