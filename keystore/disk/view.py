@@ -30,7 +30,7 @@ from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.role import Role
 from keystore.signing.authority import Authority, authority_of
 from keystore.signing.ca_access import CaAccess
-from keystore.signing.signer import open_signer
+from keystore.signing.pkcs11_signer import open_signer
 
 _OWN_ENTRIES = frozenset({
     layout.PUBLIC, layout.PRIVATE, layout.ENCLAVES, layout.STAGING, layout.LOCK, layout.SETTINGS, layout.ZENOH,

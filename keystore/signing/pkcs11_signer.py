@@ -18,8 +18,8 @@ from cryptography.hazmat.primitives.asymmetric.utils import encode_dss_signature
 from cryptography.hazmat.primitives.serialization import load_der_public_key
 
 from keystore.errors import InvalidInputError, SigningUnavailableError
-from keystore.signing.ca_access import Secret
-from keystore.signing.signer import PublicKey
+from keystore.signing.ca_access import CaAccess, Secret
+from keystore.signing.signer import FileSigner, PublicKey, Signer, load_private_key
 
 MODULE_VARIABLE = "PKCS11_MODULE_PATH"
 
@@ -155,3 +155,17 @@ def _public_key(pkcs11: Any, key: Any) -> PublicKey:
     if not isinstance(loaded, (ec.EllipticCurvePublicKey, rsa.RSAPublicKey)):
         raise SigningUnavailableError("the token's key is neither EC nor RSA")
     return loaded
+
+
+def is_token_uri(reference: bytes) -> bool:
+    """Return True if a key file holds the ``pkcs11:`` URI of a key in a token instead of a key."""
+    return reference.lstrip().startswith(b"pkcs11:")
+
+
+def open_signer(reference: bytes, place: str, access: CaAccess) -> Signer:
+    """Open the signer behind a key file of ``private/``: PEM, or the ``pkcs11:`` URI of a ``.p11`` file."""
+    if is_token_uri(reference):
+        return Pkcs11Signer.open(
+            reference.split()[0].decode("ascii", "replace"), access.pin, access.environment
+        )
+    return FileSigner(load_private_key(reference, access.passphrase, place))

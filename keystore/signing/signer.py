@@ -17,7 +17,7 @@ from cryptography.hazmat.primitives.asymmetric import ec, padding, rsa
 from cryptography.hazmat.primitives.asymmetric.utils import Prehashed
 
 from keystore.errors import SigningUnavailableError
-from keystore.signing.ca_access import CaAccess, Secret
+from keystore.signing.ca_access import Secret
 
 PublicKey = ec.EllipticCurvePublicKey | rsa.RSAPublicKey
 PrivateKey = ec.EllipticCurvePrivateKey | rsa.RSAPrivateKey
@@ -159,19 +159,3 @@ def load_private_key(pem: bytes, passphrase: Secret | None, place: str) -> Priva
             f"{place} is neither an EC nor an RSA key; DDS-Security knows only these"
         )
     return key
-
-
-def is_token_uri(reference: bytes) -> bool:
-    """Returns whether a key file holds the ``pkcs11:`` URI of a key in a token instead of a key."""
-    return reference.lstrip().startswith(b"pkcs11:")
-
-
-def open_signer(reference: bytes, place: str, access: CaAccess) -> Signer:
-    """Opens the signer behind a key file of ``private/``: PEM, or the ``pkcs11:`` URI of a ``.p11`` file."""
-    if is_token_uri(reference):
-        from keystore.signing.pkcs11_signer import Pkcs11Signer  # imports this module's types
-
-        return Pkcs11Signer.open(
-            reference.split()[0].decode("ascii", "replace"), access.pin, access.environment
-        )
-    return FileSigner(load_private_key(reference, access.passphrase, place))

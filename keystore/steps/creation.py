@@ -31,8 +31,9 @@ from keystore.formats.validity import DEFAULT_BACKDATE, DEFAULT_LIFETIME, Validi
 from keystore.signing import authority
 from keystore.signing.authority import Authority, Curve, check_can_serve
 from keystore.signing.ca_access import Secret
+from keystore.signing.pkcs11_signer import open_signer
 from keystore.signing.public_key import CYCLONE_KINDS, key_kind
-from keystore.signing.signer import Signer, key_pem, open_signer
+from keystore.signing.signer import Signer, key_pem
 from keystore.steps.governance import write_governance
 from keystore.steps.incoming_ca import install_incoming, put_incoming
 from keystore.steps.opening import ChangeOptions, opened_for_change

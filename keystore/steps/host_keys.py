@@ -36,8 +36,9 @@ from keystore.formats.subject import common_name
 from keystore.signing.authority import Curve, new_key
 from keystore.signing.ca_access import CaAccess
 from keystore.signing.identity import new_request, request_key
+from keystore.signing.pkcs11_signer import open_signer
 from keystore.signing.public_key import fingerprint
-from keystore.signing.signer import FileSigner, Signer, key_pem, load_private_key, open_signer, spki
+from keystore.signing.signer import FileSigner, Signer, key_pem, load_private_key, spki
 
 _BLOCK = re.compile(
     rb"^enclave: ([^\n]{1,300})\n(-----BEGIN CERTIFICATE REQUEST-----\n.*?\n-----END CERTIFICATE REQUEST-----\n)",

@@ -14,6 +14,7 @@ import re
 import sys
 import warnings
 from collections.abc import Iterable
+from typing import NamedTuple
 
 from enclave_common.files import read_bytes
 from nodl.infer.cpp.cache.folder import digest, digest_of
@@ -70,6 +71,15 @@ class SourceModule:
 
     def package(self) -> str:
         return self.name if self.is_package else self.name.rpartition(".")[0]
+
+
+class ProgramTarget(NamedTuple):
+    """Where a program starts: a script, or ``function`` of ``module``. ``missing``: why it is not its entry point."""
+
+    file: str
+    module: str | None = None
+    function: tuple[str, ...] = ()
+    missing: str = ""
 
 
 class Program:

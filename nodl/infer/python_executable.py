@@ -12,11 +12,10 @@ import glob
 import os
 import re
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
 
 from enclave_common.files import read_text
 from nodl.infer.cache import CachedAnswer
-from nodl.infer.program import Program
+from nodl.infer.program import Program, ProgramTarget
 from nodl.infer.start import LaunchKey
 from nodl.node_interface import NodeInterface
 
@@ -29,15 +28,6 @@ _LOADS_ENTRY_POINT = re.compile(
     r"load_entry_point\(\s*['\"]([^'\"]+)['\"]\s*,\s*['\"]console_scripts['\"]\s*,\s*['\"]([^'\"]+)['\"]"
 )
 _DEVELOPED = re.compile(r"^__file__ = ['\"](.+)['\"]$", re.MULTILINE)
-
-
-class ProgramTarget(NamedTuple):
-    """Where a program starts: a script, or ``function`` of ``module``. ``missing``: why it is not its entry point."""
-
-    file: str
-    module: str | None = None
-    function: tuple[str, ...] = ()
-    missing: str = ""
 
 
 def infer_python(

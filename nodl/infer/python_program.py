@@ -5,8 +5,7 @@ from __future__ import annotations
 from nodl.infer.analysis import failure, start, start_function, without_collector
 from nodl.infer.interpreter.run import Run
 from nodl.infer.net import unsettled_places
-from nodl.infer.program import Program
-from nodl.infer.python_executable import ProgramTarget
+from nodl.infer.program import Program, ProgramTarget
 from nodl.infer.results import interfaces_of
 from nodl.infer.start import LaunchKey
 from nodl.node_interface import Gap, NodeInterface

@@ -32,7 +32,7 @@ from keystore.errors import InvalidInputError
 from keystore.formats.validity import iso, parse_moment, utc_now
 from keystore.signing.ca_access import CaAccess, Secret
 from keystore.signing.dsse import envelope, envelope_text
-from keystore.signing.signer import open_signer
+from keystore.signing.pkcs11_signer import open_signer
 from keystore.steps.inventory import governance_facts, inventory
 from keystore.verification import verify
 

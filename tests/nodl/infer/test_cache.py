@@ -11,8 +11,7 @@ import pytest
 
 from nodl.infer import infer_executable, python_program
 from nodl.infer.cache import own_sources
-from nodl.infer.program import Program
-from nodl.infer.python_executable import ProgramTarget
+from nodl.infer.program import Program, ProgramTarget
 from nodl.infer.start import LaunchKey
 
 PROGRAM = """\

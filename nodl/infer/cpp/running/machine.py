@@ -30,7 +30,7 @@ from nodl.infer.cpp.running.values import (
     concatenated,
     unknown,
 )
-from nodl.infer.cpp.syntax import Node, line_of, words_in
+from nodl.infer.cpp.syntax import Node, line_of, text, walk, words_in
 from nodl.infer.start import Start
 from nodl.name_template import UnknownPart
 from nodl.node_interface import EndpointKind
@@ -204,13 +204,19 @@ class Machine:
             alias = frame.aliases.get(name)
             frame.blocks[-1][name] = (name in frame.names, before, frame.types.get(name), alias)
         if frame.aliases:
-            from nodl.infer.cpp.running.references import forget_shadowed
-
-            forget_shadowed(self, name, frame)
+            self._forget_shadowed(name, frame)
         frame.names.add(name)
         if written_type:
             frame.types[name] = written_type
         self.store.set((frame, name), value)
+
+    def _forget_shadowed(self, name: str, frame: Frame) -> None:
+        """Give each alias for another variable of this name the value that this variable has now."""
+        frame.aliases.pop(name, None)
+        for alias, target in list(frame.aliases.items()):
+            if target is not None and any(text(each) == name for each in walk(target)):
+                self.store.set((frame, alias), self.evaluate(target, frame))
+                frame.aliases[alias] = None
 
     def type_of(self, written: str, frame: Frame) -> Type:
         return self.names.resolve(written, frame.scope, frame.file, frame.bindings)

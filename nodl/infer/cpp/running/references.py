@@ -12,7 +12,7 @@ from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.memory import Cell
 from nodl.infer.cpp.running.values import BOTTOM, Group, Map, Obj, Param, Seq, Text, Value
-from nodl.infer.cpp.syntax import Node, children, field_of, text, unwrapped, walk
+from nodl.infer.cpp.syntax import Node, children, field_of, text, unwrapped
 
 
 def is_plain(value: Value) -> bool:
@@ -54,15 +54,6 @@ def _is_fixed(target: Node) -> bool:
         inner = field_of(target, "argument")
         return inner is not None and (inner.type == "this" or _is_fixed(inner))
     return target.type in ("identifier", "qualified_identifier")
-
-
-def forget_shadowed(run: Machine, name: str, frame: Frame) -> None:
-    """A variable of this name is declared: what stood for another one of the name keeps what that holds now."""
-    frame.aliases.pop(name, None)
-    for alias, target in list(frame.aliases.items()):
-        if target is not None and any(text(each) == name for each in walk(target)):
-            run.store.set((frame, alias), run.evaluate(target, frame))
-            frame.aliases[alias] = None
 
 
 def elements_written(
