@@ -153,7 +153,7 @@ class CommandParser(argparse.ArgumentParser):
         return " ".join((self.prog, *required, "[options]", *arguments))
 
     def error(self, message: str) -> NoReturn:
-        """Usage, message and exit status 2, as argparse."""
+        """Print usage and message, and exit with status 2, as argparse."""
         super().error(message + self._suggestion(message))
 
     def _suggestion(self, message: str) -> str:

@@ -61,10 +61,11 @@ class OutputError(Exception):
 
 @contextmanager
 def safe_output() -> Iterator[None]:
-    """Within the block, text that Python code writes to standard output and standard error is made safe as by
-    ``printable_lines``: what argparse and warnings write, too. What goes to the file descriptors is not touched.
+    """Make text that Python code writes to standard output and error safe as ``printable_lines`` does, within the
+    block.
 
-    A stream that was closed before we started is replaced by one that drops what it is given.
+    This covers what argparse and warnings write; what goes to the file descriptors is not touched. A stream that was
+    closed before we started is replaced by one that drops what it is given.
     """
     with ExitStack() as stack:
         if sys.stdout is None:
@@ -77,7 +78,7 @@ def safe_output() -> Iterator[None]:
 
 
 def stdout_is_for_the_plan() -> AbstractContextManager[Any]:
-    """Within the block, what launch files print goes to stderr."""
+    """Send what launch files print to stderr within the block."""
     return redirect_stdout(sys.stderr)
 
 

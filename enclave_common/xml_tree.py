@@ -44,7 +44,7 @@ class XmlElement:
         return len(self.children)
 
     def iter(self, tag: str = "") -> Iterator[XmlElement]:
-        """Itself and all elements in it, in the order of the text; with ``tag`` those alone."""
+        """Yield itself and all elements in it, in the order of the text; with ``tag`` those alone."""
         if tag in ("", self.tag):
             yield self
         for child in self.children:

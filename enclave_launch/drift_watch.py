@@ -192,7 +192,7 @@ class _Observer:
 
 
 def _strangers(graph: Graph, started: set[int]) -> frozenset[int]:
-    """Processes of this machine that are neither of the launch nor of a process that it started."""
+    """Return processes of this machine that are neither of the launch nor of a process that it started."""
     host = socket.gethostname()
     seen = {
         each.participant.pid

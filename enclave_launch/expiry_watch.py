@@ -75,7 +75,7 @@ def _span(span: timedelta, *, short: bool = False) -> str:
 def watched(
     launch: ProvisionedLaunch, say: Callable[[str], None], now: Callable[[], datetime] = utc_now
 ) -> Iterator[None]:
-    """While inside, ``say`` is called with each notice when its time has come, from a thread of its own."""
+    """Call ``say`` with each notice when its time has come, while inside; it runs in a thread of its own."""
     over = threading.Event()
     watch = threading.Thread(target=_watch, args=(launch, say, now, over), name="expiry-watch", daemon=True)
     watch.start()
@@ -105,9 +105,9 @@ def renewal_deadline(launch: ProvisionedLaunch, now: datetime) -> Deadline | Non
 
 
 def deadline_before(ends: Iterable[Expiry], now: datetime) -> Deadline | None:
-    """Five minutes before the first end of an enclave's; where less than 25 minutes are left, in their last fifth.
+    """Return five minutes before the first end of an enclave's; if less than 25 are left, their last fifth.
 
-    ``None`` when a new start would not help: nothing was renewed by the one before, or what ends is a CA.
+    ``None`` if a new start would not help: nothing was renewed by the one before, or what expires is a CA.
     """
     of_enclaves = [one for one in ends if one.enclave is not None]
     if not of_enclaves:

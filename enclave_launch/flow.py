@@ -85,7 +85,7 @@ def resolve(
 
 
 def _launcher_refusals(plan: LaunchPlan) -> list[Diagnostic]:
-    """Our own node is a process as well: it runs in our environment, not in one of the launch file's."""
+    """Return why our own node cannot run: it runs in our environment, not in one of the launch file's."""
     if plan.launcher is None:
         return []
     middleware = middleware_of(os.environ, plan.distro)

@@ -262,7 +262,7 @@ class EvaluatedLaunch(NamedTuple):
 
 
 def enclave_domains(processes: Iterable[PlannedProcess]) -> dict[str, dict[int, list[PlannedProcess]]]:
-    """Enclave path -> domain -> the processes of that enclave in it."""
+    """Map enclave path -> domain -> the processes of that enclave in it."""
     found: dict[str, dict[int, list[PlannedProcess]]] = {}
     for item in processes:
         if item.enclave is not None:
@@ -271,7 +271,7 @@ def enclave_domains(processes: Iterable[PlannedProcess]) -> dict[str, dict[int, 
 
 
 def mixed_enclaves(processes: Iterable[PlannedProcess]) -> tuple[Pair, ...]:
-    """Enclaves on Fast DDS with those on Cyclone DDS that could meet them."""
+    """Return enclaves on Fast DDS with those on Cyclone DDS that could meet them."""
     return mixed_pairs(
         EnclaveProcess(item.enclave.path, item.domain, vendor_of(item.middleware))
         for item in processes

@@ -148,7 +148,7 @@ def _alike(container: str, processes: Iterable[PlannedProcess]) -> tuple[str, ..
 
 
 def shared_domains(processes: Iterable[PlannedProcess]) -> Iterator[Diagnostic]:
-    """Enclaves whose processes are in several domains: each of them may join all."""
+    """Warn about enclaves whose processes are in several domains: each of them may join all."""
     for enclave, by_domain in enclave_domains(processes).items():
         if len(by_domain) > 1:
             who = (
@@ -160,7 +160,7 @@ def shared_domains(processes: Iterable[PlannedProcess]) -> Iterator[Diagnostic]:
 
 
 def failing_handshakes(processes: Iterable[PlannedProcess]) -> Iterator[Diagnostic]:
-    """Enclaves on two DDS implementations that cannot authenticate each other under the subjects they get here."""
+    """Warn about enclaves on two DDS implementations that cannot authenticate each other under their subjects."""
     pairs = mixed_enclaves(processes)
     if not pairs:
         return
@@ -171,7 +171,7 @@ def failing_handshakes(processes: Iterable[PlannedProcess]) -> Iterator[Diagnost
 
 
 def ungranted_enclaves(processes: Iterable[PlannedProcess], derived: DerivedPolicy) -> Iterator[Diagnostic]:
-    """Enclaves of executables for which no policy file speaks: signed, they permit nothing at all."""
+    """Warn about enclaves of executables that no policy file names: signed, they permit nothing at all."""
     empty = {enclave.path for enclave in derived.policy.enclaves if not enclave.profiles}
     members: dict[str, list[PlannedProcess]] = {}
     for item in processes:

@@ -78,7 +78,7 @@ class Planner(NamedTuple):
         )
 
     def _admitted(self, planned: PlannedProcess, distro: str) -> PlannedProcess:
-        """With what decides whether its enclave is used. An executable without one starts where none is found."""
+        """Add what decides whether its enclave is used. An executable without one starts where none is found."""
         process = planned.process
         middleware = middleware_of(process.final_environment, distro)
         if planned.enclave is None and process.kind == "executable":
@@ -142,7 +142,7 @@ def _plan_component(
 
 
 def _containers(processes: Iterable[PlannedProcess]) -> dict[str, PlannedProcess]:
-    """Processes into which components may be loaded, by final name; of equal names the first one started."""
+    """Map final names to processes that components may be loaded into; of equal names the first one started."""
     containers: dict[str, PlannedProcess] = {}
     for planned in processes:
         for node in planned.nodes:

@@ -12,7 +12,7 @@ from nodl.ament_index import PREFIX_VARIABLE
 
 
 def ament_prefixes(prefixes: Sequence[Path | str]) -> AbstractContextManager[None]:
-    """Within the block ``prefixes`` come before the rest of ``AMENT_PREFIX_PATH``, for us and for what we start."""
+    """Put ``prefixes`` before the rest of ``AMENT_PREFIX_PATH`` within the block, for us and for what we start."""
     return environment_with(_prepended(prefixes))
 
 

@@ -80,7 +80,7 @@ def _live(launch: Launch, settings: RunSettings) -> partial[LiveLaunch]:
 
 
 def _expiry_watch(launch: Launch) -> AbstractContextManager[None]:
-    """Warns while a provisioned launch runs that what its processes use is about to end."""
+    """Warn while a provisioned launch runs that what its processes use is about to expire."""
     if isinstance(launch, _UNSECURED):
         return nullcontext()
 

@@ -162,7 +162,9 @@ class PlanProvider:
         return self._grant(planned, process.environment)
 
     def _find(self, process: ResolvedProcess) -> PlannedProcess | None:
-        """Equal processes may have enclaves of their own; their names tell them apart unless events reordered them."""
+        """Find the process. Equal ones may have enclaves of their own; names tell them apart unless events reordered
+        them.
+        """
         key = identity(process)
         return self._by_name.get((process.process_name, key)) or self._by_identity.get(key)
 

@@ -15,7 +15,7 @@ class SourceLocation(NamedTuple):
 
     @classmethod
     def read(cls, text: str) -> SourceLocation:
-        """From ``file:line`` or ``file``, as ``str`` writes it."""
+        """Read ``file:line`` or ``file``, as ``str`` writes it."""
         file, colon, line = text.rpartition(":")
         return cls(file, int(line)) if colon and line.isdecimal() else cls(text)
 

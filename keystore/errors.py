@@ -80,7 +80,7 @@ class StorageError(KeystoreError):
 
     @classmethod
     def of(cls, error: OSError, doing: str) -> StorageError:
-        """The error of the keystore that tells ``error``; ``doing`` is a phrase such as ``writing the keystore``."""
+        """Return the error of the keystore for ``error``; ``doing`` is a phrase such as ``writing the keystore``."""
         place = f" {printable(str(error.filename))}" if error.filename else ""
         reason = error.strerror or error
         return cls(
@@ -89,5 +89,5 @@ class StorageError(KeystoreError):
 
 
 def printable(text: str | PathLike[str]) -> str:
-    """``text`` quoted for a terminal: names from outside may hold escape sequences."""
+    """Quote ``text`` for a terminal: names from outside may hold escape sequences."""
     return quoted(text)

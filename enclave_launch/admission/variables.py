@@ -60,14 +60,14 @@ def overridden(environment: Mapping[str, str], *, on_zenoh: bool = False) -> Ite
 
 
 def preloaded(environment: Mapping[str, str]) -> Iterator[Setting]:
-    """Libraries that a launch file puts into the process before its own: they may do anything in it."""
+    """Return libraries that a launch file loads into the process before its own: they may do anything in it."""
     for name in _PRELOAD:
         if environment.get(name):
             yield Setting(name, environment[name])
 
 
 def own_security(environment: Mapping[str, str]) -> Iterator[Setting]:
-    """Configurations of a DDS with security properties of their own; reads the files that they are in."""
+    """Find configurations of a DDS with security properties of their own; reads the files that they are in."""
     for name in _CONFIGURATIONS:
         # Cyclone DDS takes files and documents in one list, separated by commas, Connext by semicolons.
         for part in re.split("[,;]", environment.get(name, "")):

@@ -84,7 +84,7 @@ def _volumes(process: DeployedProcess, keystore: str) -> list[dict[str, Any]]:
 
 
 def _mount(source: str, target: str) -> dict[str, Any]:
-    """A source that is missing is an error: the default is to create an empty directory."""
+    """Return a mount whose missing source is an error: the default is to create an empty directory."""
     return {
         "type": "bind",
         "source": _literal(source),
@@ -95,5 +95,5 @@ def _mount(source: str, target: str) -> dict[str, Any]:
 
 
 def _literal(text: str) -> str:
-    """Compose expands ``$NAME``."""
+    """Escape ``$``: Compose expands ``$NAME``."""
     return text.replace("$", "$$")

@@ -65,7 +65,7 @@ def secret_name(enclave: str) -> str:
 
 
 def _secret(deployment: Deployment, material: EnclaveMaterial) -> dict[str, Any]:
-    """Without the key if it was made on its host; whoever has it adds it there."""
+    """Return the Secret; without the key if it was made on its host: whoever has it adds it there."""
     files = {**material.public, **({layout.KEY: material.key} if material.key is not None else {})}
     data = {name: base64.b64encode(content).decode() for name, content in sorted(files.items())}
     return {**_object(deployment, "Secret", secret_name(material.enclave)), "type": "Opaque", "data": data}
@@ -77,7 +77,7 @@ def _parameters(deployment: Deployment, process: DeployedProcess) -> dict[str, A
 
 
 def _parameters_name(process: DeployedProcess) -> str:
-    """The content is in the name, so new parameters replace the Pod."""
+    """Return a name with the content's digest, so that new parameters replace the Pod."""
     digest = hashlib.sha256("\0".join(process.parameter_files.values()).encode()).hexdigest()
     return f"{process.name}-{digest[:10]}"
 
@@ -119,7 +119,7 @@ def _pod(deployment: Deployment, process: DeployedProcess, image: str) -> dict[s
 
 
 def _container(deployment: Deployment, process: DeployedProcess, image: str) -> dict[str, Any]:
-    """It has ``args`` only: the image's entrypoint sets up ROS."""
+    """Return the container; it has ``args`` only: the image's entrypoint sets up ROS."""
     variables = {**process.variables(_KEYSTORE), "HOME": "/tmp", "ROS_LOG_DIR": "/tmp/log", "TZ": "UTC"}
     environment: list[dict[str, Any]] = [
         {"name": name, "value": _literal(text)} for name, text in sorted(variables.items())
@@ -144,8 +144,10 @@ def _container(deployment: Deployment, process: DeployedProcess, image: str) -> 
 
 
 def _peers(deployment: Deployment, domain: int) -> dict[str, Any]:
-    """All secured processes of the domain, on any host. Who is started later names those before it, so one more
-    process needs no restart of the others."""
+    """List all secured processes of the domain, on any host.
+
+    Who is started later names those before it, so one more process needs no restart of the others.
+    """
     peers = {_PEERS: ";".join(deployment.members[domain])}
     return {**_object(deployment, "ConfigMap", _peers_name(deployment, domain)), "data": peers}
 
@@ -174,7 +176,7 @@ def _volumes(process: DeployedProcess) -> Iterator[dict[str, Any]]:
 
 
 def _service(deployment: Deployment, process: DeployedProcess) -> dict[str, Any]:
-    """A name for the Pod: peers find each other by it, in whatever order they start."""
+    """Return a Service, the name by which peers find the Pod, in whatever order they start."""
     port = _SPDP_PORT + _DOMAIN_GAIN * process.domain
     spec = {
         "clusterIP": "None",
@@ -212,5 +214,5 @@ def _network_policy(deployment: Deployment, domain: int) -> dict[str, Any]:
 
 
 def _literal(text: str) -> str:
-    """Kubernetes expands ``$(NAME)``."""
+    """Escape ``$``: Kubernetes expands ``$(NAME)``."""
     return text.replace("$(", "$$(")

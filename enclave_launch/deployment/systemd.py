@@ -181,7 +181,7 @@ def _start(
 
 
 def _wait_for_the_clock(cert: str) -> str:
-    """A board without a battery starts with a clock at which nothing is valid yet."""
+    """Return shell words that wait: a board without a battery starts with a clock at which nothing is valid yet."""
     return (
         f"imported=$(stat -L -c %Y {cert}) || exit 1; "
         '[ "$(date +%s)" -ge "$imported" ] || '
@@ -206,7 +206,7 @@ def _link_credentials(enclave: str, keystore: str) -> str:
 
 
 def _script(process: DeployedProcess, setup: tuple[str, ...]) -> str:
-    """Security last: what sets up ROS cannot take it away."""
+    """Return the script, security last: what sets up ROS cannot take it away."""
     parts = []
     if (retries := _retries(process.respawn)) is not None:
         parts.append(

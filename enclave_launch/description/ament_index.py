@@ -20,7 +20,7 @@ __all__ = ["AMENT_PREFIX_PATH_ENV_VAR", "RESOURCE_INDEX_SUBFOLDER"]
 
 
 def get_search_paths() -> list[str]:
-    """Existing prefixes, the first has precedence. Raises ``OSError`` when nothing says where to search."""
+    """Return existing prefixes, the first has precedence; raises ``OSError`` if nothing says where to search."""
     prefixes = current_host().prefixes()
     if not prefixes:
         raise OSError(f"Environment variable '{PREFIX_VARIABLE}' is not set or empty")

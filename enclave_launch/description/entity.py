@@ -55,7 +55,7 @@ class LaunchDescriptionEntity:
         return []
 
     def describe_conditional_sub_entities(self) -> list[tuple[str, Iterable[LaunchDescriptionEntity]]]:
-        """Entities that a visit may give: the condition in words, and what depends on it."""
+        """Return entities that a visit may give: the condition in words, and what depends on it."""
         return []
 
     def visit(self, context: LaunchContext) -> list[LaunchDescriptionEntity] | None:
@@ -104,7 +104,7 @@ class Action(LaunchDescriptionEntity):
     """
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
-        """Classes of the user's: ``execute`` is not called again by the start that follows a plan."""
+        """Remember results of the user's classes: the start that follows a plan does not call ``execute`` again."""
         super().__init_subclass__(**kwargs)
         execute = vars(cls).get("execute")
         if execute is not None and is_users(execute):

@@ -31,7 +31,7 @@ _guests: dict[str, ModuleType] = {}  # modules of others that were imported with
 
 @contextmanager
 def installed(prefixes: Sequence[str] = ()) -> Iterator[None]:
-    """Within the block the public names are ours; may be nested.
+    """Make the public names ours within the block; may be nested.
 
     The Python packages of the ament ``prefixes`` can be imported too, as in a sourced workspace.
     """

@@ -227,7 +227,7 @@ class LaunchContext:
     # Hypothetical events: what a dry run tries out leaves no trace
 
     def save(self) -> ContextState:
-        """Everything that an event could change, for ``restore``."""
+        """Save everything that an event could change, for ``restore``."""
         configurations = {
             name: list(value) if isinstance(value, list) else value
             for name, value in dict(self.__configurations).items()

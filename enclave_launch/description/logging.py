@@ -32,7 +32,7 @@ def get_logger(name: str | None = None) -> logging.Logger:
 
 
 def get_output_loggers(process_name: str, output_config: object) -> tuple[logging.Logger, logging.Logger]:
-    """Loggers for stdout and stderr of a process."""
+    """Return loggers for stdout and stderr of a process."""
     return get_logger(f"{process_name}-stdout"), get_logger(f"{process_name}-stderr")
 
 

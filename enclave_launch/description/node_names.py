@@ -115,7 +115,7 @@ RemapRules = Iterable[RemapRule]
 
 
 def normalize_remap_rule(remap_rule: SomeRemapRule) -> RemapRule:
-    """Only a tuple of two will do; a list of two is a ``TypeError``."""
+    """Normalize a tuple of two; a list of two is a ``TypeError``."""
     ensure_argument_type(remap_rule, tuple, "remap_rule")
     if len(remap_rule) != 2:
         raise TypeError(f"remap_rule must be a tuple of length 2, got length {len(remap_rule)}")
@@ -127,7 +127,7 @@ def normalize_remap_rule(remap_rule: SomeRemapRule) -> RemapRule:
 
 
 def normalize_remap_rules(remap_rules: SomeRemapRules) -> Iterator[RemapRule]:
-    """Lazily: whoever keeps the iterator can read the rules once (upstream's composable nodes do)."""
+    """Normalize lazily: whoever keeps the iterator can read the rules once (upstream's composable nodes do)."""
     return map(normalize_remap_rule, remap_rules)
 
 

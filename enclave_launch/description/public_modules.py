@@ -78,7 +78,7 @@ class _Loader(Loader):
         return public_module(spec.name)
 
     def exec_module(self, module: ModuleType) -> None:
-        """Modules that a name of their package hides are there from the start, so that importing one binds nothing."""
+        """Add modules that a name of their package hides from the start, so that importing one binds nothing."""
         for name in hidden_modules(module.__name__):
             sys.modules.setdefault(name, public_module(name))
 

@@ -21,7 +21,7 @@ class Substitution:
     """Performed against a context, gives text. Third parties subclass it; only ``perform`` is required."""
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
-        """Classes of the user's: ``perform`` is not asked again by the start that follows a plan."""
+        """Remember results of the user's classes: the start that follows a plan does not call ``perform`` again."""
         super().__init_subclass__(**kwargs)
         perform = vars(cls).get("perform")
         if perform is not None and is_users(perform):

@@ -181,11 +181,11 @@ def is_normalized_substitution(x: Any) -> bool:
 
 
 def normalize_typed_substitution(value: Any, data_type: Any) -> Any:
-    """Mix of values and substitutions -> scalar, list of substitutions, or list of scalars and those lists.
+    """Return a scalar, a list of substitutions, or a list of scalars and those lists.
 
-    Anything that can be read as one substitution is: ``['a', TextSubstitution(text='b')]`` is the text
-    ``ab``; a list of two texts needs ``['a', [TextSubstitution(text='b')]]``. Raises ``TypeError`` when the
-    value can never become a ``data_type`` (``None``: any allowed type).
+    Anything that can be read as one substitution is: ``['a', TextSubstitution(text='b')]`` is the text ``ab``; a list
+    of two texts needs ``['a', [TextSubstitution(text='b')]]``. Raises ``TypeError`` if the value can never become a
+    ``data_type`` (``None``: any allowed type).
     """
     if isinstance(value, ScalarTypesTuple):
         if not is_instance_of(value, data_type):

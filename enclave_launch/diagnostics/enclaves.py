@@ -145,7 +145,7 @@ def domain_not_served(process: str, domain: int, served: str, place: SourceLocat
 
 
 def domains_shared(enclave: str, domains: str, processes: tuple[str, ...]) -> Diagnostic:
-    """Permissions name domains for the enclave as a whole, so its processes may join each other's."""
+    """Warn that processes may join each other's domains: permissions name domains for the enclave as a whole."""
     text = (
         f"enclave {enclave} may join domains {domains}, each of its processes all of them ({', '.join(processes)}); "
         "give those of each domain an enclave of their own"

@@ -35,7 +35,7 @@ def function_called_again(function: str, event: str, location: SourceLocation) -
 
 
 def include_left_out(path: str) -> Diagnostic:
-    """Told with ``--allow-missing-packages``, which goes on without the file."""
+    """Warn, with ``--allow-missing-packages``, that evaluation goes on without the file."""
     return Diagnostic(
         Code.INCLUDE_LEFT_OUT, path, f"not included, because its package is not installed or lacks it: {path}"
     )
@@ -83,13 +83,13 @@ def not_foreseeable(what: str, location: SourceLocation) -> Diagnostic:
 
 
 def executable_not_built(package: str, executable: str, placeholder: str) -> Diagnostic:
-    """Told with ``--allow-missing-packages``; ``placeholder`` is the path that stands for it."""
+    """Warn, with ``--allow-missing-packages``; ``placeholder`` is the path that stands for it."""
     text = f"package '{package}' has no executable '{executable}' yet; using {placeholder} in its place"
     return Diagnostic(Code.EXECUTABLE_NOT_BUILT, f"{package}/{executable}", text)
 
 
 def package_not_installed(package: str, placeholder: str) -> Diagnostic:
-    """Told with ``--allow-missing-packages``; ``placeholder`` is the path that stands for it."""
+    """Warn, with ``--allow-missing-packages``; ``placeholder`` is the path that stands for it."""
     text = f"package '{package}' is not installed; using {placeholder} in its place"
     return Diagnostic(Code.PACKAGE_NOT_INSTALLED, package, text)
 
@@ -112,7 +112,7 @@ def parameters_unknown(process: str, path: str, why: str, place: SourceLocation)
 
 
 def program_not_installed(program: str) -> Diagnostic:
-    """Told with ``--allow-missing-packages``, for ``$(command ...)``."""
+    """Warn, with ``--allow-missing-packages``, for ``$(command ...)``."""
     text = f"program '{program}' is not installed; a placeholder stands for what it would write"
     return Diagnostic(Code.PROGRAM_NOT_INSTALLED, program, text)
 

@@ -63,7 +63,7 @@ def record_lacks(
 def record_undecided(
     node: str, names: Sequence[str], parameters: Sequence[str], place: SourceLocation
 ) -> Diagnostic:
-    """``names``: what is granted; ``parameters``: whose value the recorded name had."""
+    """Report a coincidence. ``names``: what is granted; ``parameters``: whose value the recorded name had."""
     text = (
         f"node {node}: the recorded name may be fixed, or the value of {' or '.join(parameters)}; what is granted, as "
         f"no run decides: {', '.join(names)}"
@@ -104,7 +104,7 @@ def recording_incomplete(node: str, why: str, manifest: str, place: SourceLocati
 
 
 def action_remap_idle(node: str, rule: str, action: str, distro: str, place: SourceLocation) -> Diagnostic:
-    """Before a release remaps whole actions, a rule for an action's name changes nothing."""
+    """Warn that a rule for an action's name changes nothing before a release remaps whole actions."""
     text = (
         f"remap rule {rule} has no effect on action {action} of node {node}: {distro} remaps only the five names "
         f"below {action}/_action/, one by one"
@@ -159,7 +159,7 @@ def node_name_impossible(node: str, why: str, place: SourceLocation) -> Diagnost
 
 
 def pattern_accepted(node: str, operation: str, name: str, note: str, place: SourceLocation) -> Diagnostic:
-    """Told with ``--accept-patterns``: ``name`` is granted as a wildcard."""
+    """Report, with ``--accept-patterns``, that ``name`` is granted as a wildcard."""
     return Diagnostic(Code.PATTERN_ACCEPTED, node, f"node {node} may {operation} {name}: {note}", place)
 
 

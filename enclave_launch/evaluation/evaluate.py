@@ -61,7 +61,7 @@ def evaluate(
     host: PlanHost | None = None,
     launch_configurations: Mapping[str, str] | None = None,
 ) -> Evaluation:
-    """Everything that ``ros2 launch launch_file name:=value ...`` would start, in launch order.
+    """Return everything that ``ros2 launch launch_file name:=value ...`` would start, in launch order.
 
     ``arguments`` are (name, value) pairs, as plain text; ``launch_configurations`` are set before the file is
     included (``launch-prefix``). Python launch files, ``$(command)`` and ``OpaqueFunction`` run for real.

@@ -67,7 +67,7 @@ class Explorer:
             self._settle_now()
 
     def _settle_now(self) -> None:
-        """Everything that happens before the clock moves."""
+        """Do everything that happens before the clock moves."""
         while self._host.loop.fire_due() or self._handle_event() or self._announce_start():
             pass
 
@@ -154,8 +154,8 @@ class Explorer:
     def _suppose(self, known: frozenset[int], new_from: int) -> None:
         """Suppose an event for each handler that has not run.
 
-        ``known``: handlers that were there before the supposition we are in; of those only events about
-        processes started since (from index ``new_from``) are followed here, the others in their own turn.
+        ``known``: handlers that were there before the supposition we are in; of those only events about processes
+        started since (from index ``new_from``) are followed here, the others in their own turn.
         """
         for handler in self._context._event_handlers.all():
             if handler.internal or id(handler) in self._fired:
@@ -194,7 +194,7 @@ class Explorer:
         self._host.unforeseeable(Unforeseeable(f"{what} would lead to: {error_text(error)}", place))
 
     def _report_unreached(self) -> None:
-        """Handlers with entities that no event of this dry run could reach."""
+        """Report handlers with entities that no event of this dry run could reach."""
         for handler in self._context._event_handlers.all():
             if handler.internal or id(handler) in self._fired or not isinstance(handler, EventHandler):
                 continue

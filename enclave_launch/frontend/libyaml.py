@@ -67,8 +67,7 @@ def safe_load(stream: Any) -> Any:
 
 
 def dump(data: Any, stream: Any = None, Dumper: Any = yaml.Dumper, **options: Any) -> Any:
-    """Dump as ``yaml.dump``. The two emitters write a lone scalar, an empty key and a text with
-    escapes differently."""
+    """Dump as ``yaml.dump``. The two emitters write a lone scalar, an empty key and a text with escapes differently."""
     in_c = _in_c(Dumper, _DUMPERS)
     if in_c is None or not isinstance(data, dict | list) or not options.keys() <= _SAME_WITH_OPTIONS:
         return _dump(data, stream, Dumper, **options)

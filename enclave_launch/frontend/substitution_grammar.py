@@ -93,7 +93,7 @@ class VisitError(ValueError):
 
 
 def unescape(text: str) -> str:
-    """Backslash and any character but a newline -> that character."""
+    """Replace backslash and any character but a newline by that character."""
     return _ESCAPED.sub(r"\1", text) if "\\" in text else text
 
 
@@ -169,7 +169,7 @@ class _Scanner:
         return parts
 
     def parts(self, context: _Context, text_pattern: re.Pattern[str]) -> Template:
-        """Texts and calls, up to the first character that is neither."""
+        """Return texts and calls, up to the first character that is neither."""
         parts: list[TemplatePart] = []
         while self.position < len(self.text):
             match = text_pattern.match(self.text, self.position)

@@ -103,7 +103,7 @@ class BaseHost:
     def run_command(
         self, command: Sequence[str], *, merge_stderr: bool = False, at_event: bool = False
     ) -> CommandResult:
-        """With ``--allow-missing-packages`` a program that is not there "writes" a marked placeholder."""
+        """Run it; with ``--allow-missing-packages`` a program that is not there "writes" a marked placeholder."""
         if self.allow_missing_packages and command and shutil.which(command[0]) is None:
             program = os.path.basename(command[0])
             self.warn(program_not_installed(program))

@@ -118,7 +118,7 @@ class Host(Protocol):
         """Launch files parsed so far."""
 
     def prefixes(self) -> tuple[str, ...]:
-        """Ament prefixes to search, first wins, from the environment of this moment."""
+        """Return ament prefixes to search, first wins, from the environment of this moment."""
 
     def find_package_prefix(self, package: str) -> str:
         """Raises ``PackageNotFoundError`` (a ``KeyError``), ``ValueError`` for an impossible name."""
@@ -150,7 +150,7 @@ class Host(Protocol):
         """Return a number that grows with everything that is started or scheduled."""
 
     def next_process_index(self) -> int:
-        """N of the process name NAME-N, from 1."""
+        """Return N of the process name NAME-N, from 1."""
 
     def start_process(
         self, action: ExecuteLocal, process: ResolvedProcess, context: LaunchContext

@@ -161,7 +161,7 @@ class _Collection(NamedTuple):
 
 
 def _size_warnings(enclaves: Iterable[EnclavePolicy]) -> list[Diagnostic]:
-    """Enclaves whose permissions come near what DDS can carry, told before anything is signed.
+    """Warn, before anything is signed, about enclaves whose permissions come near what DDS can carry.
 
     Only those with many rules are looked at: the others need not load the code that knows DDS.
     """
@@ -214,8 +214,10 @@ Added = Mapping[tuple[str, str], Mapping[Rule, Reason]]  # (namespace, node) -> 
 
 
 def merge_policy_file(derived: DerivedPolicy, document: PolicyDocument) -> DerivedPolicy:
-    """Union by enclave and profile, with the reasons of both. Warnings: the document's own, unused enclaves, denials of
-    needs."""
+    """Unite by enclave and profile, with the reasons of both.
+
+    Warnings: the document's own, unused enclaves, denials of needs.
+    """
     theirs = {enclave.path: enclave for enclave in document.policy.enclaves}
     ours = {enclave.path for enclave in derived.policy.enclaves}
     warnings = [policy_file("policy file", text) for text in (*document.warnings, *document.notes)]

@@ -12,9 +12,9 @@ Wanted = Callable[[Rule, Reason], bool]
 
 
 def explain(derived: DerivedPolicy, subject: str) -> list[str]:
-    """Everything that ``subject`` is: an enclave path, a node's full name, a topic, service or action.
+    """Return everything that ``subject`` is: an enclave path, a node's full name, a topic, service or action.
 
-    Empty when it is none of these. A subject without leading slash is taken as an absolute name.
+    Empty if it is none of these. A subject without leading slash is taken as an absolute name.
     """
     name = subject if subject.startswith("/") else f"/{subject}"
     lines: list[str] = []

@@ -217,8 +217,11 @@ class _Collector:
             self._unresolved(operation, place, str(error))
 
     def _quality(self, endpoint: Endpoint, name: str) -> tuple[tuple[str, str | int], ...]:
-        """Without the policies that parameters of the launch may set (rclcpp ``qos_overriding_options.hpp``:
-        ``qos_overrides.<topic>.<kind>[_<id>].<policy>``); the program says whether it lets them."""
+        """Return the quality without the policies that parameters of the launch may set.
+
+        Source: rclcpp ``qos_overriding_options.hpp``: ``qos_overrides.<topic>.<kind>[_<id>].<policy>``; the program
+        says whether it lets them.
+        """
         start = f"qos_overrides.{name}.{endpoint.kind.value}"
         set_here = {each.rpartition(".")[2] for each in self._node.parameters if each.startswith(start)}
         return tuple(
@@ -226,7 +229,7 @@ class _Collector:
         )
 
     def _introspection(self, operation: Operation, name: str, reason: Reason) -> None:
-        """Servers and clients publish what they are asked and answer (rcl service_event_publisher.c)."""
+        """Grant servers and clients to publish requests and responses (rcl service_event_publisher.c)."""
         services = [name] if operation in _SERVICES else [f"{name}/_action/{p}" for p in ACTION_SERVICES]
         note = "the service's calls are published (introspection)"
         for service in services:
@@ -296,7 +299,7 @@ class _Collector:
             self._result.warnings.append(action_remap_idle(self._fqn, rule.text, action, self._distro, where))
 
     def _pattern(self, endpoint: Endpoint, template: NameTemplate) -> None:
-        """Only a part of the name is known: unresolved, unless patterns are accepted and it has text."""
+        """Handle a name of which only a part is known: unresolved, unless patterns are accepted and it has text."""
         operation, place = OPERATIONS[endpoint.kind], str(endpoint.source)
         text = template.text
         why = "; ".join(p.why for p in template.parts if isinstance(p, UnknownPart) and p.why)
@@ -331,7 +334,7 @@ class _Collector:
 def _built_in_rows(
     distro: str, library: ClientLibrary, conditions: frozenset[BuiltinCondition]
 ) -> tuple[tuple[Operation, str, str], ...]:
-    """Operation, name as the client library writes it, and the row for a reader."""
+    """Return operation, name as the client library writes it, and the row for a reader."""
     rows = built_in_interfaces(distro, library, conditions)
     return tuple((OPERATIONS[row.kind], row.name, str(row)) for row in rows)
 

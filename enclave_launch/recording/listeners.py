@@ -27,16 +27,16 @@ class Listener:
         self._launch, self._recording = launch, recording
 
     def added(self, line: Line) -> None:
-        """Hear of ``line``, which is in the record already."""
+        """Receive ``line``, which is in the record already."""
 
     def happened(self, event: RunEvent) -> None:
-        """Hear of an event of the launch."""
+        """Receive an event of the launch."""
 
     def looked(self) -> None:
-        """Hear that the record was read again."""
+        """Receive notice that the record was read again."""
 
     def closed(self) -> None:
-        """Hear that every process has ended and every line was added."""
+        """Receive notice that every process has ended and every line was added."""
 
 
 class EndpointEvents(Listener):

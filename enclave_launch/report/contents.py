@@ -42,7 +42,7 @@ class ReportContents(NamedTuple):
     endings: tuple[Ending, ...] | None = None
 
     def uses_of(self) -> dict[str, list[ChannelUse]]:
-        """Enclave -> what it may do, in the graph's order."""
+        """Map each enclave to what it may do, in the graph's order."""
         found: dict[str, list[ChannelUse]] = {path: [] for path in self.graph.enclaves}
         for use in self.graph.uses:
             found[use.enclave].append(use)

@@ -89,7 +89,7 @@ class EnclaveGraph(NamedTuple):
     middlewares: Mapping[str, str]
 
     def enforcement(self, enclave: str) -> str:
-        """To add to a sentence: nothing for DDS, which is what a reader expects."""
+        """Return words to add to a sentence: none for DDS, which is what a reader expects."""
         middleware = self.middlewares[enclave]
         return "" if middleware == "DDS" else f", enforced by {middleware}"
 

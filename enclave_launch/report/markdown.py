@@ -20,7 +20,7 @@ MOST_DRAWN = 60
 
 
 def markdown_report(contents: ReportContents) -> str:
-    """Sections as in the HTML report; ends with a newline."""
+    """Render sections as in the HTML report; ends with a newline."""
     return "\n".join(_lines(contents)) + "\n"
 
 

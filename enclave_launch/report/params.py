@@ -12,7 +12,7 @@ from enclave_launch.ros_rules.parameter_value import ParameterValue
 
 
 def params_yaml(plan: LaunchPlan) -> str:
-    """YAML that ``--params-file`` accepts: one section per node that has parameters, by final name where known."""
+    """Render YAML that ``--params-file`` accepts: one section per node that has parameters, by final name if known."""
     sections: dict[str, dict[str, dict[str, object]]] = {}
     for name, parameters in _named(plan):
         if parameters:

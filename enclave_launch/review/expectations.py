@@ -102,7 +102,7 @@ def _broken_text(found: Broken) -> str:
 
 
 def broken_rules(plan: PlanDocument, rules: Iterable[Never]) -> tuple[list[Broken], list[Never]]:
-    """Rules that the plan breaks, each with one shortest way, and rules that name nothing in the plan."""
+    """Return rules that the plan breaks, each with one shortest way, and rules that name nothing in the plan."""
     graph = flow_graph(plan)
     broken, idle = [], []
     for rule in rules:

@@ -59,7 +59,10 @@ FlowGraph = Mapping[str, Mapping[str, tuple[Hop, ...]]]
 
 
 def flow_graph(plan: PlanDocument, *, built_in: bool = False) -> FlowGraph:
-    """Between the enclaves of ``plan``; every enclave is a key. ``built_in``: count what every node has, too."""
+    """Return the flow between the enclaves of ``plan``; every enclave is a key.
+
+    ``built_in``: count what every node has, too.
+    """
     left_out = {path: frozenset() if built_in else plan.built_in(path) for path in plan.enclaves}
     return _graph({path: plan.enclaves[path] - left_out[path] for path in sorted(plan.enclaves)})
 
@@ -81,10 +84,10 @@ def reached_from(graph: FlowGraph, source: str) -> frozenset[str]:
 
 
 def opened_by_sharing(plan: PlanDocument) -> list[tuple[str, str, str]]:
-    """Flows that exist only because nodes share an enclave: (enclave, node that is influenced, node that then is).
+    """Return flows that exist only because nodes share an enclave.
 
-    In an enclave of its own the first node could not pass anything on to the second. Nodes of one process count as
-    one: no enclave separates them.
+    Each is (enclave, node that is influenced, node that then is): in an enclave of its own the first node could not
+    pass anything on to the second. Nodes of one process count as one: no enclave separates them.
     """
     units: dict[str, frozenset[GrantedName]] = {}
     for enclave in plan.enclaves:

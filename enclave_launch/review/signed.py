@@ -26,7 +26,7 @@ def as_signed(grants: Iterable[GrantedName]) -> frozenset[GrantedName]:
 
 
 def grants_of_rules(rules: Iterable[Rule]) -> frozenset[GrantedName]:
-    """Rules of a policy, read back from signed permissions, as the plan names them."""
+    """Read rules of a policy back from signed permissions, as the plan names them."""
     return frozenset(GrantedName(LIST_NAMES[rule.operation], rule.expression) for rule in rules)
 
 

@@ -37,7 +37,7 @@ class Split(NamedTuple):
 
 
 def merges(plan: PlanDocument, *, least_similarity: float = 0.5) -> list[Merge]:
-    """Pairs of enclaves that are alike, cheapest first. What every node has is left out of the comparison."""
+    """Return pairs of enclaves that are alike, cheapest first; what every node has is left out of the comparison."""
     own = {path: plan.own(path) for path in plan.enclaves}
     found = [
         Merge(one, two, len(own[one] & own[two]) / len(own[one] | own[two]), _excess(own, one, two))
@@ -49,7 +49,7 @@ def merges(plan: PlanDocument, *, least_similarity: float = 0.5) -> list[Merge]:
 
 
 def splits(plan: PlanDocument) -> list[Split]:
-    """Enclaves in which nodes may do what only others ask for, those that save most first."""
+    """Return enclaves in which nodes may do what only others request, those that save most first."""
     found = []
     for path in plan.enclaves:
         asked = plan.own(path)

@@ -138,7 +138,7 @@ def next_process_name(action: Any, context: Any, cmd: tuple[str, ...]) -> tuple[
 
 
 def location_in(context: Any, element: str) -> SourceLocation:
-    """Real launch keeps the file, no lines."""
+    """Return the file: real launch keeps no lines."""
     return SourceLocation(
         context.get_locals_as_dict().get("current_launch_file_path", "<program>"), 0, element
     )

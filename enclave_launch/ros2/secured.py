@@ -83,7 +83,7 @@ def _enclosed(
 
 
 def _read_secrets(launch: ProvisionedLaunch) -> Iterable[str]:
-    """Variables that the processes must not inherit from us; read now, for what --allow-late signs later."""
+    """Read variables that the processes must not inherit from us, now, for what --allow-late signs later."""
     for secret in (launch.options.access.passphrase, launch.options.access.pin):
         if secret is not None and secret.variable and secret.variable in os.environ:
             secret.value()

@@ -42,7 +42,7 @@ class RefusedParameters(ValueError):
 
 @lru_cache(maxsize=256)
 def sections_of_text(text: str) -> Mapping[str, Section]:
-    """Parameters by section name, later ones over earlier ones.
+    """Return parameters by section name, later ones over earlier ones.
 
     Raises ``RefusedParameters``, and ``yaml.YAMLError`` for what is not YAML.
     """
@@ -282,7 +282,7 @@ def _scalar_of(text: str, style: str, line: int) -> Scalar:
 
 
 def _why_no_section(name: str) -> str:
-    """Empty where the name is one that rcl takes: tokens of a full name, or wildcards for them."""
+    """Return why rcl does not take the name; empty for tokens of a full name, or wildcards for them."""
     if name.endswith("/"):
         return "the name of the node is empty"
     namespace, _, node = name.rpartition("/")

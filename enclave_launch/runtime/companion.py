@@ -51,7 +51,7 @@ class LaunchCompanion(Protocol):
     def happened(self, event: RunEvent) -> None: ...
 
     def loading(self, components: Sequence[ResolvedComponent]) -> None:
-        """Components are about to be loaded into a container that runs."""
+        """Prepare for components about to be loaded into a container that runs."""
         return
 
     async def closed(self) -> None: ...

@@ -90,7 +90,7 @@ class EnvironmentWatch:
         self._started.set()
 
     async def run(self) -> None:
-        """Until cancelled."""
+        """Run until cancelled."""
         pause = RAREST_LOOK
         while True:
             # Not wait_for: until Python 3.12 it loses a cancellation that comes together with what it waits for.

@@ -80,7 +80,7 @@ class LaunchLog:
             self._writers.screen.write(sink, lines)
 
     def show_less(self, less: bool) -> None:
-        """From now on the screen gets only what goes nowhere else; or everything again, and how much it lacks."""
+        """Give the screen only what goes nowhere else from now on; or everything again, and how much it lacks."""
         self._shows_less = less
         if not less and self._not_shown:
             missing, self._not_shown = self._not_shown, 0
@@ -114,8 +114,10 @@ class LaunchLog:
 
 @contextmanager
 def captured_logging(log: LaunchLog, ours: Callable[[], bool] = lambda: True) -> Iterator[None]:
-    """Within the block, what launch files and launch's own actions log (``launch.logging.get_logger``, and Python's
-    ``logging``) goes where the launch's own lines go, as far as it is ``ours`` and not another launch's."""
+    """Send what launch files and launch's own actions log to where the launch's own lines go, within the block.
+
+    That is ``launch.logging.get_logger`` and Python's ``logging``, as far as it is ``ours`` and not another launch's.
+    """
 
     class Forward(logging.Handler):
         def emit(self, record: logging.LogRecord) -> None:
@@ -211,8 +213,8 @@ def make_log_directory(base: Path, now: datetime, host: str, pid: int) -> Path:
 
 
 def _renew_latest(link: Path, directory: Path) -> None:
-    """Atomically, since other launches do the same; what is not a link is left alone, a failure is
-    passed over.
+    """Replace the link atomically, since other launches do the same; leave alone what is no link, pass over a
+    failure.
     """
     if link.exists() and not link.is_symlink():
         return

@@ -83,7 +83,7 @@ class LiveHost(BaseHost):
         return len(self._tasks)
 
     def write_parameter_file(self, text: str) -> str:
-        """Readable by us alone, and kept until the launch ends: a respawned node reads it again."""
+        """Write it readable by us alone, and keep it until the launch ends: a respawned node reads it again."""
         if self._parameter_directory is None:
             self._parameter_directory = Path(tempfile.mkdtemp(prefix="launch_params_"))
         path = self._parameter_directory / f"{len(self._parameter_files) + 1}.yaml"
@@ -143,7 +143,7 @@ class LiveHost(BaseHost):
         )
 
     def unforeseeable(self, item: Unforeseeable) -> None:
-        """Only a plan has to say so; here it simply happens."""
+        """Do nothing: only a plan has to say so, here it simply happens."""
 
     def warn(self, warning: Diagnostic) -> None:
         if warning not in self.warnings:

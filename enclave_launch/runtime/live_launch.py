@@ -121,7 +121,7 @@ class LiveLaunch:
         self._context: LaunchContext
 
     async def run(self) -> int:
-        """To its end; cancelling it shuts down, in order, before it returns. Gives the exit status.
+        """Run to its end; cancelling it shuts down, in order, before it returns. Return the exit status.
 
         :raises RuntimeFailure: before anything was started: no log directory, no rclpy where it is needed.
         """
@@ -332,7 +332,7 @@ class LiveLaunch:
         return 1 if self._failed or self._host.failed else 0
 
     def services(self) -> RosServices | None:
-        """Made when they are asked for; ``None`` for a launch that is known to need none.
+        """Make the services when they are requested; ``None`` for a launch that is known to need none.
 
         :raises RuntimeFailure: they are needed, and there is no rclpy.
         """

@@ -71,7 +71,7 @@ class LiveProcess:
             context.register_event_handler(handler)
 
     async def run(self) -> ProcessEnd:
-        """To its last exit; afterwards no handler of it is left, however often a launch starts something new."""
+        """Run to its last exit; afterwards no handler of it is left, however often a launch starts something new."""
         try:
             return await self._run()
         finally:

@@ -151,7 +151,7 @@ class Child:
         return self.started.done() and not self.exited.done()
 
     def signal(self, number: int, *, whole_group: bool = True) -> None:
-        """To its whole process group, or to it alone. Nothing happens once the process has ended."""
+        """Signal its whole process group, or it alone. Nothing happens once the process has ended."""
         if self.running:
             self._tree.send("signal" if whole_group else "signal_one", self.identifier, int(number))
 
@@ -274,7 +274,7 @@ class ProcessTree:
         self._children.pop(identifier, None)
 
     async def close(self) -> None:
-        """Ends the whole tree; returns when nothing of it is left."""
+        """End the whole tree; return when nothing of it is left."""
         self._channel.close()
         loop = asyncio.get_running_loop()
         await asyncio.shield(loop.run_in_executor(None, self._process.wait))
@@ -330,7 +330,7 @@ def _kept(opened: contextlib.ExitStack, pair: tuple[int, int]) -> tuple[int, int
 
 
 def _open_output(emulate_tty: bool) -> tuple[int, int]:
-    """Our end and the child's end of one output stream."""
+    """Open our end and the child's end of one output stream."""
     if not emulate_tty:
         return os.pipe()
     ours, theirs = os.openpty()

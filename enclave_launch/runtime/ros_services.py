@@ -164,7 +164,7 @@ class RosServices:
             self._node.destroy_client(client)
 
     def _wait(self, come: Callable[[], bool], what: str) -> bool:
-        """False when the launch ended first."""
+        """Wait; False if the launch ended first."""
         while not come():
             if self._closing.is_set():
                 self._tell("WARNING", f"Abandoning wait for the {what}, due to shutdown.")

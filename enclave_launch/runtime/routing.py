@@ -73,7 +73,7 @@ class OutputRouter:
         self._emit(stream, self._buffers[stream].feed(data))
 
     def flush(self) -> None:
-        """At the end of a process: a last line without a line end is a line too."""
+        """Pass on, at the end of a process, a last line without a line end."""
         for stream, buffer in self._buffers.items():
             self._emit(stream, buffer.flush())
 

@@ -160,7 +160,7 @@ class RunningLaunch:
         return self._service.warden_pid if self._service is not None else None
 
     def wait(self, timeout: float | None = None) -> int:
-        """Until all has ended. Returns the exit status.
+        """Wait until all has ended; return the exit status.
 
         :raises TimeoutError: after ``timeout`` seconds; the launch goes on.
         """
@@ -172,11 +172,12 @@ class RunningLaunch:
         return self._exit_status
 
     def wait_until(self, condition: Condition, timeout: float | None = None) -> None:
-        """Until ``condition(self)`` holds: ``started(...)``, ``printed(...)``, ``endpoint_seen(...)``, or one of your
-        own. It is asked whenever something happened.
+        """Wait until ``condition(self)`` holds: ``started(...)``, ``printed(...)``, ``endpoint_seen(...)``, or your
+        own.
 
-        :raises TimeoutError: after ``timeout`` seconds.
-        :raises RuntimeFailure: the launch ended before.
+        It is evaluated whenever something happened.
+
+        :raises TimeoutError: after ``timeout`` seconds. :raises RuntimeFailure: the launch ended before.
         """
         self._wait_for(lambda: condition(self) or self._is_over, timeout, "the condition does not hold")
         if not condition(self):

@@ -179,9 +179,7 @@ class SinkWriter:
 
 
 def _merged(batch: list[tuple[Sink, bytes]]) -> list[tuple[Sink, bytes]]:
-    """Neighbours that go to the same sink in one piece, in order of first appearance; order within a
-    sink is kept.
-    """
+    """Merge neighbours that go to the same sink, in order of first appearance; order within a sink is kept."""
     pieces: dict[Sink, list[bytes]] = {}
     for sink, data in batch:
         pieces.setdefault(sink, []).append(data)

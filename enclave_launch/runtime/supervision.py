@@ -28,7 +28,7 @@ LONGEST_PAUSE = 5.0  # seconds
 
 
 def pause_after(short_lives: int) -> float:
-    """Seconds to wait before the next start after so many lives below ``SHORT_LIFE`` in a row."""
+    """Return seconds to wait before the next start after so many lives below ``SHORT_LIFE`` in a row."""
     over = short_lives - TOLERATED
     return 0.0 if over <= 0 else min(LONGEST_PAUSE, 0.1 * 2.0 ** min(over - 1, 10))
 
@@ -107,7 +107,7 @@ class SupervisedProcess:
         return self._child
 
     async def run(self) -> ProcessEnd:
-        """From the first start to the last exit."""
+        """Run from the first start to the last exit."""
         retries = short_lives = 0
         clock = asyncio.get_running_loop().time
         try:
@@ -126,9 +126,7 @@ class SupervisedProcess:
             self._cancel_timers()
 
     def end(self, patience: Patience, *, quiet: bool = False) -> None:
-        """SIGINT now, SIGTERM and SIGKILL when it does not help. ``quiet``: the user knows, it was his
-        Ctrl-C.
-        """
+        """Send SIGINT now, SIGTERM and SIGKILL if it does not help. ``quiet``: the user pressed Ctrl-C and knows."""
         if self._ending.is_set():
             return
         self._ending.set()

@@ -62,7 +62,7 @@ class Survivors:
                     os.waitpid(pid, os.WNOHANG)
 
     def close(self) -> None:
-        """Once nothing of the launch is left."""
+        """Stop reaping, once nothing of the launch is left."""
         _wardens.discard(self._warden)
         self._reaping.__exit__(None, None, None)
         if self._cgroup is not None:
@@ -74,7 +74,7 @@ class Survivors:
 
 
 def _has_ended(child: int) -> bool:
-    """Has ``child`` ended, whoever has reaped it or will? It stays as it is."""
+    """Return whether ``child`` has ended, whoever has reaped it or will. It stays as it is."""
     try:
         return os.waitid(os.P_PID, child, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None
     except ChildProcessError:
@@ -86,7 +86,7 @@ _wardens: set[int] = set()  # of every launch that runs in this program
 
 @contextlib.contextmanager
 def _subreaper() -> Iterator[None]:
-    """Processes below us that lose their parent become our children; not told where there is no prctl."""
+    """Become the parent of processes below us that lose theirs; says nothing if there is no prctl."""
     libc = load_libc()
     if libc is None:
         yield

@@ -65,7 +65,7 @@ ABANDONED = ((signal.SIGINT, 2.0), (signal.SIGTERM, 2.0), (signal.SIGKILL, 5.0))
 
 
 def prctl(option: int, value: int) -> None:
-    """Linux only; elsewhere process groups must do."""
+    """Call prctl(2). Linux only; elsewhere process groups must do."""
     if LIBC is not None:
         LIBC.prctl(option, value, 0, 0, 0)
 
@@ -91,7 +91,7 @@ class Terminal:
         self.waiting: list[int] = []
 
     def lend(self, group: int) -> None:
-        """To ``group`` now, or once the present holder has ended."""
+        """Lend it to ``group`` now, or once the present holder has ended."""
         if self.holder not in (0, group):
             self.waiting.append(group)
             return
@@ -101,7 +101,7 @@ class Terminal:
             os.killpg(group, signal.SIGCONT)
 
     def ended(self, group: int) -> bool:
-        """Was it the holder's? Then the next one gets the terminal, else the launcher has it back."""
+        """Give the terminal to the next one if it was the holder's, else the launcher has it back."""
         self.waiting = [other for other in self.waiting if other != group]
         if self.holder != group:
             return False
@@ -147,7 +147,7 @@ class Warden:
                 return
 
     def receive(self) -> bool:
-        """False once the launcher is gone."""
+        """Receive a message; False once the launcher is gone."""
         space = socket.CMSG_SPACE(16 * array.array("i").itemsize)
         try:
             data, ancillary, _, _ = self.connection.recvmsg(1 << 16, space, socket.MSG_CMSG_CLOEXEC)
@@ -219,7 +219,7 @@ class Warden:
         self.send("started", identifier, pid)
 
     def signal_group(self, identifier: int, number: int) -> None:
-        """Only while the leader is not reaped: until then its number cannot belong to anybody else."""
+        """Signal while the leader is not reaped: until then its number cannot belong to anybody else."""
         pid = self.pids.get(identifier)
         if pid is None:
             return
@@ -234,7 +234,7 @@ class Warden:
             kill_all({pid}, number)
 
     def sweep(self, leader: int) -> None:
-        """SIGKILL to what a child left running in its session, or group, when it ended."""
+        """Send SIGKILL to what a child left running in its session, or group, when it ended."""
         if leader not in self.identifiers:
             belongs = os.getsid if self.terminal is None else os.getpgid
             left = {pid for pid in descendants(os.getpid()) if group_of(belongs, pid) == leader}
@@ -319,7 +319,7 @@ def become(program: list[Any], streams: list[int], report: int, parent: int, *, 
 
 
 def move_above(streams: list[int]) -> list[int]:
-    """Descriptors 0 to 2 are about to be overwritten: copy any that sit there."""
+    """Copy any descriptor 0 to 2 that sits there: they are about to be overwritten."""
     return [
         fcntl.fcntl(descriptor, fcntl.F_DUPFD_CLOEXEC, 3) if descriptor < 3 else descriptor
         for descriptor in streams
@@ -355,7 +355,9 @@ def children_by_parent() -> dict[int, set[int]]:
 
 
 def proc_is_ours() -> bool:
-    """Does /proc show our PID namespace? In a new one it may still be that of the old, where numbers mean others."""
+    """Return whether /proc shows our PID namespace. In a new one it may be that of the old, where numbers mean
+    others.
+    """
     try:
         return os.readlink("/proc/self") == str(os.getpid())
     except OSError:
@@ -377,7 +379,7 @@ def descendants(root: int, children: Mapping[int, set[int]] | None = None) -> se
 
 
 def set_oom_score(score: str) -> None:
-    """Raising one's own score is always allowed, lowering it takes a privilege (proc(5), oom_score_adj)."""
+    """Set it. Raising one's own score is always allowed, lowering it takes a privilege (proc(5), oom_score_adj)."""
     with contextlib.suppress(OSError), open("/proc/self/oom_score_adj", "w", encoding="ascii") as file:
         file.write(score)
 

@@ -47,7 +47,7 @@ exit status: 0 all ended well, 1 something failed (or a process could not be sec
 
 
 def names_of(options: Iterable[Option]) -> frozenset[str]:
-    """By which the parsed values of options without a short form go."""
+    """Return the names by which the parsed values of options without a short form go."""
     return frozenset(written.split()[0].lstrip("-").replace("-", "_") for written, *_ in options)
 
 
@@ -187,7 +187,7 @@ def build_parser() -> argparse.ArgumentParser:
 
 
 def add_security_options(group: argparse._ArgumentGroup) -> None:
-    """Also those of ``ros2 launch``, see ``ros2.option``."""
+    """Add options that are also those of ``ros2 launch``, see ``ros2.option``."""
     add_options(group, SECURITY)
     keystore = os.environ.get("ROS_SECURITY_KEYSTORE")
     for action in group._group_actions:

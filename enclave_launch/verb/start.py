@@ -30,7 +30,7 @@ from keystore.formats.validity import utc_now
 
 
 def launch_target(target: LaunchTarget, options: argparse.Namespace, keystore: str | None) -> int:
-    """Learn from, audit or start ``target``, as the options say. Returns the exit status."""
+    """Learn from, audit or start ``target``, as the options say. Return the exit status."""
     if options.learn is not None:
         from enclave_launch.verb.learn import learn_launch  # an add-on: recording
 
@@ -67,7 +67,7 @@ def start(
 def _launch_plainly(
     target: LaunchTarget, options: argparse.Namespace, companion: LaunchCompanion | None = None
 ) -> int:
-    """Without enclaves nobody has to know what the nodes say to each other."""
+    """Launch without enclaves: nobody has to know what the nodes say to each other."""
     launch = launch_source(target.launch_file, target.arguments, options=resolve_options(options))
     print(f"secure-launch: {unsecured_notice(os.environ)}", file=sys.stderr)
     return run(launch, options=_run_settings(options)._replace(companion=companion))

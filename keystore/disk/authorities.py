@@ -13,8 +13,7 @@ from keystore.formats.role import Role
 
 
 def foreign_authorities(view: KeystoreView, register: Register | None) -> list[tuple[Role, CertificateFacts]]:
-    """Trusted CAs that this keystore did not make and was not given, or has retired; none can be told without a
-    register."""
+    """Return trusted CAs that this keystore neither made nor was given, or has retired; none without a register."""
     if register is None:
         return []
     return [
@@ -36,7 +35,7 @@ def refuse_foreign_authorities(view: KeystoreView, register: Register | None) ->
 
 
 def describe(ca: CertificateFacts) -> str:
-    """Its name and the SHA-256 fingerprint that openssl and browsers show."""
+    """Return its name and the SHA-256 fingerprint that openssl and browsers show."""
     digest = hashlib.sha256(ca.der).hexdigest().upper()
     pairs = ":".join(digest[at : at + 2] for at in range(0, len(digest), 2))
     return f"{printable(ca.common_name or 'without a common name')}, SHA-256 {pairs}"

@@ -8,7 +8,7 @@ from keystore.disk.view import KeystoreView
 
 
 def refresh_copies(opened: Store) -> None:
-    """After a change of trust anchors or governance; links need nothing, so this mostly only looks."""
+    """Copy trust anchors and the governance again after a change; links need nothing, so this mostly only looks."""
     view = KeystoreView(opened.root)
     stale = [
         (f"{layout.enclave_directory(enclave)}/{name}", target, layout.link_source(name))

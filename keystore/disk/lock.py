@@ -42,7 +42,7 @@ def exclusive(root: Path, timeout: float = DEFAULT_TIMEOUT) -> Iterator[None]:
 
 
 def _locked(root: Path, timeout: float, deadline: float) -> int | None:
-    """The locked descriptor; None when somebody removed or replaced the file meanwhile, so that others lock it."""
+    """Return the locked descriptor; None if somebody removed or replaced the file meanwhile, so that others lock it."""
     path = root / layout.LOCK
     try:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
@@ -61,7 +61,7 @@ def _locked(root: Path, timeout: float, deadline: float) -> int | None:
 
 
 def _refuse_strange(path: Path, info: os.stat_result) -> None:
-    """We write in it: a hard link would make that another file of ours."""
+    """Refuse a hard link: we write in the file, and it would be another file of ours."""
     if not stat.S_ISREG(info.st_mode) or info.st_nlink > 1:
         raise UnsafeKeystoreError(
             f"{printable(path)} is not a file of its own, but a device or a hard link; "
@@ -99,7 +99,10 @@ def _busy(descriptor: int, root: Path, timeout: float) -> KeystoreBusyError:
 
 
 def _sign_in(descriptor: int) -> None:
-    """The program's name, never its arguments. Best effort: a full disk must not keep anyone from reading."""
+    """Write the program's name, never its arguments.
+
+    Best effort: a full disk must not keep anyone from reading.
+    """
     program = os.path.basename(sys.argv[0] if sys.argv else "python")
     text = f"{program} (pid {os.getpid()} on {socket.gethostname()}) since {iso(utc_now())}\n"
     try:

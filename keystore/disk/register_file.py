@@ -17,7 +17,8 @@ _parsed = lru_cache(maxsize=2)(parse_register)
 
 
 def read_register(root: Path) -> Register | None:
-    """None where there is none: a bundle without ``private/``, a keystore of SROS2 or of an earlier version.
+    """Read the register; None if there is none: a bundle without ``private/``, a keystore of SROS2 or of an earlier
+    version.
 
     Raises DamagedKeystoreError for what is not a register, UnsafeKeystoreError for one that others could have
     written.
@@ -29,7 +30,7 @@ def read_register(root: Path) -> Register | None:
 
 
 def needs_register(view: KeystoreView) -> bool:
-    """Whether this keystore issues but has no register: SROS2 made it, or an earlier version."""
+    """Return whether this keystore issues but has no register: SROS2 made it, or an earlier version."""
     return (
         not os.path.lexists(view.root / layout.REGISTER)
         and all(os.path.isfile(view.root / layout.ca_cert(role)) for role in Role)

@@ -35,8 +35,10 @@ def resolve_root(keystore: Path | str) -> Path:
 
 
 def read(root: Path, relative: str) -> bytes:
-    """The content of a keystore file; raises DamagedKeystoreError when it is missing, UnsafeKeystoreError for a strange
-    link, StorageError otherwise."""
+    """Read a keystore file.
+
+    Raises DamagedKeystoreError if it is missing, UnsafeKeystoreError for a strange link, StorageError otherwise.
+    """
     try:
         return _read(root, relative)
     except FileNotFoundError:
@@ -46,7 +48,7 @@ def read(root: Path, relative: str) -> bytes:
 
 
 def read_if_there(root: Path, relative: str) -> bytes | None:
-    """As ``read``, None when there is no such file (a dangling link counts as none)."""
+    """Read as ``read``; None if there is no such file (a dangling link counts as none)."""
     try:
         return _read(root, relative)
     except (FileNotFoundError, NotADirectoryError):
@@ -56,13 +58,13 @@ def read_if_there(root: Path, relative: str) -> bytes | None:
 
 
 def read_private(root: Path, relative: str) -> bytes:
-    """As ``read``, for key material: also refuses foreign owners and files that others can write."""
+    """Read key material as ``read``; also refuse foreign owners and files that others can write."""
     refuse_unsafe_private(root, relative)
     return read(root, relative)
 
 
 def _read(root: Path, relative: str) -> bytes:
-    """Text paths, not ``Path``: this runs a few hundred times before a launch."""
+    """Read by text paths, not ``Path``: this runs a few hundred times before a launch."""
     descriptor = _open(root, relative)
     try:
         info = os.fstat(descriptor)
@@ -80,7 +82,7 @@ def _read(root: Path, relative: str) -> bytes:
 
 
 def _open(root: Path, relative: str) -> int:
-    """Links are followed only where SROS2 has them; O_NONBLOCK keeps a planted FIFO from hanging us."""
+    """Open a file; follow links only where SROS2 has them. O_NONBLOCK keeps a planted FIFO from hanging us."""
     flags = os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK
     try:
         return os.open(f"{root}/{relative}", flags | os.O_NOFOLLOW)
@@ -94,7 +96,7 @@ def _open(root: Path, relative: str) -> int:
 
 
 def strange_link(root: Path, relative: str, target: str) -> UnsafeKeystoreError:
-    """The error for a link that no keystore has, with the command that removes it."""
+    """Return the error for a link that no keystore has, with the command that removes it."""
     path = root / relative
     return UnsafeKeystoreError(
         f"{printable(path)} is a link to {printable(target)}, which no keystore has there; "
@@ -103,7 +105,7 @@ def strange_link(root: Path, relative: str, target: str) -> UnsafeKeystoreError:
 
 
 def link_target(root: Path, relative: str) -> str | None:
-    """Where the file points if it is a link, else None (also when it does not exist)."""
+    """Return where the file points if it is a link, else None (also if it does not exist)."""
     try:
         return os.readlink(f"{root}/{relative}")
     except OSError:
@@ -111,7 +113,7 @@ def link_target(root: Path, relative: str) -> str | None:
 
 
 def allowed_targets(relative: str) -> tuple[str, ...]:
-    """Every link target that may stand at this place of a keystore."""
+    """Return every link target that may stand at this place of a keystore."""
     if relative in layout.CA_LINKS:
         return (layout.CA_LINKS[relative],)
     directory, _, name = relative.rpartition("/")
@@ -123,7 +125,7 @@ def allowed_targets(relative: str) -> tuple[str, ...]:
 
 
 def refuse_unsafe_private(root: Path, relative: str) -> None:
-    """Key files and the directory they are in must be ours, and writable by nobody else."""
+    """Refuse a key file if it or its directory is not ours, or others can write it."""
     path = root / relative
     try:
         found = (path.parent, os.lstat(path.parent)), (path, os.stat(path))
@@ -135,7 +137,9 @@ def refuse_unsafe_private(root: Path, relative: str) -> None:
 
 
 def refuse_unsafe_private_directories(root: Path) -> None:
-    """What waits in ``private/`` is installed as a CA, what is retired there is trusted: nobody else may add to it."""
+    """Refuse ``private/`` if somebody else may add to it: what waits there becomes a CA, what is retired there is
+    trusted.
+    """
     for relative in (layout.PRIVATE, *layout.PRIVATE_FOLDERS):
         path = root / relative
         if not os.path.lexists(path):
@@ -150,7 +154,7 @@ def refuse_unsafe_private_directories(root: Path) -> None:
 
 
 def private_problem(path: Path | str, info: os.stat_result) -> str | None:
-    """What is wrong with the owner or mode of a private file or directory, with the repairing command."""
+    """Return what is wrong with the owner or mode of a private file or directory, with the command that repairs it."""
     if info.st_uid == os.geteuid() and not info.st_mode & _WRITABLE_BY_OTHERS:
         return None
     if info.st_uid != os.geteuid():
@@ -164,12 +168,12 @@ def private_problem(path: Path | str, info: os.stat_result) -> str | None:
 
 
 def close_to_others(root: Path) -> str:
-    """One command for all that SROS2 leaves under the usual umask 002."""
+    """Return one command for all that SROS2 leaves under the usual umask 002."""
     return f"chmod -R go-w {shlex.quote(str(root))}"
 
 
 def private_repair(path: Path | str, info: os.stat_result) -> str:
-    """The command that makes ``path`` ours (someone else owns it) or closes it to others."""
+    """Return the command that makes ``path`` ours (if someone else owns it) or closes it to others."""
     quoted = shlex.quote(str(path))
     if info.st_uid != os.geteuid():
         return f"chown -R {os.geteuid()} {quoted}"
@@ -177,7 +181,7 @@ def private_repair(path: Path | str, info: os.stat_result) -> str:
 
 
 def refuse_unsafe_directory(path: Path) -> None:
-    """A directory we are about to write in: a real one, ours, and not open to everybody."""
+    """Refuse to write in a directory that is a link, not ours, or open to everybody."""
     try:
         info = os.lstat(path)
     except OSError as error:
@@ -194,7 +198,7 @@ def refuse_unsafe_directory(path: Path) -> None:
 
 
 def refuse_unsafe_parent(root: Path) -> None:
-    """Whoever can rename the keystore can replace it: its parent must not be open without the sticky bit."""
+    """Refuse a parent that is open without the sticky bit: who can rename the keystore can replace it."""
     info = os.stat(root.parent)
     if info.st_mode & stat.S_IWOTH and not info.st_mode & stat.S_ISVTX:
         raise UnsafeKeystoreError(
@@ -204,5 +208,5 @@ def refuse_unsafe_parent(root: Path) -> None:
 
 
 def mode_text(info: os.stat_result) -> str:
-    """The permission bits as ``chmod`` takes them: ``0600``."""
+    """Render the permission bits as ``chmod`` takes them: ``0600``."""
     return f"{stat.S_IMODE(info.st_mode):04o}"

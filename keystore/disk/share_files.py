@@ -18,7 +18,7 @@ from keystore.formats.shares import Share, parse_shares
 
 
 def read_shares(root: Path, enclave: str) -> tuple[Share, ...]:
-    """By owner; empty for an enclave that no launch asked for, and on a host that issues nothing."""
+    """Read the shares by owner; none for an enclave that no launch requested, and on a host that issues nothing."""
     relative = layout.shares(enclave)
     text = safe_files.read_if_there(root, relative)
     if text is None:
@@ -29,7 +29,7 @@ def read_shares(root: Path, enclave: str) -> tuple[Share, ...]:
 
 
 def enclaves_with_shares(root: Path) -> Iterator[str]:
-    """Sorted names of the enclaves that launches have shares of."""
+    """Return the sorted names of the enclaves that launches have shares of."""
     try:
         names = os.listdir(root / layout.SHARES)
     except (FileNotFoundError, NotADirectoryError, PermissionError):
@@ -62,14 +62,16 @@ class LaunchHold:
         self._descriptor = descriptor
 
     def take(self) -> None:
-        """Repeatable; does nothing where no lock can be: no keystore yet, a bundle, a keystore that others own."""
+        """Take the lock, repeatedly if need be; do nothing where no lock can be: no keystore yet, a bundle, a
+        keystore that others own.
+        """
         if self._descriptor is None:
             self._descriptor = _open(self.root, self.owner, os.O_RDWR | os.O_CREAT)
             if self._descriptor is not None:
                 fcntl.flock(self._descriptor, fcntl.LOCK_SH)
 
     def is_alone(self) -> bool:
-        """Whether nobody else holds the same launch."""
+        """Return whether nobody else holds the same launch."""
         if self._descriptor is None:
             return not is_running(self.root, self.owner)
         try:
@@ -90,7 +92,7 @@ class LaunchHold:
 
 
 def is_running(root: Path, owner: str) -> bool:
-    """Whether a process holds ``owner``; a ``LaunchHold`` of our own counts too."""
+    """Return whether a process holds ``owner``; a ``LaunchHold`` of our own counts too."""
     descriptor = _open(root, owner, os.O_RDWR)
     if descriptor is None:
         return False
@@ -104,7 +106,7 @@ def is_running(root: Path, owner: str) -> bool:
 
 
 def _open(root: Path, owner: str, flags: int) -> int | None:
-    """None where there is no such file, or none can be made: a bundle, a keystore that others own."""
+    """Open the file; None if there is none and none can be made: a bundle, a keystore that others own."""
     if not os.path.isdir(root / layout.PRIVATE):
         return None
     path = f"{root}/{layout.SHARES}/{binascii.crc32(os.fsencode(owner)):08x}.lock"

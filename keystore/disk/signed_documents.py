@@ -74,7 +74,7 @@ def trusted_document(view: KeystoreView, relative: str) -> bytes:
 
 
 def own_permissions_cas(view: KeystoreView) -> Iterator[CertificateFacts]:
-    """The permissions CAs of this keystore: those in force, a shared one, and retired ones."""
+    """Return the permissions CAs of this keystore: those in force, a shared one, and retired ones."""
     yield from view.ca_bundle(Role.PERMISSIONS)
     names = [layout.SHARED_CA_CERT]
     if os.path.isdir(view.root / layout.RETIRED):

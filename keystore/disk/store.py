@@ -51,7 +51,7 @@ class Link:
 
 
 def enclave_links(enclave: str, *, crl: bool) -> dict[str, Link]:
-    """As ``layout.enclave_links``, ready to be written."""
+    """Return ``layout.enclave_links``, ready to be written."""
     links = layout.enclave_links(enclave, crl=crl)
     return {name: Link(target, layout.link_source(name)) for name, target in links.items()}
 
@@ -75,7 +75,7 @@ class Store:
 
     @contextmanager
     def batch(self) -> Iterator[Batch]:
-        """Changes that become visible together at the end of the block, or not at all if it raises."""
+        """Collect changes that become visible together at the end of the block, or not at all if it raises."""
         batch = Batch(self)
         try:
             yield batch
@@ -140,7 +140,7 @@ class Store:
         return True
 
     def sync_directories(self, directories: set[str]) -> None:
-        """After renames and removals: make the new names durable."""
+        """Make new names durable after renames and removals."""
         if not self._durable:
             return
         if len(directories) > _SYNC_EACH and _sync_file_system(self.root):
@@ -177,7 +177,7 @@ class Batch:
         self._add(target, link)
 
     def directory(self, target: str, entries: Mapping[str, Content | Link]) -> None:
-        """A directory's files. A new directory appears at once; in an old one each is replaced."""
+        """Write a directory's files. A new directory appears at once; in an old one each is replaced."""
         if self._store.is_directory(target):
             for name, entry in entries.items():
                 self._add(f"{target}/{name}", entry)
@@ -197,7 +197,7 @@ class Batch:
         self._moves.append((place, target))
 
     def _place(self) -> str:
-        """A name in the staging area; text, not ``Path``, because there are thousands."""
+        """Return a name in the staging area; text, not ``Path``, because there are thousands."""
         if not self._moves:
             os.mkdir(self._staging, 0o700)
         return f"{self._staging}/{len(self._moves)}"
@@ -295,7 +295,7 @@ def _clear_staging(root: Path) -> None:
 
 
 def _try_link(target: str, place: str) -> bool:
-    """False where the file system has no symbolic links (FAT, some network shares)."""
+    """Make a link; False if the file system has no symbolic links (FAT, some network shares)."""
     try:
         os.symlink(target, place)
     except OSError as error:
@@ -318,7 +318,7 @@ def _fsync_path(path: Path | str) -> None:
 
 
 def _sync_file_system(path: Path) -> bool:
-    """syncfs(2) of the file system that holds ``path``; False where there is none, so that fsync must do."""
+    """Call syncfs(2) for the file system that holds ``path``; False if there is none, so that fsync must do."""
     syncfs = getattr(ctypes.CDLL(None, use_errno=True), "syncfs", None)
     if syncfs is None:
         return False

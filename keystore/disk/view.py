@@ -39,7 +39,9 @@ _OWN_ENTRIES = frozenset({
 
 
 def keystore_at(keystore: Path | str) -> KeystoreView:
-    """The keystore at that path, links resolved. Raises NotAKeystoreError for what is none, or not a complete one."""
+    """Open the keystore at that path, links resolved; raises NotAKeystoreError for what is none, or not a complete
+    one.
+    """
     view = KeystoreView(safe_files.resolve_root(keystore))
     view.require_complete()
     return view
@@ -94,7 +96,7 @@ class KeystoreView:
         return KeystoreSettings.from_json(text, str(self.root / layout.SETTINGS))
 
     def ca_bundle(self, role: Role) -> list[CertificateFacts]:
-        """All certificates of a trust anchor file, the one in use first."""
+        """Return all certificates of a trust anchor file, the one in use first."""
         return self._bundles[role]
 
     def ca(self, role: Role) -> CertificateFacts:
@@ -121,12 +123,12 @@ class KeystoreView:
         return self.ca(Role.IDENTITY).public_key == self.ca(Role.PERMISSIONS).public_key
 
     def key_file(self, role: Role) -> str | None:
-        """The file with the CA's key or token URI, None on a machine that does not hold it."""
+        """Return the file with the CA's key or token URI; None on a machine that does not hold it."""
         candidates = (layout.ca_key_uri(role), layout.ca_key(role))
         return next((name for name in candidates if os.path.lexists(self.root / name)), None)
 
     def authority(self, role: Role, access: CaAccess) -> Authority:
-        """The CA ready to sign; raises SigningUnavailableError where its key is not, or does not open."""
+        """Return the CA ready to sign; raises SigningUnavailableError if its key is not here, or does not open."""
         name = self.key_file(role)
         if name is None:
             raise SigningUnavailableError(
@@ -151,11 +153,11 @@ class KeystoreView:
         return [name for name in self.enclaves() if os.path.lexists(self.root / layout.zenoh_session(name))]
 
     def has_request(self, enclave: str) -> bool:
-        """Whether the enclave's key was made on its host: here is only the request that was signed."""
+        """Return whether the enclave's key was made on its host: here is only the request that was signed."""
         return os.path.lexists(self.root / layout.request(enclave))
 
     def common_name(self, enclave: str) -> str | None:
-        """Of the certificate that an enclave has; None without one."""
+        """Return the common name of the certificate that an enclave has; None without one."""
         relative = f"{layout.enclave_directory(enclave)}/{layout.CERT}"
         pem = safe_files.read_if_there(self.root, relative)
         return read_certificate(pem, printable(relative)).common_name if pem else None
@@ -169,7 +171,9 @@ class KeystoreView:
             )
 
     def matching(self, patterns: Iterable[str]) -> list[str]:
-        """Enclaves that fit a pattern (``/robot1/*``). Raises InvalidInputError for a pattern that none fits."""
+        """Return the enclaves that match patterns (``/robot1/*``); raises InvalidInputError for a pattern that none
+        matches.
+        """
         names, fitting = self.enclaves(), set[str]()
         for pattern in patterns:
             found = [name for name in names if fnmatchcase(name, pattern)]
@@ -181,7 +185,7 @@ class KeystoreView:
         return [name for name in names if name in fitting]
 
     def enclave_file(self, enclave: str, name: str) -> bytes | None:
-        """A public file of an enclave, ``None`` where it has none."""
+        """Return a public file of an enclave; None if it has none."""
         return safe_files.read_if_there(self.root, f"{layout.enclave_directory(enclave)}/{name}")
 
     def enclaves(self) -> list[str]:

@@ -81,7 +81,7 @@ class CertificateFacts:
         return self.certificate.public_key().public_bytes(Encoding.DER, PublicFormat.SubjectPublicKeyInfo)
 
     def extension(self, kind: type[_Extension]) -> _Extension | None:
-        """The extension of that class; None without one."""
+        """Return the extension of that class; None without one."""
         try:
             return self.certificate.extensions.get_extension_for_class(kind).value
         except x509.ExtensionNotFound:
@@ -103,7 +103,7 @@ class CertificateFacts:
 
 
 def moment(value: Any, name: str) -> datetime:
-    """A date of a certificate or CRL; cryptography before 42 gives those of RFC 5280, which are UTC, without a zone."""
+    """Return a date of a certificate or CRL as UTC; cryptography before 42 gives those of RFC 5280 without a zone."""
     if hasattr(value, f"{name}_utc"):
         found: datetime = getattr(value, f"{name}_utc")
         return found
@@ -125,7 +125,7 @@ def read_der(data: bytes) -> CertificateFacts:
 
 
 def _complete(certificate: x509.Certificate) -> CertificateFacts:
-    """``cryptography`` reads fields when they are asked for: ask for each."""
+    """Read every field: ``cryptography`` reads each only when it is requested."""
     facts = CertificateFacts(certificate)
     _ = facts.issuer, facts.subject, facts.validity, facts.public_key
     _ = certificate.extensions, certificate.signature_hash_algorithm
@@ -158,7 +158,7 @@ def read_certificates(pem: bytes, place: str) -> list[CertificateFacts]:
 
 @lru_cache(maxsize=2048)  # a launch asks for the same files before each of its processes
 def _read_all(pem: bytes) -> tuple[CertificateFacts, ...]:
-    """Every certificate of ``pem``; none where one of them cannot be read."""
+    """Read every certificate of ``pem``; none if one of them cannot be read."""
     try:
         return tuple(_read_block(block) for block in _BLOCK.findall(pem))
     except ValueError:

@@ -49,7 +49,7 @@ class Domains(_Ranges):
 
     @classmethod
     def parse(cls, text: str) -> Domains:
-        """``0``, ``0-10``, ``0,5,7-9`` or ``all``. Raises ``InvalidInputError``."""
+        """Parse ``0``, ``0-10``, ``0,5,7-9`` or ``all``; raises ``InvalidInputError``."""
         if text.strip() == "all":
             return cls.every()
         ranges = []
@@ -61,7 +61,7 @@ class Domains(_Ranges):
         return cls(tuple(ranges))
 
     def covers(self, other: Domains) -> bool:
-        """Whether every domain of ``other`` is among these."""
+        """Return whether every domain of ``other`` is among these."""
         return all(
             any(low <= first and last <= high for low, high in self.ranges) for first, last in other.ranges
         )
@@ -70,7 +70,7 @@ class Domains(_Ranges):
         return ",".join(_text(first, last) for first, last in self.ranges)
 
     def xml(self) -> str:
-        """The ``domains`` element of governance and permissions, one line, no blanks in leaves."""
+        """Render the ``domains`` element of governance and permissions: one line, no blanks in leaves."""
         return f"<domains>{''.join(_element(first, last) for first, last in self.ranges)}</domains>"
 
 

@@ -59,7 +59,7 @@ def _differences(name: str) -> str:
 
 
 def segments(name: str) -> tuple[str, ...]:
-    """The path segments of a valid name: ``/a/b`` has two, the root ``/`` none."""
+    """Split a valid name into path segments: ``/a/b`` has two, the root ``/`` none."""
     return tuple(name[1:].split("/")) if name != "/" else ()
 
 

@@ -11,7 +11,7 @@ MAX_BYTES = 200_000
 
 
 def read_given(path: Path) -> bytes:
-    """Its bytes. Raises InvalidInputError for what cannot be read, or is larger than ``MAX_BYTES``."""
+    """Read its bytes; raises InvalidInputError for what cannot be read, or is larger than ``MAX_BYTES``."""
     try:
         return read_bytes(path, MAX_BYTES)
     except OSError as error:

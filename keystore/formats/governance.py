@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, fields, replace
 from enum import Enum
+from html import escape
 from typing import TYPE_CHECKING, Any
 
 from keystore.errors import InvalidInputError, printable
@@ -98,15 +99,17 @@ class Governance:
 
     @classmethod
     def for_domains(cls, domains: Domains) -> Governance:
-        """SROS2's default for these domains."""
+        """Return SROS2's default for these domains."""
         return cls((DomainRule(domains=domains),))
 
     def domains(self) -> Domains:
-        """All domains with a rule; in any other Cyclone DDS refuses the participant."""
+        """Return all domains with a rule; in any other Cyclone DDS refuses the participant."""
         return Domains(tuple(part for rule in self.domain_rules for part in rule.domains.ranges))
 
     def extended_to(self, domains: Domains) -> Governance:
-        """The same rules for more domains; only unambiguous with a single rule, else raises NoGovernanceRuleError."""
+        """Return the same rules for more domains; only unambiguous with a single rule, else raises
+        NoGovernanceRuleError.
+        """
         if len(self.domain_rules) != 1:
             raise NoGovernanceRuleError(
                 domains,
@@ -126,7 +129,7 @@ _HEAD = (
 
 
 def governance_document(governance: Governance) -> bytes:
-    """Canonical XML (UTF-8, LF, no blanks in values), the form both implementations read alike."""
+    """Render canonical XML (UTF-8, LF, no blanks in values), the form both implementations read alike."""
     rules = "".join(_domain_rule(rule) for rule in governance.domain_rules)
     return f"{_HEAD}{rules}</domain_access_rules>\n</dds>\n".encode()
 
@@ -151,8 +154,7 @@ def _leaf(name: str, value: bool | str | Protection) -> str:
     else:
         text = value.value if isinstance(value, Protection) else value
     # Only a topic expression could hold a character that XML reserves.
-    escaped = text.replace("&", "&amp;").replace("<", "&lt;").replace(">", "&gt;")
-    return f"<{name}>{escaped}</{name}>\n"
+    return f"<{name}>{escape(text, quote=False)}</{name}>\n"
 
 
 DOMAIN_SETTINGS = tuple(
@@ -163,7 +165,7 @@ TOPIC_SETTINGS = tuple(each.name for each in fields(TopicRule) if each.name != "
 
 
 def parse_governance(document: bytes, where: str) -> Governance:
-    """A governance document, ours or SROS2's, as values. Raises InvalidInputError with file:line."""
+    """Parse a governance document, ours or SROS2's; raises InvalidInputError with file:line."""
     root = parse_xml(document, where)
     check_schema(root, "governance.xsd", where, "DDS governance document")
     return Governance(tuple(_read_rule(element) for element in root.iter("domain_rule")))

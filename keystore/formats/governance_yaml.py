@@ -65,7 +65,7 @@ def load_governance_yaml(path: Path) -> Governance:
 
 
 def governance_of(path: Path) -> Governance:
-    """A governance as a person keeps it: our YAML, or the XML that is signed. Raises InvalidInputError."""
+    """Read a governance as a person keeps it: our YAML, or the XML that is signed; raises InvalidInputError."""
     if path.suffix == ".xml":
         return parse_governance(read_given(path), str(path))
     return load_governance_yaml(path)

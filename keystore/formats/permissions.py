@@ -17,6 +17,7 @@ from __future__ import annotations
 
 from datetime import datetime
 from functools import lru_cache
+from html import escape
 from typing import NamedTuple
 
 from keystore.errors import printable
@@ -65,10 +66,10 @@ class DdsRules(NamedTuple):
 def permissions_document(
     subject: str, policy: EnclavePolicy, *, validity: Validity, domains: Domains, rmw: str | None = None
 ) -> bytes:
-    """The permissions document (UTF-8, LF) for the certificate with this ``subject`` (``CN=/talker``).
+    """Render the permissions document (UTF-8, LF) for the certificate with this ``subject`` (``CN=/talker``).
 
-    ``validity`` is the certificate's. Raises ``PolicyError`` for a name that no ROS node can have and
-    for a wildcard outside the subset that all DDS implementations read alike.
+    ``validity`` is the certificate's. Raises ``PolicyError`` for a name that no ROS node can have and for a wildcard
+    outside the subset that all DDS implementations read alike.
     """
     rules = dds_rules(policy, rmw=rmw)
     domain_set = domains.xml()
@@ -87,7 +88,7 @@ def permissions_document(
 
 
 def dds_rules(policy: EnclavePolicy, *, rmw: str | None = None) -> DdsRules:
-    """All profiles of the enclave as one set of DDS rules; DENY of any beats ALLOW of any."""
+    """Join all profiles of the enclave to one set of DDS rules; DENY of any beats ALLOW of any."""
     allowed: tuple[set[str], set[str]] = (set(), set())
     denied: tuple[set[str], set[str]] = (set(), set())
     allow = Qualifier.ALLOW
@@ -138,7 +139,7 @@ _VERB = ("publish", "subscribe to")
 
 
 def _other_direction(denial: str, granted: set[str], denied: set[str]) -> tuple[set[str], list[str]]:
-    """What to grant once more before ``denial`` of the opposite direction, and grants it may still block."""
+    """Return what to grant once more before ``denial`` of the opposite direction, and grants it may still block."""
     again: set[str] = set()
     blocked: list[str] = []
     for grant in sorted(granted):
@@ -187,14 +188,6 @@ def _dates(validity: Validity) -> str:
 
 def _utc(moment: datetime) -> str:
     return moment.strftime("%Y-%m-%dT%H:%M:%S")
-
-
-_ENTITIES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", '"': "&quot;", "'": "&#x27;"})
-
-
-def escape(text: str) -> str:
-    """As ``html.escape``, whose module takes two milliseconds to import."""
-    return text.translate(_ENTITIES)
 
 
 def _line(text: str) -> str:

@@ -63,7 +63,7 @@ class Grant:
 
 
 def parse_permissions(document: bytes, where: str = "permissions.xml") -> tuple[Grant, ...]:
-    """All grants of the document. Raises ``InvalidInputError`` (with file:line) for what DDS would not read."""
+    """Parse all grants of the document; raises ``InvalidInputError`` (with file:line) for what DDS would not read."""
     root = check_permissions_schema(document, where)
     return tuple(_grant(element) for element in root.iter("grant"))
 
@@ -123,13 +123,15 @@ class Permitted(NamedTuple):
 
 
 def grant_for(document: bytes, subject: str, place: str) -> Grant | None:
-    """The grant that DDS uses for ``subject``: the first. Raises InvalidInputError for another kind of document."""
+    """Return the grant that DDS uses for ``subject``: the first. Raises InvalidInputError for another kind of
+    document.
+    """
     grants = parse_permissions(document, place)
     return next((grant for grant in grants if grant.subject_name.strip() == subject), None)
 
 
 def rules_text(grant: Grant) -> str:
-    """What the grant allows, apart from its subject and dates; equal for equal rules however they are laid out."""
+    """Return what the grant allows, apart from its subject and dates; equal for equal rules in any layout."""
     return f"{grant.default.value} {[_plain(rule) for rule in grant.rules]}"
 
 
@@ -138,7 +140,7 @@ def _plain(rule: DdsRule) -> tuple[str, DomainRanges, tuple[str, ...], tuple[str
 
 
 def taken_away(old: Grant, new: Grant) -> tuple[str, ...]:
-    """What ``old`` permits and ``new`` surely or possibly does not, in words (``publish rt/chatter``); sorted."""
+    """Return what ``old`` permits and ``new`` surely or possibly does not, sorted words (``publish rt/chatter``)."""
     lost = {str(one) for one in _lost(old, new)}
     if old.default is Qualifier.ALLOW and new.default is not Qualifier.ALLOW:
         lost.add("everything that no rule names")
@@ -187,11 +189,11 @@ def _concerns(denial: Permitted, one: Permitted) -> bool:
 def redated(
     document: bytes, old_subjects: Collection[str], subject: str, validity: Validity, place: str
 ) -> bytes:
-    """``document`` with the grant of one of ``old_subjects`` given to ``subject`` for ``validity``.
+    """Return ``document`` with the grant of one of ``old_subjects`` given to ``subject`` for ``validity``.
 
-    Only the first such grant stays: of several for one subject the implementations use only that one, and
-    foreign grants have no place in a document every peer gets to see. Raises InvalidInputError for what is no
-    permissions document and DamagedKeystoreError when no grant fits.
+    Only the first such grant stays: of several for one subject the implementations use only that one, and foreign
+    grants have no place in a document every peer gets to see. Raises InvalidInputError for what is no permissions
+    document and DamagedKeystoreError if no grant matches.
     """
     from lxml import etree
 

@@ -50,7 +50,7 @@ _FORMS: dict[Operation, tuple[Forms, Forms]] = {
 
 
 def full_name(expression: str, profile: Profile) -> str:
-    """``expression`` as absolute name: ``x`` below ``ns``, ``~/x`` below ``ns`` and ``node``.
+    """Make ``expression`` absolute: ``x`` below ``ns``, ``~/x`` below ``ns`` and ``node``.
 
     Raises ``PolicyError`` for names that no ROS node can have, which would be dead or broader rules.
     """
@@ -72,7 +72,7 @@ def full_name(expression: str, profile: Profile) -> str:
 
 
 def dds_topics(operation: Operation, name: str) -> tuple[set[str], set[str]]:
-    """The DDS topics that a participant publishes and subscribes for ``operation`` on ``name``."""
+    """Return the DDS topics that a participant publishes and subscribes for ``operation`` on ``name``."""
     publish: set[str] = set()
     subscribe: set[str] = set()
     add_dds_topics(operation, name, publish, subscribe)
@@ -80,7 +80,7 @@ def dds_topics(operation: Operation, name: str) -> tuple[set[str], set[str]]:
 
 
 def add_dds_topics(operation: Operation, name: str, publish: set[str], subscribe: set[str]) -> None:
-    """As ``dds_topics``, into sets that the caller fills for many names: this runs before a start."""
+    """Add what ``dds_topics`` returns to sets that the caller fills for many names: this runs before a start."""
     published, subscribed = _FORMS[operation]
     for before, after in published:
         publish.add(before + name + after)
@@ -91,10 +91,10 @@ def add_dds_topics(operation: Operation, name: str, publish: set[str], subscribe
 def ros_rules(
     publish: Iterable[str], subscribe: Iterable[str], qualifier: Qualifier = Qualifier.ALLOW
 ) -> tuple[tuple[Rule, ...], Topics]:
-    """The reverse: rules that explain the topics of one permissions rule, and what no ROS rule explains.
+    """Return the rules that explain the topics of one permissions rule, and what no ROS rule explains.
 
-    Services and actions appear only where both directions of a role are complete; all else stays a
-    topic (``rt/...``) or is returned as it is. No rule of a policy is about ``ros_discovery_info``.
+    Services and actions appear only if both directions of a role are complete; all else stays a topic (``rt/...``) or
+    is returned as it is. No rule of a policy is about ``ros_discovery_info``.
     """
     remaining = (set(publish) - {DISCOVERY_TOPIC}, set(subscribe) - {DISCOVERY_TOPIC})
     rules: list[Rule] = []

@@ -16,20 +16,20 @@ Element = frozenset[str] | None
 
 
 def has_wildcard(name: str) -> bool:
-    """Whether it stands for more than one name."""
+    """Return whether it stands for more than one name."""
     return not _WILDCARDS.isdisjoint(name)
 
 
 def can_meet(a: str, b: str) -> bool:
-    """Whether some name matches both expressions."""
+    """Return whether some name matches both expressions."""
     return _meet(_elements(a), _elements(b))
 
 
 def covers(wide: str, narrow: str) -> bool:
-    """Whether every match of ``narrow`` surely matches ``wide``.
+    """Return whether every match of ``narrow`` surely matches ``wide``.
 
-    Exact when ``narrow`` is a plain name; else true only for the evident cases (equal, or ``wide`` is
-    a plain prefix and ``*``), so that "no" may also mean "not evident".
+    Exact if ``narrow`` is a plain name; else true only for the evident cases (equal, or ``wide`` is a plain prefix
+    and ``*``), so that "no" may also mean "not evident".
     """
     if wide == narrow:
         return True
@@ -60,7 +60,7 @@ def _meet(a: tuple[Element, ...], b: tuple[Element, ...]) -> bool:
 
 
 def _past_stars(positions: set[int], pattern: tuple[Element, ...]) -> set[int]:
-    """``positions`` and those behind any ``*`` that follows them, for a ``*`` may match nothing."""
+    """Return ``positions`` and those behind any ``*`` that follows them, for a ``*`` may match nothing."""
     result = set(positions)
     for j in positions:
         while j < len(pattern) and pattern[j] is _ANY_TEXT:

@@ -20,7 +20,7 @@ _TOPIC_BYTES = 17  # <topic></topic> and CRLF
 
 
 def _bytes_without_name(operation: Operation) -> tuple[int, int]:
-    """How many DDS topics an operation needs, and what they take besides the name in each of them."""
+    """Return how many DDS topics an operation needs, and what they take besides the name in each of them."""
     topics = [topic for direction in dds_topics(operation, "") for topic in direction]
     return len(topics), sum(len(topic) + _TOPIC_BYTES for topic in topics)
 
@@ -37,12 +37,12 @@ class SizeConcern(NamedTuple):
 
 
 def signed_size(document: bytes) -> int:
-    """About how many bytes the document takes once signed: line ends become CRLF, the signature is added."""
+    """Estimate the bytes of the document once signed: line ends become CRLF, the signature is added."""
     return len(document) + document.count(b"\n") + _SIGNATURE_BYTES
 
 
 def size_concern(size: int, policy: EnclavePolicy) -> SizeConcern | None:
-    """Whether a signed document of ``size`` bytes is too large, or near it; ``None`` when all is well."""
+    """Return whether a signed document of ``size`` bytes is too large, or near it; ``None`` if all is well."""
     if size < WARN_BYTES:
         return None
     fatal = size > FAST_DDS_LIMIT_BYTES
@@ -56,7 +56,7 @@ def size_concern(size: int, policy: EnclavePolicy) -> SizeConcern | None:
 
 
 def expected_concern(policy: EnclavePolicy) -> SizeConcern | None:
-    """The same before anything is signed, from the names alone (wildcards and denials count as names).
+    """Estimate the same before anything is signed, from the names alone (wildcards and denials count as names).
 
     Raises ``PolicyError`` for a name that no permission can be written for.
     """

@@ -60,7 +60,7 @@ class PolicyDocument:
 
 
 def read_policy(path: str | Path) -> PolicyDocument:
-    """The policy of a file, its includes restricted to the file's own folder.
+    """Read the policy of a file, its includes restricted to the file's own folder.
 
     Raises ``PolicyError`` (an ``InvalidInputError``) with file:line.
     """
@@ -73,7 +73,7 @@ def read_policy(path: str | Path) -> PolicyDocument:
 
 
 def parse_policy(document: bytes, where: str = "policy.xml", folder: Path | None = None) -> PolicyDocument:
-    """As ``read_policy``, from bytes; includes are followed only with a ``folder`` and below it."""
+    """Parse bytes as ``read_policy`` does; includes are followed only with a ``folder`` and below it."""
     root = parse_xml(document, where)
     file = where if folder is None else str(Path(where).resolve())
     return _PolicyReader(folder).read(PolicyElement(root, file))
@@ -215,10 +215,10 @@ class _PolicyReader:
 
 
 def policy_xml(policy: Policy) -> bytes:
-    """The policy as UTF-8 text, valid against the schema, the same for the same policy.
+    """Render the policy as UTF-8 text, valid against the schema, the same for the same policy.
 
-    An enclave without profiles (its process may join and nothing else) gets one without rules, which
-    the schema asks for. Raises ``InvalidInputError`` for a policy without enclaves.
+    An enclave without profiles (its process may join and nothing else) gets one without rules, which the schema
+    demands. Raises ``InvalidInputError`` for a policy without enclaves.
     """
     if not policy.enclaves:
         raise InvalidInputError("a policy needs at least one enclave")
@@ -285,7 +285,7 @@ class IncludingReader:
         self._followed = 0
 
     def children(self, parent: PolicyElement) -> Iterator[PolicyElement]:
-        """Each child element. Raises ``PolicyError`` for an unsafe include."""
+        """Yield each child element; raises ``PolicyError`` for an unsafe include."""
         return self._found(parent.element, parent.file, parent.chain)
 
     def _found(
@@ -342,7 +342,7 @@ class IncludingReader:
 
 
 def _pointed(root: etree._Element, include: etree._Element, where: str) -> list[etree._Element]:
-    """The elements that ``xpointer`` selects: the root without one, else an absolute path of names."""
+    """Return the elements that ``xpointer`` selects: the root without one, else an absolute path of names."""
     pointer = include.get("xpointer")
     if pointer is None:
         return [root]

@@ -98,23 +98,25 @@ class Register:
         return {one.enclave: one for one in self.documents}
 
     def of_enclave(self, enclave: str) -> list[IssuedCertificate]:
-        """Every certificate of the enclave that is remembered, in the order of issue."""
+        """Return every certificate of the enclave that is remembered, in the order of issue."""
         return self._by_enclave.get(enclave, [])
 
     def in_force(self, enclave: str) -> IssuedCertificate | None:
-        """The certificate issued last, unless it was revoked or removed."""
+        """Return the certificate issued last, unless it was revoked or removed."""
         return next((one for one in reversed(self.of_enclave(enclave)) if one.in_force), None)
 
     def permissions(self, enclave: str) -> SignedPermissions | None:
-        """The document signed last for the enclave."""
+        """Return the document signed last for the enclave."""
         return self._latest_documents.get(enclave)
 
     def trusts_authority(self, role: Role, ca: bytes) -> bool:
-        """Whether the CA with this certificate may stand in the trust file: made here or given, and not retired."""
+        """Return whether the CA with this certificate may stand in the trust file: made here or given, and not
+        retired.
+        """
         return self.authorities.get((role, ca), AuthorityState.RETIRED) is not AuthorityState.RETIRED
 
     def revoked(self, issuer: str) -> dict[int, datetime]:
-        """Serial -> date of revocation, of the certificates that this CA issued."""
+        """Map serial to date of revocation, of the certificates that this CA issued."""
         return {
             one.serial: one.revoked
             for one in self.certificates.values()
@@ -122,7 +124,7 @@ class Register:
         }
 
     def with_authority(self, role: Role, ca: bytes, state: AuthorityState) -> Register:
-        """With a new CA in use the one that was is leaving."""
+        """Put a new CA in use; the one that was is leaving."""
         known = dict(self.authorities)
         if state is AuthorityState.IN_USE:
             for (its, other), was in self.authorities.items():
@@ -132,7 +134,7 @@ class Register:
         return replace(self, authorities=known)
 
     def with_retired(self, roles: Iterable[Role]) -> Register:
-        """No CA that is leaving one of these roles is trusted any more."""
+        """Retire every CA that is leaving one of these roles: it is not trusted any more."""
         ended = set(roles)
         known = {
             (role, ca): AuthorityState.RETIRED if role in ended and state is AuthorityState.LEAVING else state
@@ -141,7 +143,7 @@ class Register:
         return replace(self, authorities=known)
 
     def with_certificates(self, issued: Iterable[IssuedCertificate]) -> Register:
-        """Each takes the place of what its enclave had."""
+        """Add certificates; each takes the place of what its enclave had."""
         fresh = {one.serial: one for one in issued}
         before = self.without_enclaves(one.enclave for one in fresh.values()).certificates
         return replace(self, certificates={**before, **fresh})
@@ -152,7 +154,7 @@ class Register:
         return replace(self, documents=(*kept, *fresh))
 
     def without_enclaves(self, enclaves: Iterable[str]) -> Register:
-        """Removed: none of their certificates is in force, what they were granted stays known."""
+        """Remove enclaves: none of their certificates is in force, what they were granted stays known."""
         gone = set(enclaves)
         known = {
             serial: one._replace(replaced=True) if one.enclave in gone else one
@@ -161,7 +163,7 @@ class Register:
         return replace(self, certificates=known)
 
     def with_revoked(self, serials: Iterable[int], now: datetime) -> Register:
-        """A CRL that lists them has to follow: its number is counted up."""
+        """Revoke certificates; a CRL that lists them has to follow, so its number is counted up."""
         known = dict(self.certificates)
         for serial in serials:
             if serial in known and known[serial].revoked is None:
@@ -169,12 +171,12 @@ class Register:
         return replace(self, certificates=known).with_next_crl(now)
 
     def with_next_crl(self, now: datetime) -> Register:
-        """Another CRL is to be published. Its number is the time where that is enough to let it grow."""
+        """Count the CRL's number up. It is the time if that is enough to let it grow."""
         number = max(int(now.timestamp()), self.crl_number + 1)
         return replace(self, crl_number=number, crl_published=True)
 
     def without_ended(self, now: datetime) -> Register:
-        """Forgets what nobody can use any more; what is in force stays, so that an enclave is still known.
+        """Forget what nobody can use any more; what is in force stays, so that an enclave is still known.
 
         What was revoked stays longer: a clock that is wrong today must not take it off the CRL.
         """
@@ -192,7 +194,7 @@ class Register:
 
 
 def register_json(register: Register) -> bytes:
-    """One line for each entry: differences between two versions can be read."""
+    """Write one line for each entry, so that differences between two versions can be read."""
     head = {
         "version": _VERSION,
         "crl_number": register.crl_number,
@@ -215,7 +217,7 @@ def register_json(register: Register) -> bytes:
 
 
 def lines_json(head: Mapping[str, Any], rows: Mapping[str, Iterable[list[Any]]]) -> bytes:
-    """An object with ``head``, then lists of ``rows``; each entry and each row on a line of its own."""
+    """Write an object with ``head``, then lists of ``rows``; each entry and each row on a line of its own."""
     entries = [f"{json.dumps(name)}: {json.dumps(value)}" for name, value in head.items()]
     for name, listed in rows.items():
         entries.append(f"{json.dumps(name)}: [\n" + ",\n".join(map(json.dumps, listed)) + "\n]")

@@ -20,7 +20,10 @@ MAX_BYTES = 4_000_000
 
 
 def parse_xml(document: bytes, where: str, max_bytes: int = MAX_BYTES) -> etree._Element:
-    """The root element. ``where`` names the document in errors; raises ``InvalidInputError`` with file:line."""
+    """Parse XML to its root element.
+
+    ``where`` names the document in errors; raises ``InvalidInputError`` with file:line.
+    """
     from lxml import etree
 
     if len(document) > max_bytes:

@@ -32,7 +32,7 @@ class Share(NamedTuple):
 
 
 def united(enclave: str, shares: Iterable[Share]) -> EnclavePolicy:
-    """All shares together. Raises InvalidInputError where a denial of one takes away what another allows."""
+    """Unite all shares; raises InvalidInputError if a denial of one takes away what another allows."""
     found = tuple(shares)
     profiles = sorted({profile for share in found for profile in share.profiles})
     together = EnclavePolicy(enclave, merged_profiles(profiles))
@@ -42,7 +42,7 @@ def united(enclave: str, shares: Iterable[Share]) -> EnclavePolicy:
 
 
 def merged_profiles(profiles: Iterable[Profile]) -> tuple[Profile, ...]:
-    """One profile for each node, its rules in order and once."""
+    """Merge to one profile for each node, its rules in order and once."""
     ordered = sorted(profiles, key=lambda profile: (profile.ns, profile.node))
     return tuple(
         Profile(*name, tuple(sorted({rule for profile in group for rule in profile.rules})))
@@ -51,13 +51,15 @@ def merged_profiles(profiles: Iterable[Profile]) -> tuple[Profile, ...]:
 
 
 def is_part_of(profiles: Iterable[Profile], whole: Iterable[Profile]) -> bool:
-    """Whether every rule of ``profiles`` is among those of ``whole`` for the same node."""
+    """Return whether every rule of ``profiles`` is among those of ``whole`` for the same node."""
     rules = {(profile.ns, profile.node): set(profile.rules) for profile in whole}
     return all(set(profile.rules) <= rules.get((profile.ns, profile.node), set()) for profile in profiles)
 
 
 def united_domains(shares: Iterable[Share]) -> Domains:
-    """Of all shares: a document is for one set of domains, so each share gets those of the others too."""
+    """Unite the domains of all shares: a document is for one set of domains, so each share gets those of the others
+    too.
+    """
     return Domains(span for share in shares for span in share.domains.ranges)
 
 
@@ -82,7 +84,7 @@ def _directions(topics: TopicSets) -> tuple[tuple[str, ...], tuple[str, ...]]:
 
 
 def shares_json(shares: Iterable[Share]) -> bytes:
-    """Readable in a diff: one line for each rule."""
+    """Write shares readable in a diff: one line for each rule."""
     content = {
         "version": _VERSION,
         "shares": [

@@ -30,7 +30,7 @@ _Document = TypeVar("_Document", bound=StrictDocument)
 
 
 def parse_strict(model: type[_Document], text: bytes, where: str) -> _Document:
-    """``text`` as ``model``; raises InvalidInputError naming ``where`` and the line or the entry."""
+    """Parse ``text`` as ``model``; raises InvalidInputError naming ``where`` and the line or the entry."""
     if len(text) > MAX_BYTES:
         raise InvalidInputError(f"{where}: larger than {MAX_BYTES} bytes")
     try:

@@ -27,13 +27,13 @@ class SubjectScheme(str, Enum):
 
 
 def common_name(enclave: str, scheme: SubjectScheme = SubjectScheme.EXACT, generation: int = 1) -> str:
-    """The CN of a valid enclave name, at most 64 characters, different for different names and generations.
+    """Return the CN of a valid enclave name, at most 64 characters, different for different names and generations.
 
     ``/front/camera`` becomes ``ros.front.camera``, the root ``ros``; from the second generation on with its number:
     ``ros.front.camera-2``. Longer names become ``ros-`` + 160 bits of SHA-256 + ``-`` + their last characters; ``-``
     cannot occur in a name, so no two of these ever meet.
 
-    A new generation is what keeps old permissions from fitting: both implementations match a grant by its subject.
+    A new generation is what keeps old permissions from matching: both implementations match a grant by its subject.
     """
     numbered = enclave if generation == 1 else f"{enclave}-{generation}"
     if scheme is SubjectScheme.COMPATIBLE:
@@ -43,13 +43,15 @@ def common_name(enclave: str, scheme: SubjectScheme = SubjectScheme.EXACT, gener
 
 
 def generation_of(cn: str) -> int:
-    """The generation that a common name of ``common_name`` has; 1 for all others."""
+    """Return the generation that a common name of ``common_name`` has; 1 for all others."""
     digits = cn.rpartition("-")[2]
     return int(digits) if "-" in cn and _GENERATION.match(digits) else 1
 
 
 def names_enclave(cn: str | None, enclave: str) -> bool:
-    """Whether ``cn`` is a common name that ``enclave`` can have, in any scheme and generation; SROS2's may be long."""
+    """Return whether ``cn`` is a common name that ``enclave`` can have, in any scheme and generation; SROS2's may be
+    long.
+    """
     if cn is None:
         return False
     generation = generation_of(cn)
@@ -62,23 +64,23 @@ def _short(enclave: str) -> str:
 
 
 def subject_name(cn: str) -> str:
-    """``subject_name`` of a grant for this common name: both implementations match exactly this form."""
+    """Return ``subject_name`` of a grant for this common name: both implementations match exactly this form."""
     return f"CN={cn}"
 
 
 def scheme_of(cn: str) -> SubjectScheme:
-    """Which scheme a certificate's common name follows: SROS2's is the enclave's path."""
+    """Return which scheme a certificate's common name follows: SROS2's is the enclave's path."""
     return SubjectScheme.COMPATIBLE if cn.startswith("/") else SubjectScheme.EXACT
 
 
 def pieces(cn: str) -> frozenset[tuple[str, str]]:
-    """The bag Cyclone compares: non-empty pieces between separators, each cut at its first ``=``."""
+    """Return the bag Cyclone compares: non-empty pieces between separators, each cut at its first ``=``."""
     cut = (piece.partition("=") for piece in re.split(_SEPARATORS, subject_name(cn)) if piece)
     return frozenset((key, value) for key, _, value in cut)
 
 
 def borrowable(names: Mapping[str, str]) -> list[tuple[str, str]]:
-    """Pairs (borrower, lender) of enclaves whose CNs let Cyclone accept the lender's grant for the borrower.
+    """Return pairs (borrower, lender) of enclaves whose CNs let Cyclone accept the lender's grant for the borrower.
 
     ``names`` maps enclave to common name. Sorted; empty for any set of names of the exact scheme.
     """
@@ -95,7 +97,7 @@ def borrowable(names: Mapping[str, str]) -> list[tuple[str, str]]:
 
 
 def cannot_be_told_apart(pairs: Iterable[tuple[str, str]], limit: int = 3) -> str:
-    """One sentence naming the first few pairs."""
+    """Name the first few pairs in one sentence."""
     listed = list(pairs)
     shown = ", ".join(f"{a} could use the permissions of {b}" for a, b in listed[:limit])
     return shown + (f" and {len(listed) - limit} more pairs" if len(listed) > limit else "")
@@ -110,7 +112,7 @@ class Half(Enum):
 
 
 def guid_prefix(common_name: str) -> int:
-    """The first 48 bits of the GUID of every secured participant whose certificate has this subject.
+    """Return the first 48 bits of the GUID of every secured participant whose certificate has this subject.
 
     DDS-Security 9.3.3 makes them from a hash of it, so they are known before anything runs (measured on both
     implementations).
@@ -120,7 +122,7 @@ def guid_prefix(common_name: str) -> int:
 
 
 def half_of(common_name: str) -> Half:
-    """In which half the GUID prefix lies that a participant with this certificate must have."""
+    """Return in which half the GUID prefix lies that a participant with this certificate must have."""
     return Half.HIGH if guid_prefix(common_name) & 1 << 46 else Half.LOW
 
 

@@ -144,15 +144,17 @@ def is_tool_enclave(enclave: str) -> bool:
 
 
 def tool_enclave_name(tool: Tool, targets: tuple[str, ...]) -> str:
-    """Where the enclave is kept: ``/tools/echo/front/scan``; of several targets the first, and how many more."""
+    """Name the tool's enclave: ``/tools/echo/front/scan``; of several targets the first, and how many more."""
     rest = f"_and_{len(targets) - 1}_more" if len(targets) > 1 else ""
     kind = tool.name.replace("-", "_")
     return f"{FOLDER}/{kind}{targets[0] if targets else ''}{rest}"
 
 
 def tool_targets(tool: Tool, words: tuple[str, ...]) -> tuple[str, ...]:
-    """Absolute names of what the tool works on, as its command line would take them. Raises ``InvalidInputError`` for
-    too few or too many, and ``PolicyError`` for what is not a name."""
+    """Return absolute names of what the tool works on, as its command line would take them.
+
+    Raises ``InvalidInputError`` for too few or too many, and ``PolicyError`` for what is not a name.
+    """
     if tool.target is ToolTarget.NOTHING and words:
         raise InvalidInputError(f"--for {tool.name} works on the whole graph: it takes no target")
     if tool.target is not ToolTarget.NOTHING and not words and not tool.optional_target:
@@ -168,7 +170,7 @@ def tool_targets(tool: Tool, words: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def tool_policy(tool: Tool, targets: tuple[str, ...], enclave: str) -> EnclavePolicy:
-    """Exactly what the table says, for these targets."""
+    """Return exactly what the table says, for these targets."""
     needs = [(operation, name.replace("~", tool.node, 1)) for operation, name in tool.own]
     needs += [(operation, name.format(target)) for target in targets for operation, name in tool.each]
     rules = tuple(Rule(operation, Qualifier.ALLOW, name) for operation, name in sorted(set(needs)))

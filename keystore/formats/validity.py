@@ -53,9 +53,9 @@ class Validity(_Ends):
         until: datetime | None = None,
         backdate: timedelta = DEFAULT_BACKDATE,
     ) -> Validity:
-        """Valid from ``now`` minus ``backdate`` for ``lifetime``, or to the absolute date ``until``.
+        """Make a validity from ``now`` minus ``backdate`` for ``lifetime``, or to the absolute date ``until``.
 
-        Raises InvalidInputError when ``until`` is past, or ``backdate`` under 14 hours or over 10 years.
+        Raises InvalidInputError if ``until`` is past, or ``backdate`` under 14 hours or over 10 years.
         """
         if backdate < MIN_BACKDATE:
             raise InvalidInputError("back-dating under 14 h makes Fast DDS start late west of UTC; use more")
@@ -81,7 +81,7 @@ def _whole(name: str, moment: datetime) -> datetime:
 
 
 def later(now: datetime, span: timedelta) -> datetime:
-    """``now + span``, at most the last date that means anything here."""
+    """Return ``now + span``, at most the last date that means anything here."""
     try:
         return min(now + span, LATEST)
     except OverflowError:
@@ -89,7 +89,7 @@ def later(now: datetime, span: timedelta) -> datetime:
 
 
 def parse_duration(text: str) -> timedelta:
-    """``90d``, ``12h``, ``10y`` (a year is 365 days), ``45m``, ``30s``, ``2w``; raises InvalidInputError."""
+    """Parse ``90d``, ``12h``, ``10y`` (a year is 365 days), ``45m``, ``30s``, ``2w``; raises InvalidInputError."""
     match = _DURATION.match(text.strip())
     if not match:
         raise InvalidInputError(f"{printable(text)} is not a duration; write for example 90d, 12h or 10y")
@@ -98,7 +98,9 @@ def parse_duration(text: str) -> timedelta:
 
 
 def parse_moment(text: str) -> datetime:
-    """An ISO date or date-time; without a zone it is UTC, a bare date is its first second; InvalidInputError."""
+    """Parse an ISO date or date-time; without a zone it is UTC, a bare date is its first second; raises
+    InvalidInputError.
+    """
     try:
         moment = datetime.fromisoformat(text.strip().replace("Z", "+00:00"))
     except ValueError:
@@ -112,7 +114,7 @@ def parse_moment(text: str) -> datetime:
 
 
 def parse_end(text: str, now: datetime) -> datetime:
-    """``--valid-for``: a duration from now or an ISO date."""
+    """Parse ``--valid-for``: a duration from now or an ISO date."""
     if _DURATION.match(text.strip()):
         return later(now, parse_duration(text))
     try:
@@ -122,10 +124,10 @@ def parse_end(text: str, now: datetime) -> datetime:
 
 
 def utc_now() -> datetime:
-    """Now in UTC, in whole seconds as certificates count."""
+    """Return now in UTC, in whole seconds as certificates count."""
     return datetime.now(timezone.utc).replace(microsecond=0)
 
 
 def iso(moment: datetime) -> str:
-    """``2030-12-31T00:00:00Z``, for reports."""
+    """Render ``2030-12-31T00:00:00Z``, for reports."""
     return moment.astimezone(timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ")

@@ -49,24 +49,24 @@ class Authority:
 
 
 def authority_of(facts: CertificateFacts, signer: Signer, place: str) -> Authority:
-    """Binds a certificate to its signer; raises SigningUnavailableError when the key is another one's."""
+    """Join a certificate to its signer; raises SigningUnavailableError if the key is another one's."""
     if spki(signer.public_key()) != facts.public_key:
         raise SigningUnavailableError(f"{place} and the private key beside it do not belong together")
     return Authority(facts, signer)
 
 
 def default_ca_name(role: Role) -> str:
-    """A common name of its own for each CA ever made, so that documents of two CAs are never confused."""
+    """Return a common name that no other CA has, so that documents of two CAs are never confused."""
     return f"ROS {role.value.removesuffix('_ca')} CA {os.urandom(4).hex()}"
 
 
 def new_key(curve: Curve) -> FileSigner:
-    """A new private key on ``curve``, in memory."""
+    """Make a private key on ``curve``, in memory."""
     return FileSigner(ec.generate_private_key(ec.SECP256R1() if curve is Curve.P256 else ec.SECP384R1()))
 
 
 def self_signed_ca(role: Role, name: str, signer: Signer, validity: Validity) -> Authority:
-    """A CA certificate for the key of ``signer``: CA:TRUE, pathlen 0, key usage after the role.
+    """Make a CA certificate for the key of ``signer``: CA:TRUE, pathlen 0, key usage after the role.
 
     keyCertSign + cRLSign for identities; the permissions CA also needs digitalSignature, without which both
     implementations refuse its documents. Raises InvalidInputError for a name that is empty or over 64 bytes.
@@ -90,7 +90,7 @@ def refuse_ca_name(name: str) -> None:
 
 
 def _key_usage(role: Role | None) -> x509.KeyUsage:
-    """Of the CA for ``role``; None: of an enclave."""
+    """Return the key usage of the CA for ``role``; with None, of an enclave."""
     is_leaf = role is None
     return x509.KeyUsage(
         digital_signature=is_leaf or role is Role.PERMISSIONS, key_cert_sign=not is_leaf,
@@ -122,7 +122,7 @@ class IdentityIssuer:
     def issue(
         self, common_name: str, key: PublicKey, validity: Validity, hosts: Sequence[str] = ()
     ) -> CertificateFacts:
-        """Issues a certificate for an already valid common name, which does not outlive the CA.
+        """Issue a certificate for an already valid common name; it does not outlive the CA.
 
         With ``hosts`` (names and addresses): of a server that is found there, and of nothing else.
         """
@@ -169,7 +169,7 @@ def _alternative_names(hosts: Sequence[str]) -> x509.SubjectAlternativeName:
 
 
 def _authority_key_id(ca: x509.Certificate, signer: Signer) -> x509.AuthorityKeyIdentifier:
-    """From the CA's own SKI when it has one (SROS2's have none), as RFC 5280 section 4.2.1.1 asks."""
+    """Take the CA's own SKI if it has one (SROS2's have none), as RFC 5280 section 4.2.1.1 asks."""
     try:
         key_id = ca.extensions.get_extension_for_class(x509.SubjectKeyIdentifier).value
     except x509.ExtensionNotFound:

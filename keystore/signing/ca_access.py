@@ -37,7 +37,7 @@ class Secret:
         return (self.file, self.descriptor, self.variable) != (None, None, None)
 
     def value(self) -> bytes:
-        """The secret without its trailing newline, read once; raises InvalidInputError."""
+        """Return the secret without its trailing newline, read once; raises InvalidInputError."""
         if self._read is None:
             self._read = self._fetch()
         return self._read
@@ -66,7 +66,7 @@ class Secret:
 
 
 def _read_all(descriptor: int) -> bytes:
-    """To its end: a pipe may give the secret in pieces."""
+    """Read to the end: a pipe may give the secret in pieces."""
     content = b""
     while len(content) <= _MAX_SECRET + 2 and (piece := os.read(descriptor, _MAX_SECRET + 3)):
         content += piece

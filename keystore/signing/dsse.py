@@ -15,7 +15,7 @@ from keystore.signing.signer import Signer, spki
 
 
 def envelope(payload: bytes, payload_type: str, signer: Signer) -> dict[str, Any]:
-    """The envelope with one signature; ``keyid`` is the SHA-256 of the public key in DER, in hex.
+    """Make the envelope with one signature; ``keyid`` is the SHA-256 of the public key in DER, in hex.
 
     Raises SigningUnavailableError as ``signer``.
     """
@@ -25,11 +25,11 @@ def envelope(payload: bytes, payload_type: str, signer: Signer) -> dict[str, Any
 
 
 def signed_bytes(payload: bytes, payload_type: str) -> bytes:
-    """The pre-authentication encoding."""
+    """Return the pre-authentication encoding, which is what is signed."""
     kind = payload_type.encode()
     return b"DSSEv1 %d %b %d %b" % (len(kind), kind, len(payload), payload)
 
 
 def envelope_text(content: dict[str, Any]) -> str:
-    """An envelope as the JSON text that is written."""
+    """Render an envelope as the JSON text that is written."""
     return json.dumps(content, indent=2) + "\n"

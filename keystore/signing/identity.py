@@ -44,14 +44,16 @@ class Identity:
 def new_identity(
     issuer: IdentityIssuer, common_name: str, validity: Validity, curve: Curve = Curve.P256
 ) -> Identity:
-    """A new key pair, and a certificate for it from ``issuer``."""
+    """Make a key pair, and a certificate for it from ``issuer``."""
     signer = new_key(curve)
     return Identity(issuer.issue(common_name, signer.public_key(), validity), key_pem(signer))
 
 
 def public_half(pem: bytes, place: str) -> PublicKey:
-    """The public key of an enclave's ``key.pem``, or of the request in its place; raises SigningUnavailableError
-    without showing any of it."""
+    """Return the public key of an enclave's ``key.pem``, or of the request in its place.
+
+    Raises SigningUnavailableError without showing any of it.
+    """
     if b"CERTIFICATE REQUEST" in pem:
         return request_key(pem, place).key
     return FileSigner(load_private_key(pem, None, place)).public_key()
@@ -69,7 +71,7 @@ class RequestedKey(NamedTuple):
 
 
 def new_request(common_name: str, signer: Signer) -> bytes:
-    """A PEM request for the key of ``signer``, signed by it."""
+    """Make a PEM request for the key of ``signer``, signed by it."""
     subject = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, common_name)])
     builder = x509.CertificateSigningRequestBuilder().subject_name(subject)
     made = builder.sign(builder_key(signer), hashes.SHA256())
@@ -77,7 +79,7 @@ def new_request(common_name: str, signer: Signer) -> bytes:
 
 
 def request_key(pem: bytes, place: str) -> RequestedKey:
-    """The key that a request asks for; raises DamagedKeystoreError unless the request is signed by that very key."""
+    """Return the key that a request asks for; raises DamagedKeystoreError unless that very key signed the request."""
     try:
         found = x509.load_pem_x509_csr(pem)
         if not found.is_signature_valid:

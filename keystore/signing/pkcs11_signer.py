@@ -25,7 +25,7 @@ MODULE_VARIABLE = "PKCS11_MODULE_PATH"
 
 
 def parse_uri(uri: str) -> dict[str, str]:
-    """Attributes of a ``pkcs11:`` URI, percent-decoded; raises InvalidInputError without showing the URI."""
+    """Parse the attributes of a ``pkcs11:`` URI, percent-decoded; raises InvalidInputError without showing the URI."""
     body = uri.removeprefix("pkcs11:")
     path, _, query = body.partition("?")
     attributes: dict[str, str] = {}
@@ -90,7 +90,10 @@ class Pkcs11Signer:
 
 
 def _sign_ecdsa(pkcs11: Any, key: Any, data: bytes) -> bytes:
-    """Tokens return r and s side by side; X.509 and CMS want DER. Hashing here suits every token."""
+    """Sign with a hash made here, which suits every token.
+
+    Tokens return r and s side by side; X.509 and CMS want DER.
+    """
     raw = bytes(key.sign(hashlib.sha256(data).digest(), mechanism=pkcs11.Mechanism.ECDSA))
     half = len(raw) // 2
     return encode_dss_signature(int.from_bytes(raw[:half], "big"), int.from_bytes(raw[half:], "big"))
@@ -127,7 +130,9 @@ def _find(pkcs11: Any, attributes: Mapping[str, str], module: str, pin: str | No
 
 
 def _session(pkcs11: Any, token: Any, pin: str | None) -> Any:
-    """A login holds for all sessions of a process (PKCS#11 section 5.6): the second CA key needs none."""
+    """Open a session. A login holds for all sessions of a process (PKCS#11 section 5.6): the second CA key needs
+    none.
+    """
     try:
         return token.open(user_pin=pin)
     except pkcs11.exceptions.UserAlreadyLoggedIn:

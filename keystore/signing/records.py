@@ -41,5 +41,5 @@ def permissions_record(enclave: str, common_name: str, document: bytes) -> Signe
 
 
 def rules_digest(grant: Grant) -> str:
-    """Equal for grants that permit the same, whatever their subject and dates."""
+    """Return a digest that is equal for grants that permit the same, whatever their subject and dates."""
     return fingerprint(rules_text(grant).encode())

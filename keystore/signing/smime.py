@@ -156,7 +156,7 @@ def read_foreign(p7s: bytes, place: str) -> SignedDocument:
 
 
 def read_any(p7s: bytes, place: str) -> SignedDocument:
-    """As ``read``, and else as ``read_foreign``."""
+    """Read as ``read``, and otherwise as ``read_foreign``."""
     return _read(p7s) or read_foreign(p7s, place)
 
 

@@ -76,7 +76,7 @@ def _refuse_without_key(view: KeystoreView, names: list[str]) -> None:
 
 
 def refuse_unfit(view: KeystoreView, names: list[str], now: datetime, accept_exposures: bool) -> None:
-    """What ``verify`` finds wrong with these enclaves or with the keystore itself would travel with the bundle."""
+    """Refuse what ``verify`` finds wrong with these enclaves or the keystore: it would travel with the bundle."""
     for name in names:
         directory = layout.enclave_directory(name)
         for file in layout.RUNTIME_FILES:
@@ -97,7 +97,7 @@ _KEYSTORE = "the keystore"
 
 
 def _concerned(place: str, owners: Mapping[str, str]) -> str | None:
-    """What a finding is about: the keystore as a whole, an exported enclave, or (None) another one."""
+    """Return what a finding is about: the keystore as a whole, an exported enclave, or (None) another one."""
     if not place.startswith(layout.ENCLAVES + "/") or place in (layout.GOVERNANCE, layout.GOVERNANCE_XML):
         return _KEYSTORE
     return owners.get(place) or owners.get(place.rpartition("/")[0])
@@ -114,7 +114,7 @@ def _refuse(what: str, finding: Finding, accept_exposures: bool) -> None:
 
 
 def files_of(view: KeystoreView, names: Iterable[str]) -> dict[str, Content]:
-    """What every bundle of these enclaves holds, by path; a key only where it was not made on its host."""
+    """Return what every bundle of these enclaves holds, by path; a key only if it was not made on its host."""
     enclaves = [(name, not view.has_request(name)) for name in names]
     found = {}
     for path in sorted(layout.bundle_files(enclaves, crl=view.has_crl)):
@@ -134,7 +134,7 @@ def _public_files(
 
 
 def _write(target: Path, files: Mapping[str, Content | Link]) -> None:
-    """Written beside the target and renamed: a bundle is complete or absent."""
+    """Write beside the target and rename: a bundle is complete or absent."""
     target.parent.mkdir(parents=True, exist_ok=True)
     aside = target.with_name(f".{target.name}.{os.getpid()}.partial")
     try:

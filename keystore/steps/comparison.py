@@ -53,9 +53,9 @@ class WantedEnclave(NamedTuple):
 def compare(
     root: Path, wanted: Mapping[str, WantedEnclave], options: ProvisionOptions, now: datetime
 ) -> ProvisionReport | None:
-    """The report of a run in which nothing is to be done; None when something is.
+    """Return the report of a run in which nothing is to be done; None if something is.
 
-    Raises NotAKeystoreError when the keystore is not complete and must not, or cannot, be made.
+    Raises NotAKeystoreError if the keystore is not complete and must not, or cannot, be made.
     """
     view = KeystoreView(root)
     if not view.is_complete:
@@ -97,10 +97,10 @@ def _first_end(view: KeystoreView, enclaves: Iterable[Validity | None]) -> datet
 def differences(
     keystore: Path | str, policy: EnclavePolicy, *, options: ProvisionOptions | None = None
 ) -> tuple[str, ...]:
-    """Why an enclave is not (or no longer) what ``provision`` with the same options left; empty when it is.
+    """Return why an enclave is not (or no longer) what ``provision`` with the same options left; empty if it is.
 
-    Reads only: bytes, dates, modes, links and signatures. Raises a KeystoreError for a
-    keystore that cannot be read at all.
+    Reads only: bytes, dates, modes, links and signatures. Raises a KeystoreError for a keystore that cannot be read
+    at all.
     """
     root = resolve_root(keystore)
     # What ends soon is renewed by a start, and good until then.
@@ -121,7 +121,7 @@ def differences(
 
 
 def with_domains(root: Path, options: ProvisionOptions) -> ProvisionOptions:
-    """The same options with the domains decided."""
+    """Return the same options with the domains decided."""
     if options.domains is not None:
         return options
     view = KeystoreView(root)
@@ -129,7 +129,7 @@ def with_domains(root: Path, options: ProvisionOptions) -> ProvisionOptions:
 
 
 def domains_of(enclave: str, options: ProvisionOptions) -> Domains:
-    """The domains that the permissions of one enclave are for."""
+    """Return the domains that the permissions of one enclave are for."""
     return options.enclave_domains.get(enclave) or options.domains or Domains.single(0)
 
 
@@ -144,7 +144,7 @@ def permissions_source(policy: EnclavePolicy, options: ProvisionOptions) -> Perm
 
 
 def wanted_enclave(root: Path, policy: EnclavePolicy, options: ProvisionOptions) -> WantedEnclave:
-    """Exactly this policy; of a launch, its share beside those of others."""
+    """Return the enclave with exactly this policy; of a launch, its share beside those of others."""
     ends_by = asked_end(options)
     if options.launch is None:
         return WantedEnclave(permissions_source(policy, options), ends_by=ends_by)
@@ -155,14 +155,14 @@ def wanted_enclave(root: Path, policy: EnclavePolicy, options: ProvisionOptions)
 
 
 def asked_end(options: ProvisionOptions) -> datetime | None:
-    """When new certificates are to end, where the caller said so."""
+    """Return when new certificates are to expire, if the caller said so."""
     if options.valid_until is not None or options.lifetime is None:
         return options.valid_until
     return later(options.now or utc_now(), options.lifetime)
 
 
 def _with_shares_of_others(view: KeystoreView, state: EnclaveState, wanted: WantedEnclave) -> EnclaveState:
-    """A bundle does not tell whose share is whose: permissions that hold all of ours are taken as a union."""
+    """Take permissions that hold all of ours as a union: a bundle does not say whose share is whose."""
     beyond, missing = beyond_and_missing(view, state, wanted)
     if missing or not beyond:
         return state
@@ -172,14 +172,17 @@ def _with_shares_of_others(view: KeystoreView, state: EnclaveState, wanted: Want
 
 
 def _outlives(state: EnclaveState, wanted: WantedEnclave) -> bool:
-    """Of a certificate that is good otherwise; seconds pass between two runs, so an hour more does not count."""
+    """Return whether a certificate that is good otherwise lasts longer.
+
+    Seconds pass between two runs, so an hour more does not count.
+    """
     if wanted.ends_by is None or state.reissue is not Reissue.NOTHING or state.facts is None:
         return False
     return state.facts.validity.not_after > later(wanted.ends_by, timedelta(hours=1))
 
 
 def as_found(state: EnclaveState) -> EnclaveReport:
-    """Nothing was done."""
+    """Return the result of an enclave to which nothing was done."""
     return EnclaveReport(state.enclave, (), (), state.validity)
 
 
@@ -191,7 +194,7 @@ def inspect_wanted(
     options: ProvisionOptions,
     now: datetime,
 ) -> EnclaveState:
-    """The enclave's state against what is wanted; what is asked to be issued anew counts as a difference."""
+    """Compare the enclave with what is wanted; what is requested to be issued anew counts as a difference."""
     # A certificate that ends with its CA cannot be renewed for longer.
     due = min(later(now, options.renew_within), *(view.ca(role).validity.not_after for role in Role))
     state = inspect(view, register, enclave, wanted.permissions, now, due)

@@ -95,7 +95,7 @@ def create_keystore(keystore: Path | str, options: CreateOptions | None = None) 
 
 
 def refuse_unusable(options: CreateOptions) -> None:
-    """Before anything is written: options that no keystore can be made with. Raises InvalidInputError."""
+    """Refuse, before anything is written, options that no keystore can be made with; raises InvalidInputError."""
     now = options.now or utc_now()
     for lifetime in (options.ca_lifetime, options.lifetime):
         Validity.starting(now, lifetime, backdate=options.backdate)
@@ -111,7 +111,7 @@ def refuse_unusable(options: CreateOptions) -> None:
 
 
 def complete(opened: Store, options: CreateOptions) -> CreateReport:
-    """What ``create_keystore`` does once it holds the lock."""
+    """Do what ``create_keystore`` does once it holds the lock."""
     view = KeystoreView(opened.root)
     view.refuse_foreign()
     actions: list[str] = []
@@ -139,7 +139,7 @@ def complete(opened: Store, options: CreateOptions) -> CreateReport:
 
 
 def _write_settings(opened: Store, options: CreateOptions) -> bool:
-    """Before anything else: it marks the directory as ours. Returns whether it was needed."""
+    """Write the settings first: they mark the directory as ours. Returns whether it was needed."""
     if os.path.lexists(opened.root / layout.SETTINGS) or os.path.lexists(opened.root / layout.PUBLIC):
         return False
     with opened.batch() as batch:
@@ -178,7 +178,9 @@ def _add_ca(opened: Store, role: Role, options: CreateOptions) -> tuple[str, lis
 
 
 def _record_present_ca(opened: Store, role: Role, options: CreateOptions) -> None:
-    """The register knows no CA of this role yet where an earlier version, or SROS2, left the keystore incomplete."""
+    """Record the CA that is there if the register knows none of this role: an earlier version, or SROS2, left the
+    keystore incomplete.
+    """
     view = KeystoreView(opened.root)
     if role in options.imported:
         place = options.imported[role].certificate
@@ -194,7 +196,7 @@ def _record_present_ca(opened: Store, role: Role, options: CreateOptions) -> Non
 
 
 def _refuse_foreign_enclaves(view: KeystoreView, role: Role) -> None:
-    """A bundle of stand-alone enclaves, or a lost CA: another CA would replace what these enclaves trust."""
+    """Refuse stand-alone enclaves of a bundle, or of a lost CA: another CA would replace what they trust."""
     if view.key_file(role) is None and os.path.isdir(view.root / layout.ENCLAVES) and view.enclaves():
         raise DamagedKeystoreError(
             f"{printable(view.root)} holds enclaves, but not the {role.label} they belong to: "
@@ -203,13 +205,13 @@ def _refuse_foreign_enclaves(view: KeystoreView, role: Role) -> None:
 
 
 def new_ca(role: Role, options: CreateOptions) -> tuple[Authority, bytes]:
-    """A fresh CA and its key file."""
+    """Make a CA and its key file."""
     signer = authority.new_key(options.curve)
     return _self_signed(role, options, signer), key_pem(signer, _passphrase(options))
 
 
 def _present_key_ca(view: KeystoreView, role: Role, options: CreateOptions) -> tuple[Authority, bytes] | None:
-    """A key that is there already (an interrupted SROS2 run) is kept."""
+    """Make a CA for a key that is there already (an interrupted SROS2 run)."""
     present = view.key_file(role)
     if present is None:
         return None
@@ -225,7 +227,9 @@ def _self_signed(role: Role, options: CreateOptions, signer: Signer) -> Authorit
 
 
 def _passphrase(options: CreateOptions) -> Secret | None:
-    """What new CA keys are encrypted with; None: they are not. Raises ``InvalidInputError`` without a passphrase."""
+    """Return what new CA keys are encrypted with; None if they are not. Raises ``InvalidInputError`` without a
+    passphrase.
+    """
     if options.encrypt_ca_keys and options.access.passphrase is None:
         raise InvalidInputError("encrypting CA keys needs a passphrase: --passphrase-file, -fd or -env")
     return options.access.passphrase if options.encrypt_ca_keys else None
@@ -240,7 +244,7 @@ def _import_ca(role: Role, options: CreateOptions, key: Path) -> tuple[Authority
 
 
 def _given(place: Path) -> CertificateFacts:
-    """The first certificate of a file that somebody gave."""
+    """Return the first certificate of a file that somebody gave."""
     return given_certificates(read_given(place), printable(place))[0]
 
 
@@ -277,7 +281,7 @@ def _complete_governance(opened: Store, options: CreateOptions) -> bool:
 
 
 def _unsigned_default(root: Path) -> bytes | None:
-    """What an interrupted run left beside a missing ``governance.p7s``, unless it is more lax than the default.
+    """Return what an interrupted run left beside a missing ``governance.p7s``, unless it is weaker than the default.
 
     Raises DamagedKeystoreError for any other document: nobody signed it, so somebody must look at it first.
     """

@@ -86,10 +86,10 @@ def inspect(
     now: datetime,
     due: datetime,
 ) -> EnclaveState:
-    """``due``: certificates that end before it count as stale (``now`` for: only the expired). ``register`` is None
-    on a host that issues nothing.
+    """Inspect what an enclave has.
 
-    Raises UnsafeKeystoreError for links, owners and modes that let others in.
+    Certificates that expire before ``due`` count as stale (``now``: only the expired). ``register`` is None on a host
+    that issues nothing. Raises UnsafeKeystoreError for links, owners and modes that let others in.
     """
     enclave = _Enclave(view, register, name, layout.enclave_directory(name), now, due)
     wanted_links = layout.enclave_links(name, crl=view.has_crl)
@@ -125,7 +125,7 @@ def granted_lifetime(view: KeystoreView, register: Register | None, enclave: str
 
 
 def _is_there(view: KeystoreView, directory: str) -> bool:
-    """Whether the enclave's directory exists; raises UnsafeKeystoreError when it or one above is a link."""
+    """Return whether the enclave's directory exists; raises UnsafeKeystoreError if it or one above is a link."""
     path = f"{view.root}/{layout.ENCLAVES}"
     for part in directory.split("/")[1:]:
         path = f"{path}/{part}"
@@ -179,7 +179,7 @@ def _identity(enclave: _Enclave) -> _Found:
 
 
 def _key_mode(enclave: _Enclave) -> int:
-    """The permission bits of the private key, 0 without one."""
+    """Return the permission bits of the private key, 0 without one."""
     path = f"{enclave.view.root}/{enclave.directory}/{layout.KEY}"
     try:
         info = os.lstat(path)
@@ -216,7 +216,7 @@ def _certificate_problem(enclave: _Enclave, facts: CertificateFacts | None, matc
 
 
 def _record_problem(register: Register | None, enclave: str, serial: int) -> str | None:
-    """What the register says against a certificate that looks good by itself."""
+    """Return what the register says against a certificate that looks good by itself."""
     if register is None:
         return None
     record = register.certificates.get(serial)
@@ -230,8 +230,10 @@ def _record_problem(register: Register | None, enclave: str, serial: int) -> str
 
 
 def _key_is_ours(enclave: _Enclave, register: Register, key_pem: bytes) -> bool:
-    """Whether the key is that of the certificate in force, or of one by the present CA that is not revoked: only such
-    a key is certified again. What an old CA issued says nothing: nobody revokes it."""
+    """Return whether the key is that of the certificate in force, or of one by the present CA that is not revoked.
+
+    Only such a key is certified again. What an old CA issued says nothing: nobody revokes it.
+    """
     try:
         present = fingerprint(spki(public_half(key_pem, "the enclave's key")))
     except SigningUnavailableError:
@@ -244,7 +246,7 @@ def _key_is_ours(enclave: _Enclave, register: Register, key_pem: bytes) -> bool:
 
 
 def _permissions_problem(enclave: _Enclave, expected: bytes | None) -> str | None:
-    """Why not exactly ``expected`` (None: whatever it is) is signed by our CA; None where it is."""
+    """Return why ``expected`` (None: whatever it is) is not what our CA signed; None if it is."""
     signed = enclave.read(layout.PERMISSIONS)
     if signed is None:
         return "no permissions"
@@ -270,7 +272,7 @@ def _permissions_problem(enclave: _Enclave, expected: bytes | None) -> str | Non
 
 
 def _link_stands(enclave: _Enclave, name: str, target: str) -> bool:
-    """A link to ``target``, or what a file system without links has instead: a copy."""
+    """Return whether there is a link to ``target``, or what a file system without links has instead: a copy."""
     present = safe_files.link_target(enclave.view.root, f"{enclave.directory}/{name}")
     if present is not None:
         return present == target

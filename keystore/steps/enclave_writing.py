@@ -72,7 +72,7 @@ class EnclaveWriter:
         return self._options.revoke and can_revoke(self._view)
 
     def _lifetime(self, enclave: str) -> timedelta:
-        """What is asked for, else what the enclave was granted, else the keystore's."""
+        """Return the requested lifetime, else what the enclave was granted, else the keystore's."""
         options = self._options
         if options.valid_until is not None:
             return options.valid_until - self._now
@@ -81,7 +81,7 @@ class EnclaveWriter:
         return granted_lifetime(self._view, self._register, enclave) or self._view.settings.lifetime
 
     def _validity(self, enclave: str) -> Validity:
-        """Of a new certificate; permissions take over what their certificate got."""
+        """Return the validity of a new certificate; permissions take over what their certificate got."""
         self._view.refuse_ended(self._now, *Role)
         cas = [self._view.ca(role).validity for role in Role]
         asked = Validity.starting(self._now, self._lifetime(enclave), backdate=self._options.backdate)
@@ -92,7 +92,7 @@ class EnclaveWriter:
         return self._options.subjects or self._view.settings.subjects
 
     def check_subjects(self, states: list[EnclaveState]) -> None:
-        """With compatible subjects: refuse new enclaves that Cyclone DDS could confuse with others."""
+        """Refuse, with compatible subjects, new enclaves that Cyclone DDS could confuse with others."""
         fresh = {state.enclave for state in states if state.reissue is not Reissue.NOTHING}
         if self._scheme is SubjectScheme.EXACT or not fresh or self._options.allow_subject_overlap:
             return
@@ -137,7 +137,7 @@ class EnclaveWriter:
         return EnclaveReport(state.enclave, tuple(actions), found, facts.validity)
 
     def record(self, batch: Batch) -> None:
-        """What was added to the batch: on record before anything of it is seen."""
+        """Put what was added to the batch on record before anything of it is visible."""
         if not (self._issued or self._signed or self._revoked):
             return
         register = self._register.with_certificates(self._issued).with_documents(self._signed)
@@ -148,8 +148,10 @@ class EnclaveWriter:
         self._issued, self._signed, self._revoked = [], [], set()
 
     def _end_rights(self, state: EnclaveState, lost: tuple[str, ...]) -> EnclaveState:
-        """Documents cannot be revoked: the old one would fit until it ends. What ends it is another subject, and the
-        old certificate on the CRL."""
+        """End what the enclave was permitted: with another subject, and the old certificate on the CRL.
+
+        Documents cannot be revoked: the old one would match until it expires.
+        """
         what = some_of(lost, 3)
         if self._scheme is SubjectScheme.COMPATIBLE:
             self.warnings.append(
@@ -184,7 +186,7 @@ class EnclaveWriter:
         entries: dict[str, Content | Link],
         actions: list[str],
     ) -> CertificateFacts:
-        """Of the certificate the enclave will have."""
+        """Return the present certificate, or issue one and add its files to ``entries``."""
         if state.reissue is Reissue.NOTHING and state.facts is not None:
             return state.facts
         made = self._issue(state, self._subject(state.enclave, new_generation), actions)
@@ -216,7 +218,7 @@ class EnclaveWriter:
         return Identity(self._issuer.issue(cn, public, self._validity(state.enclave)))
 
     def _subject(self, enclave: str, new_generation: bool) -> str:
-        """The subject it has; another one for a new generation, or after a change of the scheme."""
+        """Return the subject it has; another one for a new generation, or after a change of the scheme."""
         records = self._register.of_enclave(enclave)
         used = {one.subject for one in records} | {
             one.subject for one in self._register.documents if one.enclave == enclave
@@ -242,7 +244,7 @@ class EnclaveWriter:
         )
 
     def _revoke_longer(self, state: EnclaveState, validity: Validity) -> None:
-        """A shorter life that was asked for is one only when the longer certificate cannot be used any more."""
+        """Revoke the longer certificate: only then is a shorter life that was requested a shorter one."""
         if self._options.lifetime is None and self._options.valid_until is None:
             return
         found = revocable(self._view, self._register, [state.enclave])

@@ -34,7 +34,7 @@ class Expiry(NamedTuple):
         return self.not_before <= now <= self.not_after
 
     def is_due(self, now: datetime, limit: datetime) -> bool:
-        """It has ended or has not begun at ``now``, or ends by ``limit``."""
+        """Return whether it has expired or has not begun at ``now``, or expires by ``limit``."""
         return self.not_after <= limit or not self.is_valid(now)
 
     @property
@@ -51,7 +51,7 @@ class StatusReport(NamedTuple):
     expiries: tuple[Expiry, ...]
 
     def due(self, margin: timedelta) -> tuple[Expiry, ...]:
-        """What has ended, has not begun, or ends within ``margin``."""
+        """Return what has expired, has not begun, or expires within ``margin``."""
         limit = later(self.now, margin)
         return tuple(one for one in self.expiries if one.is_due(self.now, limit))
 
@@ -72,7 +72,7 @@ def expires_soon(
     known: Mapping[str, Validity] | None = None,
     now: datetime | None = None,
 ) -> tuple[Expiry, ...]:
-    """What ends within ``within`` (or has ended), for the CAs and these enclaves (None: all).
+    """Return what expires within ``within`` (or has expired), for the CAs and these enclaves (None: all).
 
     ``known``: enclaves that need not be read again, with the validity of their certificate and permissions, as
     ``ProvisionReport.validities`` gives them.
@@ -117,7 +117,7 @@ def _expiry(what: str, enclave: str | None, validity: Validity) -> Expiry:
 
 
 def _permissions_validity(signed: bytes, place: str) -> Validity:
-    """Of the first grant, the only one that implementations use."""
+    """Return the validity of the first grant, the only one that implementations use."""
     found = dict(reversed(re.findall(_DATE, smime.read_any(signed, place).document)))
     try:
         return Validity(parse_moment(found[b"before"].decode()), parse_moment(found[b"after"].decode()))

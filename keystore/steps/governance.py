@@ -89,7 +89,7 @@ def set_governance(
 
 
 def _stands(view: KeystoreView, document: bytes) -> bool:
-    """Whether exactly ``document`` is in force; what cannot be read is not."""
+    """Return whether exactly ``document`` is in force; what cannot be read is not."""
     try:
         signed = signed_governance(view)
     except DamagedKeystoreError:

@@ -44,7 +44,7 @@ class KeyEntry(NamedTuple):
 
 
 def inventory(keystore: Path | str) -> tuple[KeyEntry, ...]:
-    """CAs first, those that are only still trusted after the one in use; then enclaves by name.
+    """List CAs first, those that are only still trusted after the one in use; then enclaves by name.
 
     Raises NotAKeystoreError and DamagedKeystoreError.
     """
@@ -141,7 +141,7 @@ class Granted(NamedTuple):
 
 
 def granted(keystore: Path | str) -> dict[str, Granted]:
-    """Enclave -> what its permissions say; an enclave without permissions is left out.
+    """Map enclaves to what their permissions say; an enclave without permissions is left out.
 
     Raises NotAKeystoreError, DamagedKeystoreError and InvalidInputError for what cannot be read.
     """

@@ -49,9 +49,9 @@ class ChangeOptions:
 def opened_for_change(
     root: Path, now: datetime, options: ChangeOptions | ProvisionOptions
 ) -> Iterator[Store]:
-    """As ``store.opened``; a complete keystore without a register gets one made from what stands in it.
+    """Open as ``store.opened``; a complete keystore without a register gets one made from its contents.
 
-    Raises DamagedKeystoreError where the clock cannot be right, unless that is accepted or the caller gave the time.
+    Raises DamagedKeystoreError if the clock cannot be right, unless that is accepted or the caller gave the time.
     """
     with store.opened(root, timeout=options.lock_timeout, durable=options.durable) as opened:
         if options.now is None:
@@ -68,7 +68,7 @@ _BACK, _AHEAD = timedelta(days=1), timedelta(days=366)
 
 
 def _check_clock(opened: Store, now: datetime, *, accepted: bool) -> None:
-    """With a wrong clock certificates end at the wrong time, and what was revoked could be forgotten."""
+    """Refuse a wrong clock: certificates would expire at the wrong time, and revocations could be forgotten."""
     last = opened.register.written
     if last is None or last - _BACK <= now <= last + _AHEAD:
         return
@@ -83,8 +83,10 @@ def _check_clock(opened: Store, now: datetime, *, accepted: bool) -> None:
 
 
 def _adopt_newer_crl(opened: Store) -> None:
-    """Where ``private/`` was restored from a backup, the CRL may know more than the register: nobody who was revoked
-    comes back. One that our CA did not sign says nothing."""
+    """Take over a CRL that knows more than the register, as after ``private/`` was restored from a backup.
+
+    Nobody who was revoked comes back. A CRL that our CA did not sign says nothing.
+    """
     view = KeystoreView(opened.root)
     with suppress(DamagedKeystoreError):
         if view.has_crl and crl_number(view) > opened.register.crl_number:
@@ -117,8 +119,10 @@ def take_over(opened: Store, now: datetime) -> None:
 
 
 def _authorities(view: KeystoreView) -> Register:
-    """Of a trust file with several CAs only those count that the keystore made itself: a switch keeps the old one
-    among the retired, a start the new one among those that wait."""
+    """Register the CAs that the keystore made; of a trust file with several, only those count.
+
+    A switch keeps the old one among the retired, a start the new one among those that wait.
+    """
     register = Register()
     for role in Role:
         register = register.with_authority(role, view.ca(role).der, AuthorityState.IN_USE)
@@ -144,8 +148,11 @@ def _certificates_in(view: KeystoreView, directory: str, prefix: str) -> Iterato
 
 
 def _replaced(view: KeystoreView, now: datetime) -> Iterator[IssuedCertificate]:
-    """What an earlier version remembered of certificates that were replaced and had not ended: whoever copied one, with
-    its key, can still use it, so that removing its enclave has to revoke it. Raises DamagedKeystoreError."""
+    """Return certificates that were replaced and had not expired, as an earlier version remembered them.
+
+    Whoever copied one with its key can still use it, so that removing its enclave has to revoke it. Raises
+    DamagedKeystoreError.
+    """
     if safe_files.read_if_there(view.root, layout.SUPERSEDED) is None:
         return
     text = safe_files.read_private(view.root, layout.SUPERSEDED)

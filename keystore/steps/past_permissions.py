@@ -27,9 +27,9 @@ UNKNOWN_RIGHTS = "do what it was granted before"
 def what_is_taken_away(
     view: KeystoreView, register: Register, enclave: str, wanted: PermissionsSource
 ) -> tuple[str, ...]:
-    """What the enclave was granted last and is not to have any more (``publish rt/chatter``), empty for nothing.
+    """Return what the enclave was granted last and loses now (``publish rt/chatter``), empty for nothing.
 
-    Where what it had cannot be read any more, that is said instead.
+    If what it had cannot be read any more, that is said instead.
     """
     last = register.permissions(enclave)
     if last is None:
@@ -50,7 +50,7 @@ def what_is_taken_away(
 def kept_permissions(
     view: KeystoreView, register: Register, enclave: str, subject: str, validity: Validity, rmw: str | None
 ) -> bytes:
-    """What the enclave was granted before, under its new subject and dates; without a past, nothing.
+    """Return what the enclave was granted before, under its new subject and dates; without a past, nothing.
 
     Raises DamagedKeystoreError for a document that is not the one signed last for this enclave.
     """
@@ -84,7 +84,7 @@ def _document(view: KeystoreView, enclave: str, last: SignedPermissions | None) 
 
 
 def _granted_last(view: KeystoreView, last: SignedPermissions) -> Grant | None:
-    """The grant on disk, if it is the one recorded."""
+    """Return the grant on disk, if it is the one recorded."""
     try:
         grant = _grant(_document(view, last.enclave, last), last.enclave)
     except KeystoreError:
@@ -93,7 +93,7 @@ def _granted_last(view: KeystoreView, last: SignedPermissions) -> Grant | None:
 
 
 def _grant(document: bytes, enclave: str) -> Grant | None:
-    """The first grant of a document for this enclave, under any subject it can have had."""
+    """Return the first grant of a document for this enclave, under any subject it can have had."""
     grants = parse_permissions(document, f"the permissions of {enclave}")
     prefix = "CN="
     return next(

@@ -81,7 +81,7 @@ def _left_over(root: Path, enclaves: list[str]) -> list[str]:
 
 
 def drop_share_files(root: Path, enclaves: Iterable[str], options: ProvisionOptions) -> None:
-    """They were given exactly what was asked for: nothing of it is a launch's any more."""
+    """Drop the shares: the enclaves were given exactly what was requested, and nothing of it is a launch's any more."""
     stale = [name for name in enclaves if read_shares(root, name)]
     if stale:
         with store.opened(root, timeout=options.lock_timeout, durable=options.durable) as opened:
@@ -118,8 +118,10 @@ def create_enclaves(
     allow_all: bool = False,
     options: ProvisionOptions | None = None,
 ) -> ProvisionReport:
-    """Enclaves with a valid identity. New ones may do nothing, existing ones keep their permissions, unless
-    ``allow_all`` asks for every topic, service and action. The keystore must exist.
+    """Create enclaves with a valid identity in a keystore that exists.
+
+    New ones may do nothing, existing ones keep their permissions, unless ``allow_all`` requests every topic, service
+    and action.
     """
     root = resolve_root(keystore)
     chosen = with_domains(root, _as_long_as_asked(options or ProvisionOptions()))
@@ -134,16 +136,16 @@ def create_enclaves(
 def create_enclave(
     keystore: Path | str, name: str, *, allow_all: bool = False, options: ProvisionOptions | None = None
 ) -> ProvisionReport:
-    """``create_enclaves`` for one."""
+    """Create one enclave as ``create_enclaves``."""
     return create_enclaves(keystore, [name], allow_all=allow_all, options=options)
 
 
 def keep(_subject: str, _validity: Validity) -> None:
-    """The permissions source of those who do not want to change permissions."""
+    """Return no permissions: for callers who do not want to change them."""
 
 
 def _allow_all(name: str, options: ProvisionOptions) -> PermissionsSource:
-    """SROS2's default policy of create_enclave: everything on ``/*``, asked for by name here."""
+    """Return SROS2's default policy of create_enclave: everything on ``/*``, requested by name here."""
     everything = tuple(Rule(operation, Qualifier.ALLOW, "/*") for operation in Operation)
     return permissions_source(EnclavePolicy(name, (Profile("/", "all", everything),)), options)
 
@@ -151,14 +153,13 @@ def _allow_all(name: str, options: ProvisionOptions) -> PermissionsSource:
 def apply_policy(
     keystore: Path | str, policy: Policy, *, options: ProvisionOptions | None = None
 ) -> ProvisionReport:
-    """Exactly the policy's permissions for the policy's enclaves, created where missing, in a keystore that
-    exists."""
+    """Give exactly the policy's permissions to the policy's enclaves, created if missing, in a keystore that exists."""
     chosen = _as_long_as_asked(options or ProvisionOptions())
     return provision(keystore, policy.enclaves, options=chosen)
 
 
 def _as_long_as_asked(options: ProvisionOptions) -> ProvisionOptions:
-    """A life that is asked for is given to existing enclaves too: what ends an hour sooner or later is issued anew."""
+    """Give a requested life to existing enclaves too: what expires an hour sooner or later is issued anew."""
     end = asked_end(options)
     within = options.renew_within if end is None else end - (options.now or utc_now()) - timedelta(hours=1)
     return options._replace(create=False, renew_within=max(options.renew_within, within))

@@ -66,7 +66,7 @@ def reconcile(
 
 
 def _as_it_is_now(one: WantedEnclave) -> WantedEnclave:
-    """Under the lock: shares that others wrote since the comparison count."""
+    """Compare again under the lock: shares that others wrote since the comparison count."""
     if one.share is None:
         return one
     share = replace(one.share)
@@ -91,7 +91,7 @@ def _locked(root: Path, options: ProvisionOptions, now: datetime) -> Iterator[St
 def _complete_keystore(
     opened: Store, options: ProvisionOptions, now: datetime
 ) -> tuple[list[str], list[str]]:
-    """Missing parts of the keystore itself, and a governance that covers the domains."""
+    """Write missing parts of the keystore itself, and a governance that covers the domains."""
     domains = options.domains or governance_domains(KeystoreView(opened.root))
     creation = replace(
         options.creation or CreateOptions(),
@@ -115,7 +115,7 @@ def _write_all(
     wanted: Mapping[str, WantedEnclave],
     progress: Progress | None,
 ) -> tuple[EnclaveReport, ...]:
-    """In batches: bounded loss when interrupted, few calls to make it durable."""
+    """Write in batches: bounded loss if interrupted, few calls to make it durable."""
     reports = {state.enclave: as_found(state) for state in states}
     todo = [state for state in states if not state.is_good]
     for start in range(0, len(todo), _BATCH):

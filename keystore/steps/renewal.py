@@ -60,10 +60,10 @@ class RenewOptions:
 def renew(
     keystore: Path | str, enclaves: Iterable[str] | None = None, *, options: RenewOptions | None = None
 ) -> ProvisionReport:
-    """Renews these enclaves; without a list all that is due or exposed, but no tool's. Repeating does nothing more.
+    """Renew these enclaves; without a list all that is due or exposed, but no tool's. Repeating does nothing more.
 
-    Each gets the lifetime that it was granted before, unless one is asked for. Raises InvalidInputError for an enclave
-    that is not there and for new keys of nobody, SigningUnavailableError without the CA keys.
+    Each gets the lifetime that it was granted before, unless one is requested. Raises InvalidInputError for an
+    enclave that is not there and for new keys of nobody, SigningUnavailableError without the CA keys.
     """
     chosen = options or RenewOptions()
     if chosen.new_keys and enclaves is None and not chosen.everything:
@@ -102,7 +102,7 @@ def renew(
 
 
 def _still_valid(root: Path, report: ProvisionReport, now: datetime) -> list[str]:
-    """What was replaced can be used by whoever copied it, until it ends or is revoked."""
+    """Return what was replaced and can be used by whoever copied it, until it expires or is revoked."""
     register = read_register(root)
     renewed = [one.enclave for one in report.enclaves if one.actions]
     earlier = [
@@ -142,7 +142,7 @@ def _with_names_of_their_own(
 
 
 def _wanted(view: KeystoreView, name: str, named: list[str] | None, options: RenewOptions) -> WantedEnclave:
-    """Enclaves not named are only completed, as any change of a CA demands it of all."""
+    """Decide what is renewed; enclaves not named are only completed, as any change of a CA demands it of all."""
     asked = name in named if named is not None else options.everything or _is_exposed(view, name, options)
     if not asked:
         return WantedEnclave(keep)
@@ -150,7 +150,7 @@ def _wanted(view: KeystoreView, name: str, named: list[str] | None, options: Ren
 
 
 def _is_exposed(view: KeystoreView, name: str, options: RenewOptions) -> bool:
-    """A certificate that could sign documents, or whose subject another enclave's permissions fit."""
+    """Return whether a certificate could sign documents, or has a subject that another enclave's permissions match."""
     facts = _facts(view, name)
     if facts is None:
         return False
@@ -210,14 +210,14 @@ def _restore_trust_files(opened: Store) -> list[str]:
 
 
 def _trusted(opened: Store, role: Role) -> list[bytes]:
-    """The CAs that may stand in the trust file (DER), the one in use first."""
+    """Return the CAs that may stand in the trust file (DER), the one in use first."""
     known = {ca: state for (its, ca), state in opened.register.authorities.items() if its is role}
     in_use = [ca for ca, state in known.items() if state is AuthorityState.IN_USE]
     return in_use + [ca for ca in known if opened.register.trusts_authority(role, ca) and ca not in in_use]
 
 
 def _close_modes(opened: Store) -> list[str]:
-    """0700 for ``private/`` and 0600 for what is in it; enclave keys are closed with their enclave."""
+    """Set 0700 for ``private/`` and 0600 for what is in it; enclave keys are closed with their enclave."""
     candidates = {layout.PRIVATE: 0o700, layout.SHARED_CA_KEY: 0o600}
     candidates |= {layout.ca_key(role): 0o600 for role in Role}
     closed = []

@@ -44,8 +44,8 @@ def sign_requests(
 ) -> ProvisionReport:
     """Certify the requested keys in the place of those that the enclaves have; repeating does nothing more.
 
-    The enclaves must exist, with the permissions that they are to have; their private keys are deleted here.
-    Raises InvalidInputError for an enclave that does not exist and a key that is another's, SigningUnavailableError.
+    The enclaves must exist, with the permissions that they are to have; their private keys are deleted here. Raises
+    InvalidInputError for an enclave that does not exist and a key that is another's, SigningUnavailableError.
     """
     chosen = options or SigningOptions()
     root, listed = keystore_at(keystore).root, list(requests)
@@ -128,7 +128,9 @@ def _accept(
     one: Request,
     facts: CertificateFacts,
 ) -> Register:
-    """The enclave's files; its permissions again, for the dates of this certificate."""
+    """Write the enclave's files, with its permissions for the dates of this certificate; return the register with
+    both.
+    """
     name = facts.common_name or ""
     document = kept_permissions(view, register, one.enclave, subject_name(name), facts.validity, None)
     entries: dict[str, Content | Link] = {

@@ -66,7 +66,7 @@ def roll_over(
     options: ProvisionOptions | None = None,
     encrypt: bool = False,
 ) -> ProvisionReport:
-    """One step of replacing CAs; repeating an interrupted step completes it.
+    """Do one step of replacing CAs; repeating an interrupted step completes it.
 
     ``options.creation`` gives curve, lifetime and names of the new CAs. Raises InvalidInputError for a step out of
     order.
@@ -97,7 +97,7 @@ def roll_over(
 
 
 def _creation(options: ProvisionOptions, now: datetime, encrypt: bool) -> CreateOptions:
-    """How the new CAs are made."""
+    """Return how the new CAs are made."""
     given = options.creation or CreateOptions()
     return replace(given, backdate=options.backdate, access=options.access, encrypt_ca_keys=encrypt, now=now)
 
@@ -179,7 +179,7 @@ def _retired(opened: Store, role: Role) -> bool:
 
 
 def _forget_installed(opened: Store, role: Role) -> None:
-    """What a ``switch`` interrupted while it forgot: the key goes first, and only after it was installed."""
+    """Remove what an interrupted ``switch`` left: the key goes first, and only after it was installed."""
     waiting = opened.root / _waiting(role)
     if waiting.is_dir() and not os.path.lexists(waiting / layout.KEY):
         _forget_next(opened, role)
@@ -213,7 +213,7 @@ def _refuse_without_start(opened: Store, roles: Collection[Role]) -> None:
 
 
 def _retire_for_good(opened: Store, role: Role) -> None:
-    """After the trust file: whoever puts the old CA back there is found."""
+    """Record the retirement after the trust file is written: whoever puts the old CA back there is found."""
     retired = opened.register.with_retired([role])
     if retired != opened.register:
         with opened.batch() as batch:
@@ -242,7 +242,10 @@ def _refuse_to_strand(opened: Store, roles: Collection[Role]) -> None:
 
 
 def _hangs_on_old_ca(view: KeystoreView, enclave: str, roles: Collection[Role]) -> bool:
-    """What cannot be read belongs to no CA; renew or verify tells of it."""
+    """Return whether another CA than the one in use issued it.
+
+    What cannot be read belongs to no CA; renew or verify report it.
+    """
     pem = view.enclave_file(enclave, layout.CERT)
     signed = view.enclave_file(enclave, layout.PERMISSIONS)
     with suppress(DamagedKeystoreError):

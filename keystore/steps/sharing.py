@@ -42,7 +42,7 @@ class EnclaveShare:
     hold: LaunchHold | None = None
 
     def document(self, subject: str, validity: Validity) -> bytes:
-        """The permissions of all shares together. Raises InvalidInputError where they cannot be united."""
+        """Unite the permissions of all shares; raises InvalidInputError if they cannot be united."""
         domains = united_domains(self.shares) if self.shares else governance_domains(KeystoreView(self.root))
         policy = united(self.enclave, self.shares)
         return permissions_document(subject, policy, validity=validity, domains=domains, rmw=self.rmw)
@@ -71,11 +71,11 @@ class EnclaveShare:
         return any(is_running(self.root, share.owner) for share in others)
 
     def is_recorded(self) -> bool:
-        """Whether the keystore has exactly these shares; one without ``private/`` records none."""
+        """Return whether the keystore has exactly these shares; one without ``private/`` records none."""
         return self.present == self.shares or not (self.root / layout.PRIVATE).is_dir()
 
     def record(self, opened: Store, batch: Batch) -> None:
-        """Before the document that follows from it."""
+        """Write the shares before the document that follows from them."""
         opened.ensure_directory(layout.SHARES)
         if self.shares:
             batch.file(layout.shares(self.enclave), shares_json(self.shares), PRIVATE_MODE)
@@ -83,7 +83,7 @@ class EnclaveShare:
             opened.remove(layout.shares(self.enclave))
 
     def kept(self) -> tuple[str, ...]:
-        """What stays of our own share though it is not asked for any more, for a person."""
+        """Return, for a person, what stays of our own share though it is not requested any more."""
         mine = next((share for share in self.shares if share.owner == self.owner), None)
         if mine is None or self.mine is None or is_part_of(mine.profiles, self.mine.profiles):
             return ()
@@ -95,7 +95,7 @@ def _loses(before: Share, mine: Share) -> bool:
 
 
 def kept_shares(shares: Iterable[EnclaveShare]) -> list[str]:
-    """Of each share what could not be taken away yet, one sentence an enclave."""
+    """Return what could not be taken away of each share yet, one sentence an enclave."""
     kept = [(share.enclave, share.kept()) for share in shares]
     return [
         f"enclave {enclave} is in use by another running launch, or another run of this one: it keeps what this launch "
@@ -106,7 +106,7 @@ def kept_shares(shares: Iterable[EnclaveShare]) -> list[str]:
 
 
 def _words(profiles: Iterable[Profile]) -> set[str]:
-    """``publish /chatter``: what is allowed, by full names."""
+    """Say what is allowed, by full names: ``publish /chatter``."""
     return {
         f"{operation.verb} {full_name(expression, profile)}"
         for profile in profiles
@@ -126,7 +126,7 @@ class SharedEnclave(NamedTuple):
 def shared_enclaves(
     keystore: Path | str, owner: str, policies: Iterable[EnclavePolicy]
 ) -> Iterator[SharedEnclave]:
-    """Which enclaves of a launch other launches use as well, and what that costs. Reads only."""
+    """Return which enclaves of a launch other launches use as well, and what that costs. Reads only."""
     root = resolve_root(keystore)
     for policy in policies:
         others = [share for share in read_shares(root, policy.path) if share.owner != owner]
@@ -146,7 +146,7 @@ class LaunchShares(NamedTuple):
 
 
 def list_shares(keystore: Path | str) -> tuple[LaunchShares, ...]:
-    """Every launch with shares, by owner. Raises NotAKeystoreError."""
+    """List every launch with shares, by owner; raises NotAKeystoreError."""
     view = keystore_at(keystore)
     found: dict[str, list[str]] = {}
     for enclave in enclaves_with_shares(view.root):
@@ -159,7 +159,7 @@ def list_shares(keystore: Path | str) -> tuple[LaunchShares, ...]:
 
 
 def given_up(root: Path, owner: str) -> list[EnclaveShare]:
-    """The shares of ``owner``, to be dropped. Raises InvalidInputError for none, or while somebody uses them."""
+    """Return the shares of ``owner``, to be dropped; raises InvalidInputError for none, or while somebody uses them."""
     mine = [
         EnclaveShare(root, enclave, owner, None)
         for enclave in enclaves_with_shares(root)

@@ -58,8 +58,10 @@ def _permission_differences(view: KeystoreView, state: EnclaveState, wanted: Wan
 def beyond_and_missing(
     view: KeystoreView, state: EnclaveState, wanted: WantedEnclave
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """What the signed permissions grant beyond what is wanted, and what they lack; both empty for what cannot be
-    read."""
+    """Return what the signed permissions grant beyond what is wanted, and what they lack.
+
+    Both are empty for what cannot be read.
+    """
     if state.facts is None or state.facts.common_name is None:
         return (), ()
     subject, place = subject_name(state.facts.common_name), layout.PERMISSIONS

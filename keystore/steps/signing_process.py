@@ -48,7 +48,7 @@ class SigningProcess:
 
     @classmethod
     def start(cls, keystore: Path | str, options: ProvisionOptions) -> SigningProcess:
-        """Forks the process that signs for this keystore, and forgets the passphrase here.
+        """Fork the process that signs for this keystore, and forget the passphrase here.
 
         ``options``: what is decided already; nothing that comes later changes it. Call it before other people's code
         runs, and before there are threads.
@@ -65,7 +65,7 @@ class SigningProcess:
         return cls(ours)
 
     def provision(self, enclaves: Iterable[EnclavePolicy], options: ProvisionOptions) -> ProvisionReport:
-        """As ``provisioning.provision``, in the other process. Raises what that raises."""
+        """Call ``provisioning.provision`` in the other process; raises what that raises."""
         policies = [[one.path, _policy_text(one, options)] for one in enclaves]
         return _report(
             self._ask({"do": "provision", "enclaves": policies, **_decided(options)}, options.launch)
@@ -95,7 +95,7 @@ def _policy_text(one: EnclavePolicy, options: ProvisionOptions) -> str:
 
 
 def _decided(options: ProvisionOptions) -> dict[str, Any]:
-    """What a plan decides, and nothing else."""
+    """Return what a plan decides, and nothing else."""
     return {
         "domains": str(options.domains) if options.domains is not None else None,
         "enclave_domains": {name: str(domains) for name, domains in options.enclave_domains.items()},
@@ -109,7 +109,7 @@ def _decided(options: ProvisionOptions) -> dict[str, Any]:
 
 
 def _serve(channel: socket.socket, root: Path, base: ProvisionOptions) -> None:
-    """Answers until the launcher ends; never returns."""
+    """Answer until the launcher ends; never return."""
     try:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # the launcher ends first, and then we do
         ctypes.CDLL(None).prctl(_PR_SET_DUMPABLE, 0, 0, 0, 0)  # nobody of the same user reads our memory
@@ -124,7 +124,7 @@ def _serve(channel: socket.socket, root: Path, base: ProvisionOptions) -> None:
 
 
 def _read_early(secret: Secret | None) -> None:
-    """One that cannot be read is told of when something is to be signed."""
+    """Read a secret before anything else; one that cannot be read is reported when something is to be signed."""
     if secret is not None:
         with contextlib.suppress(KeystoreError):
             secret.value()
@@ -218,7 +218,7 @@ def _error(name: str, message: str, domains: str) -> KeystoreError:
 
 
 def _send(channel: socket.socket, content: Any, descriptor: int | None) -> None:
-    """``descriptor`` is duplicated into the other process."""
+    """Send a message; ``descriptor`` is duplicated into the other process."""
     data = json.dumps(content).encode()
     channel.sendmsg([_HEAD.pack(len(data))], _rights(descriptor))
     channel.sendall(data)
@@ -251,7 +251,7 @@ def _receive(channel: socket.socket) -> tuple[Any, int | None]:
 
 
 def _forget_variable(name: str) -> None:
-    """Also where /proc/self/environ shows it: in the block that the process was started with."""
+    """Overwrite a variable also where /proc/self/environ shows it: in the block that the process was started with."""
     libc = ctypes.CDLL(None)
     libc.getenv.restype = ctypes.c_void_p
     place = libc.getenv(os.fsencode(name))

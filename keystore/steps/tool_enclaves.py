@@ -97,7 +97,10 @@ def provide_watcher(keystore: Path | str, options: ProvisionOptions, *, as_ros_n
 
 
 def tool_environment(root: Path | str, enclave: str) -> dict[str, str]:
-    """Source: rcl ``security.c``; the override wins over what a command line says."""
+    """Return the variables that put a tool into its enclave.
+
+    Source: rcl ``security.c``; the override takes precedence over a command line.
+    """
     return {
         "ROS_SECURITY_ENABLE": "true",
         "ROS_SECURITY_STRATEGY": "Enforce",
@@ -112,8 +115,10 @@ def _end(root: Path, enclave: str) -> datetime:
 
 
 def enclaves_by_guid(keystore: Path | str) -> dict[int, str]:
-    """The first 48 bits of the GUIDs of its participants → enclave, for every enclave of the keystore. No key is
-    read. Source: DDS-Security 9.3.3."""
+    """Map the first 48 bits of the GUIDs of its participants to each enclave of the keystore; no key is read.
+
+    Source: DDS-Security 9.3.3.
+    """
     view = keystore_at(keystore)
     names = {enclave: view.common_name(enclave) for enclave in view.enclaves()}
     return {guid_prefix(name): enclave for enclave, name in names.items() if name}

@@ -33,7 +33,7 @@ VERBS = (
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Errors become one line on stderr and an exit status; nothing is printed twice."""
+    """Run the command; errors become one line on stderr and an exit status, and nothing is printed twice."""
     with safe_output():
         return _main(argv)
 
@@ -46,7 +46,7 @@ def _main(argv: Sequence[str] | None) -> int:
 
 
 def _offer(parser: argparse.ArgumentParser) -> None:
-    """Enclaves are offered where they must exist."""
+    """Offer enclaves for completion where they must exist."""
     existing = (each for each in parsers(parser) if not each.prog.endswith("create-enclave"))
     complete_with(existing, "enclaves", _enclaves)
 
@@ -61,7 +61,7 @@ def _enclaves(parsed_args: argparse.Namespace, **_: object) -> list[str]:
 
 
 def build_parser() -> argparse.ArgumentParser:
-    """One subparser for each verb, described by the head of its file."""
+    """Build one subparser for each verb, described by the head of its file."""
     parser = CommandParser(
         prog="secure-keystore",
         description="Create, check, renew and deploy SROS2 keystores. What was interrupted is completed by the same "

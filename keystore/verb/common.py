@@ -106,12 +106,12 @@ def add_table(parser: argparse.ArgumentParser, table: Table) -> None:
 
 
 def domains(arguments: argparse.Namespace) -> Domains | None:
-    """What ``DOMAINS`` was given. Raises InvalidInputError."""
+    """Return what ``DOMAINS`` was given; raises InvalidInputError."""
     return Domains.parse(arguments.domain_id) if arguments.domain_id else None
 
 
 def access(arguments: argparse.Namespace) -> CaAccess:
-    """How CA keys are opened, from the options of ``SIGNING``."""
+    """Return how CA keys are opened, from the options of ``SIGNING``."""
     given = vars(arguments)
     passphrase = Secret(given["passphrase_file"], given["passphrase_fd"], given["passphrase_env"])
     pin = Secret(file=given["pin_file"], variable=given["pin_env"])
@@ -119,7 +119,7 @@ def access(arguments: argparse.Namespace) -> CaAccess:
 
 
 def change(arguments: argparse.Namespace) -> dict[str, Any]:
-    """How the keystore is opened, from the options of ``CHANGE``: for any change."""
+    """Return how the keystore is opened for any change, from the options of ``CHANGE``."""
     return {
         "access": access(arguments),
         "lock_timeout": arguments.lock_timeout,
@@ -137,7 +137,7 @@ class Span:
 
 
 def span(arguments: argparse.Namespace) -> Span:
-    """From the options of ``VALIDITY``. Raises ``InvalidInputError``."""
+    """Return the validity from the options of ``VALIDITY``; raises ``InvalidInputError``."""
     text: str | None = arguments.valid_for
     backdate = parse_duration(arguments.backdate) if arguments.backdate else DEFAULT_BACKDATE
     if text is None:
@@ -149,7 +149,7 @@ def span(arguments: argparse.Namespace) -> Span:
 
 
 def provision_options(arguments: argparse.Namespace, **more: Any) -> ProvisionOptions:
-    """What ``PROVISIONING`` was given."""
+    """Return what ``PROVISIONING`` was given."""
     validity = span(arguments)
     return ProvisionOptions(
         lifetime=validity.lifetime,
@@ -165,12 +165,12 @@ def provision_options(arguments: argparse.Namespace, **more: Any) -> ProvisionOp
 
 
 def print_json(content: Any) -> None:
-    """One JSON document with sorted keys."""
+    """Print one JSON document with sorted keys."""
     print(json_text(content, indent=2, sort_keys=True, default=str))
 
 
 def print_answer(arguments: argparse.Namespace, content: dict[str, Any], lines: Iterable[str]) -> None:
-    """What was asked for, as ``--format`` says."""
+    """Print what was requested, as ``--format`` says."""
     if arguments.format == "json":
         print_json({"version": 1, **content})
     else:
@@ -178,13 +178,13 @@ def print_answer(arguments: argparse.Namespace, content: dict[str, Any], lines: 
 
 
 def print_lines(lines: Iterable[str]) -> None:
-    """Each on a line of its own."""
+    """Print each on a line of its own."""
     for line in lines:
         print(line)
 
 
 def print_report(report: ProvisionReport, arguments: argparse.Namespace) -> None:
-    """What a provisioning run did, enclave by enclave; what it left alone as a count (``-v``: by name)."""
+    """Print what a provisioning run did, enclave by enclave; what it left alone as a count (``-v``: by name)."""
     warn(report.warnings, arguments)
     if arguments.quiet:
         return

@@ -99,7 +99,7 @@ def _report_hosts_that_left(arguments: argparse.Namespace, hosts: Iterable[str])
 
 
 def _assigned(arguments: argparse.Namespace) -> dict[str, list[str]]:
-    """Host -> names or patterns of its enclaves. Raises InvalidInputError."""
+    """Map each host to names or patterns of its enclaves; raises InvalidInputError."""
     if arguments.hosts is None:
         if len(arguments.host) != 1 or not arguments.enclave:
             raise InvalidInputError("without --hosts FILE give one --host NAME and its --enclave PATTERN")
@@ -130,7 +130,7 @@ def _assigned(arguments: argparse.Namespace) -> dict[str, list[str]]:
 
 
 def _pinned(keystore: Path) -> str:
-    """The command; a bundle has no register that could tell a foreign CA."""
+    """Return the command that verifies the bundle; a bundle has no register that could tell a foreign CA."""
     view = KeystoreView(resolve_root(keystore))
     found = dict.fromkeys(fingerprint(ca.der) for role in Role for ca in view.ca_bundle(role))
     return " ".join(("secure-keystore verify BUNDLE", *(f"--require-ca {one}" for one in found)))

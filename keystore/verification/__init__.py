@@ -101,7 +101,7 @@ def _check_zenoh(view: KeystoreView, now: datetime) -> Iterator[Finding]:
 
 
 def _check_deployment(view: KeystoreView) -> Iterator[Finding]:
-    """An imported keystore is what its signed manifest says, or was changed since."""
+    """Check that an imported keystore is what its signed manifest says, and was not changed since."""
     fix = repair.run(
         view.root, "import", "HOST.bundle", note="the bundle in force, or a newer one: restores it"
     )

@@ -32,7 +32,7 @@ def check_authorities(
     now: datetime,
     required: Governance | None,
 ) -> Iterator[Finding]:
-    """Findings about both CAs (certificates, keys, bundles), the governance and the CRL."""
+    """Check both CAs (certificates, keys, bundles), the governance and the CRL."""
     for role in Role:
         for facts in view.ca_bundle(role):
             yield from _check_certificate(view, role, facts, now)
@@ -99,7 +99,7 @@ def _check_key(view: KeystoreView, role: Role, access: CaAccess) -> Iterator[Fin
 def _check_governance(
     view: KeystoreView, register: Register | None, required: Governance | None
 ) -> Iterator[Finding]:
-    """Findings about the governance: signature, strength, whether it was signed last, and the XML beside it."""
+    """Check the governance: signature, strength, whether it was signed last, and the XML beside it."""
     place = layout.GOVERNANCE
     again = repair.sign_governance(view.root)
     try:

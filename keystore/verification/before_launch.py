@@ -19,7 +19,7 @@ from keystore.verification.governance import weaknesses
 
 
 def exposures(view: KeystoreView) -> Iterator[str]:
-    """One text for each. Says nothing of a keystore that is not complete yet."""
+    """Return one text for each exposure; none for a keystore that is not complete yet."""
     if not view.is_complete:
         return
     if view.shares_one_ca:

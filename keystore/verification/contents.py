@@ -36,7 +36,7 @@ _TRUST_ANCHORS = frozenset(f"{role.value}.cert.pem" for role in Role) | {"ca.cer
 
 
 def holds_private_key(data: bytes) -> bool:
-    """In PEM, in DER, or in base64 without the lines around it; alone or behind other content."""
+    """Return whether there is a key in PEM, in DER, or in base64 without its frame; alone or behind other content."""
     if _KEY in data or any(sign in data for sign in _DER_KEYS):
         return True
     return any(sign in decoded for decoded in _decoded(data) for sign in _DER_KEYS)

@@ -51,7 +51,7 @@ _BROKEN_HASHES = frozenset({"md5", "sha1"})
 def check_enclaves(
     view: KeystoreView, register: Register | None, revoked: frozenset[int], now: datetime
 ) -> Iterator[Finding]:
-    """Findings about every enclave, and about what enclaves must not share."""
+    """Check every enclave, and what enclaves must not share."""
     names: dict[str, str] = {}
     serials: dict[int, str] = {}
     owners = {facts.public_key: f"the {role.value}" for role in Role for facts in view.ca_bundle(role)}
@@ -203,8 +203,10 @@ class _EnclaveCheck:
             )  # fmt: skip
 
     def _profile(self, facts: CertificateFacts) -> Iterator[Finding]:
-        """Basic constraints, key usage and signature (RFC 5280 sections 4.2.1.3, 4.2.1.9): what the certificate allows
-        beyond identifying one enclave."""
+        """Report what the certificate allows beyond identifying one enclave.
+
+        Basic constraints, key usage and signature: RFC 5280 sections 4.2.1.3, 4.2.1.9.
+        """
         algorithm = facts.certificate.signature_hash_algorithm
         if algorithm is None or algorithm.name in _BROKEN_HASHES:
             text = f"signed with {'no hash' if algorithm is None else algorithm.name}, which can be forged"
@@ -295,7 +297,7 @@ class _EnclaveCheck:
             yield self._finding(Severity.NOTE, "wildcard", layout.PERMISSIONS, f"grants by wildcard: {shown}")
 
     def _reach(self, grants: tuple[Grant, ...], mine: Grant) -> Iterator[Finding]:
-        """What the document permits beyond the names it lists, and to whom else."""
+        """Report what the document permits beyond the names it lists, and to whom else."""
         if mine.default is Qualifier.ALLOW:
             yield self._distrusted(
                 "default-allow", "permits on Cyclone DDS whatever no rule names (its default is ALLOW)"

@@ -42,7 +42,7 @@ _UNFINISHED = (layout.STAGING, layout.INCOMING)
 
 
 def check_files(root: Path) -> Iterator[Finding]:
-    """Findings about owners, modes, links and strange files below ``root``."""
+    """Check owners, modes, links and strange files below ``root``."""
     names: list[str] = []
     yield from _check_owner(root, ".", os.lstat(root), private=False)
     for relative, info in _walk(root, ""):
@@ -65,7 +65,7 @@ def check_files(root: Path) -> Iterator[Finding]:
 
 
 def _less_of_an_enclave(root: Path, name: str, names: list[str]) -> str:
-    """Of the directories that only case tells apart, one without key and certificate, if there is one."""
+    """Return, of directories that only case tells apart, one without key and certificate, if there is one."""
     alike = [layout.enclave_directory(other) for other in names if other.lower() == name.lower()]
     empty = [one for one in alike if not {layout.KEY, layout.CERT} & set(os.listdir(root / one))]
     return (empty or alike)[0]
@@ -118,7 +118,7 @@ def _check_directory(root: Path, relative: str, info: os.stat_result, names: lis
 
 
 def _incomplete(root: Path, relative: str) -> Iterator[Finding]:
-    """An enclave counts by its key or certificate; without both the rest of it would go unseen."""
+    """Report an enclave that has a key or a certificate and not both; without both the rest of it would go unseen."""
     names = set(os.listdir(root / relative))
     if names & layout.ENCLAVE_FILES and not names & {layout.KEY, layout.CERT}:
         enclave = relative.removeprefix(layout.ENCLAVES)
@@ -129,7 +129,7 @@ def _incomplete(root: Path, relative: str) -> Iterator[Finding]:
 
 
 def _not_a_file(root: Path, relative: str, remove: str) -> Finding | None:
-    """Something else in the place of a file that is read."""
+    """Report something else in the place of a file that is read."""
     name = relative.rpartition("/")[2]
     if relative not in _KNOWN and not (relative.startswith(layout.ENCLAVES) and name in layout.ENCLAVE_FILES):
         return None
@@ -171,7 +171,7 @@ def _belongs(root: Path, directory: str, name: str) -> bool:
 
 
 def _check_owner(root: Path, relative: str, info: os.stat_result, *, private: bool) -> Iterator[Finding]:
-    """What is not secret must be ours or the administrator's all the same."""
+    """Check what is not secret: it must be ours or the administrator's all the same."""
     path = root / relative
     problem = safe_files.private_problem(path, info) if private else None
     if problem is not None:
@@ -209,7 +209,7 @@ def _stray(root: Path, relative: str, why: str) -> Finding:
 
 
 def _holds_key(path: Path) -> bool:
-    """A stray may be anything; one that cannot be read, or is huge, is not taken for a key."""
+    """Return whether a stray file holds a key; one that cannot be read, or is huge, is not taken for a key."""
     try:
         return holds_private_key(read_bytes(path, _MAX_STRAY))
     except OSError:
@@ -220,7 +220,7 @@ _MAX_STRAY = 64_000_000  # bytes
 
 
 def check_parents(root: Path) -> Iterator[Finding]:
-    """Whoever can rename a folder above the keystore can put another one in its place."""
+    """Check the folders above: who can rename one of them can put another keystore in its place."""
     for parent in root.parents:
         try:
             info = os.stat(parent)

@@ -29,7 +29,9 @@ _PERMISSIVE = "allow_unauthenticated_participants"  # the one flag whose ``true`
 
 
 def weaknesses(governance: Governance) -> Iterator[str]:
-    """Each attribute of each rule that is weaker than the default, as ``rtps_protection_kind NONE (default SIGN)``."""
+    """Return each attribute of each rule that is weaker than the default, as ``rtps_protection_kind NONE (default
+    SIGN)``.
+    """
     for rule in governance.domain_rules:
         yield from _weaker(rule, DomainRule(), DOMAIN_SETTINGS, f"domains {rule.domains}")
         for topic in rule.topic_rules:
@@ -56,7 +58,10 @@ def _shown(value: bool | Protection) -> str:
 
 
 def check_strength(root: Path, governance: Governance, required: Governance | None) -> Iterator[Finding]:
-    """``required``: what somebody decided it should be; it may then be weaker, and must be nothing else."""
+    """Check the strength.
+
+    ``required``: what somebody decided it should be; it may then be weaker, and must be nothing else.
+    """
     again = repair.run(root, "governance", "FILE.yaml", note="must reach all participants together")
     if required is not None:
         if governance != required:
@@ -73,7 +78,7 @@ def check_strength(root: Path, governance: Governance, required: Governance | No
 
 
 def check_domains(root: Path, governance: Governance, granted: dict[str, Domains]) -> Iterator[Finding]:
-    """``granted``: the domains that the permissions of each enclave name."""
+    """Check the domains. ``granted``: those that the permissions of each enclave name."""
     for enclave, domains in granted.items():
         if missing := _without(domains, governance.domains()):
             yield Finding(

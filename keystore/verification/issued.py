@@ -27,7 +27,7 @@ from keystore.verification.finding import Finding, Severity
 
 
 def load_register(view: KeystoreView) -> tuple[Register | None, list[Finding]]:
-    """The register, or why there is none where one belongs."""
+    """Load the register, or say why there is none where one belongs."""
     try:
         register = read_register(view.root)
     except KeystoreError as error:
@@ -42,7 +42,10 @@ def load_register(view: KeystoreView) -> tuple[Register | None, list[Finding]]:
 def check_anchors(
     view: KeystoreView, register: Register | None, required: Collection[str]
 ) -> Iterator[Finding]:
-    """``required``: SHA-256 of the CA certificates to trust, for one role (``identity=``) or both; any when empty."""
+    """Check the trusted CAs.
+
+    ``required``: SHA-256 of the CA certificates to trust, for one role (``identity=``) or both; any if empty.
+    """
     for role, ca in foreign_authorities(view, register):
         yield Finding(
             Severity.ERROR, "foreign-ca", layout.ca_cert(role),
@@ -68,14 +71,14 @@ def check_anchors(
 
 
 def _is_imported(view: KeystoreView) -> bool:
-    """Whether a signed manifest names the CAs; that they are these is checked with its other files."""
+    """Return whether a signed manifest names the CAs; that they are these is checked with its other files."""
     with suppress(KeystoreError):
         return deployed_manifest(view) is not None
     return False
 
 
 def check_published(view: KeystoreView, register: Register | None, now: datetime) -> Iterator[Finding]:
-    """CRL and governance: are they the ones published last? And is everybody still there?"""
+    """Check that CRL and governance are the ones published last, and that everybody is still there."""
     if register is None:
         return
     problem = crl_problem(view, register, now)

@@ -14,17 +14,19 @@ BACKUP = "restore it from a backup"
 
 
 def run(root: Path, verb: str, *arguments: str, note: str = "") -> str:
-    """``secure-keystore VERB KEYSTORE ARGUMENTS  # note``."""
+    """Return ``secure-keystore VERB KEYSTORE ARGUMENTS  # note``."""
     return _line(" ".join(("secure-keystore", verb, _quoted(root), *map(shlex.quote, arguments))), note)
 
 
 def run_on(root: Path, command: str, relative: str, note: str = "") -> str:
-    """A command such as ``chmod go-w`` on one entry of the keystore."""
+    """Return a command such as ``chmod go-w`` on one entry of the keystore."""
     return _line(f"{command} {_quoted(root / relative)}", note)
 
 
 def grant_again(root: Path, enclave: str) -> str:
-    """What an enclave may do is unknown once its signed permissions are not to be trusted: start from nothing."""
+    """Advise to start from nothing: what an enclave may do is unknown once its signed permissions are not to be
+    trusted.
+    """
     document = f"{layout.enclave_directory(enclave)}/{layout.PERMISSIONS}"
     renew = run(
         root, "renew", enclave, note="grants nothing until secure-keystore apply-policy, or the next launch"
@@ -33,7 +35,7 @@ def grant_again(root: Path, enclave: str) -> str:
 
 
 def sign_governance(root: Path) -> str:
-    """Unsigned XML is nothing to sign again: back to the default."""
+    """Advise to go back to the default: unsigned XML is nothing to sign again."""
     removed = " ".join(_quoted(root / name) for name in (layout.GOVERNANCE, layout.GOVERNANCE_XML))
     note = "SROS2's default governance for domain 0; another: secure-keystore governance"
     return f"rm -f {removed} && {run(root, 'create', note=note)}"
@@ -44,6 +46,6 @@ def _line(command: str, note: str) -> str:
 
 
 def _quoted(path: Path) -> str:
-    """Ready for a shell, unless the name holds something that would speak to the terminal instead."""
+    """Quote for a shell, unless the name holds something that would speak to the terminal instead."""
     text = str(path)
     return shlex.quote(text) if text.isprintable() else ascii(text)

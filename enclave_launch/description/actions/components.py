@@ -61,7 +61,7 @@ class ComposableNode:
 
     @classmethod
     def parse(cls, parser: Parser, entity: Entity) -> tuple[type[ComposableNode], dict[str, Any]]:
-        """Keywords from a ``composable_node`` element; raises when something in it was not understood."""
+        """Parse keywords from a ``composable_node`` element; raises if something in it was not understood."""
         kwargs: dict[str, Any] = {
             "package": parser.parse_substitution(entity.get_attr("pkg")),
             "plugin": parser.parse_substitution(entity.get_attr("plugin")),

@@ -200,7 +200,7 @@ def _performed(context: LaunchContext, substitutions: list[Substitution] | None)
 def _remap_rules(
     description: ComposableNode, context: LaunchContext, place: SourceLocation
 ) -> Iterator[RemapRule]:
-    """Global rules, then the component's own."""
+    """Return global rules, then the component's own."""
     own = performed_remaps(description.remappings or (), context)
     for rule in (*(context.launch_configurations.get("ros_remaps") or ()), *own):
         yield placed(rule, place)

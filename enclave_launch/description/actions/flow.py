@@ -252,7 +252,7 @@ def _size_of(function: Body) -> int:
 
 
 def one_round(children: list[Action], values: Mapping[str, Any]) -> list[LaunchDescriptionEntity]:
-    """Copies of the children, with the values as locals around them."""
+    """Copy the children, with the values as locals around them."""
     named = {local_name(name): str(value) for name, value in values.items()}
 
     def begin(context: LaunchContext) -> None:

@@ -64,7 +64,7 @@ class LifecycleNode(Node):
         return cls, kwargs
 
     def execute(self, context: LaunchContext) -> list[LaunchDescriptionEntity] | None:
-        """Raises ``RuntimeError`` without a node name, and as ``Node.execute``."""
+        """Start the node; raises ``RuntimeError`` without a node name, and as ``Node.execute``."""
         self._perform_substitutions(context)
         if UNSPECIFIED_NODE_NAME in self.node_name:
             raise RuntimeError("node_name unexpectedly incomplete for lifecycle node")
@@ -221,7 +221,7 @@ class LifecycleTransition(Action):
         self.__handlers: dict[str, list[EventHandler]] = {}
 
     def execute(self, context: LaunchContext) -> list[LaunchDescriptionEntity]:
-        """Handlers for every reached goal state, then the first request to every node.
+        """Register handlers for every reached goal state, then send the first request to every node.
 
         Raises ``ValueError`` for an id that is not a number, ``KeyError`` for one without a goal state.
         """
@@ -239,7 +239,7 @@ class LifecycleTransition(Action):
         return [*registrations, *(requests[name][0] for name in names)]
 
     def __after(self, name: str, transition: int, remaining: Sequence[Action]) -> EventHandler:
-        """Once ``transition`` has reached its goal: the next request, or the end of the sequence."""
+        """Send the next request once ``transition`` has reached its goal, or end the sequence."""
         target = self.transition_targets[transition]
         done = OpaqueFunction(function=partial(self.__forget, name=name))
         handler = OnStateTransition(

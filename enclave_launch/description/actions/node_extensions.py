@@ -56,7 +56,7 @@ class NodeActionExtension:
     def prepare_for_execute(
         self, context: LaunchContext, ros_specific_arguments: dict[str, Any], node_action: Action
     ) -> tuple[list[Any], dict[str, Any]]:
-        """Words to append to the command line, and the (changed) local ROS arguments."""
+        """Return words to append to the command line, and the (changed) local ROS arguments."""
         return [], ros_specific_arguments
 
 

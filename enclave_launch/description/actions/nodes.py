@@ -229,7 +229,7 @@ class Node(ExecuteProcess):
             yield placed(rule, process.location, first + 2 * number)
 
     def __name_tokens(self) -> list[str | None]:
-        """Tokens of the fully qualified name; an unknown namespace is taken to be ``/``."""
+        """Return tokens of the fully qualified name; an unknown namespace is taken to be ``/``."""
         known = self.node_name.replace(UNSPECIFIED_NODE_NAMESPACE, "").split("/")
         return [None if token == UNSPECIFIED_NODE_NAME else token for token in known if token]
 

@@ -43,7 +43,7 @@ class PushROSNamespace(TemplateAction):
     enclave = template(default=None, keyword_only=True)
 
     def execute(self, context: LaunchContext) -> None:
-        """Raises ``SubstitutionFailure`` when the joined namespace is not valid."""
+        """Push the namespace; raises ``SubstitutionFailure`` if the joined namespace is not valid."""
         pushed = perform_substitutions(context, self.namespace)
         enclave = None if self.enclave is None else perform_substitutions(context, self.enclave)
         previous = context.launch_configurations.get("ros_namespace")
@@ -145,7 +145,7 @@ class SetUseSimTime(TemplateAction):
     value: bool | SomeSubstitutionsType = template(read=lambda value: value)
 
     def execute(self, context: LaunchContext) -> None:
-        """Older releases pass the text of the front ends on unevaluated, and refuse to switch it off.
+        """Set it; older releases pass the text of the front ends on unevaluated, and refuse to switch it off.
 
         Raises ``ValueError`` for what is not a bool, ``RuntimeError`` for ``False``.
         """

@@ -83,7 +83,7 @@ class TimerAction(Action):
         return self._completed_future
 
     def cancel(self) -> None:
-        """Never fire; harmless when it already has, or was never started."""
+        """Never fire; harmless if it already has, or was never started."""
         self.__canceled = True
         for future in (self._canceled_future, self._completed_future):
             if future is not None and not future.done():
@@ -126,7 +126,7 @@ class TimerAction(Action):
         return self.__in_kept_state()
 
     def __keep_state(self, context: LaunchContext) -> None:
-        """Newer releases visit the actions in the state of the timer's own position."""
+        """Keep the state: newer releases visit the actions in that of the timer's own position."""
         release = context.host.release
         if release.has(Feature.TIMER_COPIES_CONFIGURATIONS):
             self.__configurations = dict(context.launch_configurations)

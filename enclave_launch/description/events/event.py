@@ -244,12 +244,12 @@ def matches_pid(pid: int) -> Matcher:
 
 
 def matches_name(name: str) -> Matcher:
-    """By NAME-N."""
+    """Match by NAME-N."""
     return _matches(lambda details: bool(details["name"] == name))
 
 
 def matches_executable(executable: str) -> Matcher:
-    """By the end of the first word of the command."""
+    """Match by the end of the first word of the command."""
     return _matches(lambda details: bool(details["cmd"][0].endswith(executable)))
 
 

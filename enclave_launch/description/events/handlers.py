@@ -60,7 +60,7 @@ class BaseEventHandler:
         )
 
     def handle(self, event: Event, context: LaunchContext) -> SomeEntitiesType | None:
-        """Subclasses call this first: it makes the event a local and honours ``handle_once``."""
+        """Make the event a local and honour ``handle_once``; subclasses call this first."""
         context.extend_locals({"event": event})
         if self.__handle_once:
             context.unregister_event_handler(self)
@@ -221,7 +221,7 @@ class OnExecutionComplete(OnActionEventBase):
         )
 
     def foresee(self, started: Sequence[Any]) -> Event | None:
-        """Only of processes: everything else completes in the dry run itself."""
+        """Foresee the completion of processes only: everything else completes in the dry run itself."""
         action = self.first_accepted(started)
         return None if action is None else ExecutionComplete(action=action)
 

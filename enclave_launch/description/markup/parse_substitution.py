@@ -30,7 +30,7 @@ _shared_for: Release | None = None  # the release whose registered names the kep
 
 
 def replace_escaped_characters(data: str) -> str:
-    """Backslash and a character -> that character."""
+    """Replace backslash and a character by that character."""
     return unescape(data)
 
 

@@ -95,7 +95,7 @@ class Parser:
         return parse_substitution.replace_escaped_characters(value)
 
     def parse_description(self, entity: Entity) -> LaunchDescription:
-        """Root element -> ``LaunchDescription``; ``RuntimeError`` unless it is ``launch``."""
+        """Parse the root element to a ``LaunchDescription``; raises ``RuntimeError`` unless it is ``launch``."""
         try:
             if entity.type_name != "launch":
                 raise RuntimeError("Expected 'launch' as root tag")
@@ -158,7 +158,7 @@ class Parser:
 
     @classmethod
     def get_file_extensions_from_parsers(cls) -> set[str]:
-        """File name extensions of all front ends."""
+        """Return the file name extensions of all front ends."""
         parsers = cls._implementations().values()
         return set(itertools.chain.from_iterable(parser.get_file_extensions() for parser in parsers))
 
@@ -187,5 +187,5 @@ class Parser:
 
     @classmethod
     def get_file_extensions(cls) -> set[str]:
-        """Extensions of this front end's files, without the leading dot."""
+        """Return extensions of this front end's files, without the leading dot."""
         return set()

@@ -91,7 +91,7 @@ _entry_points_loaded = False
 
 
 def registrations_of(kind: str, name: str) -> Iterator[Callable[[], object]]:
-    """Steps that may each register ``name``; the caller stops as soon as one has.
+    """Yield steps that may each register ``name``; the caller stops as soon as one has.
 
     ``kind``: ``action`` or ``substitution``.
     """

@@ -123,7 +123,7 @@ class Parser(BaseParser):
 
     @classmethod
     def load(cls, file: FilePath | TextIO) -> tuple[Entity, Parser]:
-        """Root entity and parser of an XML file; raises ``ParseError``, ``RefusedXml``, ``OSError``."""
+        """Load an XML file; return root entity and parser. Raises ``ParseError``, ``RefusedXml``, ``OSError``."""
         return cls.load_source(launch_file.read(file))
 
     @classmethod

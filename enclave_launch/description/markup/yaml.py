@@ -149,10 +149,10 @@ class Parser(BaseParser):
 
     @classmethod
     def load(cls, file: FilePath | TextIO) -> tuple[Entity, Parser]:
-        """Root entity and parser of a YAML file.
+        """Load a YAML file; return root entity and parser.
 
-        Raises ``yaml.YAMLError``, ``RefusedYaml``, ``OSError``, and ``RuntimeError`` or a Python exception
-        for a document that is not a mapping with one key.
+        Raises ``yaml.YAMLError``, ``RefusedYaml``, ``OSError``, and ``RuntimeError`` or a Python exception for a
+        document that is not a mapping with one key.
         """
         return cls.load_source(launch_file.read(file))
 
@@ -179,6 +179,6 @@ class Parser(BaseParser):
 
 
 def _line_of(error: Exception) -> int:
-    """Line of a YAML error, 0 when it has none."""
+    """Return the line of a YAML error, 0 if it has none."""
     mark = getattr(error, "problem_mark", None)
     return mark.line + 1 if mark is not None else 0

@@ -81,7 +81,7 @@ def _normalize_value(value: Any) -> Any:
 
 
 def _normalize_sequence(items: Sequence[Any]) -> tuple[Any, ...]:
-    """Equal numbers stay numbers; text and substitutions together are one text; all else is item by item."""
+    """Keep equal numbers numbers, join text and substitutions to one text, take all else item by item."""
     kinds = {_kind(item) for item in items}
     if kinds in ({int}, {bool}):
         return tuple(items)

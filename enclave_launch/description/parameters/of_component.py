@@ -42,10 +42,10 @@ def to_parameters_list(
     namespace: str | None,
     evaluated_parameters: EvaluatedParameters,
 ) -> list[ParameterAssignment]:
-    """Dicts as they are, files as far as they apply to this node, in order.
+    """Return dicts as they are, files as far as they apply to this node, in order.
 
-    A file with sections of which none applies contributes the preceding set once more, as upstream
-    does. Raises ``FileNotFoundError`` for a missing file, ``RuntimeError`` for a ``Parameter`` description.
+    A file with sections of which none applies contributes the preceding set once more, as upstream does. Raises
+    ``FileNotFoundError`` for a missing file, ``RuntimeError`` for a ``Parameter`` description.
     """
     section = (node_name or "").lstrip("/")
     if namespace and namespace != "/":
@@ -87,7 +87,7 @@ def _applicable(document: Any, section: str) -> tuple[Mapping[str, Any], bool]:
 
 
 def _matching_patterns(sections: Mapping[str, Any], section: str) -> list[str]:
-    """Sections with wildcards that match, in the order of the file. Older releases do not look at them."""
+    """Return sections with wildcards that match, in the order of the file. Older releases do not look at them."""
     if not current_release().has(Feature.WILDCARD_SECTIONS):
         return []
     tokens = section.split("/")

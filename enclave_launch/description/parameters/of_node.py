@@ -35,7 +35,7 @@ class NodeParameters:
         self.__written: dict[str, Callable[[], Mapping[str, Section]]] = {}  # content of generated files
 
     def write(self, context: LaunchContext, section: str) -> list[str]:
-        """Words to append to the command line. ``section`` is the node's full name, or ``/**``."""
+        """Return words to append to the command line. ``section`` is the node's full name, or ``/**``."""
         words = [word for pair in _global_words(context) for word in pair]
         for item in evaluate_parameters(context, self.__own):
             words += self.__own_words(context, section, item)
@@ -80,7 +80,7 @@ class NodeParameters:
         )
 
     def written_files(self, context: LaunchContext) -> dict[str, str]:
-        """Path to text of the files that were generated for this node."""
+        """Map path to text of the files that were generated for this node."""
         return {path: context.host.parameter_file(path) or "" for path in self.__written}
 
 

@@ -93,7 +93,7 @@ class _Variadic(Substitution):
     def parse(
         cls, data: Sequence[SomeSubstitutionsType]
     ) -> tuple[Callable[..., Substitution], dict[str, Any]]:
-        """Older releases pass the arguments by a keyword that the constructor does not have."""
+        """Parse the arguments; older releases pass them by a keyword that the constructor does not have."""
         if current_release().has(Feature.ANY_ALL_ARGUMENTS):
             return partial(cls, *data), {}
         return cls, {"args": data}

@@ -41,7 +41,7 @@ class Examined(NamedTuple):
 
 
 def evidence_files(examined: Examined) -> dict[str, bytes]:
-    """Without the statement, which names them."""
+    """Return the files without the statement, which names them."""
     contents, graph = examined.contents, examined.contents.graph
     rows = list(matrix.rows(graph))
     documents: dict[str, Any] = {

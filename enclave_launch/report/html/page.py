@@ -44,8 +44,10 @@ def html_report(contents: ReportContents) -> str:
 
 
 def script_data(content: object) -> str:
-    """JSON for a ``script`` element of a data type: no ``<`` in it can end the element or begin a comment (HTML
-    standard, "Restrictions for contents of script elements")."""
+    """Render JSON for a ``script`` element of a data type: no ``<`` in it can end the element or begin a comment.
+
+    Source: HTML standard, "Restrictions for contents of script elements".
+    """
     escaped = json_text(content, separators=(",", ":"))
     return escaped.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 

@@ -132,7 +132,7 @@ def _influence(one: Influence) -> str:
 
 
 def statistics(contents: ReportContents) -> str:
-    """Counts of the plan, in the columns of table 2 of the LiSA4ROS2 paper."""
+    """Count the plan, in the columns of table 2 of the LiSA4ROS2 paper."""
     rows = (
         row((one.column, one.meaning, str(one.all), str(one.system)), attributes=' class="numbers"')
         for one in contents.counts

@@ -33,7 +33,7 @@ def wildcards(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[PlanF
 
 
 def shared(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[PlanFinding]:
-    """Enclaves in which nodes gain permissions of others."""
+    """Find enclaves in which nodes gain permissions of others."""
     for split in splits(plan):
         gains = "; ".join(f"{node} gains {some_of(grants, _NAMED)}" for node, grants in split.saved)
         nodes = len(plan.units_of(split.enclave))

@@ -50,7 +50,7 @@ def remaps(plan: PlanDocument, document: Document) -> Iterator[PlanFinding]:
 
 
 def _used_rules(document: Document) -> dict[tuple[str, str | None], set[str]]:
-    """Program and enclave -> the texts of rules that changed a name of a node of it."""
+    """Map program and enclave to the texts of rules that changed a name of a node of it."""
     found: dict[tuple[str, str | None], set[str]] = {}
     for node in document["nodes"]:
         texts = found.setdefault((node["program"], node["enclave"]), set())
@@ -62,7 +62,7 @@ def _used_rules(document: Document) -> dict[tuple[str, str | None], set[str]]:
 
 
 def _not_wholly_known(document: Document) -> set[tuple[str, str | None]]:
-    """Programs of which nothing is known, and those of nodes with gaps."""
+    """Return programs of which nothing is known, and those of nodes with gaps."""
     described = {(node["program"], node["enclave"]) for node in document["nodes"]}
     gaps = {
         diagnostic["subject"]
@@ -98,7 +98,7 @@ def security_variables(plan: PlanDocument, document: Document) -> Iterator[PlanF
 
 
 def secrets(plan: PlanDocument, document: Document) -> Iterator[PlanFinding]:
-    """Parameters with a text value whose name says that it is a secret; the value is not repeated."""
+    """Find parameters with a text value whose name says that it is a secret; the value is not repeated."""
     for item in launched(document):
         for name, value in sorted(item["parameters"].items()):
             if _SECRET.search(_CAMEL.sub("_", name)) and isinstance(value, str) and value:
@@ -106,7 +106,7 @@ def secrets(plan: PlanDocument, document: Document) -> Iterator[PlanFinding]:
 
 
 def launched(document: Document) -> tuple[Item, ...]:
-    """Processes and components."""
+    """Return processes and components."""
     return (*document["processes"], *document["components"])
 
 

@@ -39,8 +39,10 @@ _Users = Mapping[tuple[str, str], list[_User]]
 
 
 def missing_ends(plan: PlanDocument, document: Document) -> Iterator[PlanFinding]:
-    """Only what nodes ask for themselves; what runs outside of this launch is not known here. Where something of the
-    launch itself is not known, the other end may be there: then one finding says so."""
+    """Find ends that are missing, of what nodes request themselves; what runs outside this launch is not known here.
+
+    If something of the launch itself is not known, the other end may be there: then one finding says so.
+    """
     found = list(_missing_ends(plan, document))
     gaps = sorted(plan.gaps)
     if not found or not gaps:
@@ -140,7 +142,7 @@ def qos(plan: PlanDocument, document: Document) -> Iterator[PlanFinding]:
 
 
 def _quality(qos: Mapping[str, Any], other: Mapping[str, Any]) -> Quality:
-    """Times only where both say one; 0 is rmw's word for none."""
+    """Return the quality, with times only if both say one; 0 is rmw's word for none."""
 
     def time(key: str) -> int:
         return (qos[key] or INFINITE) if key in qos and key in other else INFINITE

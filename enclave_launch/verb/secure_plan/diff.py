@@ -71,7 +71,7 @@ def _both(options: argparse.Namespace) -> tuple[PlanDocument, PlanDocument, tupl
 
 
 def _keystore_and(plan: PlanDocument, keystore: str) -> tuple[PlanDocument, PlanDocument]:
-    """Enclaves of other launches in the keystore are none of this plan's business."""
+    """Return the keystore's plan and the wanted one; enclaves of other launches are none of this plan's business."""
     before, wanted = _keystore(keystore), plan_as_signed(plan)
     signed = {path: grants for path, grants in before.enclaves.items() if path in plan.enclaves}
     if plan.on_zenoh:

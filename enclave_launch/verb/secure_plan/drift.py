@@ -128,7 +128,7 @@ def _in_sight(found: Sequence[DriftFinding]) -> bool:
 def _settled(
     options: argparse.Namespace, up: Observer, findings: Findings
 ) -> tuple[Graph, list[DriftFinding]]:
-    """Once nothing changes any more and nothing is missing; what is missing has until the end of ``--for``."""
+    """Wait until nothing changes any more and nothing is missing; what is missing has until the end of ``--for``."""
     end = time.monotonic() + options.longest
     while True:
         look_until(up, Quiet(up, options.settle, max(options.longest, options.settle)))

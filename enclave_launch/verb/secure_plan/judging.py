@@ -38,10 +38,12 @@ def judged(
     within: str = DEFAULT_MARGIN,
     now: datetime | None = None,
 ) -> list[tuple[PlanFinding, str | None]]:
-    """Findings of the dry run's JSON ``document``, of the rules in ``expect`` (default: ``EXPECTATIONS`` in the
-    working directory, if it is there), and of ``keystore``, where one is given; what ends ``within`` that time is one.
+    """Return findings of the dry run's JSON ``document``, of the rules in ``expect``, and of ``keystore``, if one is
+    given.
 
-    Raises ``UsageError`` for rules that are missing or not understood, ``ProvisionError`` for the keystore.
+    ``expect`` is by default ``EXPECTATIONS`` in the working directory, if it is there; what expires ``within`` that
+    time is a finding. Raises ``UsageError`` for rules that are missing or not understood, ``ProvisionError`` for the
+    keystore.
     """
     expected = expectations(expect)
     findings = [*check_plan(document), *rule_findings(document, expected.never)]

@@ -21,13 +21,13 @@ DEFAULT_MARGIN = "30d"
 
 
 def signed_grants(keystore: Path | str) -> Mapping[str, frozenset[GrantedName]]:
-    """Enclave -> what its signed permissions allow."""
+    """Map each enclave to what its signed permissions allow."""
     with keystore_errors():
         return {enclave: grants_of_rules(found.allowed) for enclave, found in granted(keystore).items()}
 
 
 def enforced_grants(keystore: Path | str) -> Mapping[str, frozenset[GrantedName]]:
-    """Enclave -> what the configuration of the keystore's Zenoh router allows; empty without one."""
+    """Map each enclave to what the configuration of the keystore's Zenoh router allows; empty without one."""
     with keystore_errors():
         view = keystore_at(keystore)
         found = zenoh_files().enforced(view) if view.has_zenoh_router else {}

@@ -66,7 +66,9 @@ class _Launch(NamedTuple):
 
 
 def names_revision(word: str) -> bool:
-    """Is ``word`` ``REVISION:PATH`` or ``REVISION:``, as ``git show`` has it, and no file of that name?"""
+    """Return whether ``word`` is ``REVISION:PATH`` or ``REVISION:``, as ``git show`` has it, and no file of that
+    name.
+    """
     return bool(_REVISION_AND_PATH.fullmatch(word)) and not os.path.exists(word)
 
 
