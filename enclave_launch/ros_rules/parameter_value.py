@@ -27,7 +27,7 @@ _SLOTS: dict[type, int] = {bool: 0, int: 1, float: 2, str: 3, bytes: 5}
 
 
 def type_slot(value: ParameterValue) -> int:
-    """Return the position in rcl's order of types: scalars, bytes, then arrays; readers take the first that is there."""
+    """Return the position in rcl's order of types: scalars, bytes, then arrays; readers take the first there is."""
     if isinstance(value, tuple):
         return 10 + (_SLOTS.get(type(value[0]), 9) if value else 9)
     return _SLOTS[type(value)]
