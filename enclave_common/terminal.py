@@ -14,7 +14,7 @@ import os
 import re
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, ExitStack, contextmanager, redirect_stderr, redirect_stdout
 from os import PathLike
 from typing import Any, TextIO, cast
@@ -80,16 +80,6 @@ def safe_output() -> Iterator[None]:
 def stdout_is_for_the_plan() -> AbstractContextManager[Any]:
     """Send what launch files print to stderr within the block."""
     return redirect_stdout(sys.stderr)
-
-
-def raw(stream: TextIO) -> TextIO:
-    """Return the stream behind one of ``safe_output``: for control characters of our own, such as a progress bar's."""
-    return stream._stream if isinstance(stream, _SafeText) else stream
-
-
-def write_coloured(text: str, stream: TextIO) -> None:
-    """Write ``text``, whose parts were made safe before colours were added, past ``safe_output``."""
-    _write(raw(stream), text)
 
 
 class _SafeText:
@@ -161,45 +151,28 @@ def short_paths(text: str, folder: str) -> str:
     return pattern.sub(lambda found: found[1] if os.path.isfile(found[0]) else found[0], text)
 
 
-_PATIENCE = 1.0  # seconds
-_BAR_WIDTH = 30
-_CLEAR = "\r\033[K"
+_INTERVAL = 2.0  # seconds
 
 
-def wanted(quiet: bool) -> bool:
-    """Return True if a person may be looking at stderr."""
-    return sys.stderr.isatty() and not quiet
+class Progress:
+    """Called with what is done now; prints it on stderr once in a few seconds."""
 
-
-class ProgressBar:
-    """Called with how many of how many are done; on stderr."""
-
-    def __init__(self, what: str) -> None:
-        self.what = what
-        self._started = time.monotonic()
-
-    def __call__(self, done: int, total: int) -> None:
-        if time.monotonic() - self._started < _PATIENCE:
-            return
-        filled = _BAR_WIDTH * done // max(total, 1)
-        bar = f"\r[{'#' * filled}{'.' * (_BAR_WIDTH - filled)}] {done}/{total} {self.what}"
-        print(bar + (_CLEAR if done == total else ""), end="", file=raw(sys.stderr), flush=True)
-
-
-class ProgressLine:
-    """Called with what is done next; on stderr. ``clear`` at the end."""
-
-    def __init__(self, doing: str, _started: float | None = None) -> None:
-        self.doing = doing
-        self._started = time.monotonic() if _started is None else _started
-        self._shown = False
+    def __init__(self, doing: str) -> None:
+        self._doing = doing
+        self._due = time.monotonic() + _INTERVAL
 
     def __call__(self, subject: str) -> None:
-        if time.monotonic() - self._started >= _PATIENCE:
-            print(f"{_CLEAR}{self.doing} {printable(subject)} ...", end="", file=raw(sys.stderr), flush=True)
-            self._shown = True
+        if time.monotonic() >= self._due:
+            print(f"{self._doing} {printable(subject)} ...", file=sys.stderr, flush=True)
+            self._due = time.monotonic() + _INTERVAL
 
-    def clear(self) -> None:
-        """Take the line away, if there is one."""
-        if self._shown:
-            print(_CLEAR, end="", file=raw(sys.stderr), flush=True)
+
+def progress(doing: str, *, quiet: bool) -> Progress | None:
+    """Return the progress to show if a person may be looking at stderr."""
+    return Progress(doing) if sys.stderr.isatty() and not quiet else None
+
+
+def counted_progress(doing: str, *, quiet: bool) -> Callable[[int, int], None] | None:
+    """As ``progress``, called with how many of how many are done."""
+    shown = progress(doing, quiet=quiet)
+    return None if shown is None else lambda done, total: shown(f"{done} of {total}")

@@ -1,16 +1,11 @@
-"""How text for people is laid out: for the width of a terminal and in colour there, whole and plain in a pipe.
-
-Everything that launch files chose is escaped before it is coloured (``terminal``), so that the only control
-characters in a report are ours.
-"""
+"""How text for people is laid out: for the width of a terminal, whole in a pipe; always without control characters."""
 
 from __future__ import annotations
 
 import os
-import re
 import shutil
 import textwrap
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from typing import NamedTuple, TextIO
 
 from enclave_common.terminal import message, printable, short_paths
@@ -20,22 +15,12 @@ _NARROWEST = 40
 _LISTED = 4  # diagnostics of one kind, before the others are counted
 _FOLDED = 3  # lines of one list of names
 
-_RESET, _BOLD, _RED, _YELLOW, _CYAN = "\033[0m", "\033[1m", "\033[1;31m", "\033[33m", "\033[36m"
-_COLOURS = (
-    (re.compile(r"^error(?: under --secure)?:"), _RED),
-    (re.compile(r"^warning:"), _YELLOW),
-    (re.compile(r"(?<=── )enclave \S+"), _BOLD),
-    (re.compile(r"(?<=── )\[[^\]]+\]"), _CYAN),
-    (re.compile(r"permissions unknown"), _YELLOW),
-)
-
 
 class TerminalStyle(NamedTuple):
     """``width``: columns, ``None`` for lines of any length; ``full``: nothing is folded or counted; ``folder``: a
     path that is left out where it begins one."""
 
     width: int | None = None
-    colour: bool = False
     full: bool = False
     folder: str = ""
 
@@ -48,7 +33,7 @@ class TerminalStyle(NamedTuple):
 
         :param fold: after some lines, count the remaining words instead of showing them"""
         if self.width is None:
-            return [self.painted(first + text)]
+            return [first + text]
         room = max(self.width, len(first) + _NARROWEST)
 
         lines = textwrap.wrap(
@@ -58,14 +43,7 @@ class TerminalStyle(NamedTuple):
         if fold and not self.full and len(lines) > _FOLDED + 1:
             hidden = len(" ".join(line.removeprefix(further) for line in lines[_FOLDED:]).split())
             lines = [*lines[:_FOLDED], f"{further}… and {hidden} more (-v shows them)"]
-        return [self.painted(line) for line in lines]
-
-    def painted(self, line: str) -> str:
-        """Colour the parts of ``line``, if colours are requested."""
-        if self.colour:
-            for pattern, colour in _COLOURS:
-                line = pattern.sub(rf"{colour}\g<0>{_RESET}", line)
-        return line
+        return lines
 
     def listed(self, kind: str, diagnostics: Sequence[Diagnostic]) -> list[str]:
         """Format ``diagnostics``, each as ``kind: text``.
@@ -101,14 +79,7 @@ def _by_code(diagnostics: Iterable[Diagnostic]) -> list[list[Diagnostic]]:
     return list(groups.values())
 
 
-def terminal_style_of(
-    stream: TextIO, environment: Mapping[str, str], *, verbose: bool = False
-) -> TerminalStyle:
-    """Return the style that ``stream`` can show: a terminal has a width, and colours unless ``NO_COLOR``
-    (no-color.org) is set."""
-    folder = os.path.join(os.getcwd(), "")
-    if not stream.isatty():
-        return TerminalStyle(full=verbose, folder=folder)
-
-    plain = bool(environment.get("NO_COLOR")) or environment.get("TERM") == "dumb"
-    return TerminalStyle(shutil.get_terminal_size().columns, not plain, verbose, folder)
+def terminal_style_of(stream: TextIO, *, verbose: bool = False) -> TerminalStyle:
+    """Return the style for ``stream``: a terminal has a width."""
+    width = shutil.get_terminal_size().columns if stream.isatty() else None
+    return TerminalStyle(width, verbose, os.path.join(os.getcwd(), ""))

@@ -32,7 +32,7 @@ def plan_tree(plan: LaunchPlan, style: TerminalStyle | None = None) -> str:
 
     Interfaces that every node has are counted, not listed.
 
-    :param style: by default lines of any length without colours, as for a pipe"""
+    :param style: by default lines of any length, as for a pipe"""
     style = style or TerminalStyle()
     lines = style.wrapped(style.one_line(f"{plan.launch_file} (as {plan.distro})"), "", "    ")
     gains = gains_by_sharing(plan.derived, composed_only=True)

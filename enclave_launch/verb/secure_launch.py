@@ -14,7 +14,6 @@ from enclave_common.terminal import (
     short_paths,
     stdout_is_for_the_plan,
     warn,
-    write_coloured,
 )
 from enclave_common.words import did_you_mean
 from enclave_launch.errors import EnclaveLaunchError, ManifestError, UsageError
@@ -114,9 +113,7 @@ def show_plan(plan: LaunchPlan, options: argparse.Namespace, keystore: str | Non
 
 def _show_tree(plan: LaunchPlan, options: argparse.Namespace) -> int:
     shown = plan._replace(warnings=()) if options.quiet else plan
-    write_coloured(
-        plan_tree(shown, terminal_style_of(sys.stdout, os.environ, verbose=options.verbose)), sys.stdout
-    )
+    sys.stdout.write(plan_tree(shown, terminal_style_of(sys.stdout, verbose=options.verbose)))
     return 0
 
 

@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Iterator
 from datetime import timedelta
 
-from enclave_common.terminal import ProgressBar, wanted
+from enclave_common.terminal import counted_progress
 from enclave_common.words import counted, some_of
 from enclave_launch.errors import UsageError, keystore_errors, translated
 from enclave_launch.options import SecurityOptions
@@ -54,7 +54,7 @@ def _provision_options(options: argparse.Namespace) -> ProvisionOptions:
         revoke=not options.no_revoke,
         access=CaAccess(passphrase=_passphrase(options)),
         signing=vars(options).get("signing"),
-        progress=ProgressBar("enclaves") if wanted(options.quiet) else None,
+        progress=counted_progress("signing enclaves:", quiet=options.quiet),
     )
 
 

@@ -11,7 +11,7 @@ import os
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from enclave_common.terminal import ProgressLine, wanted
+from enclave_common.terminal import progress
 from enclave_common.words import did_you_mean
 from enclave_launch.errors import UsageError, translated
 from enclave_launch.evaluation import evaluate
@@ -89,11 +89,6 @@ def planned(target: LaunchTarget, options: argparse.Namespace, keystore: str | N
 
 
 def resolve_target(target: LaunchTarget, options: argparse.Namespace) -> LaunchPlan:
-    """Plan ``target``, with a progress line on a terminal."""
-    line = ProgressLine("analysing") if wanted(options.quiet) else None
-    try:
-        chosen = resolve_options(options)._replace(progress=line)
-        return resolve(target.launch_file, target.arguments, options=chosen)
-    finally:
-        if line is not None:
-            line.clear()
+    """Plan ``target``; on a terminal, report what takes long."""
+    chosen = resolve_options(options)._replace(progress=progress("analysing", quiet=options.quiet))
+    return resolve(target.launch_file, target.arguments, options=chosen)

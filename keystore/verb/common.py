@@ -10,7 +10,7 @@ from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from enclave_common.command_line import FLAG, PATH, TEXT, TIME, Option, add_options, one_of
-from enclave_common.terminal import ProgressBar, json_text, wanted
+from enclave_common.terminal import counted_progress, json_text
 from enclave_common.words import counted
 from keystore.disk.lock import DEFAULT_TIMEOUT
 from keystore.errors import InvalidInputError
@@ -158,7 +158,7 @@ def provision_options(arguments: argparse.Namespace, **more: Any) -> ProvisionOp
         subjects=SubjectScheme.COMPATIBLE if arguments.compatible_subjects else None,
         allow_subject_overlap=arguments.allow_subject_overlap,
         revoke=not arguments.no_revoke,
-        progress=ProgressBar("enclaves") if wanted(arguments.quiet) else None,
+        progress=counted_progress("signing enclaves:", quiet=arguments.quiet),
         **change(arguments),
         **more,
     )

@@ -102,7 +102,7 @@ def reader_environment(home: Path, tools: Path, underlay: str = "") -> dict[str,
         for who in ("AUTHOR", "COMMITTER")
         for what in ("NAME", "EMAIL")
     }
-    return {**kept, **identity, "PATH": path, "HOME": str(home), "UNDERLAY": underlay, "NO_COLOR": "1"}
+    return {**kept, **identity, "PATH": path, "HOME": str(home), "UNDERLAY": underlay}
 
 
 def _write(folder: Path, path: str, text: str) -> None:

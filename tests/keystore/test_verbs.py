@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import pty
 import subprocess
 import sys
 from pathlib import Path
@@ -139,27 +137,6 @@ def test_a_reader_that_leaves_is_no_traceback(root: Path) -> None:
     command = f"{PYTHON} -m keystore.verb status --all --format json {root} | head -c 1"
     done = subprocess.run(["sh", "-c", command], capture_output=True, text=True)
     assert done.stdout == "{" and "Traceback" not in done.stderr
-
-
-def test_the_progress_bar_is_for_terminals_that_wait(monkeypatch: pytest.MonkeyPatch) -> None:
-    from enclave_common.terminal import ProgressBar
-
-    parent, child = pty.openpty()
-    with os.fdopen(child, "w") as terminal:
-        monkeypatch.setattr(sys, "stderr", terminal)
-        quick = ProgressBar("enclaves")
-        quick(1, 2)
-        slow = ProgressBar("enclaves")
-        slow._started -= 2
-        slow(1, 2)
-        slow(2, 2)
-        terminal.flush()
-        shown = ""
-        while not shown.endswith("\x1b[K"):
-            shown += os.read(parent, 4096).decode()
-    os.close(parent)
-    assert shown.count("1/2 enclaves") == 1, "nothing within the first second"
-    assert shown.endswith("\r\x1b[K"), "and no trace when done"
 
 
 def test_no_bar_without_a_terminal(tmp_path: Path) -> None:
