@@ -53,8 +53,8 @@ def _text(subjects: list[str], end: datetime, margin: timedelta, keystore: str) 
     what = some_of(subjects, 3)
     if not margin:
         return (
-            f"{what} ended now: Cyclone DDS peers receive nothing more from these processes, and no process can start "
-            f"with it; renew with: secure-keystore renew {keystore}, then restart the launch"
+            f"{what} has expired: Cyclone DDS peers receive nothing more from these processes, and no process can "
+            f"start with it; renew with: secure-keystore renew {keystore}, then restart the launch"
         )
     verb = "ends" if len(subjects) == 1 else "end"
     return (
@@ -117,7 +117,7 @@ def deadline_before(ends: Iterable[Expiry], now: datetime) -> Deadline | None:
     if at < now + _SHORTEST_RUN:
         return None
     return Deadline(
-        at, f"{first.subject} ends at {first.not_after:%Y-%m-%d %H:%M:%S} UTC: renewing, starting again"
+        at, f"{first.subject} expires at {first.not_after:%Y-%m-%d %H:%M:%S} UTC: renewing, starting again"
     )
 
 

@@ -13,6 +13,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
 
 from enclave_common.dependencies import installed
+from enclave_common.words import counted
 from enclave_launch.errors import ManifestError, translated
 from enclave_launch.interfaces.descriptions import ProgramDescription, ProgramStart, meeting
 from enclave_launch.interfaces.library_access import LibraryAccess
@@ -200,7 +201,7 @@ def _shortly(places: Sequence[str]) -> str:
     """
     if len(places) <= _PLACES + 1:
         return ", ".join(places)
-    return f"{', '.join(places[:_PLACES])} and {len(places) - _PLACES} more places"
+    return f"{', '.join(places[:_PLACES])} and {counted(len(places) - _PLACES, 'more place')}"
 
 
 def _of_manifest(manifest: Lookup) -> ProgramDescription:

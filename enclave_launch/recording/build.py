@@ -44,9 +44,7 @@ def recorder_library() -> Path:
 def _cache() -> Path:
     base = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     if not os.path.isabs(base):
-        raise RuntimeFailure(
-            "the recorder has nowhere to be kept: there is no home directory; set XDG_CACHE_HOME"
-        )
+        raise RuntimeFailure("there is no folder for the recorder: no home directory; set XDG_CACHE_HOME")
     return Path(base, "enclave-launch")
 
 

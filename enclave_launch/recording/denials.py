@@ -57,7 +57,7 @@ class Denial(NamedTuple):
         head = (
             f"refused: node {need.node} may not {WORDS[need.operation]} {need.name} (enclave {need.enclave})"
         )
-        lines = [head, f"  asked for as '{asked.written}', type {asked.type or 'not known'}"]
+        lines = [head, f"  requested as '{asked.written}', type {asked.type or 'not known'}"]
         if self.granted:
             why = "; ".join(asked.error) or "no reason was given"
             lines.append(f"  the plan grants it, so that it is refused for another reason: {why}")
@@ -72,9 +72,7 @@ class Denial(NamedTuple):
                 f"  other descriptions of the node have it; --also unseen grants {some_of(self.unseen, _NAMES)}"
             )
         if self.denied:
-            lines.append(
-                "  a DENY of the policy file takes it away; nothing grants it while that stands there"
-            )
+            lines.append("  a DENY of the policy file removes it; remove that first")
         elif self.patch is None:
             lines.append("  no single change was found that allows it; describe it in a manifest of the node")
         else:

@@ -148,7 +148,7 @@ def _manifest(node: LearntNode, path: Path) -> str:
         before = path.read_text(encoding="utf-8") if path.exists() else ""
         return manifest_text(node, before)
     except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise ManifestError(f"{path}: what stands there cannot be read: {error}; move it away") from error
+        raise ManifestError(f"{path}: it cannot be read: {error}; move it away") from error
 
 
 def _read(path: Path) -> Record:

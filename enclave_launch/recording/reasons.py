@@ -86,7 +86,7 @@ _AT_LAST = (
     (
         r"Cannot create participant due to initialization error",
         "Fast DDS does not accept the files of its enclave, and does not say which",
-        "secure-keystore verify reports whether its permissions, governance or certificates are damaged, have ended or "
+        "secure-keystore verify reports whether its permissions, governance or certificates are damaged, expired or "
         "were signed by another CA; " + _PROVISION,
     ),
 )

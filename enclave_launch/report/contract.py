@@ -45,7 +45,7 @@ class Reaction(_Strict, frozen=True):
     launch_file: str
     line: int
     ends_with: Optional[str] = _described(
-        "the process at whose end it ends the launch, where that is all it does"
+        "the process at whose end it ends the launch, if that is all it does"
     )
 
 
@@ -131,9 +131,9 @@ class Interface(_Strict, frozen=True):
     """One permission of a node, with its reason."""
 
     operation: Operation
-    name: str = _described("final; wildcards where a description or an option asks for them")
+    name: str = _described("final; wildcards if a description or an option has them")
     type: str = _described("empty when not known")
-    built_in: bool = _described("every node has it; no description asks for it")
+    built_in: bool = _described("every node has it; no description lists it")
     place: str = _described("file:line of the description, or the row of the table")
     written: str = _described("the name as found there")
     remapped_by: list[str]

@@ -53,7 +53,7 @@ def _lines(contents: ReportContents) -> Iterator[str]:
     if contents.endings is not None:
         yield from ("", "## Expiry", "")
         rows = ((escaped(one.ends), str(one.days_left), escaped(one.subject)) for one in contents.endings)
-        yield from _table(("ends", "days left", "what"), rows)
+        yield from _table(("expires", "days left", "what"), rows)
 
 
 def _findings(contents: ReportContents) -> Iterator[str]:
@@ -86,7 +86,7 @@ def _enclave(graph: EnclaveGraph, enclave: str, uses: list[ChannelUse]) -> Itera
             )
             for use in own
         )
-        yield from _table(("operation", "name", "asked for by", "evidence"), rows)
+        yield from _table(("operation", "name", "requested by", "evidence"), rows)
         yield ""
     yield f"{len(uses) - len(own)} more that every node has{graph.enforcement(enclave)}."
 

@@ -99,7 +99,7 @@ def suggestions_text(merges: Sequence[Merge], splits: Sequence[Split]) -> str:
     lines = [line for merge in merges for line in _merge(merge)]
     lines += [line for split in splits for line in _split(split)]
     return (
-        "\n".join(lines or ["no two enclaves are alike, and no enclave holds more than its nodes ask for"])
+        "\n".join(lines or ["no two enclaves are alike, and no enclave may do more than its nodes need"])
         + "\n"
     )
 

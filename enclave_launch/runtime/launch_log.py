@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Literal, NamedTuple
 
 from enclave_common.terminal import printable, printable_lines
+from enclave_common.words import counted
 from enclave_launch.errors import RuntimeFailure
 from enclave_launch.runtime.overlap import Overlap
 from enclave_launch.runtime.sinks import FileSink, ScreenSink, Sink, SinkWriter
@@ -87,7 +88,7 @@ class LaunchLog:
             self.log(
                 "WARNING",
                 "launch",
-                f"{missing} lines are not shown here, the screen was too slow; the logs have them",
+                f"{counted(missing, 'line')} not shown, the screen was too slow; the logs have all",
             )
 
     def file(self, name: str) -> FileSink:

@@ -42,7 +42,7 @@ def learn_launch(target: LaunchTarget, options: argparse.Namespace, start: Start
     isolation = isolate(options.learn_isolation)
     unsecured = "" if options.secure else ", unsecured"
     _say(f"learning: every process runs as ever{unsecured}; {DEVICES_STAY_REAL}")
-    _say(f"kept apart by: {isolation.value}")
+    _say(f"isolated by: {isolation.value}")
 
     def record(patience: float | None, markers: MarkerRun | None = None) -> int:
         distro = options.distro or os.environ.get("ROS_DISTRO", "")
@@ -81,7 +81,9 @@ def _report_unseen(folder: Path, options: argparse.Namespace) -> None:
 def _report(learnt: LearntFolder, folder: Path) -> None:
     for path, node in learnt.files.items():
         runs = counted(len(node.runs), "run")
-        print(f"{path}: node {node.key.node} of {node.program}, {len(node.entries)} endpoints, {runs}")
+        print(
+            f"{path}: node {node.key.node} of {node.program}, {counted(len(node.entries), 'endpoint')}, {runs}"
+        )
     for note in learnt.notes:
         _say(f"warning: {note}")
     if not learnt.files:

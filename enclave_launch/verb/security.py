@@ -121,4 +121,4 @@ def expiry_notices(launch: ProvisionedLaunch, margin: str) -> Iterator[str]:
     with keystore_errors(), translated(InvalidInputError, UsageError):
         due = expires_soon(keystore, within, enclaves=enclaves, known=known)
     for one in due:
-        yield f"{one.subject} ends {one.not_after:%Y-%m-%d %H:%M} UTC; renew with: secure-keystore renew {keystore}"
+        yield f"{one.subject} expires {one.not_after:%Y-%m-%d %H:%M} UTC; renew with: secure-keystore renew {keystore}"

@@ -52,7 +52,7 @@ def check_options(line: CommandLine, parser: argparse.ArgumentParser) -> None:
         check_needs_secure(actions, given & {"audit_report"}, "--audit")
     elif options.secure or options.learn is not None or looks:
         raise UsageError(
-            "--audit runs the launch unsecured and tells what --secure would refuse: give it alone"
+            "--audit runs the launch unsecured and reports what --secure would refuse: give it alone"
         )
     if not options.watch:
         check_needs_secure(actions, given & {"watch_report", "watch_accept"}, "--watch")

@@ -49,7 +49,7 @@ class RouterAnswer(Enum):
     """Who answers where the router should be."""
 
     NOBODY = "nobody"
-    STRANGER = "somebody who is not this keystore's router"
+    STRANGER = "a program that is not this keystore's router"
     EARLIER = "this keystore's router with earlier rules"
     PRESENT = "this keystore's router"
 
@@ -201,7 +201,7 @@ class ZenohRouter:
                     return
                 if wrong != refused:
                     refused = wrong
-                    self._say(f"the Zenoh router keeps the rules that it has: {wrong}")
+                    self._say(f"the rules of the Zenoh router stay as they are: {wrong}")
 
     def _read(self, process: subprocess.Popen[bytes]) -> None:
         assert process.stdout is not None, "it is a pipe"

@@ -45,7 +45,7 @@ def crl_problem(view: KeystoreView, register: Register | None, now: datetime) ->
         return None
     try:
         if not crl_validity(view).covers(now):
-            return "the CRL has ended"  # every participant would be refused
+            return "the CRL has expired"  # every participant would be refused
         if register is not None and crl_number(view) != register.crl_number:
             return "the CRL is not the one published last"
     except DamagedKeystoreError:

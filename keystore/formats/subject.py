@@ -13,6 +13,8 @@ import re
 from collections.abc import Iterable, Mapping
 from enum import Enum
 
+from enclave_common.words import counted
+
 # X.520 ub-common-name; cryptography >= 43 enforces it.
 MAX_COMMON_NAME = 64
 _SEPARATORS = "[,/|]"
@@ -100,7 +102,7 @@ def cannot_be_told_apart(pairs: Iterable[tuple[str, str]], limit: int = 3) -> st
     """Name the first few pairs in one sentence."""
     listed = list(pairs)
     shown = ", ".join(f"{a} could use the permissions of {b}" for a, b in listed[:limit])
-    return shown + (f" and {len(listed) - limit} more pairs" if len(listed) > limit else "")
+    return shown + (f" and {counted(len(listed) - limit, 'more pair')}" if len(listed) > limit else "")
 
 
 class Half(Enum):

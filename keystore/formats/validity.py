@@ -61,7 +61,7 @@ class Validity(_Ends):
             raise InvalidInputError("back-dating under 14 h makes Fast DDS start late west of UTC; use more")
         end = until if until is not None else later(now, lifetime)
         if end <= now:
-            raise InvalidInputError(f"the validity would already have ended ({iso(end)})")
+            raise InvalidInputError(f"the validity would already have expired ({iso(end)})")
         if backdate > MAX_BACKDATE:
             raise InvalidInputError("back-dating by more than 10 years helps no clock; use less")
         return cls(now - backdate, end)

@@ -167,7 +167,7 @@ def _with_shares_of_others(view: KeystoreView, state: EnclaveState, wanted: Want
     if missing or not beyond:
         return state
     some = f"{', '.join(beyond[:4])}{' ...' if len(beyond) > 4 else ''}"
-    said = f"enclave {state.enclave} may do more in this bundle than this launch asks for ({some})"
+    said = f"enclave {state.enclave} may do more in this bundle than this launch needs ({some})"
     return state._replace(permissions=False, reasons=(said,))
 
 
@@ -200,7 +200,7 @@ def inspect_wanted(
     state = inspect(view, register, enclave, wanted.permissions, now, due)
     if _outlives(state, wanted):
         longer = (
-            f"valid until {iso(state.facts.validity.not_after) if state.facts else ''}, longer than asked for"
+            f"valid until {iso(state.facts.validity.not_after) if state.facts else ''}, longer than requested"
         )
         state = state._replace(
             reissue=Reissue.CERTIFICATE, permissions=True, reasons=(*state.reasons, longer)
@@ -209,4 +209,4 @@ def inspect_wanted(
         state = _with_shares_of_others(view, state, wanted)
     if wanted.reissue is Reissue.NOTHING or state.reissue is Reissue.KEY_PAIR:
         return state
-    return state._replace(reissue=wanted.reissue, permissions=True, reasons=(*state.reasons, "asked for"))
+    return state._replace(reissue=wanted.reissue, permissions=True, reasons=(*state.reasons, "requested"))

@@ -104,7 +104,7 @@ def restore_crl(
         if crl_validity(view).not_after > later(now, within):
             _link_all(opened)  # an interrupted run may have left some without
             return []
-        problem = "the CRL ends soon" if within else "the CRL has ended"
+        problem = "the CRL expires soon" if within else "the CRL has expired"
     publish_crl(opened, opened.register.with_next_crl(now), access, now)
     return [f"CRL published again: {problem}"]
 

@@ -155,11 +155,11 @@ def _judge(
 def _ends(manifest: Manifest, now: datetime, limit: datetime) -> Iterator[str]:
     for one in manifest.enclaves:
         if one.not_after < now:
-            yield f"{one.enclave} has ended"
+            yield f"{one.enclave} has expired"
         elif one.not_after <= limit:
-            yield f"{one.enclave} ends soon"
+            yield f"{one.enclave} expires soon"
     if manifest.ends <= limit and not any(one.not_after <= limit for one in manifest.enclaves):
-        yield "a CA or the CRL " + ("has ended" if manifest.ends < now else "ends soon")
+        yield "a CA or the CRL " + ("has expired" if manifest.ends < now else "expires soon")
 
 
 def _changed(place: Path) -> Iterator[str]:

@@ -11,6 +11,7 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from enclave_common.words import counted
 from keystore.disk import layout, lock, safe_files, store
 from keystore.disk.crl_file import crl_number, revoked_serials
 from keystore.disk.register_file import needs_register
@@ -114,7 +115,7 @@ def take_over(opened: Store, now: datetime) -> None:
         batch.record(register)
     opened.remove(layout.SUPERSEDED)
     opened.notes.append(
-        f"register of what was issued made from what stands here: {len(register.certificates)} certificates"
+        f"register made from the files in this keystore: {counted(len(register.certificates), 'certificate')}"
     )
 
 

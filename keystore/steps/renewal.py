@@ -94,7 +94,9 @@ def renew(
         with opened_for_change(root, now, provisioning) as opened:
             changed = named if named is not None else [one.enclave for one in report.enclaves if one.actions]
             count = revoke_replaced(opened, changed, provisioning.access, now)
-        repaired.append(f"{count} replaced certificates revoked; deploy the new crl.pem to all enclaves")
+        repaired.append(
+            f"revoked {counted(count, 'replaced certificate')}; deploy the new crl.pem to all enclaves"
+        )
         report = _with_names_of_their_own(root, report, due)
     else:
         report = report._replace(warnings=(*report.warnings, *_still_valid(root, report, now)))

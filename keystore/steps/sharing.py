@@ -99,7 +99,7 @@ def kept_shares(shares: Iterable[EnclaveShare]) -> list[str]:
     kept = [(share.enclave, share.kept()) for share in shares]
     return [
         f"enclave {enclave} is in use by another running launch, or another run of this one: it keeps what this launch "
-        f"no longer asks for ({', '.join(rules[:3])}{' ...' if len(rules) > 3 else ''}) until it starts alone"
+        f"no longer needs ({', '.join(rules[:3])}{' ...' if len(rules) > 3 else ''}) until it starts alone"
         for enclave, rules in kept
         if rules
     ]

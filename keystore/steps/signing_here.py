@@ -36,7 +36,7 @@ def refuse_without_keys(
     listed = "".join(f"\n  {line}" for line in lines[:_SHOWN]) + more
     raise SigningUnavailableError(
         f"{printable(view.root)} has no CA keys, so nothing can be signed here, but these enclaves differ from what "
-        f"is asked for:{listed}\nBring them up to date where the CA keys are (start or apply-policy there), "
+        f"is needed:{listed}\nBring them up to date where the CA keys are (start or apply-policy there), "
         "then export again"
     )
 

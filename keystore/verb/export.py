@@ -13,6 +13,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from enclave_common.command_line import FLAG, PATH, TEXTS, one_of
+from enclave_common.words import counted
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.view import KeystoreView
 from keystore.errors import InvalidInputError
@@ -73,7 +74,9 @@ def _export_hosts(arguments: argparse.Namespace) -> int:
     made = export_hosts(arguments.keystore, arguments.output, assigned, options=options)
     for one in made:
         state = "" if one.is_new else " (as last time)"
-        print(f"{one.path}: number {one.manifest.number}, {len(one.manifest.enclaves)} enclaves{state}")
+        print(
+            f"{one.path}: number {one.manifest.number}, {counted(len(one.manifest.enclaves), 'enclave')}{state}"
+        )
     if arguments.hosts and not arguments.host:
         _report_hosts_that_left(arguments, assigned)
     pins = " ".join(f"--require-ca {one}" for one in pinned(made[0].manifest))

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 from enclave_common.command_line import PATH
 from enclave_common.terminal import printable
+from enclave_common.words import counted
 from keystore.formats.validity import iso, parse_duration
 from keystore.steps.fleet import fleet_status
 from keystore.verb import common
@@ -49,13 +50,13 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _lines(report: FleetReport) -> Iterator[str]:
     for one in report.hosts:
-        held = f"{len(one.manifest.enclaves)} enclaves, until {iso(one.manifest.ends)}"
+        held = f"{counted(len(one.manifest.enclaves), 'enclave')}, until {iso(one.manifest.ends)}"
         yield f"{one.manifest.host}: number {one.manifest.number}, {held}"
         yield from (f"  {text}" for text in one.found)
     for place, why in report.unreadable:
         yield f"{printable(str(place))}: cannot be used: {why}"
     good = sum(not one.found for one in report.hosts)
-    yield f"{len(report.hosts)} hosts, {good} of them as they should be, {len(report.unreadable)} unreadable"
+    yield f"{counted(len(report.hosts), 'host')}, {good} as expected, {len(report.unreadable)} unreadable"
 
 
 def _json(report: FleetReport) -> dict[str, Any]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import argparse
 
 from enclave_common.command_line import FLAG
+from enclave_common.words import counted
 from keystore.steps.removal import RemoveOptions, remove
 from keystore.verb import common
 
@@ -27,6 +28,8 @@ def run(arguments: argparse.Namespace) -> int:
     if not arguments.quiet:
         common.print_lines(f"removed {name}" for name in report.removed)
     if report.revoked:
-        print(f"{report.revoked} certificates are revoked; deploy the new crl.pem to all enclaves")
+        print(
+            f"{counted(report.revoked, 'revoked certificate')} in the CRL; deploy the new crl.pem to all enclaves"
+        )
     common.warn(report.warnings, arguments)
     return 0

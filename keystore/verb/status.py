@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from enclave_common.command_line import FLAG
 from enclave_common.terminal import printable
+from enclave_common.words import counted
 from keystore.formats.validity import iso, parse_duration
 from keystore.steps.expiry import status
 from keystore.verb import common
@@ -63,16 +64,16 @@ def _json(report: StatusReport, due: tuple[Expiry, ...]) -> dict[str, Any]:
 
 
 def _lines(report: StatusReport, shown: tuple[Expiry, ...]) -> Iterator[str]:
-    yield f"{len(report.enclaves)} enclaves in {printable(str(report.keystore))}"
+    yield f"{counted(len(report.enclaves), 'enclave')} in {printable(str(report.keystore))}"
     for one in shown:
         yield f"{iso(one.not_after)}  {_left(one, report.now):>14}  {printable(one.subject)}"
     if not shown and report.expiries:
         first = report.expiries[0]
-        yield f"nothing is due; the first to end is the {first.subject}, {iso(first.not_after)}"
+        yield f"nothing is due; the first to expire is the {first.subject}, {iso(first.not_after)}"
 
 
 def _left(one: Expiry, now: datetime) -> str:
     if one.not_before > now:
         return "not yet valid"
     days = (one.not_after - now).days
-    return f"{days} days left" if days >= 0 else "expired"
+    return f"{counted(days, 'day')} left" if days >= 0 else "expired"

@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 
 from enclave_common.command_line import TEXT
+from enclave_common.words import counted
 from keystore.formats.tool_needs import TABLE
 from keystore.formats.validity import iso
 from keystore.steps.tool_enclaves import create_tool_enclave
@@ -52,7 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
     else:
         common.print_lines(
             (
-                f"{made.enclave}: until {iso(made.ends)}, {len(rules)} permissions",
+                f"{made.enclave}: until {iso(made.ends)}, {counted(len(rules), 'permission')}",
                 f"use it:       {made.command}",
                 f"take it back: {made.remove}",
             )

@@ -11,6 +11,7 @@ import argparse
 import shlex
 
 from enclave_common.command_line import TEXT
+from enclave_common.words import counted
 from keystore.disk import layout
 from keystore.steps.options import ProvisionOptions
 from keystore.verb import common
@@ -35,11 +36,11 @@ def run(arguments: argparse.Namespace) -> int:
     report = write_zenoh(arguments.keystore, names, router=arguments.router, options=options)
     common.print_lines(f"{name} written" for name in report.written)
     if not report.written:
-        print("everything is as it should be")
+        print("nothing to change")
     common.warn(report.gaps, arguments)
     if report.enclaves:
         router = shlex.quote(str(report.keystore / layout.ZENOH_ROUTER))
-        print(f"router of {len(report.enclaves)} enclaves at {report.router.endpoint}:")
+        print(f"router of {counted(len(report.enclaves), 'enclave')} at {report.router.endpoint}:")
         print(f"  ZENOH_ROUTER_CONFIG_URI={router} ros2 run rmw_zenoh_cpp rmw_zenohd")
     if report.restart:
         common.warn([RESTART], arguments)

@@ -10,6 +10,7 @@ from datetime import datetime
 
 from cryptography import x509
 
+from enclave_common.words import counted
 from keystore.disk import layout, safe_files
 from keystore.disk.signed_documents import signed_governance
 from keystore.disk.view import KeystoreView
@@ -92,7 +93,7 @@ def _check_subjects(view: KeystoreView, names: dict[str, str]) -> Iterator[Findi
     elif compatible:
         yield Finding(
             Severity.NOTE, "compatible-subjects", layout.ENCLAVES,
-            f"{len(compatible)} enclaves have SROS2's subjects (CN=/path); a new enclave could make their "
+            f"{counted(len(compatible), 'enclave')} with SROS2's subjects (CN=/path); a new enclave could make their "
             "permissions borrowable on Cyclone DDS",
             repair.run(view.root, "renew", *compatible, note="gives exact subjects"),
         )  # fmt: skip
@@ -280,7 +281,7 @@ class _EnclaveCheck:
 
     def _grants(self, grants: tuple[Grant, ...]) -> Iterator[Finding]:
         if len(grants) > 1:
-            text = f"{len(grants)} grants; of those with one subject only the first counts"
+            text = f"{counted(len(grants), 'grant')}; of those with one subject only the first counts"
             yield self._finding(Severity.WARNING, "several-grants", layout.PERMISSIONS, text, self._renew())
         if self.facts is None:
             return

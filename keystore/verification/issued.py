@@ -34,7 +34,9 @@ def load_register(view: KeystoreView) -> tuple[Register | None, list[Finding]]:
         return None, [Finding(Severity.ERROR, "register", layout.REGISTER, str(error), repair.BACKUP)]
     if register is None and needs_register(view):
         fix = repair.run(view.root, "renew", note="takes over what can still be known")
-        why = "there is no register: what was revoked or taken away and then put back cannot be told"
+        why = (
+            "there is no register: revoked certificates and earlier files that were put back are not noticed"
+        )
         return None, [Finding(Severity.EXPOSURE, "no-register", layout.REGISTER, why, fix)]
     return register, []
 
@@ -82,7 +84,7 @@ def check_published(view: KeystoreView, register: Register | None, now: datetime
     if register is None:
         return
     problem = crl_problem(view, register, now)
-    if problem is not None and problem != "the CRL has ended":  # which is told by its dates
+    if problem is not None and problem != "the CRL has expired":  # which is told by its dates
         yield Finding(
             Severity.ERROR, "crl-not-last", layout.CRL,
             f"{problem}: enclaves that were revoked since may talk again",

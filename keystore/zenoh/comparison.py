@@ -11,6 +11,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
+from enclave_common.words import counted
 from keystore.errors import InvalidInputError
 from keystore.zenoh.meaning import Meaning, meaning
 
@@ -74,7 +75,7 @@ def differences(before: ZenohConfiguration, after: ZenohConfiguration) -> Iterat
         if old is None or new is None:
             who = _who(name, before.enclaves.get(name) or after.enclaves.get(name, ""))
             yield ZenohDifference(
-                "subject", old is None, who, f"{len(_grouped(old or new or ()))} permissions"
+                "subject", old is None, who, f"{counted(len(_grouped(old or new or ())), 'permission')}"
             )
         else:
             yield from _rights(_enclave(name, before), old, new)

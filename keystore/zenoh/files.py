@@ -116,7 +116,7 @@ def identity_problem(view: KeystoreView, due: datetime) -> str | None:
     if facts.common_name != ROUTER_NAME or not issued_by(facts, ca):
         return "its certificate is not one that the identity CA issued for a router"
     if facts.validity.not_after < min(due, ca.validity.not_after):
-        return f"its certificate ends {iso(facts.validity.not_after)}"
+        return f"its certificate expires {iso(facts.validity.not_after)}"
     return None if key_matches(key, facts) else "its private key belongs to another certificate"
 
 

@@ -32,8 +32,8 @@ _MESSAGES = {
     "Declare Liveliness Subscriber": "declare_liveliness_subscriber",
 }  # fmt: skip
 _HANDSHAKE = (
-    ("CertificateExpired", "it does not accept the router's certificate, which has ended: secure-keystore zenoh"),
-    ("certificate expired", "its certificate has ended: secure-keystore renew"),
+    ("CertificateExpired", "it does not accept the router's certificate, which has expired: secure-keystore zenoh"),
+    ("certificate expired", "its certificate has expired: secure-keystore renew"),
     ("UnknownCA", "one side does not know the CA of the other: their files are of different keystores"),
     ("UnknownIssuer", "its certificate is of another CA: its files are of another keystore"),
     ("extended key usage", "its certificate is that of a server, such as the router's: it is for no client"),

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from datetime import datetime
 from itertools import islice
 
+from enclave_common.words import counted
 from keystore.disk import layout, safe_files
 from keystore.disk.view import KeystoreView
 from keystore.errors import KeystoreError
@@ -86,7 +87,7 @@ def _told(view: KeystoreView, file: str, wanted: bytes, found: bytes) -> Iterato
         severity = Severity.ERROR if one.more else Severity.WARNING
         yield Finding(severity, f"zenoh-{one.code}", file, _sentence(one), _again(view))
     if rest := sum(1 for _ in all_of):
-        yield Finding(Severity.NOTE, "zenoh-more", file, f"differs in {rest} more places")
+        yield Finding(Severity.NOTE, "zenoh-more", file, f"differs in {counted(rest, 'more place')}")
 
 
 def _sentence(one: ZenohDifference) -> str:

@@ -89,7 +89,7 @@ def _note(row: YamlMap) -> str:
         texts.append(f"undecided whether it is fixed or comes from {' or '.join(undecided)}")
     if isinstance(proof, YamlScalar):
         source_is_known = proof.value != ONE_RUN
-        texts.append(str(proof.value) if source_is_known else "from the parameter as far as one run tells")
+        texts.append(str(proof.value) if source_is_known else "from the parameter as far as one run shows")
     return "; ".join(texts)
 
 

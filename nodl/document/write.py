@@ -60,7 +60,7 @@ def v2_yaml(node: ManifestNode) -> Written:
         lines.append(f"{category}:")
         lines += [f"  - {{name: {_v2_name(e)}, type: {_v2_endpoint_type(e)}{qos}}}" for e in entries]
     note = (
-        f"{interface.name}: v1 says nothing of QoS; SYSTEM_DEFAULT was written, put in what the code asks for"
+        f"{interface.name}: v1 has no QoS; SYSTEM_DEFAULT was written, replace it with what the code requests"
     )
     return Written("\n".join(lines) + "\n", (note,) if topics else ())
 

@@ -327,5 +327,5 @@ def _refused(domain_id: int, directory: Path | None, error: Exception) -> str:
         return f"DDS domain {domain_id} cannot be joined: {error}"
     return (
         f"DDS domain {domain_id} cannot be joined with the enclave in {directory}: {error}. Is the domain in its "
-        "governance, and has the enclave not ended? secure-keystore tool-enclave KEYSTORE --for observe makes one"
+        "governance, and is the enclave still valid? secure-keystore tool-enclave KEYSTORE --for observe makes one"
     )

@@ -56,13 +56,13 @@ def _unmet(offered: Quality, requested: Quality) -> Iterator[str]:
     ):
         has, wants = getattr(offered, what), getattr(requested, what)
         if has in order and wants in order and order.index(has) < order.index(wants):
-            yield f"{what}: {has} is offered, {wants} asked for"
+            yield f"{what}: {has} is offered, {wants} requested"
     for what in ("deadline", "lease"):
         has, wants = getattr(offered, what), getattr(requested, what)
         if wants != INFINITE and (has == INFINITE or has > wants):
-            yield f"{_TIMES[what]}: {_seconds(has)} is offered, {_seconds(wants)} asked for"
+            yield f"{_TIMES[what]}: {_seconds(has)} is offered, {_seconds(wants)} requested"
     if {offered.ownership, requested.ownership} == set(_OWNERSHIP):
-        yield f"ownership: {offered.ownership} is offered, {requested.ownership} asked for"
+        yield f"ownership: {offered.ownership} is offered, {requested.ownership} requested"
 
 
 def differences(planned: Mapping[str, str | int], seen: Quality) -> tuple[str, ...]:

@@ -22,9 +22,7 @@ from nodl.record.lines import RecordedRun
 from nodl.record.origins import arguments_as_inputs
 from nodl.record.written import final_names, written_names
 
-_WITHOUT_PROGRAM = (
-    "nothing tells which program it is: give the launch file, or observe on the machine that runs it"
-)
+_WITHOUT_PROGRAM = "the program is not known: give the launch file, or observe on the machine that runs it"
 _ROS_TYPE_PARTS = 3
 
 
@@ -73,7 +71,7 @@ def _placed(observed: Observed, left_out: list[str]) -> Iterator[_Placed]:
                 yield _Placed(observed.run, node, found[0], ends)
             elif found:
                 names = ", ".join(sorted({each.program for each in found}))
-                left_out.append(f"{node.fqn}: it may be any of {names}; nothing tells which")
+                left_out.append(f"{node.fqn}: it may be any of {names}; which is not known")
             else:
                 left_out.append(f"{node.fqn}: {_WITHOUT_PROGRAM}")
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from enclave_common.words import counted
 from nodl.graph.model import Attribution, Graph, GraphProcess, SeenInterface
 
 
@@ -11,7 +12,10 @@ def graph_text(graph: Graph) -> str:
     """Return one block for each process: who it is, its nodes, and what they have."""
     blocks = ["\n".join(_process(process)) for process in graph.processes]
     nodes = sum(1 for _ in graph.nodes)
-    return "\n\n".join([*blocks, f"{len(graph.processes)} participants, {nodes} nodes"]) + "\n"
+    return (
+        "\n\n".join([*blocks, f"{counted(len(graph.processes), 'participant')}, {counted(nodes, 'node')}"])
+        + "\n"
+    )
 
 
 def participant_text(process: GraphProcess) -> str:

@@ -182,7 +182,7 @@ def _notes(entries: Iterable[LearntEndpoint], seen: Sequence[_Seen]) -> Iterable
             yield f"{entry.name}: fixed, or the value of {entry.origin.source}: {_UNTIL_DECIDED}"
         if entry.spellings:
             others = ", ".join(entry.spellings)
-            yield f"{entry.name}: or {others}: the runs do not tell; one under another namespace and node name does"
+            yield f"{entry.name}: or {others}: the runs do not decide; one under another namespace and node name does"
         if entry.readings:
             others = ", ".join(entry.readings)
             yield f"{entry.name}: or {others}: both are granted until a run under another name or namespace decides"
@@ -190,7 +190,7 @@ def _notes(entries: Iterable[LearntEndpoint], seen: Sequence[_Seen]) -> Iterable
             yield f"{entry.name}: the program writes {entry.moved_from} and remaps it itself"
     bad = {(e.written, e.rc) for each in seen for e in each.node.endpoints if e.rc not in (0, 1)}
     for written, rc in sorted(bad):
-        yield f"{written!r} was asked for and is not a valid name (rcl's error {rc}): a bug of the program"
+        yield f"{written!r} was requested and is not a valid name (rcl's error {rc}): a bug of the program"
 
 
 def _entries(seen: Sequence[_Seen]) -> Iterable[LearntEndpoint]:

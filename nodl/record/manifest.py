@@ -20,7 +20,7 @@ from nodl.document.v2_section import CATEGORIES, IDENTITY_KEY
 from nodl.node_interface import ClientLibrary
 from nodl.record.learning import LearntEndpoint, LearntNode
 
-_HEAD = "# Learnt by secure-launch --learn from what the node asked of librcl; see docs/recording.md.\n"
+_HEAD = "# Learnt by secure-launch --learn from what the node requested of librcl; see docs/recording.md.\n"
 _HISTORY = {0: "SYSTEM_DEFAULT", 1: "KEEP_LAST", 2: "KEEP_ALL"}
 _RELIABILITY = {0: "SYSTEM_DEFAULT", 1: "RELIABLE", 2: "BEST_EFFORT", 4: "BEST_AVAILABLE"}
 _DURABILITY = {0: "SYSTEM_DEFAULT", 1: "TRANSIENT_LOCAL", 2: "VOLATILE", 4: "BEST_AVAILABLE"}

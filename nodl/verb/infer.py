@@ -124,7 +124,7 @@ def _writable(system: InferredSystem, with_gaps: bool) -> list[NodeInterface]:
         questions = open_questions(node)
         if questions and not with_gaps:
             who = f"{node.package or '-'}/{node.executable or node.plugin or node.name}"
-            text = f"not written: {who} has {len(questions)} open questions (--with-gaps)"
+            text = f"not written: {who} has {counted(len(questions), 'open question')} (--with-gaps)"
             print(printable(text), file=sys.stderr)
         else:
             kept.append(node)

@@ -188,7 +188,8 @@ def _show_repository(machine: Machine) -> None:
     if hidden:
         machine.run("mkdir", "-p", "/etc/systemd/system/service.d")
         homes = "ProtectHome=tmpfs\n" if any(one.startswith(("/root/", "/home/")) for one in hidden) else ""
-        text = f"[Service]\n{homes}BindReadOnlyPaths={' '.join(hidden)}\n"
+        shown = " ".join(f'"{one}"' for one in hidden)
+        text = f"[Service]\n{homes}BindReadOnlyPaths={shown}\n"
         machine.write("/etc/systemd/system/service.d/repository.conf", text)
 
 

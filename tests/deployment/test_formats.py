@@ -212,7 +212,7 @@ def test_several_hosts_share_their_network_with_the_containers_or_are_refused(
     hosts.write_text("version: 1\nhosts:\n  arm: {nodes: [/ear]}\n  base: {enclaves: ['/front/*']}\n")
     words = ("compose", launch, ks, tmp_path / "out", "--hosts", str(hosts))
     assert export(*words) == 2
-    assert "would not hear each other" in capsys.readouterr().err
+    assert "would not reach each other" in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
     assert export(*words, "--host-network") == 0
     content = yaml.safe_load((tmp_path / "out/arm/compose.yaml").read_text())

@@ -1,4 +1,4 @@
-"""Every command of the tutorial and the how-to pages is run, in the workspace that the tutorial makes."""
+"""Every command of the documentation is run, in the workspace that the tutorial makes."""
 
 from __future__ import annotations
 
@@ -8,12 +8,18 @@ from pathlib import Path
 
 import pytest
 
+import enclave_launch
 from tests.docs.pages import Command, make_colcon, parts, read_aloud, reader_environment, write_files
 
 ROOT = Path(__file__).parent.parent.parent
 DOCS = ROOT / "docs"
 TUTORIAL = DOCS / "tutorial.md"
 HOW_TO = sorted((DOCS / "how-to").glob("*.md"))
+OTHERS = sorted(page for page in DOCS.glob("*.md") if page != TUTORIAL)
+SHOWN = [page for page in (*HOW_TO, *OTHERS) if any(isinstance(part, Command) for part in parts(page))]
+"""With commands; the tutorial has a test of its own."""
+WITHOUT_COMMANDS = ("learn-from-a-run.md", "watch-for-drift.md")
+"""They need real nodes: tests/recording and tests/drift do the same."""
 DEMO = ROOT / "fixtures" / "demo_ws"
 PROVISION = ["secure-launch", "--secure", "--provision-only", "--keystore", "ks", "--enclave-scope", "node"]
 
@@ -32,7 +38,7 @@ def test_the_tutorial_does_what_it_says(workspace: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "page", [page for page in HOW_TO if page.name != "asyncio.md"], ids=lambda page: page.stem
+    "page", [page for page in SHOWN if page.name != "asyncio.md"], ids=lambda page: page.stem
 )
 def test_a_page_does_what_it_says(workspace: Path, page: Path) -> None:
     write_files(TUTORIAL, workspace)
@@ -53,10 +59,20 @@ def test_the_asyncio_launcher_runs_the_demo(workspace: Path) -> None:
     read_aloud(DOCS / "how-to" / "asyncio.md", workspace, environment)
 
 
-@pytest.mark.parametrize("page", [DOCS / "README.md", TUTORIAL, *HOW_TO], ids=lambda page: page.stem)
+@pytest.mark.parametrize("page", [TUTORIAL, *HOW_TO, *OTHERS], ids=lambda page: page.stem)
 def test_links_lead_somewhere(page: Path) -> None:
-    targets = re.findall(r"\]\((?!http)([^)#]+)[^)]*\)", page.read_text(encoding="utf-8"))
-    assert [target for target in targets if not (page.parent / target).exists()] == []
+    links = re.findall(r"\]\((?!http)([^)#]*)(?:#([^)]+))?\)", page.read_text(encoding="utf-8"))
+    for target, heading in links:
+        found = page.parent / target if target else page
+        assert found.exists(), target
+        if heading:
+            assert heading in headings(found), f"{target}#{heading}"
+
+
+def headings(page: Path) -> list[str]:
+    """The anchors that GitHub makes of a page's headings."""
+    titles = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.M)
+    return [re.sub(r"[^\w\- ]", "", title.lower()).replace(" ", "-") for title in titles]
 
 
 def test_every_page_is_in_the_index() -> None:
@@ -65,6 +81,11 @@ def test_every_page_is_in_the_index() -> None:
     assert [page for page in pages if f"({page}" not in index] == []
 
 
+def test_the_page_of_the_library_has_every_public_name() -> None:
+    text = (DOCS / "python-library.md").read_text(encoding="utf-8")
+    assert [name for name in dir(enclave_launch) if not name.startswith("_") and f"`{name}" not in text] == []
+
+
 def test_there_is_something_to_run() -> None:
     for page in (TUTORIAL, *HOW_TO):
-        assert any(isinstance(part, Command) for part in parts(page)), page
+        assert page in (TUTORIAL, *SHOWN) or page.name in WITHOUT_COMMANDS, page

@@ -115,7 +115,7 @@ def test_half_open_and_unexplained_things_are_told_and_in_no_manifest() -> None:
     assert found.left_out == ("/talker: service_server /reset is half open, without reply",)
     stranger = Observed(RecordedRun("b"), one_node("/stranger", *topic("/x", writes=True)))
     assert learn_observed([stranger]).learnt.nodes == ()
-    assert "nothing tells which program it is" in learn_observed([stranger]).left_out[0]
+    assert "the program is not known" in learn_observed([stranger]).left_out[0]
 
 
 def test_the_command_line_of_a_process_tells_program_rules_and_parameters() -> None:

@@ -108,7 +108,7 @@ def test_governance_yaml(name: str) -> None:
 
 
 def test_no_keystore_is_made_for_an_impossible_validity(tmp_path: Path) -> None:
-    with pytest.raises(InvalidInputError, match="already have ended"):
+    with pytest.raises(InvalidInputError, match="already have expired"):
         provision(tmp_path / "ks", [policy("/a")], options=options(valid_until=NOW.replace(year=2001)))
     assert not (tmp_path / "ks").exists()
 

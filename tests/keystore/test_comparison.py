@@ -181,7 +181,7 @@ class TestWhatAStartFinds:
     def test_a_keystore_without_register_gets_one(self, root: Path) -> None:
         (root / layout.REGISTER).unlink()
         report = again(root)
-        assert any("register of what was issued made" in text for text in report.created)
+        assert any("register made from" in text for text in report.created)
         assert not again(root).changed
 
     def test_a_crl_that_has_ended_is_published_again(self, root: Path) -> None:
@@ -277,7 +277,7 @@ class TestALifeThatWasAskedFor:
 
         report = create_enclaves(root, ["/a"], options=asked(10))
         assert kit.actions(report) == {"/a": ("certificate", "permissions", "old certificate revoked")}
-        assert "longer than asked for" in report.enclaves[0].reasons[0]
+        assert "longer than requested" in report.enclaves[0].reasons[0]
         assert kit.actions(create_enclaves(root, ["/a"], options=asked(10))) == {}, "seconds do not count"
         longer = create_enclaves(root, ["/a"], options=asked(12))
         assert longer.enclaves[0].reasons == ("the certificate expires soon",)
@@ -297,7 +297,7 @@ def test_a_bundle_that_grants_more_than_ours_is_taken_as_a_union_and_one_that_la
     hold = LaunchHold(tmp_path / "bundle", "/mine.launch.xml")
     report = again(tmp_path / "bundle", kit.policy("/a"), launch=hold)
     assert not report.changed
-    assert any("may do more in this bundle than this launch asks for" in text for text in report.warnings)
+    assert any("may do more in this bundle than this launch needs" in text for text in report.warnings)
     assert told(tmp_path / "bundle", launch=hold) == (), "its next process starts"
     same = again(tmp_path / "bundle", kit.policy("/a", "/chatter", "/other"), launch=hold)
     assert same.warnings == report.warnings[1:]

@@ -87,11 +87,11 @@ def test_what_ends_soon_and_what_has_ended(ca: Path, tmp_path: Path) -> None:
     renew(ca, ["/robot2/arm"], options=RenewOptions(provisioning=options(lifetime=20 * DAY)))
     exported(ca, tmp_path / "out")
     soon = {one.manifest.host: one for one in fleet_status([tmp_path / "out"]).hosts}
-    assert soon["robot2"].found == ("/robot2/arm ends soon",)
+    assert soon["robot2"].found == ("/robot2/arm expires soon",)
     assert (soon["robot2"].due, soon["robot2"].ended, soon["robot1"].due) == (True, False, False)
     later = fleet_status([tmp_path / "out"], now=utc_now() + timedelta(days=21))
     assert later.hosts[2].ended
-    assert later.hosts[2].found == ("/robot2/arm has ended",)
+    assert later.hosts[2].found == ("/robot2/arm has expired",)
 
 
 def test_forged_and_foreign_bundles_are_told_where_the_ca_is_at_hand(ca: Path, tmp_path: Path) -> None:
@@ -112,7 +112,7 @@ def test_the_command_and_its_exit_status(
     out = str(tmp_path / "out")
     exported(ca, tmp_path / "out")
     assert main(["fleet", "status", out, "--keystore", str(ca)]) == 0
-    assert "3 hosts, 3 of them as they should be" in capsys.readouterr().out
+    assert "3 hosts, 3 as expected" in capsys.readouterr().out
     remove(ca, ["/robot1/arm"], options=RemoveOptions(durable=False))
     assert main(["fleet", "status", out, "--keystore", str(ca), "--format", "json"]) == 1
     document = json.loads(capsys.readouterr().out)

@@ -459,7 +459,7 @@ class TestTakingOver:
         before = register(root)
         report = provision(self.earlier(root), [policy("/a"), policy("/b")], options=options())
         assert actions(report) == {}
-        assert report.created == ("register of what was issued made from what stands here: 2 certificates",)
+        assert report.created == ("register made from the files in this keystore: 2 certificates",)
         bare = {serial: one._replace(lifetime=None) for serial, one in before.certificates.items()}
         assert replace(register(root), written=before.written) == replace(before, certificates=bare)
 

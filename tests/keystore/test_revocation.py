@@ -111,7 +111,7 @@ def test_a_launch_renews_a_crl_that_has_ended(root: Path) -> None:
     later = NOW + 100 * DAY
     wished = [policy("/a")]
     assert provision(root, wished, options=options(now=later)).created == (
-        "CRL published again: the CRL has ended",
+        "CRL published again: the CRL has expired",
     )
     assert not provision(root, wished, options=options(now=later)).changed
     assert len(crl(root)) == 1

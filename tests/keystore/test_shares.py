@@ -117,7 +117,7 @@ class TestWhileAnotherRuns:
     def test_nothing_is_revoked_that_it_uses(self, root: Path, running: LaunchHold) -> None:
         start(root, NAVIGATION, policy("/", "/plan", "/goal"))
         report = start(root, NAVIGATION, policy("/", "/plan"))
-        assert "keeps what this launch no longer asks for (publish /goal)" in str(report.warnings)
+        assert "keeps what this launch no longer needs (publish /goal)" in str(report.warnings)
         assert not (root / "public/crl.pem").exists() and "rt/goal" in granted(root)
         running.close()
         start(root, NAVIGATION, policy("/", "/plan"))
@@ -282,7 +282,7 @@ def test_a_bundle_takes_the_union_and_says_so(root: Path, tmp_path: Path) -> Non
     report = start(root, "/elsewhere/navigation.launch.py", policy("/", "/plan"))
     assert (
         not report.changed
-        and "may do more in this bundle than this launch asks for (publish rt/odom)" in str(report.warnings)
+        and "may do more in this bundle than this launch needs (publish rt/odom)" in str(report.warnings)
     )
     with pytest.raises(Exception, match=r"has no CA keys(?s:.)*lacks publish rt/goal"):
         start(root, NAVIGATION, policy("/", "/plan", "/goal"))

@@ -45,7 +45,7 @@ def test_the_bounds_themselves() -> None:
     with pytest.raises(InvalidInputError, match="before it begins"):
         Validity(NOW, NOW)
     assert Validity.starting(NOW, until=NOW + SECOND).not_after == NOW + SECOND
-    with pytest.raises(InvalidInputError, match="already have ended"):
+    with pytest.raises(InvalidInputError, match="already have expired"):
         Validity.starting(NOW, until=NOW)
     ten_years = timedelta(days=3650)
     assert Validity.starting(NOW, DAY, backdate=ten_years).not_before == NOW - ten_years
@@ -73,7 +73,7 @@ def test_what_is_not_yet_valid_is_not_covered_nor_what_has_ended(now: datetime, 
 def test_ends_before_it_begins() -> None:
     with pytest.raises(InvalidInputError, match="before it begins"):
         Validity(NOW, NOW - DAY)
-    with pytest.raises(InvalidInputError, match="already have ended"):
+    with pytest.raises(InvalidInputError, match="already have expired"):
         Validity.starting(NOW, until=NOW - DAY)
 
 

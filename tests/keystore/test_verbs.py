@@ -91,7 +91,7 @@ def test_verify_as_json(root: Path, capsys: pytest.CaptureFixture[str]) -> None:
 BAD_USAGE = {
     ("create-enclave", "KS", "/../x"): ("names are not paths", 2),
     ("create-enclave", "KS", "/new", "--valid-for", "soon"): ("ISO date", 2),
-    ("create-enclave", "KS", "/new", "--valid-for", "1999-01-01"): ("already have ended", 2),
+    ("create-enclave", "KS", "/new", "--valid-for", "1999-01-01"): ("already have expired", 2),
     ("create-enclave", "KS", "/new", "--backdate", "1h"): ("14 h", 2),
     ("create-enclave", "KS", "/new", "--passphrase-file", "/nonexistent"): (None, 0),
     ("apply-policy", "KS", "/nonexistent.xml"): ("cannot read policy", 2),

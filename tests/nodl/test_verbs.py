@@ -99,7 +99,7 @@ def test_converting_v1_to_v2(folder: Path, capsys: pytest.CaptureFixture[str]) -
     captured = capsys.readouterr()
     assert captured.out == "out/talker.py.nodl.yaml\nout/listener.nodl.yaml\n"
     assert captured.err == (
-        "note: talker: v1 says nothing of QoS; SYSTEM_DEFAULT was written, put in what the code asks for\n"
+        "note: talker: v1 has no QoS; SYSTEM_DEFAULT was written, replace it with what the code requests\n"
     )
     qos = "{history: SYSTEM_DEFAULT, reliability: SYSTEM_DEFAULT}"
     assert (folder / "out/talker.py.nodl.yaml").read_text() == (

@@ -418,7 +418,7 @@ def test_what_the_policy_file_denies_has_no_patch(stand_in: Path, tmp_path: Path
     policy.write_text(patch.text.replace("ALLOW", "DENY"))
     output = secured(workspace, "--policy", str(policy))
     assert told(output) == SECRETS
-    assert output.count("a DENY of the policy file takes it away") == 1
+    assert output.count("a DENY of the policy file removes it") == 1
     assert apply_patches(output) == 1, "the other one"
     assert told(secured(workspace, "--policy", str(policy))) == {("/bad", "publish topic", "/one")}
 

@@ -82,7 +82,7 @@ def record_of(learnt: Learnt) -> Record:
 
 def test_a_learning_run_says_what_it_is(learnt: Learnt) -> None:
     assert "unsecured" in learnt.output
-    assert "kept apart by: discovery on this machine only, in a DDS domain of its own" in learnt.output
+    assert "isolated by: discovery on this machine only, in a DDS domain of its own" in learnt.output
     assert "device files are not isolated" in learnt.output
 
 

@@ -100,7 +100,7 @@ def test_the_plan_says_what_was_recorded_and_how_sure_it_is(stand_in: Path, tmp_
     assert "recorded in 1 run)" in plan_tree(plan)
     explained_ = "\n".join(explained(plan, "/fixed"))
     assert (
-        "parameter world, set by launch; recorded in 1 run; from the parameter as far as one run tells"
+        "parameter world, set by launch; recorded in 1 run; from the parameter as far as one run shows"
         in explained_
     )
     assert "recorded in 1 run; undecided whether it is fixed or comes from a_topic or b_topic" in explained_

@@ -89,7 +89,7 @@ def test_the_launch_file_edited_and_started_again_while_it_runs(
     running: PlanProvider, tmp_path: Path, keystore: Path
 ) -> None:
     launch = provision(plan_of(tmp_path, OTHER_TALKER), keystore)
-    assert "keeps what this launch no longer asks for (publish /chatter)" in str(launch.report.warnings)
+    assert "keeps what this launch no longer needs (publish /chatter)" in str(launch.report.warnings)
     respawn(running)
 
 

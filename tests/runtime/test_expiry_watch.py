@@ -30,7 +30,7 @@ def test_each_margin_is_told_once_and_those_that_are_over_are_left_out() -> None
     found = notices([ends(2 * DAY)], "ks", NOW)
     assert [one.at - NOW for one in found] == [DAY, 47 * HOUR, 2 * DAY - timedelta(minutes=5), 2 * DAY]
     assert "ends in 1 day" in found[0].text and "secure-keystore renew ks --within 2d" in found[0].text
-    assert "ended now: Cyclone DDS peers receive nothing more" in found[-1].text
+    assert "has expired: Cyclone DDS peers receive nothing more" in found[-1].text
 
 
 def test_what_ends_together_is_one_line() -> None:

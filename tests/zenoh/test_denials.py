@@ -195,7 +195,7 @@ def test_the_verb_reads_files_and_tells_by_its_exit_status(
 
 
 HANDSHAKES = {
-    "certificate expired: verification time 1795327740 (UNIX), but certificate is not valid after 17953": "has ended",
+    "certificate expired: verification time 1795327740 (UNIX), but certificate is not valid after 17953": "has expired",
     "UnknownIssuer": "another CA",
     "certificate does not allow extended key usage for client authentication, allows server auth": "for no client",
     "BadSignature": "does not accept its certificate",

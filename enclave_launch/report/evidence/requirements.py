@@ -28,7 +28,7 @@ PARTS = (
     EvidencePart(
         "Access control",
         ("access-control.csv", "access-control.json", "plan.json"),
-        "each permission of each enclave, the nodes that ask for it, and where that is written",
+        "each permission of each enclave, the nodes that request it, and where that is written",
         (
             "CRA Annex I part I (2)(d): protection from unauthorised access",
             "IEC 62443-3-3 SR 2.1, 62443-4-2 CR 2.1: authorization enforcement",

@@ -52,11 +52,11 @@ def permissions(contents: ReportContents) -> str:
         opened = " open" if number == 0 else ""
         parts.append(
             f'<details class="enclave" data-enclave="{number}"{opened}><summary><code>{text(enclave)}</code> '
-            f"{counted(members, 'node')}, {counted(len(own), 'permission')} asked for, "
+            f"{counted(members, 'node')}, {counted(len(own), 'permission')} requested, "
             f"{len(uses) - len(own)} that every node has{contents.graph.enforcement(enclave)}</summary>\n"
             + table(
                 f"What enclave {text(enclave)} may do, and why",
-                ("operation", "name", "type", "asked for by", "evidence"),
+                ("operation", "name", "type", "requested by", "evidence"),
                 (_permission(contents.graph, use) for use in own),
             )
             + "</details>\n"
@@ -148,11 +148,11 @@ def expiry(endings: Iterable[Ending] | None) -> str:
     """Return when the certificates and documents of the keystore expire, a hint if no keystore was given."""
     if endings is None:
         return "<p>No keystore was given (<code>--keystore DIR</code>).</p>"
-    return table("When parts of the keystore expire", ("ends", "days left", "what"), _endings(endings))
+    return table("When parts of the keystore expire", ("expires", "days left", "what"), _endings(endings))
 
 
 def _endings(endings: Iterable[Ending]) -> Iterator[str]:
     for one in endings:
-        left = "ended" if one.days_left < 0 else str(one.days_left)
+        left = "expired" if one.days_left < 0 else str(one.days_left)
         mark = f'<strong class="error">{left}</strong>' if one.days_left < SOON else left
         yield row((text(one.ends), mark, text(one.subject)))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import NamedTuple
 
-from enclave_common.words import some_of
+from enclave_common.words import counted, some_of
 from enclave_launch.review.checks.rules import finding
 from enclave_launch.review.document import GrantedName, PlanDocument, PlanFinding
 from enclave_launch.review.signed import as_signed
@@ -78,6 +78,10 @@ def _expiring(plan: PlanDocument, endings: Iterable[Ending]) -> Iterator[PlanFin
     for one in endings:
         if one.enclave is None or one.enclave in plan.enclaves:
             over = one.days_left < 0
-            when = f"ended on {one.ends}" if over else f"ends on {one.ends}, in {one.days_left} days"
+            when = (
+                f"expired on {one.ends}"
+                if over
+                else f"expires on {one.ends}, in {counted(one.days_left, 'day')}"
+            )
             diagnostic = finding("keystore-expires", one.enclave or one.subject, f"{one.subject} {when}")
             yield diagnostic._replace(severity="error") if over else diagnostic

@@ -145,7 +145,7 @@ def _refuse_separate_networks(placement: Placement, engine: Engine, host_network
     hosts = [host for host, own in placement.hosts.items() if own]
     if engine is Engine.COMPOSE and len(hosts) > 1 and not host_network:
         raise UsageError(
-            f"a network of Compose ends at its host, so processes on {', '.join(hosts)} would not hear each other. "
+            f"a network of Compose ends at its host, so processes on {', '.join(hosts)} would not reach each other. "
             "Share the hosts' network with the containers: --host-network (they are then not separated from what "
             "else is on it); or use --format systemd or kubernetes"
         )

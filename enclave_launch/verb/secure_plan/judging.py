@@ -28,7 +28,7 @@ from enclave_launch.verb.secure_plan.keystores import (
 
 EXPECTATIONS = "enclaves.review.yaml"
 EXPECT: Option = ("--expect FILE", PATH, f"default: {EXPECTATIONS}, if it exists")
-WITHIN: Option = ("--within TIME", {"default": DEFAULT_MARGIN}, "what ends soon (30d)")
+WITHIN: Option = ("--within TIME", {"default": DEFAULT_MARGIN}, "what expires soon (30d)")
 
 
 def judged(

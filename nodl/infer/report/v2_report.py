@@ -90,7 +90,7 @@ def _document(node: NodeInterface, *, listener: bool) -> str:
     entries = list(dict.fromkeys(entry for entry in found if entry is not None))
     lines = [
         f"# Node {node.name or '(name not known)'}, inferred from {node.source}.",
-        "# SYSTEM_DEFAULT: quality of service that is not inferred; put in what the code asks for.",
+        "# SYSTEM_DEFAULT: quality of service that is not inferred; replace it with what the code requests.",
         "nodl_version: 2",
         "codegen:",
         f"  {IDENTITY_KEY}:",
