@@ -83,7 +83,7 @@ class Resource(NamedTuple):
 def search_prefixes(
     extra: Iterable[str] = (), environment: Mapping[str, str] | None = None
 ) -> tuple[str, ...]:
-    """``extra`` (made absolute), then the entries of ``AMENT_PREFIX_PATH``; those that exist, each once."""
+    """Return ``extra`` (made absolute), then the entries of ``AMENT_PREFIX_PATH``; those that exist, each once."""
     variables = os.environ if environment is None else environment
     listed = variables.get(PREFIX_VARIABLE, "").split(os.pathsep)
     candidates = [*(os.path.abspath(os.path.expanduser(prefix)) for prefix in extra), *listed]
@@ -91,7 +91,7 @@ def search_prefixes(
 
 
 def installed_packages(prefixes: Sequence[str]) -> list[str]:
-    """The names of all packages in the index, sorted."""
+    """Return the names of all packages in the index, sorted."""
     found: set[str] = set()
     for prefix in prefixes:
         folder = os.path.join(prefix, INDEX_FOLDER, "packages")
@@ -100,21 +100,23 @@ def installed_packages(prefixes: Sequence[str]) -> list[str]:
 
 
 def executables(folder: str) -> list[str]:
-    """The names of the programs in ``folder``, sorted; none where it does not exist."""
+    """Return the names of the programs in ``folder``, sorted; none if it does not exist."""
     if not os.path.isdir(folder):
         return []
     return sorted(entry.name for entry in os.scandir(folder) if entry.is_file() and os.access(entry, os.X_OK))
 
 
 def launch_files(package: str, prefixes: Sequence[str]) -> list[str]:
-    """The base names of the launch files below the package's share directory, sorted. Raises as ``package_prefix``."""
+    """Return the base names of the launch files below the package's share directory, sorted; raises as
+    ``package_prefix``.
+    """
     share = package_share_directory(package, prefixes)
     files = {file for _, _, files in os.walk(share) for file in files}
     return sorted(file for file in files if _LAUNCH_FILE.search(file))
 
 
 def package_prefix(package: str, prefixes: Sequence[str]) -> str:
-    """The first prefix in which ``package`` is installed.
+    """Return the first prefix in which ``package`` is installed.
 
     Raises ``ValueError`` for what cannot be a package name, else ``PackageNotFoundError``.
     """
@@ -127,12 +129,12 @@ def package_prefix(package: str, prefixes: Sequence[str]) -> str:
 
 
 def package_share_directory(package: str, prefixes: Sequence[str]) -> str:
-    """``<prefix>/share/<package>``, which need not exist. Raises as ``package_prefix``."""
+    """Return ``<prefix>/share/<package>``, which need not exist; raises as ``package_prefix``."""
     return os.path.join(package_prefix(package, prefixes), "share", package)
 
 
 def package_version(package: str, prefixes: Sequence[str]) -> str | None:
-    """What the installed ``package.xml`` says; ``None`` when the package or its version is not known."""
+    """Return what the installed ``package.xml`` says; ``None`` if the package or its version is not known."""
     try:
         share = package_share_directory(package, prefixes)
     except (PackageNotFoundError, ValueError):
@@ -141,7 +143,7 @@ def package_version(package: str, prefixes: Sequence[str]) -> str | None:
 
 
 def package_file_version(path: str) -> str | None:
-    """What a ``package.xml`` says; ``None`` when it does not, or cannot be read."""
+    """Return what a ``package.xml`` says; ``None`` if it does not, or cannot be read."""
     try:
         found = _PACKAGE_VERSION.search(read_text(path, errors="replace"))
     except OSError:
@@ -150,10 +152,10 @@ def package_file_version(path: str) -> str | None:
 
 
 def executable_path(package: str, executable: str, prefixes: Sequence[str]) -> str:
-    """The file ``<prefix>/lib/<package>/<executable>``.
+    """Return the file ``<prefix>/lib/<package>/<executable>``.
 
-    ``executable`` with a slash is taken as a path, as upstream's ``which`` does. Raises as
-    ``package_prefix``, and ``ExecutableNotInstalledError`` in the words of ``exec-in-pkg``.
+    ``executable`` with a slash is taken as a path, as upstream's ``which`` does. Raises as ``package_prefix``, and
+    ``ExecutableNotInstalledError`` in the words of ``exec-in-pkg``.
     """
     prefix = package_prefix(package, prefixes)
     folder = os.path.join(prefix, "lib", package)
@@ -172,7 +174,7 @@ def executable_path(package: str, executable: str, prefixes: Sequence[str]) -> s
 
 
 def launch_file_path(package: str, file_name: str, prefixes: Sequence[str]) -> str:
-    """The one file with exactly this base name anywhere below the package's share directory.
+    """Return the one file with exactly this base name anywhere below the package's share directory.
 
     Raises as ``package_prefix``; ``LaunchFileNotFoundError``; ``MultipleLaunchFilesError``.
     """
@@ -196,7 +198,7 @@ def launch_file_path(package: str, file_name: str, prefixes: Sequence[str]) -> s
 
 
 def find_resource(resource_type: str, name: str, prefixes: Sequence[str]) -> str | None:
-    """The first prefix that holds the resource, or ``None``. Raises for names with a path separator."""
+    """Return the first prefix that holds the resource, or ``None``; raises for names with a path separator."""
     _check_type(resource_type)
     if not name or _has_separator(name):
         raise InvalidResourceNameError(f"Resource name '{name}' is invalid")
@@ -207,7 +209,7 @@ def find_resource(resource_type: str, name: str, prefixes: Sequence[str]) -> str
 
 
 def read_resource(resource_type: str, name: str, prefixes: Sequence[str]) -> Resource:
-    """Text and prefix of a resource. Raises ``LookupError`` when no prefix has it."""
+    """Return text and prefix of a resource; raises ``LookupError`` if no prefix has it."""
     prefix = find_resource(resource_type, name, prefixes)
     if prefix is None:
         raise LookupError(
@@ -221,7 +223,7 @@ def read_resource(resource_type: str, name: str, prefixes: Sequence[str]) -> Res
 
 
 def list_resources(resource_type: str, prefixes: Sequence[str]) -> dict[str, str]:
-    """Every resource of one type: name to the first prefix that holds it. Dot files do not count."""
+    """Map every resource of one type to the first prefix that holds it. Dot files do not count."""
     _check_type(resource_type)
     found: dict[str, str] = {}
     for prefix in prefixes:
@@ -232,7 +234,7 @@ def list_resources(resource_type: str, prefixes: Sequence[str]) -> dict[str, str
 
 
 def list_resource_types(prefixes: Sequence[str]) -> set[str]:
-    """Every resource type that some prefix knows."""
+    """List every resource type that some prefix knows."""
     return {
         entry.name
         for prefix in prefixes

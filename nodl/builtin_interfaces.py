@@ -152,7 +152,7 @@ def built_in_interfaces(
     library: ClientLibrary,
     conditions: Collection[BuiltinCondition] = (BuiltinCondition.ALWAYS, BuiltinCondition.PARAMETERS),
 ) -> tuple[BuiltIn, ...]:
-    """The rows that hold under ``conditions``. Raises ``ValueError`` for a distribution we do not know."""
+    """Return the rows that hold under ``conditions``; raises ``ValueError`` for a distribution we do not know."""
     if distro not in DISTROS:
         raise ValueError(f"unknown ROS distribution '{distro}'; known: {', '.join(DISTROS)}")
     age = DISTROS.index(distro)

@@ -76,7 +76,7 @@ class InvalidNoDLError(NoDLError):
 
     @classmethod
     def at(cls, source: SourceRef, message: str) -> Self:
-        """The error at a place, whatever the constructor of the v1 API wants."""
+        """Make the error at a place, whatever the constructor of the v1 API wants."""
         error = cls.__new__(cls)
         NoDLError.__init__(error, f"{source}: {message}")
         error.source = source

@@ -47,7 +47,7 @@ class ParameterPart(NamedTuple):
     edits: tuple[Edit, ...] = ()
 
     def texts(self, parameters: Mapping[str, object]) -> tuple[str, ...]:
-        """What this part may stand for: normally one text; none when it has no value."""
+        """Return what this part may stand for: normally one text; none if it has no value."""
         values: Sequence[object] = () if self.default is None else (self.default,)
         given = self._given(parameters)
         if given:
@@ -62,7 +62,7 @@ class ParameterPart(NamedTuple):
         return bool(self.edits) and self.edits[-1][0] in CONDITIONS
 
     def may_be_none(self, parameters: Mapping[str, object]) -> bool:
-        """It certainly stands for no text at all: an empty list, a condition that does not hold."""
+        """Return whether it certainly stands for no text at all: an empty list, a condition that does not hold."""
         listed = self.item == "each" or any(
             method in ("split", "range", "unless empty") for method, _ in self.edits
         )
@@ -93,7 +93,7 @@ class ParameterPart(NamedTuple):
 
 
 def _edit(text: str, method: str, arguments: tuple[str, ...]) -> Sequence[str]:
-    """One edit: normally one text, several from ``split`` and ``range``, perhaps none from a condition."""
+    """Apply one edit: normally one text, several from ``split`` and ``range``, perhaps none from a condition."""
     if method in EDITS:
         return (getattr(text, method)(*arguments),)
     if method == "split":
@@ -112,7 +112,7 @@ def _edit(text: str, method: str, arguments: tuple[str, ...]) -> Sequence[str]:
 
 
 def _remapped(text: str, namespace: str, node: str, *pairs: str) -> str:
-    """``text`` under remap rules (matches and replacements in turn) that the program gives to its node."""
+    """Apply remap rules (matches and replacements in turn) that the program gives to its node to ``text``."""
     try:
         full = expand_name(text, namespace=namespace, node=node)
         for match, replacement in zip(pairs[::2], pairs[1::2], strict=True):
@@ -133,7 +133,7 @@ Part = str | ParameterPart | UnknownPart
 
 
 def melted(parts: Iterable[Any]) -> tuple[Any, ...]:
-    """Parts of a name, of literal texts that stand side by side one."""
+    """Join literal texts that stand side by side to one part of the name."""
     found: list[Any] = []
     for part in parts:
         if isinstance(part, str) and found and isinstance(found[-1], str):
@@ -173,7 +173,7 @@ class NameTemplate(NamedTuple):
         return NameTemplate((UnknownPart(f"{self} stands for {len(filled)} names, one per element"),))
 
     def fill_each(self, parameters: Mapping[str, object]) -> tuple[NameTemplate, ...]:
-        """``fill`` for templates over the elements of a list parameter: one template for each."""
+        """Fill templates over the elements of a list parameter as ``fill``: one template for each."""
         results: list[tuple[Part, ...]] = [()]
         for part in self.parts:
             choices: tuple[Part, ...] = (part,)

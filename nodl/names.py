@@ -38,12 +38,12 @@ class InvalidNameError(ValueError):
 
 
 def shown(name: str) -> str:
-    """``name`` in quotes, control characters escaped, so that it cannot play tricks in a terminal."""
+    """Quote ``name`` with control characters escaped, so that it cannot play tricks in a terminal."""
     return quoted(name)
 
 
 def validate_node_name(name: str) -> None:
-    """A single token of at most 255 characters. Raises ``InvalidNameError``."""
+    """Accept a single token of at most 255 characters; raises ``InvalidNameError``."""
     if name.isascii() and name.isidentifier() and len(name) <= MAX_NODE_NAME_LENGTH:
         return
     what = "node name"
@@ -56,18 +56,18 @@ def validate_node_name(name: str) -> None:
 
 
 def validate_namespace(namespace: str) -> None:
-    """``/`` or an absolute name of at most 245 characters. Raises ``InvalidNameError``."""
+    """Accept ``/`` or an absolute name of at most 245 characters; raises ``InvalidNameError``."""
     if namespace != "/":
         _check_absolute("namespace", namespace, MAX_NAMESPACE_LENGTH)
 
 
 def validate_full_name(name: str, what: str = "name") -> None:
-    """A fully qualified topic, service or action name, <= 247 characters. Raises ``InvalidNameError``."""
+    """Accept a fully qualified topic, service or action name, <= 247 characters; raises ``InvalidNameError``."""
     _check_absolute(what, name, MAX_NAME_LENGTH)
 
 
 def is_full_name(name: str) -> bool:
-    """Whether ``name`` is absolute, well-formed and not longer than ROS allows."""
+    """Return whether ``name`` is absolute, well-formed and not longer than ROS allows."""
     return len(name) <= MAX_NAME_LENGTH and _ABSOLUTE.match(name) is not None
 
 
@@ -81,10 +81,10 @@ def is_name(name: str) -> bool:
 
 
 def validate_name(name: str, what: str = "name") -> None:
-    """A name as code writes it: absolute, relative or private, with ``{node}``, ``{ns}``, ``{namespace}``.
+    """Accept a name as code writes it: absolute, relative or private, with ``{node}``, ``{ns}``, ``{namespace}``.
 
-    Follows rcl's ``rcl_validate_topic_name`` (which lets the two-character ``~a`` and ``a//b`` pass; the
-    latter is refused after expansion). Raises ``InvalidNameError``.
+    Follows rcl's ``rcl_validate_topic_name`` (which lets the two-character ``~a`` and ``a//b`` pass; the latter is
+    refused after expansion). Raises ``InvalidNameError``.
     """
     if not name:
         raise InvalidNameError(what, name, "must not be empty")
@@ -99,7 +99,7 @@ def validate_name(name: str, what: str = "name") -> None:
 
 
 def validate_written_name(name: str, what: str = "name") -> None:
-    """A name that a person writes into a manifest: ``validate_name`` without rcl's leniences.
+    """Accept a name that a person writes into a manifest: ``validate_name`` without rcl's leniences.
 
     ``~a``, ``a//b`` and wildcards are refused: they would never match, or match too much.
     """
@@ -120,10 +120,10 @@ def validate_written_name(name: str, what: str = "name") -> None:
 
 
 def expand_name(name: str, *, namespace: str, node: str, what: str = "name") -> str:
-    """The fully qualified form of ``name`` for node ``node`` in ``namespace`` (both final and valid).
+    """Return the fully qualified form of ``name`` for node ``node`` in ``namespace`` (both final and valid).
 
-    ``x`` -> ``/ns/x``; ``/x`` -> ``/x``; ``~/x`` -> ``/ns/node/x``. Raises ``InvalidNameError`` for a name
-    that is invalid before or after expansion.
+    ``x`` -> ``/ns/x``; ``/x`` -> ``/x``; ``~/x`` -> ``/ns/node/x``. Raises ``InvalidNameError`` for a name that is
+    invalid before or after expansion.
     """
     plain = _PLAIN.match(name)
     if plain:
@@ -148,12 +148,12 @@ def expand_name(name: str, *, namespace: str, node: str, what: str = "name") -> 
 
 
 def join(namespace: str, name: str) -> str:
-    """``namespace`` (absolute) and a relative ``name`` in one; the root adds no second slash."""
+    """Join ``namespace`` (absolute) and a relative ``name``; the root adds no second slash."""
     return f"/{name}" if namespace == "/" else f"{namespace}/{name}"
 
 
 def split_fqn(fqn: str) -> tuple[str, str]:
-    """``/a/b/node`` -> (``/a/b``, ``node``); the namespace of ``/node`` is ``/``."""
+    """Split ``/a/b/node`` into (``/a/b``, ``node``); the namespace of ``/node`` is ``/``."""
     namespace, _, name = fqn.rpartition("/")
     return namespace or "/", name
 

@@ -21,7 +21,7 @@ _GROUPS = (
 
 
 def policy_text(enclaves: Mapping[str, Iterable[str]]) -> str:
-    """``enclaves``: path → the lines of its profiles."""
+    """Render a policy. ``enclaves``: path → the lines of its profiles."""
     lines = ['<?xml version="1.0" encoding="UTF-8"?>', '<policy version="0.2.0">', "  <enclaves>"]
     for path, profiles in enclaves.items():
         lines += [f"    <enclave path={quoteattr(path)}>", "      <profiles>", *profiles]
@@ -30,7 +30,7 @@ def policy_text(enclaves: Mapping[str, Iterable[str]]) -> str:
 
 
 def profile_lines(namespace: str, node: str, names: Names) -> list[str]:
-    """The profile of one node; groups without names are left out."""
+    """Render the profile of one node; groups without names are left out."""
     lines = [f"        <profile ns={quoteattr(namespace)} node={quoteattr(node)}>"]
     for group, child, attribute, kind in _GROUPS:
         of_kind = sorted(set(names.get(kind, ())))

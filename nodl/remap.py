@@ -90,11 +90,11 @@ class RemapRules(NamedTuple):
         return tuple([rule for rule in (*self.local, *self.process) if rule.kind not in _OF_THE_NODE])
 
     def node_name(self, original: str) -> Resolved:
-        """The name the node gets; ``NODE:`` compares with the original name."""
+        """Return the name the node gets; ``NODE:`` compares with the original name."""
         return self._first(RemapKind.NODE_NAME, original, original)
 
     def namespace(self, original: str, node: str) -> Resolved:
-        """The namespace the node gets; ``NODE:`` compares with ``node``, its name after remapping."""
+        """Return the namespace the node gets; ``NODE:`` compares with ``node``, its name after remapping."""
         return self._first(RemapKind.NAMESPACE, node, original)
 
     def _first(self, kind: RemapKind, node: str, original: str) -> Resolved:
@@ -129,11 +129,11 @@ class NodeNames:
         return join(self.namespace, self.node)
 
     def expand(self, name: str, what: str = "name") -> str:
-        """The fully qualified name before remapping."""
+        """Return the fully qualified name before remapping."""
         return expand_name(name, namespace=self.namespace, node=self.node, what=what)
 
     def rule_matching(self, full_name: str) -> ParsedRule | None:
-        """The name rule, of whichever kind, that matches ``full_name``."""
+        """Return the name rule, of whichever kind, that matches ``full_name``."""
         return self._topics.get(full_name) or self._services.get(full_name)
 
     def topic(self, name: str) -> Resolved:
@@ -145,16 +145,16 @@ class NodeNames:
         return self._resolve(expanded, self._services) if self._services else Resolved(expanded)
 
     def action(self, name: str, *, as_a_whole: bool) -> Resolved:
-        """The action name; ``as_a_whole`` is true for the distributions that remap it (kilted and later).
+        """Return the action name; ``as_a_whole`` is true for the distributions that remap it (kilted and later).
 
-        rcl then looks it up among the topic rules. The five names below it are remapped once more,
-        each by itself: ``action_parts``.
+        rcl then looks it up among the topic rules. The five names below it are remapped once more, each by itself:
+        ``action_parts``.
         """
         expanded = self.expand(name, "action name")
         return self._resolve(expanded, self._topics) if as_a_whole else Resolved(expanded)
 
     def action_parts(self, action: str) -> ActionParts | None:
-        """What the parts of the expanded ``action`` get one by one; ``None`` if no rule names any."""
+        """Return what the parts of the expanded ``action`` get one by one; ``None`` if no rule names any."""
         validate_full_name(f"{action}/_action/{_LONGEST_PART}", "action name")
         names = [f"{action}/_action/{part}" for part in (*ACTION_SERVICES, *ACTION_TOPICS)]
         if not self._parts_are_named or not any(self.rule_matching(name) for name in names):
@@ -204,7 +204,7 @@ class ActionParts(NamedTuple):
 
 
 def parse_rule(text: str, origin: str = "") -> ParsedRule:
-    """One rule as it follows ``-r``. Raises ``InvalidRemapRuleError`` for what rcl's lexer refuses."""
+    """Parse one rule as it follows ``-r``; raises ``InvalidRemapRuleError`` for what rcl's lexer refuses."""
     match, separator, replacement = text.partition(":=")
     if not separator:
         raise InvalidRemapRuleError(text, "must have the form FROM:=TO", origin)
@@ -219,7 +219,7 @@ def parse_rule(text: str, origin: str = "") -> ParsedRule:
 
 
 def valid_rules(texts: Iterable[str]) -> tuple[ParsedRule, ...]:
-    """Those of ``texts`` that rcl would take: another one cannot have acted."""
+    """Return those of ``texts`` that rcl would take: another one cannot have acted."""
     rules = []
     for text in texts:
         with suppress(InvalidRemapRuleError):

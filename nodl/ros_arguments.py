@@ -36,7 +36,7 @@ class WrittenRosArguments(NamedTuple):
 
 
 def ros_arguments(words: Iterable[str]) -> WrittenRosArguments:
-    """What the flags among ``words`` say. What rcl would refuse is left out: the program ends there."""
+    """Read the flags among ``words``. What rcl would refuse is left out: the program ends there."""
     pairs = [(REMAP[0], word) if not flag and _is_rule(word) else (flag, word) for flag, word in flags(words)]
     parameters = (_parameter(value) for flag, value in pairs if flag in PARAMETER)
     return WrittenRosArguments(
@@ -47,7 +47,7 @@ def ros_arguments(words: Iterable[str]) -> WrittenRosArguments:
 
 
 def flags(words: Iterable[str]) -> Iterator[tuple[str, str]]:
-    """Each flag that takes a value, with it; a word that is not among ROS arguments with no flag."""
+    """Yield each flag that takes a value, with it; a word that is not among ROS arguments with no flag."""
     reading = False
     left = iter(words)
     for word in left:

@@ -21,7 +21,7 @@ from nodl.types import Action, Node, Parameter, PubSubRole, ServerClientRole, Se
 
 
 def get_node_by_executable(*, package_name: str, executable_name: str) -> Node:
-    """The node that an installed package's NoDL files describe for ``executable_name``.
+    """Return the node that an installed package's NoDL files describe for ``executable_name``.
 
     Raises ``nodl.ament_index.PackageNotFoundError`` (a ``KeyError``, as ``ament_index_python``'s),
     ``NoNoDLFilesError``, ``ExecutableNotFoundError``, ``DuplicateNodeError``, ``InvalidNoDLError``.
@@ -33,7 +33,7 @@ def get_node_by_executable(*, package_name: str, executable_name: str) -> Node:
 
 
 def parse(path: str | Path | IO[bytes] | IO[str]) -> list[Node]:
-    """The nodes of one v1 document: a path or an open file. Raises ``InvalidNoDLError``."""
+    """Parse the nodes of one v1 document: a path or an open file; raises ``InvalidNoDLError``."""
     if isinstance(path, (str, Path)):
         file = str(Path(path).resolve())
         try:
@@ -48,7 +48,7 @@ def parse(path: str | Path | IO[bytes] | IO[str]) -> list[Node]:
 
 
 def node_of(manifest: ManifestNode) -> Node:
-    """A manifest node in the values of the v1 API; an endpoint in both roles becomes role ``both``."""
+    """Return a manifest node in the values of the v1 API; an endpoint in both roles becomes role ``both``."""
     interface = manifest.interface
     kinds: dict[str, list[Endpoint]] = {"topic": [], "service": [], "action": []}
     for endpoint in interface.endpoints:

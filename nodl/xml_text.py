@@ -17,7 +17,7 @@ MAX_BYTES = 4_000_000
 
 
 def parse_xml(text: bytes | str, file: str) -> XmlElement:
-    """Text, or bytes in the encoding that they declare -> root element. Raises ``InvalidXMLError`` with file:line."""
+    """Parse text, or bytes in the encoding that they declare; raises ``InvalidXMLError`` with file:line."""
     if len(text) > MAX_BYTES:
         raise InvalidXMLError.at(SourceRef(file), f"larger than the allowed {MAX_BYTES} bytes")
     parser = expat.ParserCreate(namespace_separator="}")

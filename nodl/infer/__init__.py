@@ -23,7 +23,7 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> object:
-    """Imported when first used: who asks what a launch starts often needs no analysis at all."""
+    """Import a name when it is first used: who evaluates a launch often needs no analysis at all."""
     if name not in _HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(_HOMES[name]), name)

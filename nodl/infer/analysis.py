@@ -39,9 +39,10 @@ _CREATING = re.compile(
 
 @contextmanager
 def without_collector() -> Iterator[None]:
-    """Analysis makes many small objects that stay alive to its end; looking for garbage finds none.
+    """Analyse without garbage collection: the many small objects of an analysis stay alive to its end.
 
-    What is left then counts as old, or the next new object would have all of it searched; now and then it is searched.
+    What is left then counts as old, or the next new object would have all of it searched; now and then it is
+    searched.
     """
     enabled = gc.isenabled()
     gc.disable()
@@ -103,7 +104,7 @@ def _start_function(run: Run, module: SourceModule, path: list[str]) -> None:
 
 
 def analyse_rest(run: Run, called: set[ast.AST], instantiated: set[ast.AST]) -> None:
-    """What no analysed program uses: node classes and creating functions, with unknown arguments."""
+    """Analyse what no analysed program uses: node classes and creating functions, with unknown arguments."""
     _guarded(run, lambda: _analyse_rest(run, called, instantiated))
 
 

@@ -46,7 +46,7 @@ def settle_meanwhile(run: Run) -> None:
 
 
 def _no_settling(run: Run) -> None:
-    """Callbacks are running already."""
+    """Do nothing: callbacks are running already."""
 
 
 def _call_back(run: Run, callback: object, arity: int | None, widen_texts: bool) -> None:
@@ -59,7 +59,7 @@ def _call_back(run: Run, callback: object, arity: int | None, widen_texts: bool)
 
 
 def _expect_escaped(run: Run, expected: set[object]) -> None:
-    """Code that was handed a class or an object may make objects of it and call its methods, in any order."""
+    """Expect that code which was handed a class or an object makes objects of it and calls its methods, in any order."""
     for atom in list(run.escaped):
         if atom in expected:
             continue

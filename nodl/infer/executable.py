@@ -81,7 +81,7 @@ def _compiled(
 
 
 def _is_python(path: str) -> bool:
-    """By the first line, or the suffix of a script without one."""
+    """Decide by the first line, or the suffix of a script without one."""
     try:
         check_regular(path)
         with open(path, "rb") as stream:

@@ -146,7 +146,7 @@ class _Reader:
         self.imported: set[str] = set()
 
     def block(self, body: list[ast.stmt], scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
-        """Statements in order, up to one that control cannot pass."""
+        """Read statements in order, up to one that control cannot pass."""
         for statement in body:
             self.visit(statement, scope, around)
             if isinstance(statement, ast.Return | ast.Raise | ast.Continue | ast.Break):
@@ -232,7 +232,7 @@ _PLAIN_DECORATORS = frozenset({
 
 
 def last_name(node: ast.AST) -> str:
-    """``c`` of ``a.b.c``, ``c`` or ``a.b.c(...)``; nothing for the rest."""
+    """Return ``c`` of ``a.b.c``, ``c`` or ``a.b.c(...)``; nothing for the rest."""
     if isinstance(node, ast.Attribute):
         return node.attr
     if isinstance(node, ast.Call):
@@ -246,7 +246,9 @@ def last_name(node: ast.AST) -> str:
 def unsettled_places(
     run: Run, called: Iterable[ast.AST] = (), instantiated: Iterable[ast.AST] = ()
 ) -> list[Gap]:
-    """A gap for each place whose fate is not known; ``called``, ``instantiated``: what other runs have followed."""
+    """Return a gap for each place whose fate is not known; ``called``, ``instantiated``: what other runs have
+    followed.
+    """
     modules = list(dict.fromkeys(module.source for module in run.modules.values()))
     if run.gave_up or not any(_CREATING_TEXT.search(module.text) for module in modules):
         return []
@@ -325,7 +327,7 @@ class _Net:
             yield from self._with_inner(inner)
 
     def _class_makers(self, known: set[str]) -> set[str]:
-        """Classes with a base, near or far, that makes a node, or is among ``known``."""
+        """Return classes with a base, near or far, that makes a node, or is among ``known``."""
         found = set(known)
         while True:
             more = {
@@ -346,7 +348,7 @@ class _Net:
     # --- what is live ---------------------------------------------------------------------------------------
 
     def _live(self) -> list[FunctionText]:
-        """Modules, what their text refers to, what that refers to, and so on."""
+        """Return modules, what their text refers to, what that refers to, and so on."""
         self._meant: set[tuple[str, str]] = set()  # names by file, or for any file ("")
         live = [scope for scope in self._scopes if scope.node is None]
         waiting = [scope for scope in self._scopes if scope.node is not None]
@@ -400,7 +402,7 @@ class _Net:
         return used and (special or self._is_meant(name, scope.path))
 
     def _imports(self, scope: FunctionText) -> None:
-        """A module of the program that live text imports, makes interfaces and was not followed."""
+        """Add a gap for a module of the program that live text imports, makes interfaces and was not followed."""
         if scope.node is not None and scope.node not in self._run.entries:
             return
         module = self._modules[scope.path]

@@ -64,7 +64,7 @@ def refine(run: Run, follow: Follow) -> None:
 
 
 def _paths(follow: Follow) -> Iterator[Path]:
-    """Every path, by flipping the last outcome that was not flipped yet."""
+    """Follow every path, by flipping the last outcome that was not flipped yet."""
     outcomes: list[bool] = []
     steps = 0
     while True:

@@ -120,7 +120,7 @@ class Program:
         return said
 
     def module_name(self, path: str) -> str:
-        """``/ws/src/p/p/sub/node.py`` -> ``p.sub.node`` if ``p`` and ``sub`` are Python packages."""
+        """Return ``p.sub.node`` for ``/ws/src/p/p/sub/node.py`` if ``p`` and ``sub`` are Python packages."""
         folder, base = os.path.split(path)
         names = [] if base == "__init__.py" else [base.removesuffix(".py")]
         while "__init__.py" in self._listing(folder):

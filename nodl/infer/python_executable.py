@@ -73,7 +73,7 @@ class _Finder:
         return ProgramTarget(os.path.realpath(path))
 
     def _function(self, target: str, path: str) -> ProgramTarget:
-        """``target``: ``package.module:function`` of an entry point."""
+        """Find the function of an entry point. ``target``: ``package.module:function``."""
         module, _, function = target.partition(":")
         file = self.program.find(module.strip(), os.path.dirname(path))
         if file is None:
@@ -102,7 +102,7 @@ def _sites_of(prefix: str) -> Iterator[str]:
 
 
 def _linked_folders(site: str) -> Iterator[str]:
-    """Folders that ``*.egg-link`` and ``*.pth`` files in ``site`` add to the import path."""
+    """Return folders that ``*.egg-link`` and ``*.pth`` files in ``site`` add to the import path."""
     for link in sorted(glob.glob(os.path.join(glob.escape(site), "*.egg-link"))):
         yield from _lines(link)[:1]
     for paths in sorted(glob.glob(os.path.join(glob.escape(site), "*.pth"))):

@@ -41,7 +41,7 @@ def _run(program: Program, target: ProgramTarget, path: str) -> Run:
 
 
 def _with_gaps(interfaces: list[NodeInterface], run: Run) -> tuple[NodeInterface, ...]:
-    """Gaps that belong to the whole program go to its first node, so that nobody overlooks them."""
+    """Give gaps that belong to the whole program to its first node, so that nobody overlooks them."""
     gaps = tuple(Gap(source, why) for source, why in run.findings.gaps)
     first = interfaces[0]
     return (first._replace(gaps=(*first.gaps, *gaps)), *interfaces[1:])

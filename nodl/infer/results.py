@@ -113,7 +113,7 @@ def _endpoints(found: FoundEndpoint) -> list[Endpoint]:
 
 
 def certainty_of(template: NameTemplate) -> Certainty:
-    """Exact for a literal, from default if nothing is open, a pattern if a part is known, else unknown."""
+    """Return exact for a literal, from default if nothing is open, a pattern if a part is known, else unknown."""
     if template.is_literal:
         return Certainty.EXACT
     known = [part for part in template.parts if isinstance(part, str) and part.strip("/~")]
@@ -146,7 +146,9 @@ def templates(name: object) -> list[NameTemplate]:
 
 
 def own_name(what: str, first: bool) -> str:
-    """What a node says of itself (its ``name``, ``ns`` or ``fqn``) in a template, ``first`` or behind other text."""
+    """Return what a node says of itself (its ``name``, ``ns`` or ``fqn``) in a template, ``first`` or behind other
+    text.
+    """
     if what == "fqn":
         return "~" if first else "{ns}/{node}"
     return "{node}" if what == "name" else "{ns}"

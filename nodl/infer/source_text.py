@@ -35,8 +35,10 @@ def source_text(data: bytes) -> str:
 
 
 def mangle(tree: ast.Module, text: str) -> ast.Module:
-    """``tree`` with private names as the compiler writes them, in place: ``__x`` in ``class C`` is ``_C__x`` (language
-    reference, 6.2.1). Cheap for files that have none."""
+    """Write private names in ``tree`` as the compiler does, in place: ``__x`` in ``class C`` is ``_C__x``.
+
+    Source: language reference, 6.2.1. Cheap for files that have none.
+    """
     if _PRIVATE.search(text):
         _Mangler().visit(tree)
     return tree

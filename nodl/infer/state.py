@@ -45,7 +45,7 @@ class ProgramState:
         self.forks = 0  # how many of them are undecided: what happens there may not happen
 
     def write(self, cells: Cells, key: object, value: Value, local: bool = False) -> None:
-        """Strong update. ``local``: only the running function can see the cell (no new stamp)."""
+        """Update strongly. ``local``: only the running function can see the cell (no new stamp)."""
         old = cells.get(key)
         if old is value or (old is not None and _same(old, value)):
             return
@@ -65,7 +65,7 @@ class ProgramState:
         self._trail.clear()
 
     def version(self) -> tuple[int, int]:
-        """Equal versions, equal state."""
+        """Return the version: equal versions, equal state."""
         return self.stamp, self.learned
 
     def mark(self) -> int:
@@ -108,7 +108,7 @@ class ProgramState:
         return given[0]
 
     def repeatedly(self, action: Alternative, widen_texts: bool) -> None:
-        """``maybe`` as one step towards a fixpoint: what keeps growing is widened."""
+        """Run ``maybe`` as one step towards a fixpoint: what keeps growing is widened."""
         for outcome in self._run_each((action,)):
             for cells, key, value in outcome.values():
                 before = cells.get(key)
@@ -201,7 +201,7 @@ class ProgramState:
 
 
 def _same(old: Value, new: Value) -> bool:
-    """Equal as sets of atoms."""
+    """Return whether they are equal as sets of atoms."""
     if len(old) != len(new):
         return False
     if len(new) == 1:

@@ -79,7 +79,7 @@ def _attempted(analyse: Callable[[], Iterable[Found]], file: str, failed: list[G
 
 
 def _cpp(files: list[str]) -> tuple[list[NodeInterface], list[Gap]]:
-    """C++ sources. Without the extra ``cpp`` they are one gap."""
+    """Infer C++ sources. Without the extra ``cpp`` they are one gap."""
     if not files:
         return [], []
     from nodl.infer.cpp.entry import CppSupportMissing

@@ -121,7 +121,7 @@ def pieces_of(text: TextAtom) -> tuple[Piece, ...]:
 
 
 def concatenate(left: TextAtom, right: TextAtom) -> TextAtom:
-    """``left + right``; only where they meet can pieces melt together."""
+    """Compute ``left + right``; only where they meet can pieces melt together."""
     if type(left) is str and type(right) is str and len(left) + len(right) <= MAX_LENGTH:
         return left + right
     if not left or not right:
@@ -177,7 +177,7 @@ def common_text(texts: Sequence[TextAtom], why: str) -> Text:
 
 
 def _common_prefix(texts: Sequence[str]) -> str:
-    """Character by character; the least and the greatest text differ first."""
+    """Compare character by character; the least and the greatest text differ first."""
     low, high = min(texts), max(texts)
     length = next((i for i, (a, b) in enumerate(zip(low, high, strict=False)) if a != b), len(low))
     return low[:length]
@@ -189,7 +189,7 @@ def _literal_end(text: TextAtom, index: int) -> str:
 
 
 def edited(text: Text, method: str, arguments: tuple[str, ...]) -> TextAtom | None:
-    """``text.method(*arguments)`` where it can be said symbolically, else ``None``."""
+    """Compute ``text.method(*arguments)`` if it can be said symbolically, else ``None``."""
     if method not in EDITS:
         return None
     pieces = text.pieces

@@ -183,7 +183,7 @@ class Dictionary(HeapObject):
         return self.escaped or bool(present(self.cells.get(OTHER, BOTTOM)))
 
     def entries(self) -> list[tuple[Key, Value, bool]]:
-        """Known keys in order, with their values and whether they are certainly there."""
+        """Return known keys in order, with their values and whether they are certainly there."""
         return [
             (cell, present(value), not self.summary and ABSENT[0] not in value)
             for cell, value in self.cells.items()
@@ -332,7 +332,7 @@ def _join_items(items: list[Items]) -> Items:
 
 
 def present(value: Value) -> Value:
-    """``value`` where it is set."""
+    """Return ``value`` where it is set."""
     return tuple(atom for atom in value if type(atom) is not Absent) if ABSENT[0] in value else value
 
 
@@ -352,7 +352,7 @@ def sole(value: Value | None) -> object:
 
 
 def widen(old: Value, new: Value, texts_too: bool) -> Value:
-    """``join`` for the head of a loop: counting numbers become unknown at once, growing texts a pattern."""
+    """Join for the head of a loop: counting numbers become unknown at once, growing texts a pattern."""
     if any(type(atom) is Unknown for atom in old):  # it may be any number or text already
         covered = (int, float, str, Text) if texts_too else (int, float)
         new = tuple(atom for atom in new if not isinstance(atom, covered) or contains(old, atom))
@@ -381,7 +381,7 @@ def _widened(old: Value, joined: Value, texts_too: bool) -> Value:
 
 
 def _widen_items(old: Items, new: Items, texts_too: bool) -> Items:
-    """Elements widen one by one while the length stays; later, and when it changes, all together."""
+    """Widen elements one by one while the length stays; later, and when it changes, all together."""
     if old.exact is not None and new.exact is not None and not texts_too:
         return Items(tuple(widen(a, b, texts_too) for a, b in zip(old.exact, new.exact, strict=True)))
     return Items(None, widen(old.any_element(), new.any_element(), texts_too))

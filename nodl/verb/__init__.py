@@ -34,7 +34,7 @@ PREFIX: Option = (
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """The command line; returns the exit status."""
+    """Run the command line; return the exit status."""
     with safe_output():
         return _main(argv)
 
@@ -56,7 +56,7 @@ def _main(argv: Sequence[str] | None) -> int:
 
 
 def build_parser() -> argparse.ArgumentParser:
-    """One subparser for each verb."""
+    """Build one subparser for each verb."""
     parser = CommandParser(
         prog="secure-nodl",
         description="NoDL manifests: what a ROS 2 node publishes, subscribes, serves and calls.",

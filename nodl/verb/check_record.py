@@ -163,7 +163,9 @@ class _RecordedStart(NamedTuple):
         return self.node.parameters
 
     def final_name(self, node: str | None) -> tuple[str | None, str | None]:
-        """Of the recorded node; another one of its program has the name that the launch's rules give it."""
+        """Return the final name of the recorded node; another one of its program has the name that the launch's rules
+        give it.
+        """
         namespace, name = split_fqn(self.node.fqn)
         if node is None or node == self.node.name:
             return name, namespace
@@ -181,8 +183,7 @@ def _of_library(node: AskedNode, known: _Known) -> tuple[Sequence[NodeInterface]
 
 
 def _at_this_start(node: AskedNode, interfaces: Iterable[NodeInterface]) -> list[NodeInterface]:
-    """Descriptions that depend on parameters and words, as they are with those that the launch gave; with the further
-    nodes that they bring."""
+    """Apply parameters and words of the launch to descriptions that depend on them, with the nodes they bring."""
     namespace, name = split_fqn(node.fqn)
     situation = Situation(node.distro, name, namespace, node.parameters, node.arguments)
     documents = LibraryDocuments(Library(), node.distro)
@@ -200,7 +201,7 @@ _SAYS = {"manifest": _described, "inference": _inferred, "library": _of_library}
 
 
 def _counted(judgements: Sequence[Judgement]) -> list[Judgement]:
-    """A judge that says nothing of a node counts only if none of the others does."""
+    """Count a judge that says nothing of a node only if none of the others does."""
     speaks = {id(each.node) for each in judgements if each.comparison is not None}
     return [each for each in judgements if each.comparison is not None or id(each.node) not in speaks]
 

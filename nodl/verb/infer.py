@@ -43,7 +43,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(args: argparse.Namespace) -> int:
-    """0: nodes were found; 1: none; 2: a subject does not exist. Open questions go to standard error."""
+    """Return 0 if nodes were found, 1 if none, 2 if a subject does not exist. Open questions go to standard error."""
     try:
         system = _infer(args.subjects, search_prefixes(args.prefix))
     except LookupError as error:
@@ -72,7 +72,9 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _tell_guesses(system: InferredSystem) -> None:
-    """A manifest must name a program; a source file that nothing installs does not say which it becomes."""
+    """Report guesses: a manifest must name a program, and a source file that nothing installs does not say which it
+    becomes.
+    """
     for node in system.nodes:
         if node.executable is None and node.plugin is None and node.name:
             text = (
@@ -82,7 +84,9 @@ def _tell_guesses(system: InferredSystem) -> None:
 
 
 def _compare(system: InferredSystem, prefixes: Sequence[str]) -> int:
-    """Each program of ``system`` beside its manifest. 1: a manifest lacks something, or none was found."""
+    """Compare each program of ``system`` with its manifest. Return 1 if a manifest lacks something, or none was
+    found.
+    """
     lookup = ManifestLookup(prefixes)
     programs: dict[tuple[str, str | None, str | None], list[NodeInterface]] = {}
     for node in system.nodes:
@@ -118,7 +122,7 @@ def _documents(
 
 
 def _writable(system: InferredSystem, with_gaps: bool) -> list[NodeInterface]:
-    """The nodes that documents are written of; those with open questions only when that is asked for."""
+    """Return the nodes that documents are written of; those with open questions only if that is requested."""
     kept = []
     for node in system.nodes:
         questions = open_questions(node)
@@ -132,7 +136,7 @@ def _writable(system: InferredSystem, with_gaps: bool) -> list[NodeInterface]:
 
 
 def _infer(subjects: list[str], prefixes: Sequence[str]) -> InferredSystem:
-    """Paths together, so that they find each other's modules; packages by their executables."""
+    """Infer paths together, so that they find each other's modules; packages by their executables."""
     paths = [subject for subject in subjects if os.path.exists(subject)]
     found = [infer_paths(paths)] if paths else []
     found.extend(_infer_package(subject, prefixes) for subject in subjects if subject not in paths)

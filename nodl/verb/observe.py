@@ -42,7 +42,7 @@ _HIGHEST_DOMAIN = 232  # beyond, there are no ports (DDS-RTPS 9.6.1)
 
 
 def domain(text: str) -> int:
-    """A DDS domain of the command line, 0 to 232. Raises ``ValueError``."""
+    """Parse a DDS domain of the command line, 0 to 232; raises ``ValueError``."""
     number = int(text)
     if not 0 <= number <= _HIGHEST_DOMAIN:
         raise ValueError
@@ -180,7 +180,7 @@ def _starts(words: Sequence[str]) -> tuple[StartedNode, ...]:
 
 
 def _dry_run(words: Sequence[str]) -> Any:
-    """In a process of its own: this package knows no launch files."""
+    """Run the dry run in a process of its own: this package knows no launch files."""
     command = [sys.executable, "-m", "enclave_launch", "--dry-run", "--format", "json", *words]
     ran = subprocess.run(command, capture_output=True, text=True, check=False)
     if ran.returncode != 0:
@@ -189,7 +189,7 @@ def _dry_run(words: Sequence[str]) -> Any:
 
 
 def _enclave_directory(arguments: argparse.Namespace) -> Path | None:
-    """Where the observer's key and permissions are; ``None`` for an unsecured system."""
+    """Return where the observer's key and permissions are; ``None`` for an unsecured system."""
     secured = os.environ.get("ROS_SECURITY_ENABLE") == "true"
     keystore = arguments.keystore or (secured and os.environ.get("ROS_SECURITY_KEYSTORE"))
     enclave = arguments.enclave or (secured and os.environ.get("ROS_SECURITY_ENCLAVE_OVERRIDE"))

@@ -71,7 +71,7 @@ def _of_package(
 
 
 def description_lines(node: NodeInterface) -> Iterator[str]:
-    """One node as text: its names, then a line for each endpoint, then its parameters."""
+    """Render one node as text: its names, then a line for each endpoint, then its parameters."""
     program = node.executable or node.plugin or "?"
     where = f"{node.package}/{program}" if node.package else program
     namespace = f" in {node.namespace}" if node.namespace else ""

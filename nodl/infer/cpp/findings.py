@@ -56,7 +56,7 @@ class AllocatedNode:
         self.parameters[name] = join(self.parameters.get(name, BOTTOM), default)
 
     def default(self, name: str) -> Value:
-        """What the program gives for the parameter itself: in its node options, else where it declares it."""
+        """Return what the program gives for the parameter itself: in its node options, else where it declares it."""
         given: Value = self.overrides.get(name) or self.parameters.get(name, BOTTOM)
         return given
 

@@ -65,7 +65,7 @@ class SiteAnswer(NamedTuple):
 
 
 def sites_of(index: FileIndex) -> tuple[Site, ...]:
-    """The places of one file, by the words in its preprocessed text."""
+    """Return the places of one file, by the words in its preprocessed text."""
     if index.sites is None:
         index.sites = tuple(_found_in(index))
     return index.sites
@@ -83,7 +83,7 @@ def _found_in(index: FileIndex) -> Iterator[Site]:
 
 
 def account(run: Machine, files: Iterable[FileIndex]) -> list[SiteAnswer]:
-    """What became of each place that has no interface and no gap of its own."""
+    """Report what became of each place that has no interface and no gap of its own."""
     answers: list[SiteAnswer] = []
     reachable = reachable_functions(run)
     for index in files:
@@ -130,7 +130,7 @@ def open_calls(run: Machine, function: Function) -> Iterator[Site]:
 
 
 def _may_have_object(run: Machine, function: Function) -> bool:
-    """Whether an object of the class was made; who makes one where nobody looked is told there."""
+    """Return whether an object of the class was made; who makes one unseen is reported there."""
     owner = function.owner.rpartition("::")[2]
     return not owner or function.static or owner == function.name or owner in run.used_classes()
 
@@ -141,7 +141,7 @@ _CALL = re.compile(rb'(?<!["\w])([A-Za-z_]\w*)\s*(?=[(<])')
 
 
 def _called_at(node: Node | None) -> Node | None:
-    """The call whose callee ends in the name at ``node``, or what the parser did not understand around it."""
+    """Return the call whose callee ends in the name at ``node``, or what the parser did not understand around it."""
     while (
         node is not None
         and node.parent is not None
@@ -198,7 +198,7 @@ def _class_around(index: FileIndex, site: Site) -> Class | None:
 
 
 def _is_overridden(run: Machine, function: Function) -> bool:
-    """A method that no object has, since its class overrides it, and that nobody calls by its class."""
+    """Return whether no object has the method, since its class overrides it, and nobody calls it by its class."""
     if not function.virtual or not function.owner:
         return False
     last = function.owner.rpartition("::")[2]
@@ -225,7 +225,9 @@ def _around(offset: int, functions: list[Function], starts: list[int]) -> Functi
 
 
 def _is_handled(index: FileIndex, site: Site, handled: set[int]) -> bool:
-    """A call whose name is this word had its result: the call begins before it and its arguments behind it."""
+    """Return whether a call whose name is this word had its result: it begins before the word, its arguments behind
+    it.
+    """
     node = index.tree.root_node.descendant_for_byte_range(site.offset, site.offset + 1)
     while node is not None and node.type not in (
         "compound_statement",
@@ -239,7 +241,7 @@ def _is_handled(index: FileIndex, site: Site, handled: set[int]) -> bool:
 
 
 def _is_declaration(index: FileIndex, site: Site) -> bool:
-    """``create_publisher`` as the name of a method that is only declared, or in a macro that nobody uses."""
+    """Return whether ``create_publisher`` is the name of a method only declared, or in a macro that nobody uses."""
     node = index.tree.root_node.descendant_for_byte_range(site.offset, site.offset + 1)
     while node is not None and node.type not in ("call_expression", "ERROR", "init_declarator"):
         if node.type in _DECLARES:
@@ -252,7 +254,7 @@ def _is_declaration(index: FileIndex, site: Site) -> bool:
 
 
 def reachable_functions(run: Machine) -> set[Function]:
-    """Every function that one of those that ran could call, by its name: more than are called, never fewer."""
+    """Return every function that one of those that ran could call, by its name: never fewer than are called."""
     return Reach(run).from_functions(run.called)
 
 
@@ -281,7 +283,7 @@ class Reach:
         return set(self._each())
 
     def from_words(self, words: Iterable[str]) -> Iterator[Function]:
-        """From a function that mentions ``words``; what only the made objects' own hooks reach is left out."""
+        """Yield functions reachable from one that mentions ``words``, without the made objects' own hooks."""
         self._mention(words)
         yield from self._each()
 
@@ -340,7 +342,7 @@ class Reach:
                     self.waiting.append(method)
 
     def _field(self, field: Field) -> None:
-        """A member object is made with its class; a pointer only points to what somebody else made."""
+        """Follow a member: an object is made with its class, a pointer only points to what somebody else made."""
         words = _WORD.findall(field.type)
         if not field.pointer and not _POINTER.search(field.type):
             self._mention(words)
@@ -357,7 +359,7 @@ _WORD = re.compile(r"[A-Za-z_]\w*")
 def open_words(
     run: Machine, function: Function, by_name: Mapping[str, Sequence[Function]]
 ) -> tuple[set[str], set[str]]:
-    """What a function that ran mentions without the call having been followed: functions; classes only spoken of."""
+    """Return functions that one that ran mentions without the call having been followed; and classes only spoken of."""
     calls: set[str] = set()
     types: set[str] = set()
     source = function.node.text or b""
@@ -383,7 +385,7 @@ _TYPES = ("parameter_declaration", "optional_parameter_declaration", "type_descr
 
 
 def _mentioned_how(node: Node | None, handled: set[int]) -> str:
-    """``followed``, ``type`` (nothing is made or called) or ``open``."""
+    """Return ``followed``, ``type`` (nothing is made or called) or ``open``."""
     inside_type = False
     while node is not None and node.parent is not None:
         parent = node.parent
@@ -422,7 +424,7 @@ def _is_dead(run: Machine, file: str, offset: int) -> bool:
 
 
 def leads_to_interfaces(run: Machine, words: frozenset[str]) -> bool:
-    """Whether a function with these words, or one that it may call, makes an interface, a node or a plugin."""
+    """Return whether a function with these words, or one that it may call, makes an interface, a node or a plugin."""
     return _make(words) or any(_make(function.words) for function in Reach(run).from_words(words))
 
 

@@ -42,7 +42,7 @@ class Call:
         return ros_type(self.types[0]) if self.types else ""
 
     def key(self, what: str) -> tuple[object, ...]:
-        """For the object that the call makes."""
+        """Return the key for the object that the call makes."""
         return what, self.frame.file.file, self.node.start_byte, self.frame.path
 
     def value(self, index: int) -> Value:
@@ -97,37 +97,38 @@ _HARMLESS_FUNCTIONS = re.compile(
 
 
 def is_harmless_class(name: str) -> bool:
-    """Whether objects of this class make no interface, even of nodes that they get."""
+    """Return whether objects of this class make no interface, even of nodes that they get."""
     return _HARMLESS_CLASSES.fullmatch(name) is not None and name not in LIBRARY_CLASSES
 
 
 def is_harmless_function(name: str) -> bool:
-    """Whether this function makes no interface; what it calls back is run all the same."""
+    """Return whether this function makes no interface; what it calls back is run all the same."""
     return _HARMLESS_FUNCTIONS.fullmatch(name) is not None
 
 
 def library_class(*names: str) -> Callable[[ClassModel], ClassModel]:
-    """Decorator: the model of these classes, run where one is made, by itself or as a base; what it gives stands for
-    the object."""
+    """Register the model of these classes, run if one is made, by itself or as a base; its result stands for the
+    object.
+    """
     return registered(LIBRARY_CLASSES, names)
 
 
 def node_class(*names: str) -> Callable[[ClassModel], ClassModel]:
-    """Decorator: as ``library_class``, of classes that are nodes."""
+    """Register as ``library_class``, for classes that are nodes."""
     NODE_BASES.update(names)
     return library_class(*names)
 
 
 def library_function(*names: str) -> Callable[[FunctionModel], FunctionModel]:
-    """Decorator: the model of these functions, run in place of the library's code."""
+    """Register the model of these functions, run in place of the library's code."""
     return registered(LIBRARY_FUNCTIONS, names)
 
 
 def library_method(cls: str, *names: str) -> Callable[[FunctionModel], FunctionModel]:
-    """Decorator: the model of these methods of ``cls``, run in place of the library's code."""
+    """Register the model of these methods of ``cls``, run in place of the library's code."""
     return registered(LIBRARY_METHODS, [(cls, name) for name in names])
 
 
 def node_method(*names: str) -> Callable[[FunctionModel], FunctionModel]:
-    """Decorator: the model of these methods on any node whose class has none of its own for them."""
+    """Register the model of these methods on any node whose class has none of its own for them."""
     return registered(NODE_METHODS, names)

@@ -17,7 +17,7 @@ _work: Callable[[Any], Any] | None = None  # of a worker process
 
 
 def each_in_parallel(work: Callable[[Piece], Result], pieces: Sequence[Piece]) -> Iterator[Result]:
-    """``work`` of each piece, in their order. One after the other where processes cannot be had.
+    """Return ``work`` of each piece, in their order; one after the other if processes cannot be had.
 
     Raises what ``work`` raises.
     """
@@ -54,11 +54,11 @@ def _worked(piece: Any) -> Any:
 
 
 def _processors() -> int:
-    """Those that this process may use."""
+    """Return those that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def _may_fork() -> bool:
-    """A process with threads must not fork, and a daemonic one has no children."""
+    """Return whether this process may fork: one with threads must not, and a daemonic one has no children."""
     possible = "fork" in multiprocessing.get_all_start_methods()
     return possible and threading.active_count() == 1 and not multiprocessing.current_process().daemon

@@ -80,7 +80,9 @@ class Sources:
         return self._preprocessed[key]
 
     def _is_modelled(self, name: str, found: str, file: str) -> bool:
-        """rclcpp is known by its model alone; other libraries of the table too, but for their own packages."""
+        """Return whether a header is of rclcpp or a library of the table, known by its model alone, seen from
+        outside.
+        """
         folder = name.partition("/")[0]
         if name.endswith("/version.h"):
             return False  # which release this is
@@ -120,7 +122,9 @@ class Sources:
         return self._indexed[key]
 
     def closure(self, files: Iterable[str], symbols: Mapping[str, str], complete: bool) -> list[FileIndex]:
-        """``files``, what they include, and the library sources of other packages that define what they include."""
+        """Return ``files``, what they include, and the library sources of other packages that define what they
+        include.
+        """
         found: dict[str, FileIndex] = {}
         waiting = list(dict.fromkeys(files))
         packages: set[str] = set()
@@ -148,7 +152,7 @@ _CORE = frozenset({
 
 
 def library_sources(package: SourcePackage) -> list[str]:
-    """What the libraries of a package are built from."""
+    """Return what the libraries of a package are built from."""
     libraries = [t for t in package.build.targets.values() if not t.executable]
     return list(dict.fromkeys(file for target in libraries for file in target.sources))
 
@@ -157,7 +161,7 @@ def library_sources(package: SourcePackage) -> list[str]:
 
 
 def run_program(sources: Sources, entry: Entry, start: Start | None) -> ProgramFindings:
-    """Everything that the program may make. Raises ``CppSupportMissing``."""
+    """Run everything that the program may make; raises ``CppSupportMissing``."""
     symbols = dict(entry.symbols)
     files = sources.closure(entry.files, symbols, entry.complete)
     missing = [name for name in _possible_plugins(sources, files) if name not in {i.file for i in files}]
@@ -184,7 +188,7 @@ def _place(entry: Entry) -> SourceRef:
 
 
 def _possible_plugins(sources: Sources, files: Iterable[FileIndex]) -> list[str]:
-    """Sources of plugins whose base class a loader of the program asks for."""
+    """Return sources of plugins whose base class a loader of the program loads."""
     wanted: set[str] = set()
     for index in files:
         for match in re.finditer(r"ClassLoader\s*<\s*([\w:]+)\s*>", index.source.text):
@@ -209,7 +213,7 @@ def _start(run: Machine, entry: Entry) -> None:
 
 
 def _globals(run: Machine, entry: Entry) -> None:
-    """Variables outside of functions are made before main."""
+    """Make variables outside of functions, as happens before main."""
     from nodl.infer.cpp.running.variables import constant
 
     for file in entry.files:
@@ -224,7 +228,9 @@ def _globals(run: Machine, entry: Entry) -> None:
 
 
 def _check_order(run: Machine, initialised: Global, mark: int) -> None:
-    """Nobody knows which of two files is initialised first ([basic.start.dynamic]): one must not write to the other."""
+    """Check that none of two files writes to the other while it is initialised: nobody knows which is first
+    ([basic.start.dynamic]).
+    """
     for cell in run.store.changes(mark):
         owner = cell[0]
         if isinstance(owner, Global) and owner.file.file not in run.names.visible(initialised.file.file):
@@ -258,7 +264,7 @@ def _construct_entry(run: Machine, entry: Entry) -> None:
 
 
 def _entry_arguments(run: Machine, cls: Class) -> list[Value]:
-    """What a container gives: node options, to the constructor that takes only these; else it is not known."""
+    """Return what a container gives: node options, to the constructor that takes only these; else it is not known."""
     constructors = run.names.find_methods(cls, cls.name)
     options: Value = (run.obj(("options", cls), Type("rclcpp::NodeOptions")),)
     required = {c: [p for p in c.parameters if p.default is None] for c in constructors}
@@ -303,7 +309,7 @@ def _findings(run: Machine, sources: Sources) -> ProgramFindings:
 
 
 def _text_gaps(run: Machine, index: FileIndex) -> None:
-    """What the parser did not understand, and macros that nobody in reach defines."""
+    """Report what the parser did not understand, and macros that nobody in reach defines."""
     if not any(function.file is index for function in run.called):
         return
     for _, line, written in index.errors:
@@ -326,13 +332,13 @@ _CALLED = re.compile(r"([A-Za-z_]\w*)\s*\(")
 
 
 def registered_components(index: FileIndex) -> list[str]:
-    """Classes that a file registers as components."""
+    """Return the classes that a file registers as components."""
     found = ((match[1] or match[2]) for match in _REGISTERED.finditer(index.source.text))
     return [name.replace(" ", "").lstrip(":") for name in found]
 
 
 def target_entry(target: Target, package: SourcePackage, workspace: Workspace) -> Entry:
-    """The program of an executable target."""
+    """Return the program of an executable target."""
     files = sources_of(target, package.build)
     commands = workspace.compile_commands
     known = next((commands[os.path.realpath(f)] for f in files if os.path.realpath(f) in commands), None)

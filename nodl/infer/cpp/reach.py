@@ -32,13 +32,13 @@ class SourcesInReach:
         self._folders = tuple(os.path.abspath(folder) for folder in folders)
 
     def hold(self, package: str | None) -> bool:
-        """Whether the sources of ``package`` are among them."""
+        """Return whether the sources of ``package`` are among them."""
         return bool(self._folders or self._workspaces) and package in self._workspace.packages
 
     def infer(
         self, package: str, executable: str | None, plugin: str | None, start: Start | None = None
     ) -> Answer:
-        """The nodes of an executable or component. Raises ``CppSupportMissing``."""
+        """Infer the nodes of an executable or component; raises ``CppSupportMissing``."""
         found = self._workspace.packages[package] if self.hold(package) else None
         if found is None:
             return Answer((), f"the sources of package '{package}' are not in reach ({self._searched()})")
@@ -85,7 +85,7 @@ class SourcesInReach:
 
 
 def _built(folder: str) -> Iterator[SourcePackage]:
-    """The source folders that a build remembers."""
+    """Return the source folders that a build remembers."""
     from nodl.infer.cpp.reading.project import read_source_package
 
     for cache in sorted(Path(folder).glob("*/CMakeCache.txt")):

@@ -32,7 +32,7 @@ def interfaces_of(
     plugin: str | None,
     start: Start | None = None,
 ) -> list[NodeInterface]:
-    """One interface for each node and each name that it may have; gaps of the whole program go to the first.
+    """Return one interface for each node and each name that it may have; gaps of the whole program go to the first.
 
     With ``start`` the names of further nodes, which the parameters of the first do not reach, are filled in.
     """
@@ -58,7 +58,7 @@ def _filled(interface: NodeInterface, start: Start) -> NodeInterface:
 
 
 def program_gaps(findings: ProgramFindings) -> list[Gap]:
-    """What belongs to no single node, and every place without a result."""
+    """Return what belongs to no single node, and every place without a result."""
     gaps = [Gap(source, why) for source, why in findings.gaps]
     gaps += [Gap(answer.source, answer.reason) for answer in findings.answers if not answer.dead]
     if findings.from_default and findings.nodes:
@@ -121,7 +121,7 @@ def _endpoint(found: PossibleEndpoint, record: AllocatedNode) -> list[Endpoint]:
 
 
 def _dependence(record: AllocatedNode, gaps: list[Gap]) -> Dependence | None:
-    """The names that follow the final name of another topic, for launch to fill in."""
+    """Return the names that follow the final name of another topic, for launch to fill in."""
     variations: dict[tuple[EndpointKind, str], Variation] = {}
     for found in record.endpoints:
         if found.follows is None:
@@ -140,7 +140,7 @@ def _dependence(record: AllocatedNode, gaps: list[Gap]) -> Dependence | None:
 
 
 def _variation(follows: Follows, record: AllocatedNode) -> Variation | None:
-    """``None`` where the topic's name has parts that launch does not fill in; they are told with the endpoint."""
+    """Return the variation; ``None`` if the topic's name has parts that launch does not fill in, which are reported."""
     (template, *others) = _templates(follows.topic, record)
     parts = [_reference(part) for part in template.parts]
     if others or None in parts:
@@ -151,7 +151,7 @@ def _variation(follows: Follows, record: AllocatedNode) -> Variation | None:
 
 
 def _reference(part: Part) -> str | None:
-    """A part in the words of descriptions (docs/library.md)."""
+    """Return a part in the words of descriptions (docs/library.md)."""
     if isinstance(part, ParameterPart) and not part.edits and part.item is None:
         return f"$(param {part.name} {part.default})" if part.default is not None else f"$(param {part.name})"
     return part if isinstance(part, str) and "{" not in part else None
@@ -184,7 +184,7 @@ def _parts(text: Text, record: AllocatedNode) -> Iterator[Part]:
 
 
 def _is_certain(found: PossibleEndpoint, when: list[tuple[Condition, ...]], record: AllocatedNode) -> bool:
-    """Made whatever the build says: without a condition, or on every side of one."""
+    """Return whether it is made whatever the build says: without a condition, or on every side of one."""
     if any(not conditions for conditions in when):
         return True
     same = [c for other, given in record.endpoints.items() if _alike(other, found) for c in given]
@@ -219,7 +219,7 @@ def _conditional_gaps(record: AllocatedNode) -> list[Gap]:
 
 
 def _rules(record: AllocatedNode, gaps: list[Gap]) -> tuple[str, ...]:
-    """The remap rules in the options of the node; what cannot be read as one is a gap."""
+    """Return the remap rules in the options of the node; what cannot be read as one is a gap."""
     rules: dict[str, None] = {}
     for words in record.arguments:
         for before, word in pairwise(words):

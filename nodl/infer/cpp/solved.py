@@ -64,7 +64,7 @@ def _solved(sources: Sources, key: LaunchKey, entry: Entry, start: Start | None)
 
 @contextmanager
 def _garbage_at_the_end() -> Iterator[None]:
-    """What a run makes refers to itself and stays to its end: garbage is looked for once, then, and only among that."""
+    """Collect garbage once, at the end: what a run makes refers to itself and stays until then."""
     enabled, limit = gc.isenabled(), sys.getrecursionlimit()
     gc.disable()
     gc.freeze()
@@ -80,7 +80,7 @@ def _garbage_at_the_end() -> Iterator[None]:
 
 
 def solve_all(sources: Sources, answers: Answers, programs: Sequence[Program]) -> list[Made]:
-    """Each of ``programs``: from earlier runs where nothing has changed, the others in parallel."""
+    """Solve each of ``programs``: from earlier runs if nothing has changed, the others in parallel."""
     found = {each: answers.find(("program", *each)) for each in programs}
     groups = _groups([each for each, made in found.items() if made is None])
     for group, fresh in zip(groups, each_in_parallel(partial(_solve_group, sources), groups), strict=True):
@@ -91,7 +91,7 @@ def solve_all(sources: Sources, answers: Answers, programs: Sequence[Program]) -
 
 
 def _groups(programs: Sequence[Program]) -> list[list[Program]]:
-    """Each program alone, but behind a component the executables that may do nothing but make it."""
+    """Group each program alone, but behind a component the executables that may do nothing but make it."""
     groups = {each: [each] for each in programs}
     components = [each for each in programs if each[1].cls]
     for each in programs:
@@ -116,7 +116,7 @@ def _solve_group(sources: Sources, group: Sequence[Program]) -> list[Made]:
 
 
 def _under(key: LaunchKey, component: Made, sources: Sources, executable: Entry) -> Made:
-    """What an executable makes that only makes the component."""
+    """Return the component's answer as that of an executable that makes only the component."""
     solved: Solved = component.answer
     nodes = tuple(
         node._replace(package=key.package, executable=key.executable, plugin=key.plugin)
@@ -137,13 +137,13 @@ _DEFAULTS = ("rclcpp::NodeOptions()", "NodeOptions()", "{}")
 
 
 def may_only_make(executable: Entry, component: Entry) -> bool:
-    """Whether it is worth to ask ``only_makes``."""
+    """Return whether it is worth to evaluate ``only_makes``."""
     file = _main_beside(executable, component)
     return file is not None and f"<{component.cls}>" in text_or_nothing(file)
 
 
 def _main_beside(executable: Entry, component: Entry) -> str | None:
-    """The one source that the executable has beside those of the component; ``None`` if that is not all."""
+    """Return the one source that the executable has beside those of the component; ``None`` if that is not all."""
     own = [file for file in executable.files if file not in component.files]
     rest = tuple(file for file in executable.files if file in component.files)
     alike = (executable.symbols, executable.complete) == (component.symbols, component.complete)
@@ -151,7 +151,7 @@ def _main_beside(executable: Entry, component: Entry) -> str | None:
 
 
 def only_makes(executable: Entry, component: Entry, sources: Sources) -> bool:
-    """Whether ``executable`` makes ``component``, as a container would, and nothing else."""
+    """Return whether ``executable`` makes ``component``, as a container would, and nothing else."""
     file, symbols = _main_beside(executable, component), dict(component.symbols)
     index = sources.index(file, symbols, component.complete) if file is not None else None
     made = _made(index) if index is not None else None
@@ -165,7 +165,7 @@ def only_makes(executable: Entry, component: Entry, sources: Sources) -> bool:
 
 
 def _made(index: FileIndex) -> re.Match[str] | None:
-    """What such a ``main`` makes, where the file has nothing else."""
+    """Return what such a ``main`` makes, if the file has nothing else."""
     others = (
         index.classes, index.globals, index.aliases, index.using, index.enums, index.declared, index.errors,
         index.source.uncertain, index.source.unknown_macros,
@@ -179,7 +179,7 @@ def _made(index: FileIndex) -> re.Match[str] | None:
 
 
 def _options_alone(component: str, files: Iterable[FileIndex]) -> FunctionParameter | None:
-    """The parameter of the one constructor that takes options, and takes nothing else; ``main`` can call no other."""
+    """Return the parameter of the one constructor that takes options and nothing else; ``main`` can call no other."""
     name = component.rpartition("::")[2]
     classes = (each for index in files for each in index.classes.get(name, ()) if each.qualified == component)
     found = [each for cls in classes for each in (*cls.methods.get(name, ()), *cls.declared.get(name, ()))]

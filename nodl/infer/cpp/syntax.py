@@ -36,13 +36,13 @@ def check_support() -> None:
 
 
 def parse(source: bytes) -> Tree:
-    """The tree of ``source``. Raises ``CppSupportMissing``."""
+    """Parse ``source`` to its tree; raises ``CppSupportMissing``."""
     return _parser().parse(source)
 
 
 @lru_cache(maxsize=4096)
 def parse_expression(source: str) -> Node | None:
-    """The tree of one expression that stands for itself: the body of a macro, the arguments of a declaration."""
+    """Parse one expression that stands for itself: the body of a macro, the arguments of a declaration."""
     root = parse(f"auto x_ = {source};".encode()).root_node
     for node in walk(root):
         if node.type == "init_declarator":
@@ -51,12 +51,12 @@ def parse_expression(source: str) -> Node | None:
 
 
 def field_of(node: Node | None, name: str) -> Node | None:
-    """The part of ``node`` that the grammar calls so; ``None`` without one, or for no node."""
+    """Return the part of ``node`` that the grammar calls so; ``None`` without one, or for no node."""
     return node.child_by_field_name(name) if node is not None else None
 
 
 def text(node: Node | None) -> str:
-    """What the source says; the empty text for no node."""
+    """Return what the source says; the empty text for no node."""
     found = node.text if node is not None else None  # cut out of the source anew each time
     return found.decode("utf-8", "replace") if found is not None else ""
 
@@ -65,24 +65,24 @@ _WORD = re.compile(r"[A-Za-z_]\w*")
 
 
 def words_in(node: Node) -> frozenset[str]:
-    """Every identifier and keyword below ``node``, those in literals included."""
+    """Return every identifier and keyword below ``node``, those in literals included."""
     return frozenset(_WORD.findall(text(node)))
 
 
 def line_of(node: Node) -> int:
-    """The line that ``node`` begins in, counted from 1."""
+    """Return the line that ``node`` begins in, counted from 1."""
     return int(node.start_point[0]) + 1
 
 
 def children(node: Node | None) -> list[Node]:
-    """The named children without comments."""
+    """Return the named children without comments."""
     if node is None:
         return []
     return [child for child in node.named_children if child.type != "comment"]
 
 
 def walk(node: Node) -> Iterator[Node]:
-    """``node`` and everything below it, in order."""
+    """Yield ``node`` and everything below it, in order."""
     stack = [node]
     while stack:
         current = stack.pop()
@@ -91,7 +91,7 @@ def walk(node: Node) -> Iterator[Node]:
 
 
 def unwrapped(node: Node | None) -> Node | None:
-    """``node`` without parentheses and ``dependent_name`` around it."""
+    """Return ``node`` without parentheses and ``dependent_name`` around it."""
     while node is not None and node.type in (
         "parenthesized_expression",
         "dependent_name",
@@ -103,7 +103,7 @@ def unwrapped(node: Node | None) -> Node | None:
 
 
 def callee_name(callee: Node) -> str:
-    """The name of a callee without its template arguments."""
+    """Return the name of a callee without its template arguments."""
     whole = "".join(text(callee).split())
     if not whole.endswith(">"):
         return whole.lstrip(":")
@@ -116,7 +116,7 @@ def callee_name(callee: Node) -> str:
 
 
 def template_arguments(node: Node | None) -> list[Node]:
-    """The template arguments that a callee writes out: those of ``f<A, B>`` and ``x.f<A>`` and ``a::f<A>``."""
+    """Return the template arguments that a callee writes out: those of ``f<A, B>``, ``x.f<A>`` and ``a::f<A>``."""
     while node is not None and node.type in ("field_expression", "qualified_identifier", "dependent_name"):
         node = field_of(node, "field") or field_of(node, "name") or next(iter(node.named_children), None)
     listed = field_of(node, "arguments") if node is not None and node.type.startswith("template_") else None

@@ -33,7 +33,7 @@ class Inferred:
 
 
 def infer_sources(files: Sequence[str], prefixes: Sequence[str] = ()) -> Inferred:
-    """The nodes of ``files``. Raises ``CppSupportMissing``."""
+    """Infer the nodes of ``files``; raises ``CppSupportMissing``."""
     check_support()
     workspace = workspace_of(files, prefixes)
     loose = (os.path.dirname(file) for file in files if workspace.package_of(file) is None)
@@ -52,7 +52,7 @@ def infer_sources(files: Sequence[str], prefixes: Sequence[str] = ()) -> Inferre
 
 
 def _infer(files: Sequence[str], sources: Sources, answers: Answers) -> Made:
-    """The programs of all files: those that are built, loose ones, then the nodes that nobody makes."""
+    """Infer the programs of all files: those that are built, loose ones, then the nodes that nobody makes."""
     workspace, read = sources.workspace, dict[str, str]()
     found: list[Solved] = []
     lasting = True
@@ -100,7 +100,7 @@ def _infer(files: Sequence[str], sources: Sources, answers: Answers) -> Made:
 
 
 def workspace_of(files: Iterable[str], prefixes: Sequence[str] = ()) -> Workspace:
-    """The packages that ``files`` lie in, and those beside them in the same source space."""
+    """Return the packages that ``files`` lie in, and those beside them in the same source space."""
     own: dict[str, None] = {}
     roots: dict[str, None] = {}
     builds: dict[str, None] = {}
@@ -121,7 +121,7 @@ def _package_folder(file: Path) -> Path | None:
 
 
 def _source_space(package: Path) -> Path | None:
-    """``src`` of a colcon workspace, or the repository that holds the package beside others."""
+    """Return ``src`` of a colcon workspace, or the repository that holds the package beside others."""
     for folder in package.parents:
         if folder.name == "src":
             return folder
@@ -132,7 +132,7 @@ def _source_space(package: Path) -> Path | None:
 
 
 def programs(workspace: Workspace, sources: Sources, given: set[str]) -> list[tuple[LaunchKey, Entry]]:
-    """Every executable and component that one of the given files belongs to."""
+    """Return every executable and component that one of the given files belongs to."""
     found: list[tuple[LaunchKey, Entry]] = []
     touched = [p for p in workspace.packages.values() if any(f.startswith(p.folder + os.sep) for f in given)]
     for package in touched:
@@ -143,7 +143,7 @@ def programs(workspace: Workspace, sources: Sources, given: set[str]) -> list[tu
 def package_programs(
     package: SourcePackage, workspace: Workspace, sources: Sources, given: set[str] | None = None
 ) -> list[tuple[LaunchKey, Entry]]:
-    """The executables and components of one package; with ``given`` those built from one of these files."""
+    """Return the executables and components of one package; with ``given`` those built from one of these files."""
     found: list[tuple[LaunchKey, Entry]] = []
     build = package.build
     for target in build.targets.values():
@@ -159,7 +159,7 @@ def package_programs(
 
 
 def components(package: SourcePackage, sources: Sources) -> dict[str, LaunchKey]:
-    """By CMake and by the macro in the source."""
+    """Return components by CMake and by the macro in the source."""
     found = {
         name: LaunchKey(package.name, executable, name) for name, executable in package.build.plugins.items()
     }
@@ -202,7 +202,7 @@ def _all_sources(package: SourcePackage) -> list[str]:
 def _left_over(
     workspace: Workspace, sources: Sources, files: Sequence[str]
 ) -> Iterable[tuple[LaunchKey, Entry]]:
-    """Files of no target: their mains and components."""
+    """Return files of no target: their mains and components."""
     built = {f for p in workspace.packages.values() for t in p.build.targets.values() for f in t.sources}
     loose = [file for file in files if file not in built and not _is_test(file, workspace)]
     by_folder: dict[str, list[str]] = {}
@@ -278,7 +278,7 @@ class Answering:
     def of_program(
         self, package: SourcePackage, executable: str | None, plugin: str | None, start: Start | None
     ) -> Answer:
-        """The nodes of an executable or component of ``package``. Raises ``CppSupportMissing``."""
+        """Infer the nodes of an executable or component of ``package``; raises ``CppSupportMissing``."""
         try:
             programs = self._programs_of(package)
         except CppSupportMissing:

@@ -49,7 +49,7 @@ def assign(run: Run, target: ast.expr, value: Value, frame: Frame) -> None:
 
 
 def store_attribute(run: Run, owners: Value, name: str, value: Value, node: ast.AST, frame: Frame) -> None:
-    """``owner.name = value``, with what a setter of the owner's class makes of it."""
+    """Run ``owner.name = value``, with what a setter of the owner's class makes of it."""
     certain = len(owners) == 1
     for owner in owners:
         if isinstance(owner, Instance) and _set_by_property(run, owner, name, value, node, frame):
@@ -67,7 +67,7 @@ _UNMODELLED = frozenset({"unittest", "pytest", "tkinter"})  # whose objects hold
 
 
 def _patched(run: Run, owner: External, name: str, node: ast.AST, frame: Frame) -> None:
-    """Setting an attribute of a library's module or class changes what its other users get, if these are modelled."""
+    """Add a gap for a replaced attribute of a library's module or class, if its other users are modelled."""
     if owner.path.partition(".")[0] in _UNMODELLED:
         return
     if "(" not in owner.path and "[" not in owner.path and ".qos" not in owner.path:
@@ -86,7 +86,7 @@ def _set_by_property(run: Run, owner: Instance, name: str, value: Value, node: a
 
 
 def store_item(run: Run, obj: Dictionary, key: Value, value: Value) -> None:
-    """``obj[key] = value``."""
+    """Run ``obj[key] = value``."""
     if len(key) == 1 and is_key(key[0]):
         cell = Key(key[0])
         if not run.repeated and obj.cells.get(cell) == ABSENT:
@@ -148,7 +148,7 @@ def _store_subscript(run: Run, target: ast.Subscript, value: Value, frame: Frame
 
 
 def _set_environment(run: Run, key: Value, value: Value, node: ast.AST, frame: Frame) -> None:
-    """What the program reads from its environment later is what it put there."""
+    """Remember what the program puts into its environment: it reads that later."""
     if len(key) == 1 and isinstance(key[0], str):
         run.state.write(run.environment, key[0], value)
     else:
@@ -193,7 +193,7 @@ def _unpack(run: Run, targets: list[ast.expr], value: Value, frame: Frame) -> No
 
 
 def delete(run: Run, target: ast.expr, frame: Frame) -> None:
-    """``del``: of elements that are known exactly what goes; else the length is unknown, and all may stay."""
+    """Run ``del``: of elements that are known exactly what goes; else the length is unknown, and all may stay."""
     if isinstance(target, ast.Attribute):
         owners = run.evaluate(target.value, frame)
         for owner in owners:
@@ -224,5 +224,5 @@ def _delete_item(run: Run, owner: object, key: Value, certain: bool) -> None:
 
 
 def _edited(run: Run, owner: Sequence, added: Value) -> None:
-    """Some elements go, ``added`` come: each may be any."""
+    """Let some elements go and ``added`` come: each may be any."""
     run.state.store(owner, ITEMS, (Items(None, join_all((owner.items.any_element(), added, EDITED))),))

@@ -109,7 +109,7 @@ def _recursive(run: Run, function: FunctionValue, cells: LocalCells, call: Call)
 
 
 def _remembered(run: Run, function: FunctionValue, cells: LocalCells, call: Call) -> Value:
-    """A call that leaves the state as it found it gives the same again while the state is the same."""
+    """Return the result of an earlier call that left the state as it found it, while the state is the same."""
     key = (function, tuple(cells.values()), id(call.node))
     version = run.state.version()
     known = run.memo.get(key)

@@ -38,7 +38,7 @@ OPPOSITE = {
 
 
 def truth_of(atom: object) -> bool | None:
-    """``bool(atom)`` of the concrete value, ``None`` if it may be either."""
+    """Return ``bool(atom)`` of the concrete value, ``None`` if it may be either."""
     if isinstance(atom, CONSTANTS):
         return bool(atom)
     if isinstance(atom, Text):
@@ -66,7 +66,7 @@ def _defines_truth(cls: ClassValue) -> bool:
 
 
 def truth(value: Value) -> bool | None:
-    """``bool(value)`` if all alternatives agree; ``None`` if they differ or one of them is open."""
+    """Return ``bool(value)`` if all alternatives agree; ``None`` if they differ or one of them is open."""
     seen = {truth_of(atom) for atom in value}
     return seen.pop() if len(seen) == 1 else None
 
@@ -77,7 +77,7 @@ def decide(run: Run, test: ast.expr, frame: Frame) -> bool | None:
 
 
 def forked(run: Run, test: ast.expr, frame: Frame) -> bool | None:
-    """The outcome of a test that asks for a parameter, on the path that is followed; ``None``: both, joined."""
+    """Return the outcome of a test of a parameter, on the path that is followed; ``None``: both, joined."""
     if run.state.forks or run.repeated:
         return None
     condition = _condition(run, test, frame)
@@ -88,7 +88,7 @@ def forked(run: Run, test: ast.expr, frame: Frame) -> bool | None:
 
 
 def _condition(run: Run, test: ast.expr, frame: Frame) -> Condition | None:
-    """What ``test`` asks of a parameter; ``None`` where that cannot be said."""
+    """Return what ``test`` requires of a parameter; ``None`` if that cannot be said."""
     if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not):
         found = _condition(run, test.operand, frame)
         return None if found is None else (found[0], OPPOSITE[found[1]], found[2])
@@ -163,7 +163,7 @@ _READS = frozenset({"get_parameter", "get_parameter_value", "declare_parameter"}
 
 
 def _only_reads(node: ast.expr) -> bool:
-    """Evaluating it once more changes nothing."""
+    """Return whether evaluating it once more changes nothing."""
     calls = (part for part in ast.walk(node) if isinstance(part, ast.Call))
     return all(isinstance(call.func, ast.Attribute) and call.func.attr in _READS for call in calls)
 
@@ -190,7 +190,7 @@ def narrowed(run: Run, test: ast.expr, outcome: bool, frame: Frame) -> None:
 
 
 def only_if(condition: Condition, text: TextAtom) -> Text:
-    """``text`` where the condition holds, and nothing elsewhere."""
+    """Return ``text`` if the condition holds, and nothing otherwise."""
     asked, edit, given = condition
     test: Piece = Input(asked.name, asked.owner, None, ((edit, given),))
     return make_text((test, *(pieces_of(text) if text else ())))

@@ -72,7 +72,7 @@ def make_function(run: Run, node: FunctionNode, name: str, frame: Frame) -> Func
 
 
 def define_function(run: Run, node: ast.FunctionDef | ast.AsyncFunctionDef, frame: Frame) -> bool:
-    """``def``: make the function, apply the decorators from the last to the first, bind the name."""
+    """Run ``def``: make the function, apply the decorators from the last to the first, bind the name."""
     function = make_function(run, node, node.name, frame)
     value: Value = (function,)
     for decorator in reversed(node.decorator_list):
@@ -110,7 +110,7 @@ def _decorated(run: Run, value: Value, function: FunctionValue, decorator: ast.e
 
 
 def define_class(run: Run, node: ast.ClassDef, frame: Frame) -> bool:
-    """``class``: run the body, complete the class, apply the decorators last to first, bind the name."""
+    """Run ``class``: run the body, complete the class, apply the decorators last to first, bind the name."""
     bases = tuple(sole(run.evaluate(base, frame)) for base in node.bases if not isinstance(base, ast.Starred))
     keywords = {each.arg: run.evaluate(each.value, frame) for each in node.keywords if each.arg is not None}
     if any(isinstance(base, ast.Starred) for base in node.bases) or len(keywords) < len(node.keywords):
@@ -144,7 +144,7 @@ _HOOKS = frozenset({
 def _made_otherwise(
     run: Run, cls: ClassValue, keywords: dict[str, Value], node: ast.AST, frame: Frame
 ) -> None:
-    """A gap for a class whose objects, attributes or subclasses are not made as ``type`` and ``object`` make them."""
+    """Add a gap for a class whose objects, attributes or subclasses ``type`` and ``object`` do not make."""
     metaclass = sole(keywords.get("metaclass", external("builtins.type")))
     plain = isinstance(metaclass, External) and metaclass.path in _PLAIN_METACLASSES
     if not plain or any(base.node in run.with_metaclass for base in program_classes(cls)[1:]):
@@ -159,7 +159,7 @@ def _made_otherwise(
 
 
 def functions_of(value: Value) -> Value:
-    """``value`` with the functions themselves in place of class and static methods."""
+    """Return ``value`` with the functions themselves in place of class and static methods."""
     return tuple(
         each for atom in value for each in (atom.function if isinstance(atom, ClassMethod) else (atom,))
     )
@@ -282,7 +282,7 @@ _HARMLESS_BASES = frozenset({"builtins.object", "typing.Generic", "abc.ABC", "ty
 
 
 def new_instance(run: Run, cls: ClassValue, call: Call) -> Instance:
-    """``object.__new__(cls)``."""
+    """Run ``object.__new__(cls)``."""
     return run.allocate(call.node, f"instance {id(cls)}", lambda: Instance(cls))
 
 

@@ -81,9 +81,9 @@ def _class_item(run: Run, cls: ClassValue, key: Value, node: ast.AST, frame: Fra
 
 
 def chosen_by_parameter(obj: Dictionary, key: Value, default: Value | None = None) -> Value | None:
-    """The texts of a dictionary, each where the parameter that is the ``key`` says so; ``None``: not such a look-up.
+    """Return the texts of a dictionary, each if the parameter that is the ``key`` says so.
 
-    ``default``: what is taken for any other value.
+    ``default``: what is taken for any other value. ``None``: not such a look-up.
     """
     asked = input_of(key[0]) if len(key) == 1 else None
     if asked is None or not is_plain_parameter(asked) or obj.is_open or obj.default:
@@ -209,7 +209,7 @@ def _elements_of(run: Run, atom: object, node: ast.AST, frame: Frame) -> Items:
 
 
 def _input_items(text: Text) -> Value:
-    """Each element of a parameter that holds a list."""
+    """Return each element of a parameter that holds a list."""
     piece = text.pieces[0]
     if len(text.pieces) == 1 and isinstance(piece, Input) and piece.item is None and not piece.edits:
         return (make_text((Input(piece.name, piece.owner, "each"),)),)

@@ -189,7 +189,7 @@ def _conditional(run: Run, node: ast.IfExp, frame: Frame) -> Value:
 
 
 def _boolean(run: Run, node: ast.BoolOp, frame: Frame) -> Value:
-    """``a or b``: the left side unless it may be false (``and``: true); then the right one as well."""
+    """Evaluate ``a or b``: the left side unless it may be false (``and``: true); then the right one as well."""
     stops_at = isinstance(node.op, ast.Or)
     result: Value = BOTTOM
     for index, operand in enumerate(node.values):

@@ -96,7 +96,7 @@ _WIDE = re.compile(r"\d{4}")  # a width or precision that makes texts of no use,
 
 
 def formatted(value: Value, spec: str | None) -> list[TextAtom]:
-    """``format(value, spec)`` for constants; what depends on the rest is a hole."""
+    """Run ``format(value, spec)`` for constants; what depends on the rest is a hole."""
     if spec == "":
         return as_texts(value)
     return _each_formatted(value, spec, lambda atom: format(atom, spec or ""))
@@ -114,7 +114,7 @@ def _each_formatted(value: Value, spec: str | None, write: Callable[[Any], str])
 
 
 def percent(left: Value, right: Value) -> Value:
-    """``'text %s' % values``."""
+    """Run ``'text %s' % values``."""
     results: list[TextAtom] = []
     for atom in left:
         if isinstance(atom, str):
@@ -148,7 +148,7 @@ def _percent_text(match: re.Match[str], value: Value) -> list[TextAtom]:
 
 
 def str_format(template: TextAtom, args: Arguments) -> list[TextAtom]:
-    """``template.format(...)``."""
+    """Run ``template.format(...)``."""
     if not isinstance(template, str):
         return [_hole("a format that is not known")]
     operands: list[Sequences[TextAtom]] = []
@@ -171,7 +171,7 @@ def str_format(template: TextAtom, args: Arguments) -> list[TextAtom]:
 
 
 def joined(separators: Value, items: Items) -> list[TextAtom]:
-    """``separator.join(items)``."""
+    """Run ``separator.join(items)``."""
     separator_texts = [atom for atom in separators if isinstance(atom, str | Text)]
     if items.exact is None or len(items.exact) > 32 or not separator_texts:
         return [_hole("joined texts")]

@@ -42,7 +42,7 @@ class Frame:
         return type(self.cells) is LocalCells and self.cells.shared
 
     def capture(self) -> None:
-        """Inner functions can see the cells, and those around them, from now on."""
+        """Let inner functions see the cells, and those around them, from now on."""
         frame: Frame | None = self
         while frame is not None and not frame.captured:
             if type(frame.cells) is LocalCells:

@@ -13,7 +13,7 @@ from nodl.source_ref import SourceRef
 
 
 def run_import(run: Run, node: ast.Import, frame: Frame) -> bool:
-    """``import``: bind the module to its ``as`` name; without one, bind the top package to its own."""
+    """Run ``import``: bind the module to its ``as`` name; without one, bind the top package to its own."""
     for alias in node.names:
         whole = import_module(run, alias.name, frame)
         if alias.asname:
@@ -25,7 +25,7 @@ def run_import(run: Run, node: ast.Import, frame: Frame) -> bool:
 
 
 def run_import_from(run: Run, node: ast.ImportFrom, frame: Frame) -> bool:
-    """``from ... import``: bind each name to what the module holds; ``*`` of a library goes to ``stars``."""
+    """Run ``from ... import``: bind each name to what the module holds; ``*`` of a library goes to ``stars``."""
     base = absolute_name(node, frame.module.source)
     module = import_module(run, base, frame) if base else external("")
     for alias in node.names:

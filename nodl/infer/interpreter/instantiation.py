@@ -93,7 +93,7 @@ _FOLLOWED = frozenset({
 
 
 def _expect_operators(run: Run, cls: ClassValue, instance: Instance) -> None:
-    """Operators, iteration, tests and texts call special methods; where is not followed, so any time they may."""
+    """Expect calls of special methods at any time, by operators, iteration, tests and texts; where is not followed."""
     for base in program_classes(cls):
         for name, value in list(base.cells.items()):
             if (
@@ -106,7 +106,7 @@ def _expect_operators(run: Run, cls: ClassValue, instance: Instance) -> None:
 
 
 def _expect_callbacks(run: Run, cls: ClassValue, instance: object) -> None:
-    """A foreign base class calls the methods that override its own; which ones, only its model knows."""
+    """Expect a foreign base class to call the methods that override its own; which ones, only its model knows."""
     seen: set[object] = set()
     hooks = [foreign.hooks_of(base) for base in foreign_bases(cls)]
     if not hooks:

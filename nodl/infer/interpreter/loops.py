@@ -23,13 +23,13 @@ Loop = ast.For | ast.AsyncFor | ast.While
 
 
 def run_for(run: Run, node: For, frame: Frame) -> bool:
-    """``for``: turn by turn if all elements are known, else to a fixpoint. False: control cannot pass."""
+    """Run ``for``: turn by turn if all elements are known, else to a fixpoint. Return False if control cannot pass."""
     iterated = run.evaluate(node.iter, frame)
     return _looped(run, node, frame, lambda: _for(run, node, iterated, frame))
 
 
 def run_while(run: Run, node: ast.While, frame: Frame) -> bool:
-    """``while``: to a fixpoint, unless the test is false at once. False: control cannot pass."""
+    """Run ``while``: to a fixpoint, unless the test is false at once. Return False if control cannot pass."""
     return _looped(run, node, frame, lambda: _while(run, node, frame))
 
 
@@ -39,7 +39,7 @@ def may_unroll(run: Run, count: int) -> bool:
 
 
 def _looped(run: Run, node: Loop, frame: Frame, turns: Callable[[], tuple[bool, bool]]) -> bool:
-    """The ``turns`` of a loop, which tell whether control can pass it, and whether at its end; then its ``else``."""
+    """Run the ``turns`` of a loop, which say whether control can pass it, and whether at its end; then its ``else``."""
     before, loop_forks = frame.unsettled, frame.loop_forks
     frame.unsettled = False
     frame.loop_forks = run.state.forks
@@ -184,7 +184,7 @@ def dict_comprehension(run: Run, node: ast.DictComp, frame: Frame) -> Value:
 
 
 def _inner_frame(run: Run, frame: Frame) -> Frame:
-    """Of a comprehension in ``frame``; in a class body it does not see the names of the class (reference, 4.2.2)."""
+    """Make the frame of a comprehension; in a class body it does not see the names of the class (reference, 4.2.2)."""
     closure = frame.closure if frame.is_class else frame
     inner = Frame(frame.module, LocalCells(), closure, run.state.depth)
     inner.function = frame.function
@@ -194,7 +194,7 @@ def _inner_frame(run: Run, frame: Frame) -> Frame:
 
 
 def _leave(inner: Frame) -> None:
-    """The variables of a comprehension die with it, unless a function made in it lives on."""
+    """Drop the variables of a comprehension, unless a function made in it lives on."""
     if type(inner.cells) is LocalCells and not inner.cells.shared:
         inner.cells.dead = True
 
@@ -242,7 +242,7 @@ def _surely(one: Callable[[Value], bool], element: Value) -> bool:
 def _where(
     run: Run, generators: list[ast.comprehension], tests: list[ast.expr], frame: Frame, emit: Emit
 ) -> bool:
-    """The inner ``generators`` where all ``tests`` hold; what an undecided one lets through may be there or not."""
+    """Run the inner ``generators`` where all ``tests`` hold; what an undecided one lets through may be there or not."""
     if not tests:
         return _generate(run, generators, frame, emit)
     outcome = decide(run, tests[0], frame)

@@ -53,7 +53,7 @@ def binary(run: Run, node: ast.BinOp, frame: Frame) -> Value:
 def binary_operation(
     run: Run, node: ast.AST, left: Value, op: ast.operator, right: Value, frame: Frame
 ) -> Value:
-    """``left op right``; ``ANY`` where nothing is known."""
+    """Evaluate ``left op right``; ``ANY`` if nothing is known."""
     if _has_own(left) or _has_own(right):
         return ANY  # by a special method, which is called from outside
     if isinstance(op, ast.Add):

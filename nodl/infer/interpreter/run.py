@@ -221,7 +221,7 @@ class Run(Allocations):
     # --- the world outside ------------------------------------------------------------------------------
 
     def register_callback(self, value: Value, arity: int | None) -> None:
-        """``value`` may be called by code that is not analysed, with ``arity`` arguments (``None``: any)."""
+        """Register ``value``: code that is not analysed may call it, with ``arity`` arguments (``None``: any)."""
         for atom in value:
             if isinstance(atom, FunctionValue | BoundMethod | Partial | ClassMethod):
                 if atom not in self.callbacks:
@@ -230,10 +230,10 @@ class Run(Allocations):
                     self.callbacks[atom] = None
 
     def escape(self, args: Arguments, opened: bool = True, objects: bool = True) -> None:
-        """All of ``args`` go to code that is not analysed: it may call callables and fill containers.
+        """Hand all of ``args`` to code that is not analysed: it may call callables and fill containers.
 
-        ``opened`` is false for libraries that are known to leave containers alone, ``objects`` for those that
-        neither make objects of classes they are given nor call methods of objects.
+        ``opened`` is false for libraries that are known to leave containers alone, ``objects`` for those that neither
+        make objects of classes they are given nor call methods of objects.
         """
         for value in args.all_values():
             if len(value) != 1 or type(value[0]) not in _INERT:
@@ -259,10 +259,10 @@ class Run(Allocations):
                 self.escape_value((atom.receiver,), opened, objects, depth + 1)
 
     def escape_object(self, atom: ClassValue | Instance, trusted: bool = False) -> None:
-        """Code that is not analysed has the class or object: it may make objects and call methods.
+        """Hand the class or object to code that is not analysed: it may make objects and call methods.
 
-        A node in such hands is a gap, unless they are ``trusted`` to know nothing of ROS, as Python's own library does.
-        Objects of libraries are theirs already.
+        A node in such hands is a gap, unless they are ``trusted`` to know nothing of ROS, as Python's own library
+        does. Objects of libraries are theirs already.
         """
         of_program = isinstance(atom, ClassValue) or isinstance(atom.cls, ClassValue)
         if isinstance(atom, Instance) and self.at is not None and not trusted:
@@ -289,6 +289,8 @@ class Run(Allocations):
         self.findings.gap(SourceRef(frame.module.source.path, getattr(node, "lineno", 0)), why)
 
     def variables_of(self, node: ast.AST, frame: Frame) -> Value:
-        """``vars(x)``, ``x.__dict__``, ``globals()``: a gap, for what is done with this dictionary is not followed."""
+        """Evaluate ``vars(x)``, ``x.__dict__``, ``globals()``: a gap, for what is done with this dictionary is not
+        followed.
+        """
         self.gap(node, frame, "variables are used as a dictionary, which is not analysed")
         return unknown("a dictionary of variables")

@@ -127,7 +127,7 @@ def _jump(run: Run, node: ast.Break | ast.Continue, frame: Frame) -> bool:
 
 
 def _match(run: Run, node: ast.Match, frame: Frame) -> bool:
-    """Any of the cases may be taken, and none of them unless the last one takes everything."""
+    """Run any of the cases, and none of them unless the last one takes everything."""
     subject = run.evaluate(node.subject, frame)
     last = node.cases[-1]
     everything = isinstance(last.pattern, ast.MatchAs) and last.pattern.pattern is None and last.guard is None
@@ -173,7 +173,7 @@ def _delete(run: Run, node: ast.Delete, frame: Frame) -> bool:
 
 
 def run_try(run: Run, node: Any, frame: Frame) -> bool:
-    """Each handler may run, after any part of the body; it sees every value written on the way."""
+    """Run each handler after any part of the body; it sees every value written on the way."""
     mark, returned = run.state.mark(), frame.returned
     run.state.depth += 1
     passes = run.execute(node.body, frame)
@@ -230,7 +230,7 @@ def _perhaps_handled(
 
 
 def run_with(run: Run, node: ast.With | ast.AsyncWith, frame: Frame) -> bool:
-    """``with``: the body, whose exceptions the managers may swallow. False: control cannot pass."""
+    """Run ``with``: the body, whose exceptions the managers may swallow. Return False if control cannot pass."""
     managers: list[object] = []
     for item in node.items:
         manager = run.evaluate(item.context_expr, frame)
@@ -267,7 +267,7 @@ def _entered(run: Run, manager: Value, node: ast.AST, frame: Frame) -> Value:
 
 
 def _enters(atom: Instance) -> bool:
-    """Rather than ``__aenter__``, or what only a library knows."""
+    """Return whether ``with`` calls the object's ``__enter__``, or what only a library knows."""
     classes = program_classes(atom.cls) if isinstance(atom.cls, ClassValue) else []
     return isinstance(atom.cls, External) or any("__enter__" in each.cells for each in classes)
 

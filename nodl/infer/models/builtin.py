@@ -133,7 +133,7 @@ def _zip(run: Run, call: Call) -> Value:
 
 
 def _some(run: Run, call: Call) -> Value:
-    """``sorted``, ``reversed``, ``set``: a list of any of the elements, in any order."""
+    """Model ``sorted``, ``reversed``, ``set``: a list of any of the elements, in any order."""
     element = _items(run, call).any_element()
     run.register_callback(call.args.keywords.get("key", BOTTOM), 1)
     return run.sequence(call.node, "list", Items(None, element))
@@ -159,13 +159,13 @@ def _filter(run: Run, call: Call) -> Value:
 
 
 def _extreme(run: Run, call: Call) -> Value:
-    """``min``, ``max``: one of the elements, nobody knows which."""
+    """Model ``min``, ``max``: one of the elements, nobody knows which."""
     run.register_callback(call.args.keywords.get("key", BOTTOM), 1)
     return join(chosen(run, call), ANY)
 
 
 def _dict(run: Run, call: Call) -> Value:
-    """Made of dictionaries, pairs and keywords; keys that are not constant go under ``OTHER``."""
+    """Make a dictionary of dictionaries, pairs and keywords; keys that are not constant go under ``OTHER``."""
     obj = run.allocate(call.node, "dict", Dictionary)
     for atom in call.args.at(0) or BOTTOM:
         if isinstance(atom, Dictionary):
@@ -180,7 +180,7 @@ def _dict(run: Run, call: Call) -> Value:
 
 
 def store_pairs(run: Run, obj: Dictionary, items: Items, call: Call) -> None:
-    """What ``dict`` and ``dict.update`` make of pairs."""
+    """Store what ``dict`` and ``dict.update`` make of pairs."""
     for pair in items.exact if items.exact is not None else (items.any_element(),):
         parts = elements(run, pair, call.node, call.frame).exact
         key = sole(parts[0]) if parts and len(parts) == 2 else None
@@ -192,7 +192,7 @@ def store_pairs(run: Run, obj: Dictionary, items: Items, call: Call) -> None:
 
 
 def chosen(run: Run, call: Call) -> Value:
-    """``next``, ``random.choice``: one of the elements."""
+    """Model ``next``, ``random.choice``: one of the elements."""
     if len(call.args.positional) > 1 and not call.args.more:
         return join_all((*call.args.positional, _items(run, call).any_element())) or ANY
     return _items(run, call).any_element() or ANY
@@ -262,7 +262,7 @@ def _isinstance(run: Run, call: Call) -> Value:
 
 
 def _of_classes(atom: object, classes: Value) -> bool | None:
-    """``isinstance``; ``None`` where that is not decided."""
+    """Decide ``isinstance``; ``None`` if that is not decided."""
     cls = classes[0] if len(classes) == 1 else None
     if isinstance(cls, Sequence):
         listed = cls.items.exact
@@ -307,7 +307,7 @@ def _dynamic_code(run: Run, call: Call) -> Value:
 
 
 def import_dynamic(run: Run, call: Call) -> Value:
-    """``import_module(name)`` and ``__import__``: the module; a gap if its name is not known."""
+    """Model ``import_module(name)`` and ``__import__``: the module; a gap if its name is not known."""
     name = sole(call.args.at(0))
     if isinstance(name, str) and not name.startswith("."):
         return import_module(run, name, call.frame)
@@ -316,12 +316,12 @@ def import_dynamic(run: Run, call: Call) -> Value:
 
 
 def _variables(run: Run, call: Call) -> Value:
-    """``vars``, ``globals``, ``locals``."""
+    """Model ``vars``, ``globals``, ``locals``."""
     return run.variables_of(call.node, call.frame)
 
 
 def _object_new(run: Run, call: Call) -> Value:
-    """``object.__new__(cls)``: an object whose constructor has not run."""
+    """Model ``object.__new__(cls)``: an object whose constructor has not run."""
     made: list[object] = []
     for atom in call.args.at(0) or ANY:
         if isinstance(atom, ClassValue):

@@ -28,7 +28,7 @@ def endpoint_object(run: Run, kind: EndpointKind, record: NodeRecord, names: Val
 
 
 def method(run: Run, receiver: Instance, name: str, call: Call) -> Value:
-    """A method of such an object."""
+    """Model a method of such an object."""
     if name == "configure_introspection":
         run.findings.gap(
             call.source, "service introspection publishes events below the service, which is not followed"
@@ -63,7 +63,7 @@ _BY_PATH = {
 
 
 def known_quality(call: Call, position: int) -> QosPolicies:
-    """Policies by NoDL v2's names, sorted; empty where they are not certain."""
+    """Return policies by NoDL v2's names, sorted; empty if they are not certain."""
     value = call.args.at(position, "qos_profile")
     if value is None or len(value) != 1 or call.args.at(-1, "qos_overriding_options") is not None:
         return ()

@@ -159,7 +159,7 @@ def is_node_class(path: str) -> bool:
 
 
 def _unbound_method(run: Run, path: str, name: str, call: Call) -> Value:
-    """``Node.__init__(self, 'name')``."""
+    """Call ``Node.__init__(self, 'name')``."""
     result: Value = ANY
     for receiver in call.args.positional[0] if call.args.positional else ():
         if isinstance(receiver, Instance):
@@ -169,7 +169,7 @@ def _unbound_method(run: Run, path: str, name: str, call: Call) -> Value:
 
 
 def _note_unknown_package(run: Run, path: str, call: Call) -> None:
-    """A gap for a class or function of a ROS package that cannot be read: it may make a node of its own."""
+    """Add a gap for a class or function of a ROS package that cannot be read: it may make a node of its own."""
     if may_make_nodes(path, run.dependencies):
         why = f"{path}() is of a ROS package that is not analysed, and may make a node or interfaces"
         run.gap(call.node, call.frame, why)
@@ -226,7 +226,7 @@ def call_foreign_method(run: Run, method: ForeignMethod, call: Call) -> Value:
 
 
 def _escape_to(run: Run, path: str, call: Call) -> None:
-    """The arguments go to the library of ``path``."""
+    """Hand the arguments to the library of ``path``."""
     run.escape(call.args, opened=path.partition(".")[0] not in _TRUSTED, objects=not keeps_off(path))
 
 
@@ -242,7 +242,7 @@ def _call_node_method(run: Run, receiver: Instance, path: str, name: str, call: 
 
 
 def _initialise_other_bases(run: Run, receiver: Instance, path: str, call: Call) -> None:
-    """An unknown base class may pass the call on to the next one in the method resolution order."""
+    """Hand the arguments to an unknown base class, which may call the next one in the method resolution order."""
     _escape_to(run, path, call)
     _note_unknown_package(run, path, call)
     paths = _foreign_bases(receiver)
@@ -310,5 +310,5 @@ def hooks_of(base: object) -> frozenset[str] | None:
 
 @functools.lru_cache(maxsize=4096)
 def constant(path: str) -> Value | None:
-    """Constants of foreign modules that matter for names."""
+    """Return constants of foreign modules that matter for names."""
     return stdlib.CONSTANTS.get(path)

@@ -59,7 +59,7 @@ def call_method(run: Run, receiver: object, name: str, call: Call) -> Value:
 
 
 def _lost(run: Run, receiver: object, call: Call) -> Value:
-    """A method that is not modelled: it may call what it is given and change its object."""
+    """Handle a method that is not modelled: it may call what it is given and change its object."""
     run.escape(call.args)
     run.escape_value((receiver,))
     return ANY
@@ -171,7 +171,7 @@ def _copy_sequence(run: Run, owner: Sequence, call: Call) -> Value:
 
 
 def _edited(run: Run, owner: Sequence, call: Call) -> Value:
-    """``insert``, ``remove``, ``sort`` ...: what is left, in which order, is not known."""
+    """Handle ``insert``, ``remove``, ``sort`` ...: what is left, in which order, is not known."""
     run.register_callback(call.args.keywords.get("key", BOTTOM), 1)
     return _stored(
         run, owner, None, join_all((owner.items.any_element(), *call.args.positional)), edited=True

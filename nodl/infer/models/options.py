@@ -30,7 +30,7 @@ _KEEP_TEXT = frozenset({"builtins.str", "builtins.int"})  # types that leave a w
 
 
 def made_parser(run: Run, call: Call) -> Value:
-    """``ArgumentParser(...)``: the object that collects the options declared on it."""
+    """Model ``ArgumentParser(...)``: the object that collects the options declared on it."""
     return (run.library_object(call, PARSER),)
 
 

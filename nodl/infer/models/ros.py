@@ -93,7 +93,7 @@ def names_of(value: Value) -> list[object]:
 
 
 def types_of(value: Value) -> list[str]:
-    """ROS names of interface types; the empty string when a type is not known."""
+    """Return ROS names of interface types; the empty string if a type is not known."""
     types = list(dict.fromkeys(interface_type(atom.path) for atom in value if isinstance(atom, External)))
     known = [name for name in types if name]
     return known or [""]
@@ -101,7 +101,7 @@ def types_of(value: Value) -> list[str]:
 
 @functools.lru_cache(maxsize=4096)
 def interface_type(path: str) -> str:
-    """``std_msgs.msg.String`` or ``std_msgs.msg._string.String`` -> ``std_msgs/msg/String``."""
+    """Return ``std_msgs.msg.String`` or ``std_msgs.msg._string.String`` as ``std_msgs/msg/String``."""
     steps = path.split(".")
     if len(steps) >= 3 and steps[1] in _INTERFACE_FOLDERS:
         return f"{steps[0]}/{steps[1]}/{steps[-1]}"
@@ -159,7 +159,7 @@ def _resolved_name(run: Run, record: NodeRecord, call: Call) -> Value:
 
 
 def _wait_until_active(run: Run, record: NodeRecord, call: Call) -> Value:
-    """``BasicNavigator.waitUntilNav2Active(navigator, localizer)`` asks both for their lifecycle state."""
+    """Model ``BasicNavigator.waitUntilNav2Active(navigator, localizer)``: clients for the lifecycle state of both."""
     for index, (keyword, default) in enumerate((("navigator", "bt_navigator"), ("localizer", "amcl"))):
         for name in as_texts(call.args.at(index, keyword) or (default,)):
             service = concatenate(name, "/get_state")
@@ -168,7 +168,7 @@ def _wait_until_active(run: Run, record: NodeRecord, call: Call) -> Value:
 
 
 def _manage_lifecycle(run: Run, record: NodeRecord, call: Call) -> Value:
-    """``BasicNavigator`` calls every lifecycle manager that it finds while it runs."""
+    """Model ``BasicNavigator``, which calls every lifecycle manager that it finds while it runs."""
     name = unknown("the services of lifecycle managers that are found at run time")[0]
     record.add_endpoint(CLIENT, name, "nav2_msgs/srv/ManageLifecycleNodes", call.source)
     return NONE
@@ -193,7 +193,7 @@ NODE_METHODS: dict[str, NodeMethod] = {
 
 
 def call_library(run: Run, path: str, call: Call) -> Value | None:
-    """``path(...)`` for what the tables know; ``None`` for the rest."""
+    """Call ``path(...)`` for what the tables know; ``None`` for the rest."""
     key = _table_key(path)
     made = ENDPOINT_CALLS.get(key)
     if made is not None:

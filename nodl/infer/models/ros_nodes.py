@@ -37,7 +37,7 @@ def is_lifecycle(path: str) -> bool:
 
 
 def initialise_node(run: Run, instance: Instance, path: str, call: Call) -> None:
-    """``Node.__init__``: the instance becomes a node."""
+    """Model ``Node.__init__``: the instance becomes a node."""
     record = record_of_instance(run, instance, call)
     run.understood.add(call.node)
     record.created = True
@@ -86,7 +86,7 @@ def record_of_instance(run: Run, instance: Instance, call: Call) -> NodeRecord:
 
 
 def create_node(run: Run, path: str, call: Call) -> Value:
-    """``rclpy.create_node(...)`` or ``Node(...)`` used as it is."""
+    """Model ``rclpy.create_node(...)`` or ``Node(...)`` used as it is."""
     instance = run.library_object(call, path, "node")
     initialise_node(run, instance, path, call)
     return (instance,)

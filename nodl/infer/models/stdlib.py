@@ -83,7 +83,7 @@ def _partial(run: Run, call: Call) -> Value:
 
 
 def _thread(run: Run, call: Call) -> Value:
-    """``Thread(target=f, args=(...))``: calls ``f`` with these arguments, some time later."""
+    """Model ``Thread(target=f, args=(...))``: it calls ``f`` with these arguments, some time later."""
     target = call.args.at(1, "target") or NONE
     _register_with(run, target, call.args.keywords.get("args"), call.args.keywords.get("kwargs"), call)
     return (run.library_object(call, "threading.Thread"),)
@@ -127,7 +127,7 @@ def _default_dict(run: Run, call: Call) -> Value:
 
 
 def _copy(run: Run, call: Call) -> Value:
-    """``copy`` and ``deepcopy`` give something unknown; a copy of an object of the program is a gap."""
+    """Model ``copy`` and ``deepcopy``: something unknown; a copy of an object of the program is a gap."""
     given = call.args.at(0) or ANY
     run.escape_value(given, opened=False, objects=False)
     if any(isinstance(atom, Instance) and isinstance(atom.cls, ClassValue) for atom in given):

@@ -21,7 +21,7 @@ class Lacking(NamedTuple):
 
 
 def lacking(described: Iterable[NodeInterface], inferred: Sequence[NodeInterface]) -> Lacking:
-    """Of one program. Names that follow a parameter are compared by its default, as manifests list them."""
+    """Compare one program. Names that follow a parameter are compared by its default, as manifests list them."""
     has = {named for node in described for endpoint in node.endpoints if (named := _named(node, endpoint))}
     missing: list[Endpoint] = []
     questions = [f"{gap.source}: {gap.why}" for node in inferred for gap in node.gaps]
@@ -43,7 +43,7 @@ def lacking(described: Iterable[NodeInterface], inferred: Sequence[NodeInterface
 
 
 def _named(node: NodeInterface, endpoint: Endpoint) -> Named | None:
-    """Kind and full name, by the defaults of parameters; ``None`` where the name is not known."""
+    """Return kind and full name, by the defaults of parameters; ``None`` if the name is not known."""
     filled = endpoint.name.unconditional.fill({})
     if not filled.is_literal or not filled.text:
         return None
@@ -55,7 +55,7 @@ def _named(node: NodeInterface, endpoint: Endpoint) -> Named | None:
 
 
 def to_text(program: str, found: Lacking) -> str:
-    """How many interfaces the manifest has, then a line for each that it lacks and for what stays open."""
+    """Say how many interfaces the manifest has, then a line for each that it lacks and for what stays open."""
     lines = [
         f"{program}: the manifest has {found.agreed} of {found.agreed + len(found.endpoints)} interfaces"
     ]

@@ -54,7 +54,7 @@ class ExpandedSystem(NamedTuple):
 
 
 def expand(system: InferredSystem) -> ExpandedSystem:
-    """Sorted by node and place; equal questions are asked once."""
+    """Sort by node and place; evaluate equal questions once."""
     unresolved = dict.fromkeys(system.gaps)
     nodes = []
     for interface, programs in _told_once(system.nodes):
@@ -75,7 +75,7 @@ def expand(system: InferredSystem) -> ExpandedSystem:
 
 
 def _told_once(nodes: Iterable[NodeInterface]) -> list[tuple[NodeInterface, tuple[str, ...]]]:
-    """Each node with every program that holds it; the gaps are those of all of them."""
+    """Return each node with every program that holds it; the gaps are those of all of them."""
     found: dict[object, NodeInterface] = {}
     programs: dict[object, dict[str, None]] = {}
     for node in nodes:

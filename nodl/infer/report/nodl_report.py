@@ -13,7 +13,7 @@ from nodl.node_interface import Endpoint, EndpointKind, NodeInterface
 
 
 def to_v1(system: InferredSystem) -> dict[str, str]:
-    """File name -> text: one document per package (``nodes.nodl.xml`` for nodes of none)."""
+    """Map file name to text: one document per package (``nodes.nodl.xml`` for nodes of none)."""
     packages: dict[str, list[NodeInterface]] = {}
     for node in system.nodes:
         packages.setdefault(f"{node.package or 'nodes'}.nodl.xml", []).append(node)

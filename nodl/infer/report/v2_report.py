@@ -42,7 +42,7 @@ class _Entry(NamedTuple):
 
 
 def to_v2(nodes: Sequence[NodeInterface]) -> dict[str, str]:
-    """File name -> text. Helper nodes of a ``TransformListener`` are said in the document of the node beside them."""
+    """Map file name to text. Helper nodes of a ``TransformListener`` are in the document of the node beside them."""
     listeners = {_key(node) for node in nodes if (node.name or "").endswith(RANDOM_ENDING)}
     documents: dict[str, str] = {}
     for node in nodes:
@@ -69,7 +69,7 @@ def _stem(node: NodeInterface) -> str:
 
 
 def open_questions(node: NodeInterface) -> list[str]:
-    """What a document cannot say of ``node``, with the place: its gaps, and names or types that are not known."""
+    """Return what a document cannot say of ``node``, with the place: its gaps, and names or types not known."""
     questions = [f"{gap.source}: {gap.why}" for gap in node.gaps]
     for endpoint in node.endpoints:
         if _entry(endpoint, node.depends) is None:
@@ -199,7 +199,7 @@ def _clashing(entries: Iterable[_Entry]) -> list[tuple[EndpointKind, str]]:
 
 
 def _entry(endpoint: Endpoint, depends: Dependence | None = None) -> _Entry | None:
-    """``None`` for what NoDL v2 cannot say."""
+    """Return the entry; ``None`` for what NoDL v2 cannot say."""
     template = endpoint.name.unconditional
     filled = template.fill({})
     name = filled.text

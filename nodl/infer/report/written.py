@@ -13,7 +13,7 @@ from nodl.policy_text import policy_text, profile_lines
 
 
 def to_json(system: ExpandedSystem, *, built_in: bool = False) -> str:
-    """``{"nodes": [...], "unresolved": [...]}``; built-in interfaces only with ``built_in``."""
+    """Write ``{"nodes": [...], "unresolved": [...]}``; built-in interfaces only with ``built_in``."""
     document = {
         "nodes": [_node(node, built_in) for node in system.nodes],
         "unresolved": [

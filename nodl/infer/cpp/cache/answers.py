@@ -36,7 +36,7 @@ class WatchedStart:
 
 
 def _said(start: Start, what: str, node: str | None) -> Asked:
-    """What a launch says of a node: of its ``parameters``, or of its final ``name``."""
+    """Return what a launch says of a node: of its ``parameters``, or of its final ``name``."""
     answer = sorted(start.parameters(node).items()) if what == "parameters" else start.final_name(node)
     return what, json.dumps(node), repr(answer)
 
@@ -72,7 +72,7 @@ class Answers:
         self._content = lru_cache(maxsize=None)(digest_of)
 
     def find(self, question: object, start: Start | None = None) -> Made | None:
-        """The answer of a run in which all files that it was made from, and the launch, were as they are now."""
+        """Return the answer of a run in which all files that it was made from, and the launch, were as they are now."""
         for asked, files, answer in variants(self._folder, self._key(question, start)):
             if _says_the_same(start, asked) and all(self._content(name) == was for name, was in files):
                 return Made(answer, dict(files))

@@ -31,7 +31,7 @@ _ENUMERATIONS: dict[str, type[Enum]] = {
 
 
 def encoded(value: object) -> object:
-    """``value`` as what JSON has. Raises ``TypeError`` for what is not on the list."""
+    """Return ``value`` as what JSON has; raises ``TypeError`` for what is not on the list."""
     if isinstance(value, Enum):
         return {"enum": type(value).__name__, "value": value.value}
     if value is None or isinstance(value, str | bool | int | float):
@@ -48,7 +48,7 @@ def encoded(value: object) -> object:
 
 
 def decoded(value: object) -> Any:
-    """What ``encoded`` made; lists come back as tuples. Raises ``ValueError`` for anything else."""
+    """Return what ``encoded`` was given; lists come back as tuples. Raises ``ValueError`` for anything else."""
     if isinstance(value, list):
         return tuple(decoded(each) for each in value)
     if not isinstance(value, dict):
@@ -64,7 +64,7 @@ def decoded(value: object) -> Any:
 
 
 def variants(folder: CacheFolder, key: str) -> list[Any]:
-    """The answers to one question that are kept under ``key``, newest first; none where they cannot be read."""
+    """Return the cached answers to one question under ``key``, newest first; none if they cannot be read."""
     content = folder.read(key)
     try:
         return list(decoded(json.loads(content))) if content is not None else []

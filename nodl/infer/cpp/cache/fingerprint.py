@@ -20,7 +20,7 @@ _BUILD_NAMES = frozenset({"CMakeLists.txt", "compile_commands.json", "CMakeCache
 
 @lru_cache(maxsize=1)
 def analyser() -> str:
-    """Of our own code, whatever it is installed as, and of the parser."""
+    """Return a digest of our own code, whatever it is installed as, and of the parser."""
     root = Path(__file__).parents[3]
     own = [(str(path.relative_to(root)), digest_of(str(path))) for path in sorted(root.rglob("*.py"))]
     return digest(own, [_version(name) for name in ("tree-sitter", "tree-sitter-cpp")])
@@ -34,10 +34,10 @@ def _version(name: str) -> str:
 
 
 def surroundings(workspace: Workspace, folders: Sequence[str] = ()) -> str:
-    """Of the names of all files in the packages, right in ``folders`` and below the prefixes' ``include``, and of what
-    the build files say.
+    """Return a digest of the names of files that an ``#include`` may mean, and of what the build files say.
 
-    A file that comes or goes may change what an ``#include`` means; a build file, what a program consists of.
+    The files are those in the packages, right in ``folders`` and below the prefixes' ``include``. One that comes or
+    goes may change what an ``#include`` means; a build file, what a program consists of.
     """
     folders = sorted({package.folder for package in workspace.packages.values()})
     headers = [os.path.join(prefix, "include") for prefix in workspace.prefixes]

@@ -25,7 +25,7 @@ class CacheFolder:
         self._path = _prepared(default_path() if path is None else path)
 
     def read(self, key: str) -> bytes | None:
-        """What was written under ``key``; ``None`` for nothing, or for what is damaged or not ours."""
+        """Return what was written under ``key``; ``None`` for nothing, or for what is damaged or not ours."""
         if self._path is None:
             return None
         try:
@@ -54,7 +54,7 @@ class CacheFolder:
 
 
 def default_path() -> str | None:
-    """``None`` where there is no home directory."""
+    """Return the folder; ``None`` if there is no home directory."""
     base = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
     return os.path.join(base, "enclave-launch", "inferred") if os.path.isabs(base) else None
 
@@ -80,7 +80,7 @@ def _is_ours(status: os.stat_result) -> bool:
 
 
 def _make_room(path: str) -> None:
-    """The oldest half goes when there are too many."""
+    """Delete the oldest half if there are too many."""
     if len(os.listdir(path)) <= _MOST_ENTRIES:
         return
     with os.scandir(path) as listed:
@@ -90,12 +90,12 @@ def _make_room(path: str) -> None:
 
 
 def digest(*parts: object) -> str:
-    """Of anything whose ``repr`` says all of it."""
+    """Return a digest of anything whose ``repr`` says all of it."""
     return digest_of_content(repr(parts).encode("utf-8", "surrogatepass"))
 
 
 def digest_of(path: str) -> str:
-    """Of a file's content; of one that cannot be read, that it cannot."""
+    """Return a digest of a file's content; of one that cannot be read, that it cannot."""
     try:
         return digest_of_content(read_bytes(path))
     except OSError as error:
@@ -103,5 +103,5 @@ def digest_of(path: str) -> str:
 
 
 def digest_of_content(content: bytes) -> str:
-    """SHA-256 of bytes, in hexadecimal."""
+    """Return the SHA-256 of bytes, in hexadecimal."""
     return hashlib.sha256(content).hexdigest()

@@ -17,7 +17,7 @@ _BRACES = re.compile(r"\{\{|\}\}|\{(?P<index>\d*)\}|[{}]")
 
 @library_function("snprintf", "std::snprintf", "sprintf", "std::sprintf")
 def _printed(run: Machine, call: Call) -> Value:
-    """(buffer, [size,] format, ...): the text goes to the buffer."""
+    """Model (buffer, [size,] format, ...): the text goes to the buffer."""
     first = 2 if _name(call).endswith("snprintf") else 1
     written = _percent(call.value(first), call.values[first + 1 :])
     if first == 2 and not _fits(written, call.value(1)):
@@ -33,13 +33,13 @@ def _name(call: Call) -> str:
 
 
 def _fits(written: Value, size: Value) -> bool:
-    """Whether nothing of a text is cut off; taken for granted where the size is that of the buffer."""
+    """Return whether nothing of a text is cut off; taken for granted if the size is that of the buffer."""
     length = max((len(plain(atom) or "") for atom in written), default=0)
     return not any(isinstance(atom, int) and length >= atom for atom in size)
 
 
 def _percent(form: Value, values: Sequence[Value]) -> Value:
-    """``"topic_%02d"`` with its values; a conversion that is not followed makes a part that is not known."""
+    """Fill ``"topic_%02d"`` with its values; a conversion that is not followed makes a part that is not known."""
     pieces, waiting = [], list(values)
     for piece, match in _pieces(form, _PERCENT):
         if match is None or match[0] == "%%":
@@ -60,7 +60,7 @@ def _converted(match: re.Match[str], value: Value) -> Value:
 
 @library_function("fmt::format", "std::format")
 def _formatted(run: Machine, call: Call) -> Value:
-    """(format, ...): ``{}`` and ``{0}`` are filled in; other fields make a part that is not known."""
+    """Model (format, ...): ``{}`` and ``{0}`` are filled in; other fields make a part that is not known."""
     pieces, position = [], 0
     for piece, match in _pieces(call.value(0), _BRACES):
         if match is None or match[0] in ("{{", "}}"):
@@ -79,7 +79,7 @@ def _shown(value: Value) -> Value:
 
 
 def _pieces(form: Value, pattern: re.Pattern[str]) -> Iterator[tuple[str, re.Match[str] | None]]:
-    """The parts of a format that is one known text: as written, or with what asks for a value."""
+    """Split a format that is one known text into what is as written and what needs a value."""
     written = plain(form[0]) if len(form) == 1 else None
     position = 0
     for match in pattern.finditer(written or ""):

@@ -40,8 +40,7 @@ _TRANSPORTS = {
 
 
 def _image_publisher(run: Machine, record: AllocatedNode, base: Value, call: Call) -> None:
-    """image_transport/src/publisher.cpp: one publisher for each transport plugin that is installed, below the final
-    name of the image."""
+    """Model image_transport/src/publisher.cpp: one publisher for each installed plugin, below the image's final name."""
     run.endpoint(record, PUB, base, _IMAGE, call)
     for topic in concatenated(base):
         for plugin, kind in list(_TRANSPORTS.items())[:3]:
@@ -50,7 +49,7 @@ def _image_publisher(run: Machine, record: AllocatedNode, base: Value, call: Cal
 
 
 def _info_topic(base: Value) -> Value:
-    """image_transport/src/camera_common.cpp, getCameraInfoTopic: the last part of the name replaced."""
+    """Model image_transport/src/camera_common.cpp, getCameraInfoTopic: the last part of the name replaced."""
     found: list[object] = []
     for atom in base:
         parts = atom.parts if isinstance(atom, Text) else ()
@@ -65,14 +64,14 @@ def _info_topic(base: Value) -> Value:
 
 
 def _owner_of(call: Call) -> Obj | None:
-    """The node among the arguments, else that of the object, or that the object was made with."""
+    """Return the node among the arguments, else that of the object, or that the object was made with."""
     this = call.receiver
     owner = owner_in(call.values) or (this if this is not None and this.node else None)
     return owner or (this.data.get("owner") if this is not None else None)
 
 
 def _image(what: str, run: Machine, call: Call, place: int = 3) -> Value:
-    """``place``: of the transport among the arguments of a subscription."""
+    """Make the interface of an image. ``place``: of the transport among the arguments of a subscription."""
     owner, texts = _owner_of(call), texts_in(call.values)
     if owner is None or owner.node is None:
         run.gap(call.node, call.frame, f"the node that image_transport makes a {what} on is not known")
@@ -96,7 +95,7 @@ def _image(what: str, run: Machine, call: Call, place: int = 3) -> Value:
 def _image_subscription(
     run: Machine, record: AllocatedNode, base: Value, call: Call, transport: object
 ) -> None:
-    """image_transport/src/subscriber.cpp: one topic, by the transport."""
+    """Model image_transport/src/subscriber.cpp: one topic, by the transport."""
     known = plain(transport) if isinstance(transport, Text) else None
     if known in _TRANSPORTS:
         _transported_subscription(run, record, base, call, str(known), "", "")
@@ -114,14 +113,16 @@ def _image_subscription(
 
 
 def hinted(call: Call) -> Value:
-    """The transport that hints among the arguments name; nothing without hints."""
+    """Return the transport that hints among the arguments name; nothing without hints."""
     hints = [a for v in call.values for a in v if isinstance(a, Obj) and a.type.last == "TransportHints"]
     return join(*(each.data.get("transport", unknown("a transport")) for each in hints))
 
 
 def _transports_of(record: AllocatedNode, call: Call, place: int) -> Value:
-    """As given, else ``raw``; for the methods of ``ImageTransport`` the hints decide, else the parameter that they read
-    (image_transport/src/image_transport.cpp, ``getTransportOrDefault``)."""
+    """Return the transports as given, else ``raw``; for methods of ``ImageTransport`` hints decide, else a parameter.
+
+    Source: image_transport/src/image_transport.cpp, ``getTransportOrDefault``.
+    """
     if call.receiver is None:
         return (call.values[place] or unknown("a transport")) if len(call.values) > place else literal("raw")
     parameter = (Param(record, "image_transport"),) if "image_transport" in record.parameters else None
@@ -134,7 +135,7 @@ def _only_text(atom: Param) -> str | None:
 
 
 def _chosen_by(run: Machine, record: AllocatedNode, base: Value, call: Call, chosen: Param) -> None:
-    """A parameter names the transport: of all its topics the one with its value is subscribed."""
+    """Subscribe, of all topics of a parameter that names the transport, the one with its value."""
     default = _only_text(chosen) or ""
     for topic in concatenated(base):
         raw = Follows("remapped", topic, "", chosen.name, "raw", default)
@@ -160,7 +161,9 @@ def _transported_subscription(
 
 
 def chosen_transport(run: Machine, chosen: Param, known: Sequence[str]) -> str | None:
-    """The default of a parameter that names a transport; ``None`` unless it, and what launch gives, is in the table."""
+    """Return the default of a parameter that names a transport; ``None`` unless it, and what launch gives, is in the
+    table.
+    """
     default = _only_text(chosen) or ""
     given = given_by_launch(run, chosen.record, chosen.name)
     run.from_default.pop(chosen.name, None)  # its values are all listed
@@ -168,13 +171,13 @@ def chosen_transport(run: Machine, chosen: Param, known: Sequence[str]) -> str |
 
 
 def only_if(parameter: str, default: str, value: str) -> Value:
-    """An empty ending for a name, which drops the name unless the parameter has this ``value``."""
+    """Return an empty ending for a name, which drops the name unless the parameter has this ``value``."""
     return (Text((ParameterPart(parameter, default, None, (("only if equal", (value,)),)),)),)
 
 
 @library_class("image_transport::TransportHints")
 def _transport_hints(run: Machine, call: Call) -> None:
-    """image_transport/transport_hints.hpp: (node, default, parameter name), read by ``get_parameter_or``."""
+    """Model image_transport/transport_hints.hpp: (node, default, parameter name), read by ``get_parameter_or``."""
     owner, texts = owner_in(call.values), texts_in(call.values)
     name = plain(texts[1][0]) if len(texts) > 1 and len(texts[1]) == 1 else "image_transport"
     fallback = texts[0] if texts else literal("raw")
@@ -190,7 +193,9 @@ def _transport(run: Machine, call: Call) -> Value:
 
 @library_function("image_transport::getCameraInfoTopic")
 def _camera_info_topic(run: Machine, call: Call) -> Value:
-    """image_transport/camera_common.hpp. Callers give it the name that launch has remapped, which it follows then."""
+    """Model image_transport/camera_common.hpp. Callers give it the name that launch has remapped, which it follows
+    then.
+    """
     found: list[object] = []
     for image in call.value(0):
         for atom in _info_topic((image,)):
@@ -217,7 +222,7 @@ for _what, _function, _method in (
 
 @library_class("image_transport::SubscriberFilter")
 def _subscriber_filter(run: Machine, call: Call) -> None:
-    """image_transport/subscriber_filter.hpp: (node, topic, transport)."""
+    """Model image_transport/subscriber_filter.hpp: (node, topic, transport)."""
     if call.values:
         _filter(run, call)
 
@@ -228,7 +233,7 @@ def _filter(run: Machine, call: Call) -> Value:
 
 
 def _handle(what: str, run: Machine, call: Call) -> Value | None:
-    """image_transport/publisher.hpp and its siblings: default, copied, or (node, topic, ...) as the functions."""
+    """Model image_transport/publisher.hpp and its siblings: default, copied, or (node, topic, ...) as the functions."""
     same = tuple(
         a for v in call.values for a in v if isinstance(a, Obj) and a.type.name == call.this.type.name
     )
@@ -243,9 +248,12 @@ for _what in ("publisher", "camera publisher", "subscriber", "camera subscriber"
 
 @library_class("camera_info_manager::CameraInfoManager")
 def _manager(run: Machine, call: Call) -> None:
-    """(node, camera, url): ``set_camera_info`` in humble, ``~/set_camera_info`` from jazzy on; in rolling a further
-    text is the namespace. Which one is installed is not asked: both are listed. Source: ros-perception/image_common
-    humble d118138, jazzy d04d2c8, rolling f6e4ab6: camera_info_manager/src/camera_info_manager.cpp."""
+    """Model (node, camera, url): ``set_camera_info`` in humble, ``~/set_camera_info`` from jazzy on.
+
+    In rolling a further text is the namespace. Which one is installed is not looked up: both are listed. Source:
+    ros-perception/image_common humble d118138, jazzy d04d2c8, rolling f6e4ab6:
+    camera_info_manager/src/camera_info_manager.cpp.
+    """
     record = node_of(run, call, "camera_info_manager::CameraInfoManager")
     if record is None:
         return

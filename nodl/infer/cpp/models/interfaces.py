@@ -34,12 +34,12 @@ KINDS = {"publisher": PUB, "subscription": SUB, "service": SRV, "client": CLI}
 
 
 def owner_in(values: Sequence[Value]) -> Obj | None:
-    """The first node among the arguments or in lists among them; ``None`` if they hold none."""
+    """Return the first node among the arguments or in lists among them; ``None`` if they hold none."""
     return next((obj for value in values for obj in nodes_in(value)), None)
 
 
 def node_of(run: Machine, call: Call, whose: str = "") -> AllocatedNode | None:
-    """The node that the object of a library gets; a gap, with the name of its class, where it gets none."""
+    """Return the node that the object of a library gets; a gap, with the name of its class, if it gets none."""
     owner = owner_in(call.values)
     if owner is None:
         run.gap(call.node, call.frame, f"the node of this {whose or call.this.type.name} is not known")
@@ -47,17 +47,17 @@ def node_of(run: Machine, call: Call, whose: str = "") -> AllocatedNode | None:
 
 
 def texts_in(values: Sequence[Value]) -> list[Value]:
-    """The arguments that hold something and no node: names and the like."""
+    """Return the arguments that hold something and no node: names and the like."""
     return [value for value in values if value and not nodes_in(value)]
 
 
 def named_in(values: Sequence[Value]) -> list[Value]:
-    """The arguments that may be a text."""
+    """Return the arguments that may be a text."""
     return [value for value in values if any(isinstance(atom, Text | Param) for atom in value)]
 
 
 def add(run: Machine, owner: Obj, kind: EndpointKind, name: Value, type_name: str, call: Call) -> Value:
-    """The interface of one call, under the sub-namespace of a sub-node; the object it gives."""
+    """Add the interface of one call, under the sub-namespace of a sub-node; return the object it gives."""
     record = owner.node
     assert record is not None
     prefix = owner.data.get("prefix")
@@ -81,7 +81,7 @@ def _below(prefix: Value, name: Value) -> Value:
 
 
 def owner_and_name(call: Call) -> tuple[Obj | None, int]:
-    """The node among the first arguments, and where the name stands: behind the last of them."""
+    """Return the node among the first arguments, and where the name stands: behind the last of them."""
     owner: Obj | None = None
     position = 0
     for index, value in enumerate(call.values[:4]):
@@ -115,13 +115,13 @@ def _typed(word: str, kind: EndpointKind) -> None:
 
 
 def _adapted(call: Call) -> str:
-    """The type of an interface; that of a type adapter is its second argument."""
+    """Return the type of an interface; that of a type adapter is its second argument."""
     kind = call.types[0] if call.types else NO_TYPE
     return ros_type(kind.arguments[-1] if kind.last in ("TypeAdapter", "as") and kind.arguments else kind)
 
 
 def _statistics(run: Machine, call: Call) -> None:
-    """Topic statistics, when the options of the subscription ask for them (rclcpp/subscription_options.hpp)."""
+    """Add topic statistics, if the options of the subscription request them (rclcpp/subscription_options.hpp)."""
     for atom in (atom for value in call.values[2:] for atom in value):
         if not isinstance(atom, Obj) or not atom.type.last.startswith("SubscriptionOptions"):
             continue
@@ -153,8 +153,11 @@ def _text_type(value: Value) -> str:
 
 
 def _of_rcl(name: str, kind: EndpointKind, name_at: int) -> None:
-    """rcl/publisher.h, subscription.h, service.h, client.h, rcl_action/action_server.h, action_client.h, in C: the node
-    is the second argument. The type stands in a structure that is not followed."""
+    """Register the model of rcl's C function, in which the node is the second argument.
+
+    Source: rcl/publisher.h, subscription.h, service.h, client.h, rcl_action/action_server.h, action_client.h. The
+    type stands in a structure that is not followed.
+    """
 
     def function(run: Machine, call: Call) -> Value:
         owner = owner_in([call.value(1)])
@@ -190,7 +193,7 @@ _action("generic_client", CALL)
 @library_method(f"rclcpp::{SRV.value}", "configure_introspection")
 @library_method(f"rclcpp::{CLI.value}", "configure_introspection")
 def _introspection(run: Machine, call: Call) -> Value:
-    """rcl/src/rcl/service_event_publisher.c: a publisher beside the service, made when introspection is switched on."""
+    """Add the publisher beside a service that is made if introspection is on (rcl/src/rcl/service_event_publisher.c)."""
     data = call.this.data
     if data.get("record") is not None:
         name = concatenated(data["name"], literal("/_service_event"))

@@ -43,7 +43,7 @@ OPTIONS = "rclcpp::NodeOptions"
 
 
 def become_node(run: Machine, call: Call, *, lifecycle: bool = False) -> AllocatedNode:
-    """The object is a node from now on: ``Node(name, options)`` or ``Node(name, namespace, options)``."""
+    """Make the object a node: ``Node(name, options)`` or ``Node(name, namespace, options)``."""
     this = call.this
     record = run.nodes.get(this)
     if record is None:
@@ -96,7 +96,7 @@ def _read_options(run: Machine, record: AllocatedNode, options: Obj, call: Call)
 def _read_parameters(
     run: Machine, record: AllocatedNode, words: tuple[str | None, ...], given: Seq, call: Call
 ) -> None:
-    """rcl/src/rcl/arguments.c: ``-p name:=value`` and files of parameters, given to the node in code."""
+    """Read ``-p name:=value`` and files of parameters that the code gives to the node (rcl/src/rcl/arguments.c)."""
     for flag, word, item in zip(words, words[1:], given.items[1:], strict=False):
         names = {_assigned(atom) for atom in item} if flag in ("-p", "--param") else set()
         if len(names) == 1 and None not in names:
@@ -109,13 +109,13 @@ def _read_parameters(
 
 
 def _assigned(atom: object) -> str | None:
-    """The name in ``name:=value``, which may be known where the value is not."""
+    """Return the name in ``name:=value``, which may be known if the value is not."""
     first = atom.parts[0] if isinstance(atom, Text) and atom.parts else None
     return first.partition(":=")[0] if isinstance(first, str) and ":=" in first else None
 
 
 def _asked_for(run: Machine, record: AllocatedNode, options: Obj, call: Call) -> None:
-    """What rclcpp makes when the options ask for it: topic statistics, logger services (node_logging.cpp)."""
+    """Add what rclcpp makes if the options request it: topic statistics, logger services (node_logging.cpp)."""
     statistics = run.store.get((options, "enable_topic_statistics"))
     if statistics and truth(statistics) is not False:
         kind = "statistics_msgs/msg/MetricsMessage"
@@ -127,7 +127,7 @@ def _asked_for(run: Machine, record: AllocatedNode, options: Obj, call: Call) ->
 
 
 def _word(run: Machine, item: Value) -> str | None:
-    """An argument as text; names of other nodes are those of this start."""
+    """Return an argument as text; names of other nodes are those of this start."""
     return text_of(run, item[0]) if len(item) == 1 else None
 
 
@@ -173,19 +173,19 @@ for _what, _name in (("name", "get_name"), ("ns", "get_namespace"), ("fqn", "get
 
 @node_method("get_sub_namespace")
 def _sub_namespace(run: Machine, call: Call) -> Value:
-    """rclcpp/src/rclcpp/node.cpp: empty for the node itself."""
+    """Return the sub-namespace, empty for the node itself (rclcpp/src/rclcpp/node.cpp)."""
     return call.this.data.get("prefix") or literal("")
 
 
 @node_method("get_effective_namespace")
 def _effective_namespace(run: Machine, call: Call) -> Value:
-    """rclcpp/src/rclcpp/node.cpp: the namespace of the node, of a sub-node with its own behind it."""
+    """Return the namespace of the node, of a sub-node with its own behind it (rclcpp/src/rclcpp/node.cpp)."""
     return unknown("the namespace of a sub-node") if call.this.data.get("prefix") else _says("ns", run, call)
 
 
 @node_method("create_sub_node")
 def _sub_node(run: Machine, call: Call) -> Value:
-    """Relative names of a sub-node stand below its sub-namespace."""
+    """Make a sub-node: its relative names stand below its sub-namespace."""
     made = run.obj(call.key("sub"), Type("rclcpp::Node"), heap=True)
     made.node, made.is_node = call.record, True
     outer = call.this.data.get("prefix")
@@ -195,7 +195,7 @@ def _sub_node(run: Machine, call: Call) -> Value:
 
 @node_method("resolve_topic_name", "resolve_service_name", "resolve_topic_or_service_name")
 def _resolved(run: Machine, call: Call) -> Value:
-    """rclcpp/node_interfaces/node_topics.cpp: the final name, which launch gives to the name as written."""
+    """Return the final name, which launch gives to the name as written (rclcpp/node_interfaces/node_topics.cpp)."""
     return call.value(0)
 
 
@@ -242,7 +242,7 @@ def _options(run: Machine, call: Call) -> Value | None:
     "automatically_declare_parameters_from_overrides", "allocator", "get_rcl_node_options",
 )  # fmt: skip
 def _setter(run: Machine, call: Call) -> Value:
-    """``options.arguments({...})`` and kin return the options."""
+    """Get or set an option, as ``options.arguments({...})`` and kin do; return the options."""
     function = field_of(call.node, "function")
     name = text(field_of(function, "field"))
     if not call.values:
@@ -265,8 +265,10 @@ ARGUMENT = "an argument of the program"
 
 @library_function("rclcpp::init", "rclcpp::init_and_remove_ros_arguments")
 def _init(run: Machine, call: Call) -> Value:
-    """rclcpp/utilities.hpp: (argc, argv, ...). With arguments of the program's own making, those of the launch are not
-    heard; they are rules for all nodes."""
+    """Model rclcpp/utilities.hpp, (argc, argv, ...).
+
+    With arguments of the program's own making those of the launch are not used; they are rules for all nodes.
+    """
     for atom in call.value(1) or ((Seq(()),) if call.values else BOTTOM):
         if isinstance(atom, Seq) and not atom.open:
             run.global_arguments.append(tuple(_word(run, item) for item in atom.items))

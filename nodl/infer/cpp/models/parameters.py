@@ -32,12 +32,14 @@ from nodl.infer.cpp.syntax import field_of, unwrapped
 
 
 def parameter_names(run: Machine, value: Value) -> list[str | None]:
-    """The texts that name a parameter; those made of parameters by what the launch file, else the default, gives."""
+    """Return the texts that name a parameter; those made of parameters by what the launch file, else the default,
+    gives.
+    """
     return [text_of(run, atom) for atom in value]
 
 
 def read(run: Machine, record: AllocatedNode, name: Value, default: Value = BOTTOM) -> Value:
-    """The value of a parameter: open until launch, with what is known of its default."""
+    """Read a parameter: its value is open until launch, with what is known of its default."""
     found: list[object] = []
     for filled in parameter_names(run, name):
         if filled is None:
@@ -61,7 +63,7 @@ def _declare(run: Machine, call: Call) -> Value:
 
 
 def _default(value: Value) -> Value:
-    """None where only the type is given: ``declare_parameter("x", rclcpp::PARAMETER_STRING)``."""
+    """Return the default; None if only the type is given: ``declare_parameter("x", rclcpp::PARAMETER_STRING)``."""
     typed = any("PARAMETER_" in str(getattr(atom, "why", getattr(atom, "name", ""))) for atom in value)
     return BOTTOM if typed else value
 
@@ -76,7 +78,7 @@ def _get(run: Machine, call: Call) -> Value:
 
 
 def _write(run: Machine, call: Call, value: Value) -> None:
-    """To the second argument."""
+    """Write the value to the second argument."""
     target = unwrapped(call.given[1]) if len(call.given) > 1 else None
     if target is not None and target.type == "pointer_expression":
         target = field_of(target, "argument")
@@ -100,7 +102,7 @@ def _has(run: Machine, call: Call) -> Value:
 
 @node_method("set_parameter", "set_parameters", "set_parameters_atomically")
 def _set(run: Machine, call: Call) -> Value:
-    """The program sets a parameter itself: one more value that it may have."""
+    """Add one more value that a parameter may have, since the program sets it itself."""
     stack = list(call.values)
     while stack:
         for atom in stack.pop():
@@ -134,7 +136,7 @@ def _declare_if_not(run: Machine, call: Call) -> Value:
 
 @library_function("nav2_util::get_plugin_type_param", "nav2::get_plugin_type_param")
 def _plugin_type(run: Machine, call: Call) -> Value:
-    """The parameter ``<name>.plugin`` of the node."""
+    """Read the parameter ``<name>.plugin`` of the node."""
     name = concatenated(call.value(1), literal(".plugin"))
     found = [read(run, owner.node, name) for owner in nodes_in(call.value(0)) if owner.node]
     return join(*found) if found else unknown("the class of a plugin")
@@ -147,8 +149,10 @@ _CLIENTS = ("rclcpp::AsyncParametersClient", "rclcpp::SyncParametersClient")
 
 @library_class(*_CLIENTS)
 def _client(run: Machine, call: Call) -> None:
-    """(node or its four interfaces, name of the remote node, ...): six clients below that name; below the node's own
-    where it is empty."""
+    """Model (node or its four interfaces, name of the remote node, ...): six clients below that name.
+
+    They are below the node's own name if it is empty.
+    """
     record = node_of(run, call, call.this.type.last)
     if record is None:
         return

@@ -123,7 +123,7 @@ ROWS.update(dict.fromkeys(NONE, ()))
 
 
 def _make(row: Sequence[Makes], run: Machine, call: Call) -> None:
-    """The interfaces of a row, on the node among the arguments."""
+    """Make the interfaces of a row, on the node among the arguments."""
     owner = owner_in(call.values)
     run.later(call.values, call.frame)
     if owner is None:
@@ -164,7 +164,7 @@ LIBRARY_CLASSES.update({name: partial(_make, row) for name, row in ROWS.items()}
 
 @library_class("message_filters::Subscriber")
 def _filter_subscriber(run: Machine, call: Call) -> None:
-    """message_filters/subscriber.h: with a node it subscribes at once, else when ``subscribe`` is called."""
+    """Model message_filters/subscriber.h: with a node it subscribes at once, else when ``subscribe`` is called."""
     if call.values:
         _subscribe(run, call)
 
@@ -187,7 +187,7 @@ def _subscribe(run: Machine, call: Call) -> Value:
 
 @library_class("tf2_ros::TransformListener")
 def _listener(run: Machine, call: Call) -> None:
-    """tf2_ros/src/transform_listener.cpp: without a node it makes one, ``transform_listener_impl_<address>``."""
+    """Model tf2_ros/src/transform_listener.cpp: without a node it makes one, ``transform_listener_impl_<address>``."""
     owner = owner_in(call.values)
     if owner is None and any(_may_be_node(value) for value in call.values[1:2]):
         run.gap(call.node, call.frame, "the node of this tf2_ros::TransformListener is not known")
@@ -209,7 +209,7 @@ def _may_be_node(value: Value) -> bool:
 
 @library_class("rclcpp::node_interfaces::NodeInterfaces")
 def _node_interfaces(run: Machine, call: Call) -> Value | None:
-    """rclcpp/node_interfaces/node_interfaces.hpp: parts of a node, which stand for it."""
+    """Model rclcpp/node_interfaces/node_interfaces.hpp: parts of a node, which stand for it."""
     owner = owner_in(call.values)
     return (owner,) if owner is not None else None
 
@@ -223,7 +223,7 @@ def _static_listener(run: Machine, call: Call) -> None:
 
 @library_class("tf2_ros::Buffer")
 def _buffer(run: Machine, call: Call) -> None:
-    """tf2_ros/src/buffer.cpp: with a node, the service ``tf2_frames`` on it."""
+    """Model tf2_ros/src/buffer.cpp: with a node, the service ``tf2_frames`` on it."""
     owner = owner_in(call.values)
     if owner is not None and owner.node is not None:
         run.endpoint(owner.node, SRV, literal("tf2_frames"), "tf2_msgs/srv/FrameGraph", call)
@@ -231,13 +231,15 @@ def _buffer(run: Machine, call: Call) -> None:
 
 @library_class("tf2_ros::BufferServer")
 def _buffer_server(run: Machine, call: Call) -> None:
-    """tf2_ros/buffer_server.h: (buffer, node, action name, ...)."""
+    """Model tf2_ros/buffer_server.h: (buffer, node, action name, ...)."""
     _make((Makes(ACT, "{0}", "tf2_msgs/action/LookupTransform"),), run, replace(call, values=call.values[1:]))
 
 
 @library_class("robot_localization::RosRobotLocalizationListener")
 def _robot_localization(run: Machine, call: Call) -> None:
-    """robot_localization/src/ros_robot_localization_listener.cpp: two topics, and a listener with a node of its own."""
+    """Model robot_localization/src/ros_robot_localization_listener.cpp: two topics, and a listener with a node of its
+    own.
+    """
     row = (
         Makes(SUB, "odom/filtered", "nav_msgs/msg/Odometry"),
         Makes(SUB, "acceleration/filtered", "geometry_msgs/msg/AccelWithCovarianceStamped"),
@@ -264,7 +266,7 @@ for _word, _kind in (("server", ACT), ("client", CALL)):
 
 @library_class("nav2_util::ServiceServer", "nav2::ServiceServer")
 def _service(run: Machine, call: Call) -> None:
-    """(name, node, callback): with the parameter ``service_introspection_mode`` also its events."""
+    """Model (name, node, callback): with the parameter ``service_introspection_mode`` also its events."""
     record, texts = node_of(run, call), texts_in(call.values)
     if record is None:
         return
@@ -279,7 +281,7 @@ def _service(run: Machine, call: Call) -> None:
 
 @library_class("nav_2d_utils::OdomSubscriber")
 def _odometry(run: Machine, call: Call) -> None:
-    """(node, default topic): the parameter ``odom_topic`` names it."""
+    """Model (node, default topic): the parameter ``odom_topic`` names it."""
     record, texts = node_of(run, call), texts_in(call.values)
     if record is not None:
         topic = read(run, record, literal("odom_topic"), texts[0] if texts else literal("odom"))
@@ -288,7 +290,7 @@ def _odometry(run: Machine, call: Call) -> None:
 
 @node_class("nav2_util::LifecycleNode", "nav2::LifecycleNode")
 def _nav2_lifecycle(run: Machine, call: Call) -> None:
-    """nav2_util/lifecycle_node.hpp: a lifecycle node with a bond to its manager."""
+    """Model nav2_util/lifecycle_node.hpp: a lifecycle node with a bond to its manager."""
     record = become_node(run, call, lifecycle=True)
     for kind in (PUB, SUB):
         run.endpoint(record, kind, literal("bond"), "bond/msg/Status", call)
@@ -299,7 +301,9 @@ def _nav2_lifecycle(run: Machine, call: Call) -> None:
 
 @node_class("rclcpp_components::ComponentManager", "rclcpp_components::ComponentManagerIsolated")
 def _component_manager(run: Machine, call: Call) -> None:
-    """rclcpp_components/component_manager.hpp: (executor, name, options); what it loads is the launch's business."""
+    """Model rclcpp_components/component_manager.hpp: (executor, name, options); what it loads is the launch's
+    business.
+    """
     names = named_in(call.values)
     record = become_node(run, replace(call, values=names[:1] or [literal("ComponentManager")]))
     for name, kind in (("load_node", "LoadNode"), ("unload_node", "UnloadNode"), ("list_nodes", "ListNodes")):

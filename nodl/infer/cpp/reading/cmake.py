@@ -55,7 +55,7 @@ class Build:
 
 
 def read_build(folder: str | None) -> Build:
-    """The build of a package folder; an empty one without ``CMakeLists.txt``."""
+    """Read the build of a package folder; an empty one without ``CMakeLists.txt``."""
     build = Build()
     if folder is not None:
         BuildReader(build).read(folder, {})
@@ -186,7 +186,7 @@ class BuildReader:
             variables[given[1]] = ";".join([*given[2 + (given[0] == "INSERT") :], *before])
 
     def _do_cmake_parse_arguments(self, given: list[str], variables: dict[str, str]) -> None:
-        """``PREFIX options one-value-words multi-value-words arguments...``; empty lists are kept as empty words."""
+        """Parse ``PREFIX options one-value-words multi-value-words arguments...``; empty lists stay empty words."""
         if len(given) < 4:
             return
         prefix, single, several = given[0], given[2].split(";"), given[3].split(";")
@@ -244,7 +244,7 @@ class BuildReader:
             self.read(folder, variables)
 
     def _do_include(self, given: list[str], variables: dict[str, str]) -> None:
-        """A file of the package, or a module in a folder of ``CMAKE_MODULE_PATH``."""
+        """Include a file of the package, or a module in a folder of ``CMAKE_MODULE_PATH``."""
         folders = (".", *variables.get("CMAKE_MODULE_PATH", "").split(";"))
         names = (given[0], f"{given[0]}.cmake")
         paths = (absolute(os.path.join(folder, name), variables) for folder in folders for name in names)
@@ -310,7 +310,7 @@ Command = tuple[str, list[str]]
 
 
 def commands(source: str) -> Iterator[Command]:
-    """Every command with its arguments, parentheses kept as arguments of their own."""
+    """Yield every command with its arguments, parentheses kept as arguments of their own."""
     source = re.sub(r"#\[(=*)\[(?:.|\n)*?\]\1\]|(?<!\\)#[^\n]*", "", source)
     position = 0
     while True:
@@ -348,7 +348,7 @@ class Layer(dict[str, str]):
 
 
 def end_of_block(listed: Sequence[Command], start: int) -> int:
-    """The index of the command that closes the block at ``start``; of the last command if none does."""
+    """Return the index of the command that closes the block at ``start``; of the last command if none does."""
     name = listed[start][0]
     depth = 0
     for index in range(start, len(listed)):
@@ -359,7 +359,7 @@ def end_of_block(listed: Sequence[Command], start: int) -> int:
 
 
 def expand(words: list[str], variables: dict[str, str]) -> list[str]:
-    """Variables filled in; lists become several arguments unless they stand in quotes."""
+    """Fill variables in; lists become several arguments unless they stand in quotes."""
     found: list[str] = []
     for word in words:
         quoted = word.startswith('"')
@@ -373,7 +373,7 @@ def expand(words: list[str], variables: dict[str, str]) -> list[str]:
 
 
 def condition_state(condition: list[str]) -> bool | None:
-    """Whether a condition holds on Linux without tests; ``None`` for all but a few simple ones."""
+    """Decide whether a condition holds on Linux without tests; ``None`` for all but a few simple ones."""
     words = [word.lstrip('"') for word in condition if word not in ("(", ")")]
     written = " ".join(words)
     if written in ("BUILD_TESTING", "CATKIN_ENABLE_TESTING", "WIN32", "APPLE", "MSVC", "ANDROID", "FALSE"):
@@ -384,18 +384,18 @@ def condition_state(condition: list[str]) -> bool | None:
 
 
 def absolute(word: str, variables: dict[str, str]) -> str:
-    """A path as seen from ``CMAKE_CURRENT_SOURCE_DIR``, normalised; an absolute one stays where it is."""
+    """Return a path as seen from ``CMAKE_CURRENT_SOURCE_DIR``, normalised; an absolute one stays where it is."""
     return os.path.normpath(os.path.join(variables.get("CMAKE_CURRENT_SOURCE_DIR", ""), word))
 
 
 def recursive_pattern(pattern: str, how: str) -> str:
-    """For ``GLOB_RECURSE`` the pattern with ``**`` before the file name; else the pattern as it is."""
+    """Return for ``GLOB_RECURSE`` the pattern with ``**`` before the file name; else the pattern as it is."""
     folder, name = os.path.split(pattern)
     return os.path.join(folder, "**", name) if how == "GLOB_RECURSE" else pattern
 
 
 def compile_definitions(words: list[str], only_flags: bool = False) -> dict[str, str]:
-    """Macros with their values, ``1`` by default; with ``only_flags`` only words that start with ``-D``."""
+    """Return macros with their values, ``1`` by default; with ``only_flags`` only words that start with ``-D``."""
     found = {}
     for word in words:
         if word.startswith("-D"):

@@ -261,7 +261,7 @@ class _Collector:
 
 
 def _specialised(name: str, templates: list[str]) -> tuple[str, ...] | None:
-    """The arguments in ``Foo<int>::f`` and ``f<int>``, unless they are the parameters of the template themselves."""
+    """Return the arguments in ``Foo<int>::f`` and ``f<int>``, unless they are the template's own parameters."""
     written = split_type(name)[1] if "operator" not in name else ()
     return (
         None
@@ -275,14 +275,16 @@ def _required(node: Node, name: str) -> Node:
 
 
 def _is_variable(node: Node) -> bool:
-    """``Foo member(1, this);`` reads as a function that takes types named 1 and this."""
+    """Return whether it is a variable: ``Foo member(1, this);`` reads as a function that takes types named 1 and
+    this.
+    """
     declarator = function_declarator(node)
     listed = children(field_of(declarator, "parameters")) if declarator is not None else []
     return any(text(item) in ("this", "*this", "nullptr", "true", "false") for item in listed)
 
 
 def _plain_name(name: str) -> str:
-    """Without template arguments: ``Foo<T>::bar`` is ``Foo::bar``; operators stay whole."""
+    """Strip template arguments: ``Foo<T>::bar`` is ``Foo::bar``; operators stay whole."""
     if "operator" in name:
         return name
     out, depth = [], 0
@@ -294,7 +296,7 @@ def _plain_name(name: str) -> str:
 
 
 def _enumerated(value: Node | None, before: int | None, numbers: Mapping[str, int]) -> int | None:
-    """The number of an enumerator: as written, that of another, else one more than the one before."""
+    """Return the number of an enumerator: as written, that of another, else one more than the one before."""
     if value is None:
         return None if before is None else before + 1
     written = text(value).rstrip("uUlL")
@@ -316,7 +318,7 @@ class DeclaredVariable(NamedTuple):
 
 
 def declared_names(node: Node) -> list[DeclaredVariable]:
-    """The variables of a declaration."""
+    """Return the variables of a declaration."""
     found: list[DeclaredVariable] = []
     values = node.children_by_field_name("default_value") or node.children_by_field_name("value")
     for declarator in node.children_by_field_name("declarator"):

@@ -160,7 +160,7 @@ class FileIndex:
 
 
 def conversion(node: Node) -> Node | None:
-    """The declarator of a conversion operator: ``operator T()``; ``None`` for all else."""
+    """Return the declarator of a conversion operator, ``operator T()``; ``None`` for all else."""
     declarator = field_of(node, "declarator") if node.type == "function_definition" else None
     while declarator is not None and declarator.type == "qualified_identifier":
         declarator = field_of(declarator, "name")
@@ -168,7 +168,7 @@ def conversion(node: Node) -> Node | None:
 
 
 def written_name(node: Node, declarator: Node) -> str:
-    """The name in a function's declarator: ``Foo::bar``, ``Foo::operator bool``."""
+    """Return the name in a function's declarator: ``Foo::bar``, ``Foo::operator bool``."""
     if declarator.type != "operator_cast":
         return text(field_of(declarator, "declarator"))
     whole = text(field_of(node, "declarator"))
@@ -176,7 +176,7 @@ def written_name(node: Node, declarator: Node) -> str:
 
 
 def function_declarator(node: Node) -> Node | None:
-    """The declarator with the parameters; ``None`` for variables, arrays and pointers to functions."""
+    """Return the declarator with the parameters; ``None`` for variables, arrays and pointers to functions."""
     declarator = field_of(node, "declarator")
     while declarator is not None and declarator.type != "function_declarator":
         if declarator.type in ("init_declarator", "array_declarator"):
@@ -191,7 +191,7 @@ def function_declarator(node: Node) -> Node | None:
 
 
 def type_text(node: Node) -> str:
-    """The type as written, on one line, without ``const``, ``&`` and ``*`` around it; may be empty."""
+    """Return the type as written, on one line, without ``const``, ``&`` and ``*`` around it; may be empty."""
     kind = field_of(node, "type")
     if kind is not None and kind.type in BODIES and field_of(kind, "body") is not None:
         return text(field_of(kind, "name")) or unnamed(kind)
@@ -203,12 +203,12 @@ BODIES = ("class_specifier", "struct_specifier", "union_specifier", "enum_specif
 
 
 def unnamed(node: Node) -> str:
-    """A name for a structure without one."""
+    """Make a name for a structure without one."""
     return f"unnamed_{line_of(node)}_{node.start_point[1]}"
 
 
 def parameters_of(declarator: Node, function: Function | None = None) -> list[FunctionParameter]:
-    """Parameters in order, without a lone ``void``; ``...`` or a pack marks ``function`` as variadic."""
+    """Return parameters in order, without a lone ``void``; ``...`` or a pack marks ``function`` as variadic."""
     listed = field_of(declarator, "parameters")
     found = []
     for child in listed.named_children if listed is not None else ():
@@ -229,7 +229,7 @@ def parameters_of(declarator: Node, function: Function | None = None) -> list[Fu
 
 
 def _marks(declarator: Node | None) -> str:
-    """``&`` or ``*`` of a declarator."""
+    """Return ``&`` or ``*`` of a declarator."""
     if declarator is None:
         return ""
     written = text(declarator)
@@ -237,7 +237,7 @@ def _marks(declarator: Node | None) -> str:
 
 
 def template_names(node: Node | None) -> list[str]:
-    """The names of a template's parameters in order, empty for one without."""
+    """Return the names of a template's parameters in order, empty for one without."""
     names = []
     for child in children(node):
         identifiers = [c for c in walk(child) if c.type in ("type_identifier", "identifier")]
@@ -253,7 +253,7 @@ def template_names(node: Node | None) -> list[str]:
 
 
 def template_defaults(node: Node | None) -> dict[str, str]:
-    """The defaults of a template's parameters, by their names."""
+    """Return the defaults of a template's parameters, by their names."""
     found = {}
     for child in children(node):
         default = field_of(child, "default_type") or field_of(child, "default_value")

@@ -31,7 +31,7 @@ class Macro(NamedTuple):
 
 
 def expanded(source: str, macros: Mapping[str, Macro], depth: int = 0) -> str:
-    """``source`` with every use of ``macros`` replaced, on the line where the use begins."""
+    """Replace every use of ``macros`` in ``source``, on the line where the use begins."""
     if not macros or depth > MAX_DEPTH:
         return source
     out: list[str] = []
@@ -56,7 +56,7 @@ def expanded(source: str, macros: Mapping[str, Macro], depth: int = 0) -> str:
 
 
 def _arguments(source: str, position: int) -> tuple[list[str] | None, int]:
-    """The texts between parentheses and the place behind them."""
+    """Return the texts between parentheses and the place behind them."""
     while position < len(source) and source[position].isspace():
         position += 1
     if position >= len(source) or source[position] != "(":
@@ -83,7 +83,7 @@ def _arguments(source: str, position: int) -> tuple[list[str] | None, int]:
 
 
 def _filled(macro: Macro, given: list[str], scanned: list[str]) -> str:
-    """The body with its arguments: as written beside ``#`` and ``##``, else ``scanned`` ([cpp.subst])."""
+    """Fill the body with its arguments: as written beside ``#`` and ``##``, else ``scanned`` ([cpp.subst])."""
     if not macro.parameters:
         return macro.body
     values, expanded_ones = _by_name(macro, given), _by_name(macro, scanned)
@@ -112,7 +112,7 @@ def _quoted(value: str) -> str:
 def decided(
     condition: str, macros: Mapping[str, Macro], complete: bool, has_include: Callable[[str], bool | None]
 ) -> bool | None:
-    """The value of an ``#if``; ``None`` when a symbol in it may be defined where we cannot see it."""
+    """Return the value of an ``#if``; ``None`` if a symbol in it may be defined where we cannot see it."""
     tokens = re.findall(r"[A-Za-z_]\w*|\d+|&&|\|\||[!<>=]=|[()!<>+\-*,./\"]", condition)
     try:
         value = _Condition(tokens, macros, complete, has_include).value()
@@ -197,7 +197,7 @@ class _Condition:
         return 0 if self.complete else None
 
     def _version(self, name: str, given: list[str]) -> int | None:
-        """``RCLCPP_VERSION_GTE(28, 0, 0)``, of the ``version.h`` that ament_generate_version_header() writes."""
+        """Decide ``RCLCPP_VERSION_GTE(28, 0, 0)``, of the ``version.h`` that ament_generate_version_header() writes."""
         wanted = [int(token) for token in given if token.isdigit()]
         if not name.endswith("_VERSION_GTE") or len(wanted) != 3:
             return None

@@ -87,7 +87,7 @@ class Names:
         self.enums |= index.enums
 
     def _attach(self) -> None:
-        """Methods defined outside of their class."""
+        """Attach methods defined outside of their class."""
         self.methods: dict[Class, dict[str, list[Function]]] = {}
         for each in (c for found in self.classes.values() for c in found):
             self.methods[each] = {name: [*found] for name, found in each.methods.items()}
@@ -101,7 +101,7 @@ class Names:
                 _complete(function, self.declared.get(name, ()))
 
     def _class_of_method(self, function: Function) -> Class | None:
-        """The class that a function outside of it names as its owner."""
+        """Return the class that a function outside of it names as its owner."""
         if not function.owner:
             return None
         outer = function.scope[: len(function.scope) - len(function.owner.split("::"))]
@@ -121,7 +121,7 @@ class Names:
 
     @_once
     def _used_namespaces(self, file: str) -> tuple[str, ...]:
-        """Those that ``using namespace`` brings into a file, its headers included."""
+        """Return those that ``using namespace`` brings into a file, its headers included."""
         seen = (self.files[each] for each in sorted(self.visible(file)) if each in self.files)
         return tuple(used for index in seen for used in index.using)
 
@@ -135,7 +135,7 @@ class Names:
 
     @_once
     def spoken_of(self, function: Function) -> frozenset[str]:
-        """The functions, classes and aliases of the program whose names a function mentions."""
+        """Return the functions, classes and aliases of the program whose names a function mentions."""
         return function.words & self._declared_words
 
     @cached_property
@@ -171,7 +171,7 @@ class Names:
                 yield "::".join((*scope[:length], used, name))
 
     def _base_names(self, qualified: str) -> tuple[str, ...]:
-        """The bases of a class by that name: what they declare is visible in it."""
+        """Return the bases of a class by that name: what they declare is visible in it."""
         if qualified not in self._bases:
             self._bases[qualified] = ()  # while the bases themselves are looked up
             found = [
@@ -227,7 +227,7 @@ class Names:
 
     @_once
     def bases(self, cls: Class) -> list[tuple[str, Class | None]]:
-        """The bases as written, with the class where its source is in reach."""
+        """Return the bases as written, with the class if its source is in reach."""
         found = []
         for written in cls.bases:
             kind = self.resolve(written, cls.scope, cls.file)
@@ -240,13 +240,13 @@ class Names:
         return listed[0] if len(listed) == 1 else None
 
     def class_of(self, kind: Type, scope: Scope, file: FileIndex) -> Class | None:
-        """The class of a type, of a template the specialisation for its arguments; doubts are noted."""
+        """Return the class of a type, of a template the specialisation for its arguments; doubts are noted."""
         cls = self.find_class(kind.name, scope, file)
         return cls if cls is None else self.specialisations.meant(cls, kind)
 
     @_once
     def ancestry(self, cls: Class | None) -> list[Class]:
-        """The class and its bases, nearest first; nothing for no class."""
+        """Return the class and its bases, nearest first; nothing for no class."""
         order: list[Class] = []
         waiting = [cls] if cls is not None else []
         while waiting:
@@ -269,7 +269,9 @@ class Names:
         return [d for each in self.ancestry(cls) for d in each.declared.get(name, ())]
 
     def foreign_header(self, name: str, file: FileIndex) -> str:
-        """The header, of a ROS library that nobody has reviewed, that a class may come from; empty if there is none."""
+        """Return the header, of a ROS library nobody has reviewed, that a class may come from; empty if there is
+        none.
+        """
         found = ""
         for each in sorted(self.visible(file.file)):
             index = self.files.get(each)
@@ -287,7 +289,7 @@ class Names:
         return found
 
     def is_of_c(self, name: str, file: FileIndex) -> bool:
-        """Whether a type that is not in reach comes from a header of C that ``file`` includes."""
+        """Return whether a type that is not in reach comes from a header of C that ``file`` includes."""
         seen = (self.files[each].source.foreign for each in self.visible(file.file) if each in self.files)
         return is_of_c(name, [header for foreign in seen for header in foreign])
 
@@ -316,7 +318,7 @@ class Names:
         bindings: Mapping[str, Type] | None = None,
         depth: int = 0,
     ) -> Type:
-        """The type that ``written`` means, aliases followed and template parameters filled in."""
+        """Return the type that ``written`` means, aliases followed and template parameters filled in."""
         key = (file.file, scope, written)
         if not bindings and key in self._types:
             return self._types[key]
@@ -356,7 +358,7 @@ class Names:
 
     @_once
     def is_standard(self, name: str, scope: Scope, file: FileIndex) -> bool:
-        """Whether a name without a namespace is one of ``std``, which ``using namespace std`` brings in."""
+        """Return whether a name without a namespace is one of ``std``, which ``using namespace std`` brings in."""
         own = self.find_class(name, scope, file) is not None or self.alias(name, scope, file) is not None
         return "std" in self._used_namespaces(file.file) and not own
 
@@ -382,7 +384,7 @@ class Names:
         return Type(name, arguments, pointer)
 
     def _used(self, head: str, file: FileIndex) -> str | None:
-        """``msg`` under ``using namespace std_msgs``."""
+        """Resolve ``msg`` under ``using namespace std_msgs``."""
         if head not in ("msg", "srv", "action"):
             return None
         used = self._used_namespaces(file.file)
@@ -390,7 +392,7 @@ class Names:
         return f"{packages[0]}::{head}" if len(packages) == 1 else None
 
     def _member(self, outer: Type, rest: str, pointer: bool, scope: Scope, file: FileIndex) -> Type:
-        """A type named inside of another: ``Foo<T>::SharedPtr``, ``ActionT::Goal``."""
+        """Resolve a type named inside of another: ``Foo<T>::SharedPtr``, ``ActionT::Goal``."""
         if rest in POINTER_MEMBERS:
             return outer._replace(pointer=True)
         cls = self.find_class(outer.name, scope, file)
@@ -410,7 +412,7 @@ def _extend(table: dict[str, list[Declared]], own: Mapping[str, list[Declared]])
 
 
 def _complete(function: Function, declared: Iterable[Function]) -> None:
-    """What only the declaration of a function says: default arguments, ``virtual``, ``override``."""
+    """Add what only the declaration of a function says: default arguments, ``virtual``, ``override``."""
     for each in declared:
         if len(each.parameters) != len(function.parameters):
             continue
@@ -428,7 +430,7 @@ def hidden(names: Names, cls: Class) -> frozenset[str]:
 
 
 def _fixed(names: Names, cls: Class) -> set[str]:
-    """Methods that the class seen at compile time decides, without constructors and destructors."""
+    """Return methods that the class seen at compile time decides, without constructors and destructors."""
     found = [*names.methods.get(cls, {}).items(), *cls.declared.items()]
     virtual = {name for name, listed in found if any(each.virtual for each in listed)}
     return {name for name, _ in found if name != cls.name and not name.startswith("~")} - virtual

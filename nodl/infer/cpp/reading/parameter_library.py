@@ -62,7 +62,7 @@ def listener_of(content: str) -> str:
 def _structure(
     name: str, entries: Mapping[object, object], path: tuple[str, ...], declared: list[str]
 ) -> str:
-    """A ``struct`` with a field for each entry; what the constructor declares goes to ``declared``."""
+    """Make a ``struct`` with a field for each entry; what the constructor declares goes to ``declared``."""
     fields = []
     for key, entry in ((str(key), entry) for key, entry in entries.items()):
         field = key.removeprefix("__map_") + ("_map" if key.startswith("__map_") else "")

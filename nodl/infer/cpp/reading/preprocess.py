@@ -74,7 +74,7 @@ class Preprocessed:
 def preprocess(
     file: str, source: str, symbols: Mapping[str, str], complete: bool, include: Include
 ) -> Preprocessed:
-    """``symbols``: what the build defines; ``complete``: nothing else is defined on the command line."""
+    """Preprocess. ``symbols``: what the build defines; ``complete``: nothing else is defined on the command line."""
     return _Pass(file, symbols, complete, include).run(source)
 
 
@@ -239,7 +239,7 @@ class _Pass:
             self.macros.setdefault(name, macro)
 
     def _tidied(self, source: str) -> str:
-        """Macros expanded; what only the compiler and linker read, such as export macros, blanked."""
+        """Expand macros, and blank what only the compiler and linker read, such as export macros."""
         source = _EXPORT.sub(_blank, source)
         source = _ATTRIBUTE.sub(_blank, source)
         source = _DISAMBIGUATOR.sub(_blank, source)
@@ -251,7 +251,7 @@ class _Pass:
         return match[1] + re.sub(r"[^\n]", " ", whole[len(match[1]) :])
 
     def _bare_macros(self, source: str) -> str:
-        """A macro that stands alone on its line, as ``Q_OBJECT`` does, confuses the grammar."""
+        """Blank macros that stand alone on their line, as ``Q_OBJECT`` does: they confuse the grammar."""
         lines = source.split("\n")
         before = ";"
         for index, line in enumerate(lines):
@@ -272,7 +272,7 @@ class _Pass:
 
 
 def _follows(lines: list[str], index: int) -> bool:
-    """Whether the next text goes on with the same declaration: then it was an attribute."""
+    """Return whether the next text goes on with the same declaration: then it was an attribute."""
     for line in lines[index + 1 :]:
         if line.strip():
             return bool(re.match(r"\s*(?:[a-z_]\w*[\s:<*&]|~|[A-Z]\w*\s*\()", line))
@@ -296,7 +296,7 @@ def _without_comments(source: str) -> str:
 
 
 def _guards_of(lines: list[str]) -> frozenset[str]:
-    """Symbols that guard against a second inclusion: ``#ifndef X`` and, with nothing between, ``#define X``."""
+    """Return symbols that guard against a second inclusion: ``#ifndef X`` and, with nothing between, ``#define X``."""
     words = [line.split() for line in lines if line.strip()]
     return frozenset(
         first[1]

@@ -76,7 +76,7 @@ class Workspace:
         return best
 
     def header(self, name: str, from_file: str, quoted: bool) -> str | None:
-        """The file that ``#include`` means: beside the file, in its package, in others, in the prefixes."""
+        """Return the file that ``#include`` means: beside the file, in its package, in others, in the prefixes."""
         if quoted:
             beside = os.path.normpath(os.path.join(os.path.dirname(from_file), name))
             if os.path.isfile(beside):
@@ -98,7 +98,7 @@ class Workspace:
         return self._generated(name, package, first)
 
     def _generated(self, name: str, *packages: SourcePackage | None) -> str | None:
-        """The file of parameters that generate_parameter_library makes this header of."""
+        """Return the file of parameters that generate_parameter_library makes this header of."""
         target, suffix = os.path.splitext(os.path.basename(name))
         for package in filter(None, (*packages, *self.packages.values())) if suffix == ".hpp" else ():
             if "generate_parameter_library" in package.depends and target in package.build.parameter_files:
@@ -158,7 +158,7 @@ def _defined(words: Sequence[str]) -> dict[str, str]:
 
 
 def find_packages(roots: Iterable[str]) -> dict[str, SourcePackage]:
-    """Every package below ``roots``; folders that colcon would ignore are left out."""
+    """Find every package below ``roots``; folders that colcon would ignore are left out."""
     found: dict[str, SourcePackage] = {}
     for root in roots:
         for folder, folders, names in os.walk(root):
@@ -183,7 +183,7 @@ def read_source_package(folder: str) -> SourcePackage:
 
 
 def plugin_classes(file: str) -> list[PluginClass]:
-    """The classes of a plugin description file; none when it cannot be read."""
+    """Return the classes of a plugin description file; none if it cannot be read."""
     found = []
     for match in _CLASS.finditer(re.sub(r"<!--(?:.|\n)*?-->", "", text_or_nothing(file))):
         values = {m[1]: unescape(m[2] if m[2] is not None else m[3]) for m in _ATTRIBUTE.finditer(match[1])}
@@ -194,7 +194,7 @@ def plugin_classes(file: str) -> list[PluginClass]:
 
 
 def sources_of(target: Target, build: Build) -> list[str]:
-    """The target's own sources and those of the libraries of its package that it links."""
+    """Return the target's own sources and those of the libraries of its package that it links."""
     order, waiting = [target.name], [target]
     while waiting:
         current = waiting.pop()

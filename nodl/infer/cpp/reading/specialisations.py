@@ -26,7 +26,7 @@ class Specialisations:
             self._of.setdefault(each.qualified, []).append(each)
 
     def of_method(self, cls: Class, function: Function) -> Class:
-        """The specialisation of ``cls`` whose method this is; else the class itself."""
+        """Return the specialisation of ``cls`` whose method this is; else the class itself."""
         listed = self._of.get(cls.qualified, ())
         found = next((c for c in listed if c.specialises == function.specialises), None)
         if found is not None:
@@ -34,11 +34,11 @@ class Specialisations:
         return found or cls
 
     def meant(self, cls: Class, kind: Type) -> Class:
-        """Of the template ``cls`` the class for the arguments of ``kind``; a doubt is noted."""
+        """Return, of the template ``cls``, the class for the arguments of ``kind``; a doubt is noted."""
         return self._chosen(cls, kind) if cls.qualified in self._of else cls
 
     def bindings(self, cls: Class, kind: Type) -> dict[str, Type]:
-        """What the parameters of the template ``cls`` stand for."""
+        """Return what the parameters of the template ``cls`` stand for."""
         return self._with_defaults(cls, kind) if cls.specialises is None else {}
 
     def _with_defaults(self, cls: Class, kind: Type) -> dict[str, Type]:
@@ -48,7 +48,7 @@ class Specialisations:
         return bound
 
     def _chosen(self, cls: Class, kind: Type) -> Class:
-        """The explicit specialisation for these very arguments, else the template; any other is a doubt."""
+        """Return the explicit specialisation for these very arguments, else the template; any other is a doubt."""
         listed, names = self._of[cls.qualified], self._names
         same = [c for c in names.classes[cls.name] if c.qualified == cls.qualified and not c.specialises]
         primary = same[0] if same else cls

@@ -61,9 +61,9 @@ def split_type(written: str) -> tuple[str, tuple[str, ...], str, bool]:
 
 
 def ros_type(kind: Type) -> str:
-    """``std_msgs::msg::String`` as ``std_msgs/msg/String``; empty for what is not an interface type.
+    """Return ``std_msgs::msg::String`` as ``std_msgs/msg/String``; empty for what is not an interface type.
 
-    Where generated headers are in reach the name leads to their template, ``String_<...>`` (rosidl_generator_cpp).
+    If generated headers are in reach the name leads to their template, ``String_<...>`` (rosidl_generator_cpp).
     """
     steps = kind.name.split("::")
     if len(steps) == 3 and steps[1] in ("msg", "srv", "action") and steps[2]:

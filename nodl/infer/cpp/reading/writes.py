@@ -34,7 +34,7 @@ class Writes(NamedTuple):
 
 
 def writes_of(node: Node) -> Writes:
-    """What the code below ``node`` may change itself."""
+    """Return what the code below ``node`` may change itself."""
     changed: set[str] = set()
     replaced: set[str] = set()
     for each in walk(node):
@@ -53,7 +53,7 @@ def _replaced(node: Node) -> set[str]:
 
 
 def _words_of(node: Node) -> set[str]:
-    """The variables that ``node`` itself may change."""
+    """Return the variables that ``node`` itself may change."""
     if node.type == "assignment_expression":
         return _in(field_of(node, "left"))
     if node.type == "update_expression":
@@ -83,7 +83,7 @@ def _called(node: Node) -> set[str]:
 
 
 def _is_alias(node: Node) -> bool:
-    """A reference or pointer that is not to a constant."""
+    """Return whether it is a reference or pointer that is not to a constant."""
     return "const" not in text(field_of(node, "type")) and any(
         each.type in ("reference_declarator", "pointer_declarator")
         or (each.type == "init_declarator" and text(each)[:1] in "&*")

@@ -45,7 +45,7 @@ def _divided(left: Any, right: Any) -> Any:
 
 
 def _subtracted(left: Any, right: Any) -> Any:
-    """Of sizes and other unsigned numbers it is a large one: below zero is not certain."""
+    """Subtract; below zero is not certain: of sizes and other unsigned numbers it is a large one."""
     if isinstance(left, int) and isinstance(right, int) and 0 <= left < right:
         raise OverflowError
     return left - right
@@ -60,7 +60,7 @@ _ARITHMETIC: dict[str, Callable[[Any, Any], Any]] = {
 
 
 def arithmetic(operator: str, left: object, right: object) -> Value:
-    """``left operator right`` of two numbers, or the order of two texts."""
+    """Compute ``left operator right`` of two numbers, or the order of two texts."""
     if not isinstance(left, int | float) or not isinstance(right, int | float):
         return unknown("a computed value")
     try:
@@ -73,8 +73,10 @@ def arithmetic(operator: str, left: object, right: object) -> Value:
 
 
 def added(left: Value, right: Value) -> Value:
-    """``left + right`` where one is a text: put together. Beside a number a text is a pointer that moves on; one
-    letter may be a ``char``, which is a number itself."""
+    """Compute ``left + right``; if one is a text they are put together.
+
+    Beside a number a text is a pointer that moves on; one letter may be a ``char``, which is a number itself.
+    """
     if not any(isinstance(atom, int | float | Const) or _is_number(atom) for atom in (*left, *right)):
         return concatenated(left, right)
     return join(*(_sum(first, second) for first in left for second in right)) or unknown("a computed value")
@@ -92,12 +94,12 @@ def _sum(left: object, right: object) -> Value:
 
 
 def _is_number(atom: object) -> bool:
-    """A parameter whose default is a number."""
+    """Return whether it is a parameter whose default is a number."""
     return isinstance(atom, Param) and any(isinstance(each, int | float) for each in atom.default)
 
 
 def as_type(name: str, value: Value) -> Value:
-    """``value`` as a variable of this fundamental type holds it; of other types it is as it was."""
+    """Return ``value`` as a variable of this fundamental type holds it; of other types as it was."""
     bounds = _RANGES.get(name)
     if bounds is None:
         as_float = name in ("double", "float")

@@ -83,7 +83,7 @@ def assignment(run: Machine, node: Node, frame: Frame) -> Value:
 
 
 def _points_elsewhere(run: Machine, name: Node, value: Value, frame: Frame) -> None:
-    """``p = &x``: of a plain value what the pointer shows from now on is not known."""
+    """Run ``p = &x``: what a pointer to a plain value shows from now on is not known."""
     owner = frame.owner_of(text(name))
     if owner is not None and text(name) in owner.aliases:
         owner.aliases[text(name)] = None
@@ -92,7 +92,7 @@ def _points_elsewhere(run: Machine, name: Node, value: Value, frame: Frame) -> N
 
 
 def _assigned(run: Machine, targets: Sequence[Obj], value: Value, node: Node, frame: Frame) -> bool:
-    """``object = value``: by the operator of its class, else member by member; whether that could be done."""
+    """Run ``object = value``, by the operator of its class, else member by member; return whether that could be done."""
     from nodl.infer.cpp.running.invocation import call_methods
 
     for target in targets:
@@ -108,7 +108,7 @@ def _assigned(run: Machine, targets: Sequence[Obj], value: Value, node: Node, fr
 
 
 def object_class(run: Machine, left: Node, frame: Frame) -> Class | None:
-    """The class of what an object is assigned to; ``None`` where a pointer is assigned, or that is not known."""
+    """Return the class of what an object is assigned to; ``None`` if a pointer is assigned, or that is not known."""
     inner = unwrapped(left)
     if inner is None:
         return None
@@ -128,7 +128,7 @@ def _combined(operator: str, before: Value, value: Value) -> Value:
 
 
 def _as_declared(run: Machine, left: Node, value: Value, frame: Frame) -> Value:
-    """A number as the type of the variable holds it."""
+    """Return a number as the type of the variable holds it."""
     if not any(isinstance(atom, int | float) for atom in value):
         return value
     kind, pointer = declared_type(run, left, frame)
@@ -161,7 +161,7 @@ def assign(run: Machine, target: Node, value: Value, frame: Frame) -> None:
 
 
 def _assign_result(run: Machine, call: Node, value: Value, frame: Frame) -> None:
-    """``f() = x``: an option or element of a known library; else what is written is not known."""
+    """Run ``f() = x``: an option or element of a known library; else what is written is not known."""
     from nodl.infer.cpp.libraries import LIBRARY_METHODS, Call
 
     function = field_of(call, "function")
@@ -190,21 +190,21 @@ _TEMPORARY = re.compile(r"std::(?:string|vector<[^()]*>)\(")
 
 
 def _gives_reference(run: Machine, callee: Node | None) -> bool:
-    """Whether a function of the program gives a reference."""
+    """Return whether a function of the program gives a reference."""
     listed = run.names.functions_by_name.get(text(callee).partition("<")[0].rpartition("::")[2], ())
     declarators = [field_of(each.node, "declarator") for each in listed]
     return any(each is not None and each.type == "reference_declarator" for each in declarators)
 
 
 def _one_of(atom: object, value: Value) -> object:
-    """A container one of whose elements is written."""
+    """Return a container after one of its elements, it is not known which, was written."""
     if isinstance(atom, Seq):
         return open_sequence((*atom.items, value))
     return atom._replace(open=True) if isinstance(atom, Map) else Unknown("a text whose letters are written")
 
 
 def _through_pointer(run: Machine, pointer: Node, value: Value, frame: Frame) -> None:
-    """``*p = x`` where ``p`` is an iterator, or a pointer of which nobody knows to what."""
+    """Run ``*p = x`` where ``p`` is an iterator, or a pointer of which nobody knows to what."""
     kind, owner = declared_type(run, pointer, frame)[0], frame.owner_of(text(pointer))
     if owner is None or kind.pointer or text(pointer) in owner.aliases:
         return
@@ -268,7 +268,7 @@ def _assign_field(run: Machine, node: Node, value: Value, frame: Frame) -> None:
 
 
 def _assign_half(run: Machine, node: Node, owners: Value, name: str, value: Value, frame: Frame) -> None:
-    """``pair.first = x``; through an iterator it is not known whose entry is written."""
+    """Run ``pair.first = x``; through an iterator it is not known whose entry is written."""
     argument = field_of(node, "argument")
     if not is_plain(value):
         return
@@ -300,7 +300,7 @@ def _assign_element(run: Machine, node: Node, value: Value, frame: Frame) -> Non
 
 
 def with_entry(atom: Map, key: Value, value: Value) -> Map:
-    """``map[key] = value``: of a key that is certainly the same the entry is replaced."""
+    """Run ``map[key] = value``: of a key that is certainly the same the entry is replaced."""
     certain = len(key) == 1 and not isinstance(key[0], Unknown) and _is_one_text(key[0])
     kept = tuple(entry for entry in atom.entries if not (certain and entry[0] == key))
     definite = len(key) == 1 and plain(key[0]) is not None
@@ -308,7 +308,7 @@ def with_entry(atom: Map, key: Value, value: Value) -> Map:
 
 
 def _is_one_text(atom: object) -> bool:
-    """Whether it has the same value wherever it stands: a literal, a parameter, a text of those."""
+    """Return whether it has the same value wherever it stands: a literal, a parameter, a text of those."""
     if isinstance(atom, Text):
         return not any(isinstance(part, UnknownPart) for part in atom.parts)
     return isinstance(atom, Param | bool | int | float)

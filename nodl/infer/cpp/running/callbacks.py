@@ -59,7 +59,7 @@ class _Rounds:
 
 
 def run_callbacks(run: Machine) -> None:
-    """A lifecycle node is configured, then activated, before anything else that its transitions have prepared."""
+    """Configure a lifecycle node, then activate it, before anything else that its transitions have prepared."""
     rounds = _Rounds(run)
     run.calls_back = True
     for name in HOOKS[:2]:
@@ -80,7 +80,7 @@ def run_callbacks(run: Machine) -> None:
 
 
 def _round(rounds: _Rounds) -> bool:
-    """Every callback once, without those that would do what they did before; whether any ran."""
+    """Run every callback once, without those that would do what they did before; return whether any ran."""
     ran = False
     for key, (atom, frame) in list(rounds.run.callbacks.items()):
         ran |= _call(rounds, key, atom, frame)
@@ -121,7 +121,7 @@ def _call(rounds: _Rounds, key: Key, atom: object, frame: Frame, certainly: bool
 
 
 def _unsettle(rounds: _Rounds, atom: object) -> bool:
-    """What a callback may change that was not followed is not known; whether that is news."""
+    """Forget what a callback may change that was not followed; return whether that is news."""
     store, writes, news = rounds.run.store, _writes(rounds, atom), False
     for cell in rounds.read:
         if cell[1] not in writes.changed:
@@ -149,7 +149,7 @@ def _run(run: Machine, atom: object, frame: Frame, certainly: bool) -> None:
 
 
 def _matters(rounds: _Rounds, atom: object) -> bool:
-    """Whether it may make an interface, or change what a callback that runs has read."""
+    """Return whether it may make an interface, or change what a callback that runs has read."""
     return _makes(rounds.run, atom) or not rounds.names_read.isdisjoint(_writes(rounds, atom).changed)
 
 
@@ -160,7 +160,7 @@ def _makes(run: Machine, atom: object) -> bool:
 
 
 def _writes(rounds: _Rounds, atom: object) -> Writes:
-    """Of the callback, and of whatever it may call."""
+    """Return what the callback, and whatever it may call, writes."""
     run = rounds.run
     if not isinstance(atom, Lambda | Bound):
         return Writes(frozenset(), frozenset())
@@ -181,7 +181,7 @@ def _written(function: Function) -> Writes:
 
 
 def _widen(run: Machine, mark: int, give_up: bool) -> None:
-    """Lists that grow lose their order and length; in the end what still changes is not known."""
+    """Widen lists that grow: they lose their order and length; in the end what still changes is not known."""
     earlier = run.store.before(mark)
     for cell, value in run.store.changes(mark).items():
         before = earlier[cell]
@@ -195,7 +195,7 @@ def _widen(run: Machine, mark: int, give_up: bool) -> None:
 
 
 def _settled(atom: object, before: Value) -> Value:
-    """What is not known any more: a text or number that is new, also within a list or map."""
+    """Replace a text or number that is new by one that is not known, also within a list or map."""
     if atom in before:
         return (atom,)
     if isinstance(atom, Text | int | float):
@@ -209,7 +209,7 @@ def _settled(atom: object, before: Value) -> Value:
 
 
 def _find_overrides(run: Machine) -> None:
-    """Destructors, and what a base in a library calls: overrides of classes whose base is not in reach."""
+    """Call destructors, and what a base in a library calls: overrides of classes whose base is not in reach."""
     for obj in list(run.objects.values()):
         if obj.cls is None:
             continue
@@ -230,7 +230,7 @@ _PLAIN_NODES = frozenset({"rclcpp::Node", "rclcpp_lifecycle::LifecycleNode"})
 
 
 def _library_bases(run: Machine, cls: Class) -> set[str]:
-    """The bases whose source is not in reach, but for those of the standard library."""
+    """Return the bases whose source is not in reach, but for those of the standard library."""
     names = run.names
     outside = [
         names.resolve(written, each.scope, each.file).name

@@ -91,7 +91,7 @@ def _cast(run: Machine, name: str, site: CallSite) -> Value:
 
 
 def _own_method(run: Machine, name: str, site: CallSite) -> Value | None:
-    """``f()`` and ``Base::f()`` inside of a class; ``None`` if the class has no such method."""
+    """Call ``f()`` and ``Base::f()`` inside of a class; ``None`` if the class has no such method."""
     this, frame = current_object(site.frame), site.frame
     if this is None:
         return None
@@ -154,7 +154,7 @@ def _free_call(run: Machine, name: str, site: CallSite) -> Value:
 
 
 def _made_or_unknown(run: Machine, name: str, qualified: str, site: CallSite) -> Value:
-    """``Foo(...)``, ``Foo::make_shared(...)``, ``Foo::f(...)``, else a variable, else nobody knows what."""
+    """Evaluate ``Foo(...)``, ``Foo::make_shared(...)``, ``Foo::f(...)``, else a variable, else nobody knows what."""
     frame, (head, _, last) = site.frame, qualified.rpartition("::")
     if last in ("make_shared", "make_unique", "create") and head:
         made_value = _static_maker(run, head, last, site)
@@ -192,7 +192,7 @@ def _qualified(run: Machine, name: str, frame: Frame) -> str:
 
 
 def _static_maker(run: Machine, head: str, last: str, site: CallSite) -> Value | None:
-    """``rclcpp::Node::make_shared(...)``: as ``std::make_shared<rclcpp::Node>(...)``."""
+    """Evaluate ``rclcpp::Node::make_shared(...)`` as ``std::make_shared<rclcpp::Node>(...)``."""
     kind = run.type_of(head, site.frame)
     own = run.names.find_methods(run.class_of(kind, site.frame), last)
     if own or (last == "create" and kind.name not in LIBRARY_CLASSES):

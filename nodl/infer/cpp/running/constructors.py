@@ -39,7 +39,7 @@ def construct(
     heap: bool = False,
     members: Mapping[str, Value] | None = None,
 ) -> Value:
-    """An object of ``kind``: by its source, by the table of libraries, or one of which nothing is known."""
+    """Make an object of ``kind``: by its source, by the table of libraries, or one of which nothing is known."""
     cls = run.class_of(kind, frame)
     if cls is None and kind.name in SEQUENCES | MAPS and not arguments:
         run.handle(node, frame)
@@ -74,7 +74,7 @@ def construct(
 
 
 def _unmodelled(run: Machine, kind: Type, node: Node, frame: Frame, deliberate: bool) -> None:
-    """A class that is neither in reach nor in the table may be a node or make one.
+    """Make an object of a class that is neither in reach nor in the table: it may be a node or make one.
 
     ``deliberate``: it is made with arguments or with new, as structures of C are not.
     """
@@ -173,7 +173,7 @@ def construct_class(
 
 
 def _made_unseen(run: Machine, cls: Class, arguments: Sequence[Value], node: Node, frame: Frame) -> None:
-    """No constructor in reach takes these arguments: they copy an object, or what becomes of them is not known."""
+    """Make an object though no constructor in reach takes these arguments: a copy, or one that is not known."""
     if cls.name in cls.declared:
         whom = f"the constructor of {cls.name}, whose source is not in reach"
         handed_over(run, whom, arguments, node, frame)
@@ -185,7 +185,7 @@ def _made_unseen(run: Machine, cls: Class, arguments: Sequence[Value], node: Nod
 def _written_arguments(
     run: Machine, constructor: Function, arguments: Sequence[Value], inner: Frame, node: Node, frame: Frame
 ) -> None:
-    """A constructor that writes to a text or list of its caller through a reference is not followed."""
+    """Add a gap if a constructor writes to a text or list of its caller through a reference."""
     for parameter, value in zip(constructor.parameters, arguments, strict=False):
         after = run.store.get((inner, parameter.name)) or BOTTOM
         changed = is_written_back(parameter) and set(after) != set(value)
@@ -195,13 +195,13 @@ def _written_arguments(
 
 
 def is_written_back(parameter: FunctionParameter) -> bool:
-    """Whether what a function writes to the parameter shows in its caller."""
+    """Return whether what a function writes to the parameter shows in its caller."""
     marked = parameter.type.rstrip().endswith(("&", "*"))
     return marked and "const" not in parameter.type.split() and bool(parameter.name)
 
 
 def _is_delegate(cls: Class, written: str) -> bool:
-    """Whether an initialiser names the class itself, not a base or member of the same last name."""
+    """Return whether an initialiser names the class itself, not a base or member of the same last name."""
     plain = written.partition("<")[0]
     if plain.rpartition("::")[2] != cls.name or cls.name in cls.fields:
         return False
@@ -247,7 +247,7 @@ def _alias_initialiser(
 def _foreign_base(
     run: Machine, this: Obj, cls: Class, kind: Type, values: Sequence[Value], node: Node, frame: Frame
 ) -> None:
-    """A base whose source is not in reach: of a node, of a library that is known, or a gap."""
+    """Make a base whose source is not in reach: of a node, of a library that is known, or a gap."""
     this.foreign_base = kind.name
     model = LIBRARY_CLASSES.get(kind.name)
     if model is not None:
@@ -281,7 +281,7 @@ def _members(run: Machine, this: Obj, cls: Class, given: dict[str, Node], inner:
 
 
 def _member(run: Machine, member: Field, kind: Type, value: Node | None, frame: Frame) -> Value:
-    """What a member holds at first: of its initialiser, else as it is declared."""
+    """Return what a member holds at first: of its initialiser, else as it is declared."""
     if value is None:
         if kind.pointer:
             return BOTTOM
@@ -295,7 +295,7 @@ def _member(run: Machine, member: Field, kind: Type, value: Node | None, frame: 
 
 
 def bind_parameters(run: Machine, function: Function, arguments: Sequence[Value], inner: Frame) -> None:
-    """Each parameter gets its argument, a copy unless ``&`` or ``*``; else its default or an unknown."""
+    """Give each parameter its argument, a copy unless ``&`` or ``*``; else its default or an unknown."""
     inner.function = function
     for index, parameter in enumerate(function.parameters):
         if index < len(arguments):
@@ -315,7 +315,7 @@ def bind_parameters(run: Machine, function: Function, arguments: Sequence[Value]
 
 
 def as_parameter(run: Machine, parameter: FunctionParameter, value: Value, node: Node, inner: Frame) -> Value:
-    """An argument as its parameter has it: an object of the parameter's class unless it is a reference or pointer."""
+    """Return an argument as its parameter has it: an object of its class unless it is a reference or pointer."""
     if parameter.type.rstrip().endswith(("&", "*")):
         return value
     return copied(run, value, node, inner, _class_of_parameter(run, parameter, value, inner))
@@ -324,7 +324,7 @@ def as_parameter(run: Machine, parameter: FunctionParameter, value: Value, node:
 def _class_of_parameter(
     run: Machine, parameter: FunctionParameter, value: Value, inner: Frame
 ) -> Class | None:
-    """The class of a parameter that is an object, where an object is given."""
+    """Return the class of a parameter that is an object, if an object is given."""
     if not any(isinstance(atom, Obj) and atom.cls is not None for atom in value):
         return None
     if inner.function is not None and not {*re.findall(r"\w+", parameter.type)}.isdisjoint(

@@ -35,7 +35,7 @@ from nodl.infer.cpp.syntax import children, text
 
 
 def is_standard(name: str) -> bool:
-    """Methods of containers, texts and pointers, which every other class may also have."""
+    """Return whether it is a method of containers, texts and pointers, which every other class may also have."""
     return name in CONTAINER_METHODS or name in _COMMON
 
 
@@ -56,7 +56,7 @@ CONTAINER_METHODS = frozenset({
 
 
 def container_call(run: Machine, atom: object, name: str, site: CallSite) -> Value:
-    """A method of a text or container."""
+    """Call a method of a text or container."""
     if name in _ADDING and isinstance(atom, Seq | Unknown):
         return _added(run, atom, name, site)
     values = site.values
@@ -121,13 +121,13 @@ def _added(run: Machine, atom: object, name: str, site: CallSite) -> Value:
 
 
 def _is_begin(site: CallSite) -> bool:
-    """``x.insert(x.begin(), ...)``."""
+    """Return whether it is ``x.insert(x.begin(), ...)``."""
     start = re.sub(r"\s", "", text(site.given[0])) if site.given else ""
     return start in (f"{text(site.receiver)}.begin()", f"{text(site.receiver)}.cbegin()")
 
 
 def _inserted(run: Machine, atom: object, source: Value, site: CallSite) -> Value:
-    """``a.insert(a.end(), b.begin(), b.end())``."""
+    """Run ``a.insert(a.end(), b.begin(), b.end())``."""
     items = [item for each in source for item in items_of(run, each)[0]]
     exact = isinstance(atom, Seq) and all(items_of(run, each)[1] for each in source)
     longer = (*(atom.items if isinstance(atom, Seq) else ((atom,),)), *items)
@@ -174,7 +174,7 @@ def _map_call(run: Machine, atom: Map, name: str, site: CallSite) -> Value:
 
 
 def _new_entry(run: Machine, site: CallSite) -> tuple[Value, Value]:
-    """Key and value of ``emplace(key, arguments of the value ...)``."""
+    """Return key and value of ``emplace(key, arguments of the value ...)``."""
     key, *rest = site.values
     if len(rest) > 1 and any(isinstance(a, Group) for v in rest for a in v):  # std::piecewise_construct
         return unknown("a key"), unknown("an element that is made of pieces")
@@ -188,7 +188,7 @@ def _new_entry(run: Machine, site: CallSite) -> tuple[Value, Value]:
 
 
 def _entered(atom: Map, key: Value, value: Value, replace: bool) -> Map:
-    """A key that a map already has keeps its value, unless that is to be replaced."""
+    """Enter a pair: a key that a map already has keeps its value, unless that is to be replaced."""
     if replace or _is_missing(atom, key):
         return with_entry(atom, key, value)
     if _is_definite(atom, key):
@@ -203,7 +203,7 @@ def _without(atom: Map, key: Value) -> Map:
 
 
 def _is_definite(atom: Map, key: Value) -> bool:
-    """Whether it is certain which entry has this key, or that none has."""
+    """Return whether it is certain which entry has this key, or that none has."""
     return (
         not atom.open
         and len(key) == 1
@@ -213,7 +213,7 @@ def _is_definite(atom: Map, key: Value) -> bool:
 
 
 def _is_missing(atom: Map, key: Value) -> bool:
-    """Whether a map certainly has no such key."""
+    """Return whether a map certainly has no such key."""
     return _is_definite(atom, key) and all(known != key for known, _ in atom.entries)
 
 
@@ -252,7 +252,7 @@ def _sequence_call(run: Machine, atom: Seq | Group, name: str, site: CallSite) -
 
 
 def _rearranged(atom: Seq | Group, name: str, site: CallSite) -> Seq | None:
-    """What a method that changes a list leaves of it; ``None`` for one that does not."""
+    """Return what a method that changes a list leaves of it; ``None`` for one that does not."""
     exact, items, values = isinstance(atom, Group) or not atom.open, atom.items, site.values
     first = values[0] if values else BOTTOM
     if name == "clear":

@@ -26,7 +26,7 @@ from nodl.infer.cpp.syntax import Node
 
 
 def nodes_in(value: Value) -> list[Obj]:
-    """The nodes (or interfaces of nodes) that ``value`` may be or hold in plain containers."""
+    """Return the nodes (or interfaces of nodes) that ``value`` may be or hold in plain containers."""
     found: list[Obj] = []
     for atom in value:
         if isinstance(atom, Obj) and atom.node is not None:
@@ -57,7 +57,7 @@ def handed_over(
 
 
 def copied(run: Machine, value: Value, node: Node, frame: Frame, cls: Class | None = None) -> Value:
-    """Structures are copied by value; nodes, pointers and all else stay who they are.
+    """Copy structures by value; nodes, pointers and all else stay who they are.
 
     Into an object of ``cls`` goes of a derived class what it has of ``cls`` (slicing), also from behind a pointer.
     """
@@ -95,7 +95,7 @@ def _copy(run: Machine, atom: object, node: Node, frame: Frame, cls: Class | Non
 
 
 def _member_copied(run: Machine, cls: Class, name: str, value: Value, node: Node, frame: Frame) -> Value:
-    """A member as a copy has it: objects within are copied too, those that it points to are not."""
+    """Return a member as a copy has it: objects within are copied too, those that it points to are not."""
     field = cls.fields[name]
     kind = run.names.resolve(field.type, cls.scope, cls.file)
     if field.static or field.pointer or kind.pointer:
@@ -106,7 +106,7 @@ def _member_copied(run: Machine, cls: Class, name: str, value: Value, node: Node
 
 
 def elements_copied(run: Machine, kind: Type, value: Value, node: Node, frame: Frame) -> Value:
-    """A container of type ``kind`` as a copy has it: its elements are copied unless they are pointers."""
+    """Return a container of type ``kind`` as a copy has it: its elements are copied unless they are pointers."""
     if not kind.arguments or kind.arguments[-1].pointer:
         return value
     return tuple(_elements_copied(run, atom, node, frame) for atom in value)
@@ -121,14 +121,14 @@ def _elements_copied(run: Machine, atom: object, node: Node, frame: Frame) -> ob
 
 
 def _takes_another(constructor: Function) -> bool:
-    """Whether it copies or moves an object of its class."""
+    """Return whether it copies or moves an object of its class."""
     given = [each for each in constructor.parameters if each.default is None]
     words = re.findall(r"\w+", given[0].type) if len(given) == 1 else []
     return constructor.name in words and "&" in given[0].type
 
 
 def overwrite(run: Machine, targets: Sequence[Obj], value: Value) -> None:
-    """``object = other``: the object has the members of the other one then; or may have, of several objects."""
+    """Run ``object = other``: it has the members of the other one then; or may have, of several objects."""
     others = [atom for atom in value if isinstance(atom, Obj) and atom.cls is not None]
     for target in targets:
         for each in run.names.ancestry(target.cls):
@@ -141,7 +141,7 @@ def overwrite(run: Machine, targets: Sequence[Obj], value: Value) -> None:
 
 
 def iterated(run: Machine, subject: Value) -> tuple[list[Value], bool]:
-    """What a loop over ``subject`` goes through; whether that is exactly known."""
+    """Return what a loop over ``subject`` goes through, and whether that is exactly known."""
     if len(subject) == 1:
         items, exact = items_of(run, subject[0])
         return items, exact
@@ -150,7 +150,7 @@ def iterated(run: Machine, subject: Value) -> tuple[list[Value], bool]:
 
 
 def items_of(run: Machine, atom: object) -> tuple[list[Value], bool]:
-    """Items of a container or list parameter, and whether exactly these; one unknown item for all else."""
+    """Return items of a container or list parameter, and whether exactly these; one unknown item for all else."""
     if isinstance(atom, Seq):
         return list(atom.items), not atom.open
     if isinstance(atom, Map):
@@ -164,7 +164,7 @@ def items_of(run: Machine, atom: object) -> tuple[list[Value], bool]:
 
 
 def parameter_items(run: Machine, atom: Param) -> tuple[list[Value], bool]:
-    """The elements of a list that a parameter gives: those of the launch file, else of its default."""
+    """Return the elements of a list that a parameter gives: those of the launch file, else of its default."""
     given = given_by_launch(run, atom.record, atom.name)
     if isinstance(given, list | tuple):
         return [(Param(atom.record, atom.name, i, literal(str(each))),) for i, each in enumerate(given)], True

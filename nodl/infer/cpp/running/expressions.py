@@ -20,7 +20,7 @@ _ESCAPES = {"n": "\n", "t": "\t", "\\": "\\", '"': '"', "'": "'", "0": "\0", "r"
 
 @expression("string_literal")
 def string_literal(run: Machine, node: Node, frame: Frame) -> Value:
-    """The text between the quotes with its escapes resolved; a prefix like ``u8`` is dropped."""
+    """Return the text between the quotes with its escapes resolved; a prefix like ``u8`` is dropped."""
     whole = text(node)
     inner = whole[whole.find('"') + 1 : -1]
     return literal(re.sub(r"\\(x[0-9a-fA-F]+|[0-7]{1,3}|u[0-9a-fA-F]{4}|.)", lambda m: _escaped(m[1]), inner))
@@ -36,19 +36,19 @@ def _escaped(written: str) -> str:
 
 @expression("raw_string_literal")
 def raw_string(run: Machine, node: Node, frame: Frame) -> Value:
-    """The text between the outer parentheses, backslashes as they are."""
+    """Return the text between the outer parentheses, backslashes as they are."""
     return literal(text(node).partition("(")[2].rpartition(")")[0])
 
 
 @expression("concatenated_string")
 def concatenated_string(run: Machine, node: Node, frame: Frame) -> Value:
-    """Adjacent literals as one text; a macro name between them may become an unknown part of it."""
+    """Join adjacent literals to one text; a macro name between them may become an unknown part of it."""
     return concatenated(*(run.evaluate(child, frame) for child in children(node)))
 
 
 @expression("user_defined_literal")
 def user_defined(run: Machine, node: Node, frame: Frame) -> Value:
-    """Texts with the suffix ``s`` or ``sv``; any other suffix, such as ``ms``, makes an unknown."""
+    """Return texts with the suffix ``s`` or ``sv``; any other suffix, such as ``ms``, makes an unknown."""
     inner = children(node)
     suffix = text(inner[-1]) if len(inner) > 1 else ""
     plain = suffix in ("s", "sv") and inner[0].type.endswith("string_literal")
@@ -57,14 +57,14 @@ def user_defined(run: Machine, node: Node, frame: Frame) -> Value:
 
 @expression("char_literal")
 def character(run: Machine, node: Node, frame: Frame) -> Value:
-    """The letter as a text, with simple escapes such as that for a newline resolved."""
+    """Return the letter as a text, with simple escapes such as that for a newline resolved."""
     inner = text(node)[1:-1]
     return literal(_ESCAPES.get(inner[1:], inner[1:]) if inner.startswith("\\") else inner)
 
 
 @expression("number_literal")
 def number(run: Machine, node: Node, frame: Frame) -> Value:
-    """An integer where the digits make one, else a float ([lex.icon], [lex.fcon]); unknown if they make neither."""
+    """Return an integer if the digits make one, else a float ([lex.icon], [lex.fcon]); unknown if they make neither."""
     written = text(node).replace("'", "").lower()
     digits, hexadecimal = written.rstrip("ulz"), written.startswith("0x")
     octal = digits.isdigit() and digits.startswith("0")
@@ -77,19 +77,19 @@ def number(run: Machine, node: Node, frame: Frame) -> Value:
 
 @expression("true", "false")
 def boolean(run: Machine, node: Node, frame: Frame) -> Value:
-    """``true`` and ``false`` as a Python ``bool``."""
+    """Return ``true`` and ``false`` as a Python ``bool``."""
     return (node.type == "true",)
 
 
 @expression("null", "nullptr")
 def null(run: Machine, node: Node, frame: Frame) -> Value:
-    """No alternative at all: a null pointer adds nothing to what a variable may be."""
+    """Return no alternative at all: a null pointer adds nothing to what a variable may be."""
     return BOTTOM
 
 
 @expression("this")
 def this(run: Machine, node: Node, frame: Frame) -> Value:
-    """The object whose method runs; in a lambda that of the function around it; unknown outside of both."""
+    """Return the object whose method runs; in a lambda that of the function around it; unknown outside of both."""
     owner: Frame | None = frame
     while owner is not None and owner.this is None:
         owner = owner.outer
@@ -98,13 +98,13 @@ def this(run: Machine, node: Node, frame: Frame) -> Value:
 
 @expression("parenthesized_expression", "condition_clause", "dependent_name", "init_statement")
 def inside(run: Machine, node: Node, frame: Frame) -> Value:
-    """Parentheses, a condition: the value of the expression in them."""
+    """Evaluate parentheses, a condition: the value of the expression in them."""
     return run.evaluate(unwrapped(node), frame)
 
 
 @expression("parameter_pack_expansion")
 def expansion(run: Machine, node: Node, frame: Frame) -> Value:
-    """``args...``: the value of the expression before the dots."""
+    """Evaluate ``args...``: the value of the expression before the dots."""
     return run.evaluate(node.named_children[0], frame)
 
 
@@ -122,13 +122,13 @@ def comma(run: Machine, node: Node, frame: Frame) -> Value:
 
 @expression("identifier", "field_identifier", "namespace_identifier", "type_identifier")
 def identifier(run: Machine, node: Node, frame: Frame) -> Value:
-    """A variable, member, constant, enumerator or function; unknown when none of that name is in reach."""
+    """Look up a variable, member, constant, enumerator or function; unknown if none of that name is in reach."""
     return variable(run, text(node), frame)
 
 
 @expression("qualified_identifier")
 def qualified(run: Machine, node: Node, frame: Frame) -> Value:
-    """As ``identifier``, for a name with ``::``, which is looked up without blanks."""
+    """Look up, as ``identifier``, a name with ``::``, without blanks."""
     return variable(run, re.sub(r"\s+", "", text(node)), frame)
 
 
@@ -137,7 +137,7 @@ def qualified(run: Machine, node: Node, frame: Frame) -> Value:
 
 @expression("initializer_list")
 def initializer_list(run: Machine, node: Node, frame: Frame) -> Value:
-    """Braces without a type: a map if every item is a pair that starts with a text, else a list."""
+    """Evaluate braces without a type: a map if every item is a pair that starts with a text, else a list."""
     items = [run.evaluate(child, frame) for child in children(node)]
     pairs = [
         item for item in items if len(item) == 1 and isinstance(item[0], Seq) and len(item[0].items) == 2
@@ -149,27 +149,27 @@ def initializer_list(run: Machine, node: Node, frame: Frame) -> Value:
 
 @expression("initializer_pair")
 def initializer_pair(run: Machine, node: Node, frame: Frame) -> Value:
-    """Of ``.field = value`` the value; who fills an aggregate reads the field."""
+    """Return the value of ``.field = value``; who fills an aggregate reads the field."""
     return run.evaluate(field_of(node, "value"), frame)
 
 
 @expression("argument_list")
 def argument_list(run: Machine, node: Node, frame: Frame) -> Value:
-    """The value of a single argument; several, or none, make a ``Group``."""
+    """Return the value of a single argument; several, or none, make a ``Group``."""
     values = [run.evaluate(child, frame) for child in children(node)]
     return values[0] if len(values) == 1 else (Group(tuple(values)),)
 
 
 @expression("compound_literal_expression")
 def compound_literal(run: Machine, node: Node, frame: Frame) -> Value:
-    """``Foo{...}``: what the items in the braces make of the type."""
+    """Evaluate ``Foo{...}``: what the items in the braces make of the type."""
     kind = run.type_of(text(field_of(node, "type")), frame)
     return made(run, node, kind, children(field_of(node, "value")), frame)
 
 
 @expression("new_expression")
 def new(run: Machine, node: Node, frame: Frame) -> Value:
-    """``new Foo(...)``: what its constructor makes, on the heap, so that assigning it copies nothing."""
+    """Evaluate ``new Foo(...)``: what its constructor makes, on the heap, so that assigning it copies nothing."""
     kind = run.type_of(text(field_of(node, "type")), frame)
     given = children(field_of(node, "arguments"))
     values = [run.evaluate(child, frame) for child in given]
@@ -185,7 +185,7 @@ def new(run: Machine, node: Node, frame: Frame) -> Value:
 
 @expression("sizeof_expression")
 def size_of(run: Machine, node: Node, frame: Frame) -> Value:
-    """The bytes of a fundamental type on 64 bit Linux; unknown for any other operand."""
+    """Return the bytes of a fundamental type on 64 bit Linux; unknown for any other operand."""
     size = SIZES.get(text(field_of(node, "type") or field_of(node, "value")).strip("() "))
     return unknown("a size") if size is None else (size,)
 
@@ -198,14 +198,14 @@ def nothing_known(run: Machine, node: Node, frame: Frame) -> Value:
 
 @expression("cast_expression")
 def c_cast(run: Machine, node: Node, frame: Frame) -> Value:
-    """``(T) x``, converted like ``static_cast<T>(x)``."""
+    """Convert ``(T) x`` like ``static_cast<T>(x)``."""
     kind = run.type_of(text(field_of(node, "type")), frame)
     return cast(run, kind, run.evaluate(field_of(node, "value"), frame))
 
 
 @expression("lambda_expression")
 def lambda_(run: Machine, node: Node, frame: Frame) -> Value:
-    """Captures by value keep what the variable holds now; the rest is looked up where the lambda was made."""
+    """Capture by value what the variable holds now; the rest is looked up where the lambda was made."""
     inner = Frame(
         frame.file, frame.scope, frame.function, None, frame.bindings, frame, frame.path, run.conditions(node, frame),
         depth=frame.depth, captured=True,
@@ -241,5 +241,5 @@ def _is_by_reference(capture: Node) -> bool:
 
 
 def words_of(node: Node) -> list[str]:
-    """Every identifier in ``node``, in order and with repetitions."""
+    """Yield every identifier in ``node``, in order and with repetitions."""
     return [text(each) for each in walk(node) if each.type in ("identifier", "field_identifier")]

@@ -101,7 +101,7 @@ def call_values(run: Machine, callee: Value, values: Sequence[Value], node: Node
 
 
 def _bound(atom: Bound, values: Sequence[Value]) -> list[tuple[Obj | None, Sequence[Value]]]:
-    """The object and arguments of a call; a method without its object gets that as its first argument."""
+    """Return the object and arguments of a call; a method without its object gets that as its first argument."""
     function = atom.function
     objects = [each for each in values[0] if isinstance(each, Obj)] if values else []
     if atom.this is None and function.owner and objects and len(values) == len(function.parameters) + 1:
@@ -110,7 +110,7 @@ def _bound(atom: Bound, values: Sequence[Value]) -> list[tuple[Obj | None, Seque
 
 
 def _placed(fixed: Sequence[Value], values: Sequence[Value]) -> list[Value]:
-    """The arguments of ``std::bind`` with its placeholders filled in."""
+    """Return the arguments of ``std::bind`` with its placeholders filled in."""
     found = []
     for value in fixed:
         place = next(
@@ -165,7 +165,7 @@ def call_functions(
     frame: Frame,
     types: Sequence[Type],
 ) -> Value:
-    """What the overloads that fit best may return; ``unknown_call`` decides if none fits."""
+    """Return what the overloads that fit best may return; ``unknown_call`` decides if none fits."""
     fitting = candidates(_meant(run, functions, types, node, frame), values, run.makes_interfaces)
     if not fitting:
         return unknown_call(run, functions[0].name, values, node, [], frame)
@@ -175,7 +175,7 @@ def call_functions(
 def _meant(
     run: Machine, functions: Sequence[Function], arguments: Sequence[Type], node: Node, frame: Frame
 ) -> Sequence[Function]:
-    """Of a template's specialisations that for these arguments, else the template; a gap where they are not known."""
+    """Return the specialisation for these arguments, else the template; a gap if they are not known."""
     special = [each for each in functions if each.specialises is not None]
     if not special:
         return functions
@@ -193,13 +193,13 @@ def _meant(
 def _of_class(
     run: Machine, methods: Sequence[Function], this_object: Obj | None, bindings: dict[str, Type] | None
 ) -> list[Type]:
-    """The arguments of the class whose methods these are."""
+    """Return the arguments of the class whose methods these are."""
     bound = bindings or (_class_bindings(methods[0], this_object) if this_object is not None else {})
     return list(bound.values())
 
 
 def _any_of(run: Machine, calls: Sequence[Callable[[], Value]]) -> Value:
-    """One of several calls, nobody knows which."""
+    """Run one of several calls, nobody knows which."""
     if len(calls) == 1:
         return calls[0]()
     found: list[Value] = []
@@ -224,7 +224,7 @@ def call_methods(
     exactly: bool = False,
     bindings: dict[str, Type] | None = None,
 ) -> Value:
-    """As ``call_functions``; if none fits, bases (unless ``exactly``) and methods of nodes are tried."""
+    """Call as ``call_functions``; if none fits, bases (unless ``exactly``) and methods of nodes are tried."""
     methods = _meant(run, methods, types or _of_class(run, methods, this_object, bindings), node, frame)
     function = chosen(methods, values)
     if function is None and this_object is not None and this_object.cls is not None and not exactly:
@@ -252,7 +252,7 @@ def call_methods(
 def _check_defaults(
     run: Machine, function: Function, this: Obj, given: int, node: Node, frame: Frame
 ) -> None:
-    """A virtual method gets the default arguments of the class that its object is seen as ([dcl.fct.default]/10)."""
+    """Check defaults: a virtual method gets those of the class its object is seen as ([dcl.fct.default]/10)."""
     if this.cls is None or not function.virtual:
         return
     named = [
@@ -304,7 +304,10 @@ def invoke(
 def _outcome(
     run: Machine, key: object, given: object, depth: int, action: Callable[[], CallOutcome]
 ) -> CallOutcome:
-    """Of ``action``, or of the same call before, whose steps count again: a budget means the same in every round."""
+    """Return the outcome of ``action``, or of the same call before.
+
+    Its steps count again: a budget means the same in every round.
+    """
     if depth > MEMORY_DEPTH:
         return action()
     known = run.memory.find(key, given)
@@ -333,7 +336,7 @@ def _run_body(run: Machine, function: Function, values: Sequence[Value], inner: 
 
 
 def _as_returned(run: Machine, function: Function, inner: Frame) -> Value:
-    """What a function gives back, of an object of a derived class what the type it returns has of it."""
+    """Return what a function gives back; of an object of a derived class what the type it returns has of it."""
     declarator = field_of(function.node, "declarator")
     if declarator is None or declarator.type != "function_declarator":
         return inner.returned  # a reference or pointer
@@ -360,7 +363,7 @@ def _class_bindings(function: Function, this_object: Obj) -> dict[str, Type]:
 
 
 def _element_types(run: Machine, function: Function, node: Node, frame: Frame) -> dict[str, Type]:
-    """``T`` of a parameter ``std::list<T> &``, from the container that is given."""
+    """Return ``T`` of a parameter ``std::list<T> &``, from the container that is given."""
     bound: dict[str, Type] = {}
     given = children(field_of(node, "arguments")) if function.templates else []
     for parameter, argument in zip(function.parameters, given, strict=False):
@@ -377,7 +380,7 @@ def _element_types(run: Machine, function: Function, node: Node, frame: Frame) -
 
 
 def _deduced(function: Function, values: Sequence[Value], types: Sequence[Type]) -> dict[str, Type]:
-    """Template parameters: as given, else from the types of the arguments."""
+    """Return template parameters: as given, else from the types of the arguments."""
     if not function.templates:
         return {}
     bound = dict(zip(function.templates, types, strict=False))
@@ -398,7 +401,7 @@ _WRITTEN_BACK = frozenset({
 
 
 def _is_element(call: Node) -> bool:
-    """``x.at(i)``: an element that a call gives by reference, and whose evaluation changes nothing."""
+    """Return whether it is ``x.at(i)``: an element given by reference, whose evaluation changes nothing."""
     callee = field_of(call, "function")
     name = text(field_of(callee, "field"))
     return name in ("at", "front", "back", "begin", "rbegin", "data", "value")
@@ -411,7 +414,7 @@ def write_back(
     node: Node,
     frame: Frame,
 ) -> None:
-    """What a function does to its reference parameters shows in the caller's variables."""
+    """Write what a function does to its reference parameters to the caller's variables."""
     given = children(field_of(node, "arguments"))
     for parameter, argument in zip(parameters, given, strict=False):
         if not is_written_back(parameter):

@@ -12,7 +12,7 @@ from nodl.name_template import ParameterPart
 
 
 def text_of(run: Machine, atom: Atom) -> str | None:
-    """The text that a value stands for in this run: that of a parameter as launch sets it, else its default."""
+    """Return the text that a value stands for in this run: of a parameter as launch sets it, else its default."""
     known = plain(atom)
     if known is not None or not isinstance(atom, Text | Param):
         return known
@@ -23,7 +23,7 @@ def text_of(run: Machine, atom: Atom) -> str | None:
 
 
 def settled_text(run: Machine, atom: Atom) -> str | None:
-    """``text_of`` where a launch has settled it; a parameter that only has its default is open."""
+    """Return ``text_of`` if a launch has settled it; a parameter that only has its default is open."""
     if run.start is None:
         parts = atom.parts if isinstance(atom, Text) else ()
         if isinstance(atom, Param) or any(isinstance(part, ParameterPart) for part in parts):
@@ -32,7 +32,7 @@ def settled_text(run: Machine, atom: Atom) -> str | None:
 
 
 def given_by_launch(run: Machine, record: AllocatedNode, name: str) -> object | None:
-    """What the launch file sets; a value that decides what is made is remembered."""
+    """Return what the launch file sets; a value that decides what is made is remembered."""
     if run.start is None:
         run.from_default[name] = None
         return None
@@ -52,7 +52,7 @@ def _parameter_text(run: Machine, param: Param) -> str | None:
 
 
 def _part_text(run: Machine, part: object) -> str | None:
-    """The same for a piece of a text."""
+    """Return the same for a piece of a text."""
     if isinstance(part, ParameterPart):
         return _parameter_part(run, part)
     if not isinstance(part, NodeNamePart):

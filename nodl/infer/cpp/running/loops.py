@@ -22,7 +22,7 @@ MAX_ROUNDS = 3
 @statement("for_range_loop")
 @in_a_block
 def for_range_loop(run: Machine, node: Node, frame: Frame) -> int:
-    """One turn for each item; each turn may also be left out where the items are not exactly known."""
+    """Run one turn for each item; each may also be left out if the items are not exactly known."""
     right, body = field_of(node, "right"), field_of(node, "body")
     subject = run.evaluate(right, frame)
     items, exact = iterated(run, subject)
@@ -56,14 +56,14 @@ _VARIABLES = ("identifier", "field_expression", "subscript_expression", "pointer
 
 
 def _points(run: Machine, right: Node | None, frame: Frame) -> bool:
-    """Whether the elements are pointers."""
+    """Return whether the elements are pointers."""
     if right is not None and right.type == "initializer_list":
         return any(each.type == "pointer_expression" for each in children(right))
     return element_type(seen_type(run, right, frame)).pointer
 
 
 def _over(run: Machine, body: Node | None, steps: list[Callable[[], None]], exact: bool, frame: Frame) -> int:
-    """The body once for each step; any number of times each unless ``exact``."""
+    """Run the body once for each step; any number of times each unless ``exact``."""
     if not steps and exact:
         run.kill(body, frame, "the loop runs over nothing")
         return NEXT
@@ -87,7 +87,7 @@ def _over(run: Machine, body: Node | None, steps: list[Callable[[], None]], exac
 
 
 def _after(run: Machine, loop: Loop, outcome: int) -> int:
-    """What left the loop early joins what came to its end; whether anything goes on behind it."""
+    """Join what left the loop early with what came to its end; return whether anything goes on behind it."""
     run.settle(loop.start, loop.breaks, bool(outcome & NEXT))
     return NEXT if loop.breaks else outcome & NEXT
 
@@ -115,7 +115,7 @@ def for_statement(run: Machine, node: Node, frame: Frame) -> int:
 
 
 def _iterator(node: Node) -> tuple[str, Node] | None:
-    """Variable and container of ``for (auto it = c.begin(); it != c.end(); ++it)``."""
+    """Return variable and container of ``for (auto it = c.begin(); it != c.end(); ++it)``."""
     condition = unwrapped(field_of(node, "condition"))
     left, right = field_of(condition, "left"), field_of(condition, "right")
     if (
@@ -138,7 +138,7 @@ _ENDINGS = frozenset({"end", "cend", "rend", "crend"})
 
 
 def _over_iterator(run: Machine, node: Node, name: str, container: Node, frame: Frame) -> int:
-    """The iterator stands for the element that it points to."""
+    """Run the loop with the iterator standing for the element that it points to."""
     items, exact = iterated(run, run.evaluate(container, frame))
     exact = exact and field_of(node, "update") is not None
     body = field_of(node, "body")
@@ -153,7 +153,7 @@ def while_statement(run: Machine, node: Node, frame: Frame) -> int:
 
 
 def _counted(run: Machine, node: Node, frame: Frame) -> int:
-    """As often as the condition is certainly true; after that any number of times."""
+    """Run as often as the condition is certainly true; after that any number of times."""
     condition, body, update = (field_of(node, name) for name in ("condition", "body", "update"))
     loop = Loop(run.store.mark())
     returns, outer_path = 0, frame.path
@@ -182,7 +182,7 @@ def _counted(run: Machine, node: Node, frame: Frame) -> int:
 def _repeated(
     run: Machine, body: Node | None, update: Node | None, condition: Node | None, frame: Frame, loop: Loop
 ) -> int:
-    """Until nothing changes; what still does after some rounds is not known."""
+    """Run until nothing changes; what still does after some rounds is not known."""
     returns = 0
     for round_ in range(MAX_ROUNDS + 2):
         mark = run.store.mark()
@@ -208,7 +208,7 @@ def _repeated(
 
 @statement("do_statement")
 def do_statement(run: Machine, node: Node, frame: Frame) -> int:
-    """The body once, then any number of times unless it left or the condition is certainly false."""
+    """Run the body once, then any number of times unless it left or the condition is certainly false."""
     body, condition = field_of(node, "body"), unwrapped(field_of(node, "condition"))
     loop = Loop(run.store.mark())
     outcome = _iteration(run, body, frame, loop)

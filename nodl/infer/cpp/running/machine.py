@@ -58,7 +58,7 @@ class StepLimitExceeded(Exception):
 
 
 def registered(table: dict[Key, Handler], names: Iterable[Key]) -> Callable[[Handler], Handler]:
-    """Decorator: ``table`` has the function under these names."""
+    """Register the function under these names of ``table``."""
 
     def register(handler: Handler) -> Handler:
         table.update(dict.fromkeys(names, handler))
@@ -68,12 +68,12 @@ def registered(table: dict[Key, Handler], names: Iterable[Key]) -> Callable[[Han
 
 
 def statement(*kinds: str) -> Callable[[StatementHandler], StatementHandler]:
-    """Decorator: the handler runs statements of these tree-sitter types and says which ways lead on."""
+    """Register a handler that runs statements of these tree-sitter types and returns which ways lead on."""
     return registered(STATEMENTS, kinds)
 
 
 def expression(*kinds: str) -> Callable[[ExpressionHandler], ExpressionHandler]:
-    """Decorator: the handler gives the value of expressions of these tree-sitter types."""
+    """Register a handler that returns the value of expressions of these tree-sitter types."""
     return registered(EXPRESSIONS, kinds)
 
 
@@ -131,7 +131,7 @@ class Machine:
         return handler(self, node, frame)
 
     def _misread(self, node: Node, frame: Frame) -> Value:
-        """What the parser did not understand in an expression: its parts are run, its value is not known."""
+        """Run the parts of what the parser did not understand in an expression; its value is not known."""
         for child in node.named_children:
             for each in child.named_children if child.is_error else [child]:
                 self.evaluate(each, frame)
@@ -222,15 +222,15 @@ class Machine:
         return self.names.resolve(written, frame.scope, frame.file, frame.bindings)
 
     def class_of(self, kind: Type, where: Frame | Class) -> Class | None:
-        """The class that a type means in code or in a class; ``None`` where its source is not in reach."""
+        """Return the class that a type means in code or in a class; ``None`` if its source is not in reach."""
         return self.names.class_of(kind, where.scope, where.file)
 
     def held_class(self, kind: Type | None, where: Frame | Class) -> Class | None:
-        """The class of the object that a variable of this type is; ``None`` where it is a pointer, or none in reach."""
+        """Return the class of the object in a variable of this type; ``None`` if it is a pointer, or none in reach."""
         return None if kind is None or kind.pointer else self.class_of(kind, where)
 
     def methods_of(self, atom: object, name: str) -> Sequence[Function]:
-        """The methods of that name of an object of a class in reach; none for anything else."""
+        """Return the methods of that name of an object of a class in reach; none for anything else."""
         return self.names.find_methods(atom.cls, name) if isinstance(atom, Obj) else ()
 
     def hidden_names(self, owner: Obj) -> frozenset[str]:
@@ -248,7 +248,7 @@ class Machine:
         return found
 
     def frame(self, key: object, fresh: Frame) -> Frame:
-        """``fresh``, or the frame that a lambda kept of the same call before: its closures are the same ones then."""
+        """Return ``fresh``, or the frame that a lambda kept of the same call before: its closures are the same then."""
         known = self.frames.get(key)
         if known is None or known.active or not known.captured:
             self.frames[key] = fresh
@@ -274,7 +274,7 @@ class Machine:
         self.gaps.setdefault((source, why))
 
     def handle(self, node: Node, frame: Frame) -> None:
-        """This place has its result: an interface, a gap, or somebody who was followed."""
+        """Record that this place has its result: an interface, a gap, or somebody who was followed."""
         self.handled.setdefault(frame.file.file, set()).add(node.start_byte)
 
     def resolve(self, node: Node, frame: Frame) -> None:
@@ -310,7 +310,7 @@ class Machine:
             record.endpoints.setdefault(found, []).append(conditions)
 
     def later(self, values: Iterable[Value], frame: Frame) -> None:
-        """Closures that somebody outside keeps: they may be called at any time."""
+        """Keep closures for later that somebody outside keeps: they may be called at any time."""
         atoms = [*chain.from_iterable(values)]
         for atom in atoms:
             if isinstance(atom, Lambda):
@@ -320,7 +320,7 @@ class Machine:
                     self.callbacks.setdefault((each.function, each.this), (each, frame))
 
     def _with_objects(self, atom: Bound, atoms: Sequence[Atom]) -> list[Bound]:
-        """A method that is handed over beside objects that have it is called on those."""
+        """Bind a method that is handed over beside objects that have it to those."""
         if atom.this is not None or atom.function.static or not atom.function.owner:
             return [atom]
         name = atom.function.name
@@ -333,7 +333,7 @@ class Machine:
     # --- who matters --------------------------------------------------------------------------------------
 
     def used_classes(self) -> set[str]:
-        """The classes of all objects that were made, with their bases."""
+        """Return the classes of all objects that were made, with their bases."""
         self.size.get("classes")
         return self._used
 
@@ -344,7 +344,7 @@ class Machine:
             self.size["classes"] = len(self._used)
 
     def makes_interfaces(self, function: Function) -> bool:
-        """Whether ``function``, or anything that it may call, may make an interface or a node."""
+        """Return whether ``function``, or anything that it may call, may make an interface or a node."""
         return bool(CREATES.fullmatch(function.name)) or self._leads(function, function.words)
 
     def subtree_matters(self, node: Node) -> bool:
@@ -401,7 +401,7 @@ class Frame:
     active: bool = False  # runs now
 
     def owner_of(self, name: str) -> Frame | None:
-        """The frame whose variable ``name`` is."""
+        """Return the frame whose variable ``name`` is."""
         frame: Frame | None = self
         while frame is not None:
             if name in frame.names:

@@ -68,7 +68,7 @@ class AbstractStore:
                 self.log.noted.setdefault(key, said)
 
     def holds(self, reads: Reads, *, in_any_order: bool = False) -> bool:
-        """Whether all this says what it said; ``in_any_order``: alternatives may have changed places."""
+        """Return whether all this says what it said; ``in_any_order``: alternatives may have changed places."""
         get = self._cells.get
         for cell, value in reads.cells.items():
             present = get(cell, _ABSENT)
@@ -88,7 +88,7 @@ class AbstractStore:
                 self._remember(cell, value)
 
     def others_run(self) -> None:
-        """From now on others may run at any time: what they find are all values that cells have from here on."""
+        """Expect from now on that others run at any time: they find all values that cells have from here on."""
         if self._history is None:
             self._history = dict(self._cells)
 
@@ -109,13 +109,13 @@ class AbstractStore:
         return len(self._trail)
 
     def changes(self, mark: int) -> Changes:
-        """What was written since ``mark``, as it is now."""
+        """Return what was written since ``mark``, as it is now."""
         self._spend((len(self._trail) - mark) // _LOOKED_AT_IN_A_STEP)
         cells = self._cells
         return {cell: cells[cell] for cell, _ in self._trail[mark:] if cell in cells and not _is_over(cell)}
 
     def before(self, mark: int) -> Changes:
-        """The values at ``mark`` of all cells that were written since."""
+        """Return the values at ``mark`` of all cells that were written since."""
         found: Changes = {}
         for cell, old in self._trail[mark:]:
             found.setdefault(cell, BOTTOM if old is _ABSENT else old)
@@ -139,12 +139,12 @@ class AbstractStore:
 
 
 def _is_over(cell: Cell) -> bool:
-    """Whether it is a variable of a call that nobody can see any more."""
+    """Return whether it is a variable of a call that nobody can see any more."""
     return bool(getattr(cell[0], "finished", False))
 
 
 def _is_local(cell: Cell) -> bool:
-    """Whether it is a variable of a call, which nobody sees before it is set."""
+    """Return whether it is a variable of a call, which nobody sees before it is set."""
     return hasattr(cell[0], "finished")
 
 
@@ -172,7 +172,7 @@ class Memory:
         self._kept: dict[object, _Kept] = {}
 
     def find(self, key: object, given: object) -> tuple[CallOutcome, int] | None:
-        """The outcome of the last run, if that depended on ``given`` and all that it read is as it was; its steps."""
+        """Return the outcome of the last run, if ``given`` and all that it read is as it was; and its steps."""
         kept = self._kept.get(key)
         if kept is not None and kept.given == given and self._store.holds(kept.reads):
             self._store.saw(kept.reads)
@@ -182,7 +182,7 @@ class Memory:
         return None
 
     def keep(self, key: object, given: object, action: Callable[[], tuple[CallOutcome, int]]) -> CallOutcome:
-        """The outcome of ``action``, which takes so many steps."""
+        """Remember the outcome of ``action``, which takes so many steps."""
         found: list[tuple[CallOutcome, int]] = []
         mark = self._store.mark()
         reads = self._store.watched(lambda: found.append(action()))

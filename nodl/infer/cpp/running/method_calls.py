@@ -19,7 +19,7 @@ from nodl.infer.cpp.syntax import Node, callee_name, field_of, text, unwrapped
 
 
 def method_call(run: Machine, site: CallSite) -> Value:
-    """``x.f(...)`` for each thing that ``x`` may be, results joined; ``BOTTOM`` where ``x`` holds nothing."""
+    """Call ``x.f(...)`` for each thing that ``x`` may be; join the results, ``BOTTOM`` if ``x`` holds nothing."""
     callee, frame, subject = site.callee, site.frame, site.receiver
     field = unwrapped(field_of(callee, "field"))
     name = callee_name(field) if field is not None else ""
@@ -63,7 +63,7 @@ def method_call(run: Machine, site: CallSite) -> Value:
 
 
 def _could_make(run: Machine, receiver: Node, name: str, frame: Frame) -> bool:
-    """Whether the method, of an object that was not seen to be made, would make interfaces."""
+    """Return whether the method, of an object that was not seen to be made, would make interfaces."""
     kind, _ = declared_type(run, receiver, frame)
     cls = run.class_of(kind, frame)
     if cls is not None:
@@ -93,7 +93,7 @@ def _on_atom(run: Machine, atom: object, name: str, site: CallSite) -> Value:
 
 
 def on_object(run: Machine, atom: Obj, name: str, site: CallSite) -> Value:
-    """A method of one object: its source, else a closure in a member, else the tables, else unknown code."""
+    """Call a method of one object: its source, else a closure in a member, else the tables, else unknown code."""
     callee, frame = site.callee, site.frame
     if atom.cls is not None:
         argument = field_of(callee, "argument")
@@ -122,14 +122,14 @@ def on_object(run: Machine, atom: Obj, name: str, site: CallSite) -> Value:
 def only_declared(
     run: Machine, cls: Class | None, name: str, site: CallSite, receiver: Obj | None
 ) -> Value | None:
-    """A method that the class or a base declares without a body in reach; ``None`` if none does."""
+    """Return a method that the class or a base declares without a body in reach; ``None`` if none does."""
     if cls is None or not run.names.declarations(cls, name):
         return None
     return without_source(run, f"{cls.name}::{name}", site.values, site.node, site.frame, receiver)
 
 
 def of_this(run: Machine, this: Obj, name: str, frame: Frame) -> list[Function]:
-    """What ``name()`` calls inside of a class: its own while it is made as a base, or if it is not virtual."""
+    """Return what ``name()`` calls inside of a class: its own while it is made as a base, or if it is not virtual."""
     methods = run.names.find_methods(this.cls, name)
     cls, ancestry = class_around(run, frame), run.names.ancestry(this.cls)
     if this.building is not None and this.building is not this.cls:
@@ -143,13 +143,13 @@ def of_this(run: Machine, this: Obj, name: str, frame: Frame) -> list[Function]:
 
 
 def model_of(this: Obj, name: str) -> FunctionModel | None:
-    """What the tables have of a method: by the object's class, its library base, or for it as a node."""
+    """Return what the tables have of a method: by the object's class, its library base, or for it as a node."""
     found = LIBRARY_METHODS.get((this.type.name, name)) or LIBRARY_METHODS.get((this.foreign_base, name))
     return found or (NODE_METHODS.get(name) if this.is_node else None)
 
 
 def by_model(run: Machine, atom: Obj, name: str, site: CallSite) -> Value | None:
-    """What the tables know of a method; ``None`` if they do not know it."""
+    """Return what the tables know of a method; ``None`` if they do not know it."""
     model = model_of(atom, name)
     if model is None:
         return None

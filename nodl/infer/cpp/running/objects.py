@@ -53,14 +53,14 @@ MAX_ELEMENTS = 32
 
 
 def is_plain_type(name: str) -> bool:
-    """A text, number or container."""
+    """Return whether it is a text, number or container."""
     return name in SEQUENCES or name in MAPS or name in _TEXTS or name in _SCALARS
 
 
 def declared_value(
     run: Machine, node: Node, written: str, value: Node | None, pointer: bool, frame: Frame
 ) -> Value:
-    """What ``T x``, ``T x = v``, ``T x(v)``, ``T x{v}`` makes."""
+    """Return what ``T x``, ``T x = v``, ``T x(v)``, ``T x{v}`` makes."""
     kind = run.type_of(written, frame)
     if value is None:
         return BOTTOM if pointer or kind.pointer else default_value(run, node, kind, frame)
@@ -80,7 +80,7 @@ def _is_auto(written: str) -> bool:
 
 
 def initial_value(run: Machine, value: Node, frame: Frame, reference: bool = False) -> Value:
-    """What ``= v`` (copied unless ``reference``), ``(v)`` or ``{v}`` gives; ``BOTTOM`` for empty brackets."""
+    """Return what ``= v`` (copied unless ``reference``), ``(v)`` or ``{v}`` gives; ``BOTTOM`` for empty brackets."""
     if value.type in ("argument_list", "initializer_list"):
         inner = children(value)
         if len(inner) == 1:
@@ -95,7 +95,7 @@ def initial_value(run: Machine, value: Node, frame: Frame, reference: bool = Fal
 
 
 def _gives_iterator(value: Node) -> bool:
-    """``x.find(...)``, ``std::find_if(...)``: the element itself, seen through an iterator."""
+    """Return whether it is ``x.find(...)`` or ``std::find_if(...)``: the element itself, seen through an iterator."""
     callee = text(field_of(value, "function")) if value.type == "call_expression" else ""
     return _ITERATORS.search(callee) is not None
 
@@ -106,7 +106,7 @@ _ITERATORS = re.compile(
 
 
 def converted(run: Machine, kind: Type, value: Value, node: Node, frame: Frame) -> Value:
-    """``Foo x = y``: a copy of an object, as a Foo, or a Foo made of y."""
+    """Convert ``Foo x = y``: a copy of an object, as a Foo, or a Foo made of y."""
     from nodl.infer.cpp.running.constructors import construct
 
     cls = run.class_of(kind, frame)
@@ -118,7 +118,7 @@ def converted(run: Machine, kind: Type, value: Value, node: Node, frame: Frame) 
 
 
 def made(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame: Frame) -> Value:
-    """An object of ``kind`` from arguments in parentheses or braces."""
+    """Make an object of ``kind`` from arguments in parentheses or braces."""
     from nodl.infer.cpp.running.constructors import construct
 
     cls = run.class_of(kind, frame)
@@ -150,14 +150,14 @@ def made(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame: Fra
 
 
 def in_braces(run: Machine, value: Node, kind: Type, frame: Frame) -> Value:
-    """What braces make of a type that is known; of anything else its value."""
+    """Return what braces make of a type that is known; of anything else its value."""
     if value.type == "initializer_list" and kind.name:
         return made(run, value, kind, children(value), frame)
     return run.evaluate(value, frame)
 
 
 def _sequence(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame: Frame) -> Value:
-    """In braces its elements; in parentheses a copy, a part of another one, or so many equal elements."""
+    """Make a list: in braces its elements; in parentheses a copy, a part of another one, or so many equal elements."""
     inner = kind.arguments[0] if kind.arguments else NO_TYPE
     cls = run.held_class(inner, frame)
     items = [
@@ -184,7 +184,7 @@ def _sequence(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame
 def _repeated(
     run: Machine, node: Node, inner: Type, count: object, frame: Frame, value: Value | None = None
 ) -> Value:
-    """So many elements of type ``inner``: each an object of its own, or one for all where that is not known."""
+    """Return so many elements of type ``inner``: each its own object, or one for all if that is not known."""
     if isinstance(count, int) and 0 <= count <= MAX_ELEMENTS:
         made_ones = []
         for index in range(count):
@@ -211,7 +211,7 @@ def as_set(items: Sequence[Value]) -> Seq:
 
 
 def cast(run: Machine, kind: Type, value: Value) -> Value:
-    """``static_cast<T>(x)``: a number as T holds it, the enumerator of a number, else the object itself."""
+    """Evaluate ``static_cast<T>(x)``: a number as T holds it, the enumerator of a number, else the object itself."""
     if kind.last not in run.names.enums:
         return as_type(kind.name, value)
     numbers = run.names.enumerator_numbers
@@ -227,7 +227,10 @@ def cast(run: Machine, kind: Type, value: Value) -> Value:
 
 
 def text_of(run: Machine, values: Sequence[Value]) -> Value:
-    """``std::string(...)``: of a text, of so many letters, of a part of a text. Two letters in braces look the same."""
+    """Make ``std::string(...)`` of a text, of so many letters, of a part of a text.
+
+    Two letters in braces look the same.
+    """
     if len(values) == 1:
         is_made = any(isinstance(atom, int | float | Seq) for atom in values[0])
         return unknown("a made text") if is_made else values[0]
@@ -235,7 +238,7 @@ def text_of(run: Machine, values: Sequence[Value]) -> Value:
 
 
 def _copies(run: Machine, cls: Class, value: Value) -> bool:
-    """Whether an object of the class, or of a derived one, is all that a constructor gets."""
+    """Return whether an object of the class, or of a derived one, is all that a constructor gets."""
     derived = all(isinstance(atom, Obj) and cls in run.names.ancestry(atom.cls) for atom in value)
     return bool(value) and derived and cls.name not in run.names.methods[cls]
 
@@ -245,7 +248,7 @@ def _all_of(kind: Type, value: Value) -> bool:
 
 
 def as_map(items: Sequence[Value]) -> Value:
-    """A map with these pairs as entries; a map among them comes back as it is, all else gives an unknown."""
+    """Return a map with these pairs as entries; a map among them comes back as it is, all else gives an unknown."""
     entries = []
     for value in items:
         for atom in value:
@@ -259,12 +262,12 @@ def as_map(items: Sequence[Value]) -> Value:
 
 
 def is_aggregate(run: Machine, cls: Class) -> bool:
-    """Whether braces fill its fields: the class has neither bases nor constructors."""
+    """Return whether braces fill its fields: the class has neither bases nor constructors."""
     return not (cls.bases or run.names.find_methods(cls, cls.name) or cls.name in cls.declared)
 
 
 def fields_of(cls: Class) -> list[str]:
-    """The members that braces fill, in order."""
+    """Return the members that braces fill, in order."""
     return [each.name for each in cls.fields.values() if not each.static]
 
 
@@ -277,7 +280,7 @@ def _aggregate(
     frame: Frame,
     values: list[Value] | None,
 ) -> Value:
-    """An object whose fields braces fill; ``values``: what was given, where that ran already."""
+    """Make an object whose fields braces fill; ``values``: what was given, if that ran already."""
     from nodl.infer.cpp.running.constructors import construct
 
     names = fields_of(cls)
@@ -296,7 +299,7 @@ def _aggregate(
 
 
 def default_value(run: Machine, node: Node, kind: Type, frame: Frame) -> Value:
-    """What a declaration without initial value holds."""
+    """Return what a declaration without initial value holds."""
     from nodl.infer.cpp.running.constructors import construct
 
     if kind.name in _TEXTS:

@@ -42,7 +42,7 @@ from nodl.infer.cpp.syntax import Node, children, field_of, text
 
 @expression("field_expression")
 def field(run: Machine, node: Node, frame: Frame) -> Value:
-    """``x.f`` or ``x->f``: a member of an object, ``first`` or ``second`` of a pair; unknown for all else."""
+    """Evaluate ``x.f`` or ``x->f``: a member of an object, ``first`` or ``second`` of a pair; unknown for all else."""
     owners = run.evaluate(field_of(node, "argument"), frame)
     if text(field_of(node, "operator")) == "->":
         owners = pointed_to(run, owners, "operator->", node, frame)
@@ -64,7 +64,7 @@ def field(run: Machine, node: Node, frame: Frame) -> Value:
 
 @expression("binary_expression")
 def binary(run: Machine, node: Node, frame: Frame) -> Value:
-    """``a && b`` with ``b`` run only where it may be, arithmetic, comparisons, joined texts, streams."""
+    """Evaluate ``a && b`` with ``b`` run only where it may be, arithmetic, comparisons, joined texts, streams."""
     operator = text(field_of(node, "operator"))
     left_node, right_node = field_of(node, "left"), field_of(node, "right")
     left = run.evaluate(left_node, frame)
@@ -88,7 +88,7 @@ def binary(run: Machine, node: Node, frame: Frame) -> Value:
 
 
 def has_text(value: Value) -> bool:
-    """Whether one of the alternatives is a text or a parameter."""
+    """Return whether one of the alternatives is a text or a parameter."""
     return any(isinstance(atom, Text | Param) for atom in value)
 
 
@@ -113,7 +113,7 @@ def _logical(run: Machine, either: bool, left: Value, right_node: Node | None, f
 
 
 def computed(operator: str, left: object, right: object) -> Value:
-    """A comparison or arithmetic on two alternatives, enumerators by their number; unknown if undecided."""
+    """Compute a comparison or arithmetic on two alternatives, enumerators by their number; unknown if undecided."""
     if operator in ("==", "!="):
         same = _same(left, right)
         return unknown("a comparison") if same is None else (same == (operator == "=="),)
@@ -122,7 +122,7 @@ def computed(operator: str, left: object, right: object) -> Value:
 
 
 def number_of(atom: object) -> object:
-    """An enumerator as its number."""
+    """Return an enumerator as its number."""
     return atom.number if isinstance(atom, Const) and atom.number is not None else atom
 
 
@@ -158,7 +158,7 @@ _MANIPULATORS = re.compile(
 def _streamed(
     run: Machine, target: Node | None, left: Value, written: Node | None, right: Value, frame: Frame
 ) -> Value:
-    """``stream << text``; the stream is a text that grows, until something changes how it writes."""
+    """Evaluate ``stream << text``; the stream is a text that grows, until something changes how it writes."""
     if not has_text(left):
         return left or unknown("a stream")
     if written is not None and _MANIPULATORS.match(text(written)):
@@ -190,7 +190,7 @@ def _extracted(run: Machine, stream: Node | None, left: Value, right: Node | Non
 
 @expression("unary_expression")
 def unary(run: Machine, node: Node, frame: Frame) -> Value:
-    """``!x``, ``-x`` and ``+x``; unknown for other operators and for what cannot be computed."""
+    """Evaluate ``!x``, ``-x`` and ``+x``; unknown for other operators and for what cannot be computed."""
     operator = text(field_of(node, "operator"))
     value = run.evaluate(field_of(node, "argument"), frame)
     own = by_operator(run, operator, value, [], node, frame)
@@ -206,7 +206,7 @@ def unary(run: Machine, node: Node, frame: Frame) -> Value:
 
 @expression("pointer_expression")
 def pointer(run: Machine, node: Node, frame: Frame) -> Value:
-    """``&x`` and ``*x`` are ``x``; ``&Foo::f`` is the method, ``&text[i]`` is unknown."""
+    """Evaluate ``&x`` and ``*x`` as ``x``; ``&Foo::f`` is the method, ``&text[i]`` is unknown."""
     argument = field_of(node, "argument")
     if text(node).startswith("&") and argument is not None and argument.type == "qualified_identifier":
         found = method_pointer(run, argument, frame)
@@ -222,7 +222,7 @@ def pointer(run: Machine, node: Node, frame: Frame) -> Value:
 
 
 def method_pointer(run: Machine, node: Node, frame: Frame) -> Value | None:
-    """``&Foo::on_message``."""
+    """Evaluate ``&Foo::on_message``."""
     head, _, last = re.sub(r"\s+", "", text(node)).rpartition("::")
     kind = run.type_of(re.sub(r"<.*>$", "", head), frame)
     cls = run.class_of(kind, frame)
@@ -234,7 +234,7 @@ def method_pointer(run: Machine, node: Node, frame: Frame) -> Value | None:
 
 @expression("conditional_expression")
 def conditional(run: Machine, node: Node, frame: Frame) -> Value:
-    """``a ? b : c``: the side that is chosen, the other one dead; both joined if that is not decided."""
+    """Evaluate ``a ? b : c``: the side that is chosen, the other one dead; both joined if that is not decided."""
     known = truth(run.evaluate(field_of(node, "condition"), frame))
     sides = {True: field_of(node, "consequence"), False: field_of(node, "alternative")}
     if known is not None:
@@ -254,7 +254,7 @@ def conditional(run: Machine, node: Node, frame: Frame) -> Value:
 
 @expression("update_expression")
 def update(run: Machine, node: Node, frame: Frame) -> Value:
-    """``++x`` or ``x--``; an ``x`` that was not one known integer becomes unknown."""
+    """Evaluate ``++x`` or ``x--``; an ``x`` that was not one known integer becomes unknown."""
     argument = field_of(node, "argument")
     before = run.evaluate(argument, frame)
     own = by_operator(run, "++" if "++" in text(node) else "--", before, [], node, frame)
@@ -269,7 +269,7 @@ def update(run: Machine, node: Node, frame: Frame) -> Value:
 
 @expression("subscript_expression")
 def subscript(run: Machine, node: Node, frame: Frame) -> Value:
-    """``container[key]`` for all that the container may be; unknown where nothing is found."""
+    """Evaluate ``container[key]`` for all that the container may be; unknown if nothing is found."""
     container = field_of(node, "argument")
     held = run.evaluate(container, frame)
     keys = [run.evaluate(child, frame) for child in children(field_of(node, "indices"))]
@@ -286,7 +286,7 @@ def subscript(run: Machine, node: Node, frame: Frame) -> Value:
 def _with_new_entries(
     run: Machine, held: Value, key: Value, container: Node, node: Node, frame: Frame
 ) -> Value:
-    """The maps after ``map[key]``, which makes an entry where there is none under the key ([map.access]).
+    """Return the maps after ``map[key]``, which makes an entry if there is none under the key ([map.access]).
 
     Entries of plain values are made for keys that are known alone.
     """
@@ -313,7 +313,7 @@ def _with_new_entries(
 
 
 def element(run: Machine, atom: object, key: Value) -> Value:
-    """``container[key]``."""
+    """Evaluate ``container[key]``."""
     if isinstance(atom, Map):
         definite = [value for known, value in atom.entries if len(key) == 1 and known == key]
         if definite and not atom.open:

@@ -10,7 +10,7 @@ from nodl.infer.cpp.running.values import Bound, Lambda, Map, Obj, Seq, Text, Un
 
 
 def chosen(functions: Sequence[Function], arguments: Sequence[Value]) -> Function | None:
-    """The overload that takes so many arguments; of several, the one whose parameters look like them."""
+    """Choose the overload that takes so many arguments; of several, the one whose parameters look like them."""
     found = candidates(functions, arguments)
     return found[0] if found else None
 
@@ -43,7 +43,7 @@ def _takes(function: Function, count: int) -> bool:
 
 
 def _likeness(parameter: FunctionParameter, value: Value) -> int:
-    """How well an argument fits a parameter, by their looks."""
+    """Rate how well an argument fits a parameter, by their looks."""
     atom = value[0] if value else None
     kind = parameter.type
     is_text = "string" in kind or "char" in kind

@@ -16,12 +16,12 @@ from nodl.infer.cpp.syntax import Node, children, field_of, text, unwrapped
 
 
 def is_plain(value: Value) -> bool:
-    """Whether a text, number or container is among the alternatives."""
+    """Return whether a text, number or container is among the alternatives."""
     return any(isinstance(atom, Text | Seq | Map | Group | Param | int | float) for atom in value)
 
 
 def bind_reference(run: Machine, name: str, kind: str, initial: Node | None, frame: Frame) -> None:
-    """``T & name = initial`` or ``T * name = &initial`` was declared, and has its value."""
+    """Bind ``T & name = initial`` or ``T * name = &initial``, which was declared and has its value."""
     target = unwrapped(initial)
     if (
         target is None
@@ -43,7 +43,7 @@ def bind_reference(run: Machine, name: str, kind: str, initial: Node | None, fra
 
 
 def _is_fixed(target: Node) -> bool:
-    """An expression that means the same variable wherever it stands."""
+    """Return whether an expression means the same variable wherever it stands."""
     if target.type == "subscript_expression":
         listed = children(field_of(target, "indices"))
         inner = field_of(target, "argument")
@@ -59,7 +59,7 @@ def _is_fixed(target: Node) -> bool:
 def elements_written(
     run: Machine, body: Node | None, names: Sequence[str], subject: Value, frame: Frame
 ) -> bool:
-    """Whether a loop over ``subject`` writes to the plain elements, or letters, that ``names`` stand for."""
+    """Return whether a loop over ``subject`` writes to the plain elements, or letters, that ``names`` stand for."""
     held: list[object] = [atom for atom in subject if isinstance(atom, Text | Param)]
     held += [atom for name in names for atom in run.store.get((frame, name)) or BOTTOM]
     held += [inner for atom in held if isinstance(atom, Group) for item in atom.items[1:] for inner in item]
@@ -69,7 +69,7 @@ def elements_written(
 
 
 def keep_references(run: Machine, made: Value, given: Sequence[Node], frame: Frame) -> None:
-    """An object made of variables may keep references to them: changes of either are told from now on."""
+    """Note that an object made of variables may keep references to them: changes of either are gaps from now on."""
     held = [cell for obj in made if isinstance(obj, Obj) for cell in _held(run, obj)]
     for each in given if held else ():
         target = unwrapped(each)
@@ -87,7 +87,7 @@ def keep_references(run: Machine, made: Value, given: Sequence[Node], frame: Fra
 
 
 def _held(run: Machine, obj: Obj) -> list[Cell]:
-    """Members that are references or pointers to plain values, but for letters."""
+    """Return members that are references or pointers to plain values, but for letters."""
     return [
         (obj, name)
         for cls in run.names.ancestry(obj.cls)
@@ -97,7 +97,7 @@ def _held(run: Machine, obj: Obj) -> list[Cell]:
 
 
 def cell_of_name(run: Machine, name: str, frame: Frame) -> Cell | None:
-    """Where a local variable or member of that name lies."""
+    """Return where a local variable or member of that name lies."""
     owner = frame.owner_of(name)
     if owner is not None:
         return owner, name
@@ -110,11 +110,11 @@ def cell_of_name(run: Machine, name: str, frame: Frame) -> Cell | None:
 
 
 def told(run: Machine, cell: Cell, value: Value, node: Node, frame: Frame) -> None:
-    """A gap where a variable is written that an object keeps a reference to."""
+    """Add a gap if a variable is written that an object keeps a reference to."""
     if cell in run.shared and set(run.store.get(cell) or BOTTOM) != set(value):
         run.gap(node, frame, f"{text(node)[:40]} is written while an object keeps a reference to it")
 
 
 def through(run: Machine, what: Node, frame: Frame) -> None:
-    """A gap: somebody writes to a plain value through ``what``, and it is not known to which."""
+    """Add a gap: somebody writes to a plain value through ``what``, and it is not known to which."""
     run.gap(what, frame, f"what {text(what)[:40]} refers to is written: which variable that is is not known")

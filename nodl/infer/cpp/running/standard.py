@@ -56,7 +56,7 @@ _READS = re.compile(
 
 
 def may_write(name: str) -> bool:
-    """Whether a function of the standard library may change what its arguments refer to."""
+    """Return whether a function of the standard library may change what its arguments refer to."""
     return name.startswith("std::") and _READS.fullmatch(name) is None
 
 
@@ -98,7 +98,7 @@ def _get(run: Machine, values: Sequence[Value], node: Node, frame: Frame) -> Val
 
 @_standard("std::bind", "boost::bind", "std::bind_front")
 def _bind(run: Machine, values: Sequence[Value], node: Node, frame: Frame) -> Value:
-    """A method with its object, or a function with its first arguments."""
+    """Bind a method to its object, or a function to its first arguments."""
     if not values:
         return BOTTOM
     found: list[object] = []
@@ -122,7 +122,7 @@ def _bind(run: Machine, values: Sequence[Value], node: Node, frame: Frame) -> Va
 
 
 def _placeholder(value: Value) -> int:
-    """Of ``_1`` the number, else 0."""
+    """Return the number of ``_1``, else 0."""
     found = [re.search(r"the value of (?:\w+::)*_(\d)$", a.why) for a in value if isinstance(a, Unknown)]
     return next((int(match[1]) for match in found if match), 0)
 
@@ -170,7 +170,7 @@ def _once(run: Machine, atom: Lambda, elements: Sequence[Value], node: Node, fra
 
 @_standard("std::find_if", "std::find")
 def _find_if(run: Machine, values: Sequence[Value], node: Node, frame: Frame) -> Value:
-    """The element of a list that is exactly known, or its end."""
+    """Find the element of a list that is exactly known, or its end."""
     from nodl.infer.cpp.running.invocation import call_values
 
     items, exact = items_of(run, values[0][0]) if values and len(values[0]) == 1 else ([], False)
@@ -185,7 +185,7 @@ def _find_if(run: Machine, values: Sequence[Value], node: Node, frame: Frame) ->
 
 
 def same(left: Value, right: Value) -> bool | None:
-    """Whether two literals read the same; ``None`` unless each value is exactly one literal."""
+    """Return whether two literals read the same; ``None`` unless each value is exactly one literal."""
     first = plain(left[0]) if len(left) == 1 else None
     second = plain(right[0]) if len(right) == 1 else None
     return None if first is None or second is None else first == second
@@ -215,12 +215,12 @@ _CALLS = frozenset({"std::for_each", "std::invoke", "std::apply", "std::visit"})
 
 
 def as_algorithm(name: str, given: Sequence[Node]) -> str:
-    """``for_each(v.begin(), ...)`` is found in ``std`` by its arguments ([basic.lookup.argdep])."""
+    """Find ``for_each(v.begin(), ...)`` in ``std`` by its arguments ([basic.lookup.argdep])."""
     return f"std::{name}" if len(given) > 1 and _BY_ARGUMENT.fullmatch(name) else name
 
 
 def writes_elements(run: Machine, name: str, values: Sequence[Value]) -> bool:
-    """Whether a function of the standard library calls something that writes to what it gets by reference."""
+    """Return whether a standard function calls something that writes to what it gets by reference."""
     if not name.startswith("std::") or _KEEPS.fullmatch(name):
         return False
     atoms = [atom for value in values for atom in value]
@@ -246,7 +246,7 @@ def _writes(run: Machine, atom: object) -> bool:
 
 
 def called_now(run: Machine, values: Sequence[Value], node: Node, frame: Frame) -> None:
-    """Closures that write to what they captured may be called before what follows, or not."""
+    """Run closures that write to what they captured: they may be called before what follows, or not."""
     from nodl.infer.cpp.running.invocation import call_lambda
 
     def once(atom: Lambda) -> int:

@@ -61,7 +61,7 @@ def braces(run: Machine, node: Node, frame: Frame) -> int:
 
 @statement("declaration_list", "case_statement", "labeled_statement", "preproc_else", "else_clause")
 def block(run: Machine, node: Node, frame: Frame) -> int:
-    """The children in order, without a scope of their own."""
+    """Run the children in order, without a scope of their own."""
     return sequence(run, children(node), frame)
 
 
@@ -109,7 +109,7 @@ def return_statement(run: Machine, node: Node, frame: Frame) -> int:
 
 @statement("throw_statement")
 def throw_statement(run: Machine, node: Node, frame: Frame) -> int:
-    """Leaves like a return, but adds nothing to what the call gives back."""
+    """Leave like a return, but add nothing to what the call gives back."""
     for child in children(node):
         run.evaluate(child, frame)
     return RETURN
@@ -147,7 +147,7 @@ class _Switch(Loop):
 @statement("if_statement")
 @in_a_block
 def if_statement(run: Machine, node: Node, frame: Frame) -> int:
-    """The side that the condition chooses, the other one dead; both, joined, if that is not decided."""
+    """Run the side that the condition chooses, the other one dead; both, joined, if that is not decided."""
     condition = field_of(node, "condition")
     for child in children(condition):
         for inner in children(child) if child.type == "init_statement" else ():
@@ -176,7 +176,7 @@ def condition_value(run: Machine, condition: Node | None, frame: Frame) -> bool 
 
 @statement("preproc_if", "preproc_ifdef", "preproc_elif")
 def preprocessor_branches(run: Machine, node: Node, frame: Frame) -> int:
-    """A conditional that only the build decides: either side, or neither."""
+    """Run a conditional that only the build decides: either side, or neither."""
     alternative = field_of(node, "alternative")
     head = (field_of(node, "condition"), field_of(node, "name"), alternative)
     own = [child for child in children(node) if child not in head]
@@ -186,7 +186,7 @@ def preprocessor_branches(run: Machine, node: Node, frame: Frame) -> int:
 @statement("switch_statement")
 @in_a_block
 def switch_statement(run: Machine, node: Node, frame: Frame) -> int:
-    """The chosen case and those it falls through to; any of the cases where that is not decided."""
+    """Run the chosen case and those it falls through to; any of the cases if that is not decided."""
     condition = field_of(node, "condition")
     subject = run.evaluate(field_of(condition, "value") or unwrapped(condition), frame)
     cases = [c for c in children(field_of(node, "body")) if c.type == "case_statement"]
@@ -210,7 +210,7 @@ def switch_statement(run: Machine, node: Node, frame: Frame) -> int:
 
 
 def _has_inner_labels(switch: Node) -> bool:
-    """Whether a case of this switch stands inside of another statement of it."""
+    """Return whether a case of this switch stands inside of another statement of it."""
     body = field_of(switch, "body")
     waiting = [inner for case in children(body) for inner in children(case) if case.type == "case_statement"]
     while waiting:
@@ -272,7 +272,7 @@ def _caught(run: Machine, clause: Node, frame: Frame) -> int:
 
 @statement("declaration")
 def declaration(run: Machine, node: Node, frame: Frame) -> int:
-    """Sets the variables, also static ones, structured bindings and ``Foo f(a);`` read as a function."""
+    """Set the variables, also static ones, structured bindings and ``Foo f(a);`` read as a function."""
     declarators = node.children_by_field_name("declarator")
     functions = [declarator for declarator in declarators if declarator.type == "function_declarator"]
     for declarator in functions:
@@ -300,7 +300,7 @@ def declaration(run: Machine, node: Node, frame: Frame) -> int:
 
 
 def _structured(declarators: Sequence[Node]) -> tuple[Node, Node | None] | None:
-    """The names of ``auto & [a, b] = value`` and the value."""
+    """Return the names of ``auto & [a, b] = value`` and the value."""
     for declarator in declarators:
         inner: Node | None = declarator
         if declarator.type == "init_declarator":
@@ -313,7 +313,7 @@ def _structured(declarators: Sequence[Node]) -> tuple[Node, Node | None] | None:
 
 
 def _points(node: Node) -> bool:
-    """Whether a declaration has a ``*``, and not only ``&``."""
+    """Return whether a declaration has a ``*``, and not only ``&``."""
     return any(each.type == "pointer_declarator" for each in walk(node) if each.type.endswith("declarator"))
 
 
@@ -326,7 +326,7 @@ def _is_static(node: Node) -> bool:
 def _static_local(
     run: Machine, node: Node, name: str, kind: str, initial: Callable[[], Value], frame: Frame
 ) -> None:
-    """A variable that is made once and keeps its value from call to call."""
+    """Make a variable once; it keeps its value from call to call."""
     key = ("static", frame.file.file, node.start_byte, name, str(sorted(frame.bindings.items())))
     kept = run.frames.setdefault(key, Frame(frame.file, frame.scope))
     if run.store.get((kept, name)) is None:
@@ -336,7 +336,7 @@ def _static_local(
 
 
 def _vexing(run: Machine, node: Node, declarator: Node, frame: Frame) -> None:
-    """``Listener l(buffer, this);`` reads as the declaration of a function."""
+    """Handle ``Listener l(buffer, this);``, which reads as the declaration of a function."""
     arguments = parse_expression(f"f{text(field_of(declarator, 'parameters'))}")
     given = field_of(arguments, "arguments")
     if arguments is not None and arguments.type == "call_expression" and children(given):
@@ -370,14 +370,14 @@ def _local_alias(run: Machine, node: Node, frame: Frame) -> None:
 
 
 def bind_names(run: Machine, names: list[str], value: Value, frame: Frame) -> None:
-    """A structured binding."""
+    """Bind the names of a structured binding."""
     for index, name in enumerate(names):
         parts = [part for atom in value for part in _bound_part(run, atom, index)]
         run.local(frame, name, join(*parts) if parts else unknown(f"the value of {name}"))
 
 
 def _bound_part(run: Machine, atom: object, index: int) -> list[Value]:
-    """What the name at ``index`` is bound to: an element, or a member of a structure."""
+    """Return what the name at ``index`` is bound to: an element, or a member of a structure."""
     if isinstance(atom, Group | Seq):
         exact = not (isinstance(atom, Seq) and atom.open) and index < len(atom.items)
         return [atom.items[index]] if exact else list(atom.items)

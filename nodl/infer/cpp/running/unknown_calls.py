@@ -38,7 +38,7 @@ from nodl.name_template import ParameterPart, Part
 def without_source(
     run: Machine, name: str, values: Sequence[Value], node: Node, frame: Frame, receiver: Obj | None
 ) -> Value:
-    """Declared in a header in reach, defined where we cannot see it."""
+    """Handle what is declared in a header in reach, and defined where we cannot see it."""
     nodes = [o for value in values for o in nodes_in(value)]
     if receiver is not None and receiver.node is not None:
         nodes.append(receiver)
@@ -68,7 +68,7 @@ def unknown_call(
     frame: Frame,
     receiver: Obj | None = None,
 ) -> Value:
-    """A function of a library that is not modelled."""
+    """Handle a function of a library that is not modelled."""
     last = name.rpartition("::")[2]
     harmless = is_harmless_function(name) or (receiver is not None and receiver.type.name in LIBRARY_CLASSES)
     if receiver is not None and receiver.foreign_base and is_harmless_class(receiver.foreign_base):
@@ -92,7 +92,7 @@ def unknown_call(
 
 
 def _may_be_written(run: Machine, name: str, given: Sequence[Node], frame: Frame) -> None:
-    """A text that somebody unknown gets as a variable may be another one afterwards."""
+    """Note that a text which somebody unknown gets as a variable may be another one afterwards."""
     for each in given:
         target = unwrapped(each)
         if target is not None and target.type == "pointer_expression" and text(target).startswith("&"):
@@ -104,8 +104,10 @@ def _may_be_written(run: Machine, name: str, given: Sequence[Node], frame: Frame
 
 
 def changed_by_standard(run: Machine, name: str, given: Sequence[Node], frame: Frame) -> None:
-    """``std::reverse(x.begin(), x.end())``, ``std::getline(stream, x)``: every variable among the arguments, also that
-    of ``std::back_inserter(x)``, may have changed."""
+    """Change every variable among the arguments, as ``std::reverse(x.begin(), x.end())`` may.
+
+    Likewise ``std::getline(stream, x)``, and that of ``std::back_inserter(x)``.
+    """
     seen: set[str] = set()
     targets = [target for each in given for target in _variables(each)]
     if name == "std::swap":
@@ -125,7 +127,7 @@ def changed_by_standard(run: Machine, name: str, given: Sequence[Node], frame: F
 
 
 def _replaced(run: Machine, given: Sequence[Node], targets: Sequence[Node], frame: Frame) -> bool:
-    """``std::replace(s.begin(), s.end(), 'a', 'b')`` in a text; whether that could be followed."""
+    """Run ``std::replace(s.begin(), s.end(), 'a', 'b')`` in a text; return whether that could be followed."""
     if len(given) != 4 or len({text(target) for target in targets}) != 1:
         return False
     old, new = (run.evaluate(each, frame) for each in given[2:])
@@ -154,7 +156,7 @@ def _with_letter(atom: object, old: str | None, new: str | None) -> Text | None:
 
 
 def _variables(given: Node) -> list[Node]:
-    """Variables and members that an argument names, but for those in closures."""
+    """Return variables and members that an argument names, but for those in closures."""
     if given.type in ("identifier", "field_expression") and not (
         given.parent is not None
         and given.parent.type == "call_expression"
@@ -181,7 +183,7 @@ def _changed(run: Machine, name: str, target: Node, frame: Frame) -> None:
 
 
 def _is_iterator(run: Machine, target: Node, frame: Frame) -> bool:
-    """Whether a local variable is an iterator or pointer into a container, not one itself, by its declaration."""
+    """Return whether a local variable is declared as an iterator or pointer into a container, not as one itself."""
     name = text(target)
     owner = frame.owner_of(name)
     if owner is None or name in owner.aliases or name not in owner.types or owner.types[name].endswith("&"):
@@ -205,7 +207,7 @@ _RANGE = re.compile(r"\b(?:c?r?(?:begin|end)|find\w*|(?:lower|upper)_bound|next|
 
 
 def _after(atom: object, name: str) -> Value:
-    """A list keeps its elements, in another order, and may have others."""
+    """Return the list afterwards: it keeps its elements, in another order, and may have others."""
     if isinstance(atom, Seq):
         more = () if _ORDERS.fullmatch(name) else (unknown(f"what {name}() may have written"),)
         return (open_sequence((*atom.items, *more)),)

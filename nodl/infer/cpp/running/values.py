@@ -67,7 +67,7 @@ class Notes:
 
 
 def hold(noted: Noted) -> bool:
-    """Whether all these notes say what they said."""
+    """Return whether all these notes say what they said."""
     for (notes, name), said in noted.items():
         says = notes._values.get(name, _ABSENT)
         if says is not said and says != said:
@@ -190,7 +190,7 @@ class Obj:
 
 
 def bounded(value: Value) -> Value:
-    """``value``, or one that is not known where containers in it hold too much in all."""
+    """Return ``value``, or one that is not known if containers in it hold too much in all."""
     containers = [atom for atom in value if isinstance(atom, Seq | Map | Group)]
     if not containers or sum(_parts(atom, MAX_PARTS) for atom in containers) <= MAX_PARTS:
         return value
@@ -199,7 +199,7 @@ def bounded(value: Value) -> Value:
 
 
 def _parts(atom: Atom, most: int) -> int:
-    """How many values a container holds in all; any number above ``most`` where it is more."""
+    """Count the values that a container holds in all; any number above ``most`` if it is more."""
     found = 0
     waiting = [atom]
     while waiting and found <= most:
@@ -214,7 +214,7 @@ def _parts(atom: Atom, most: int) -> int:
 
 
 def join(*values: Value) -> Value:
-    """The alternatives of all; too many become one that is not known."""
+    """Join the alternatives of all; too many become one that is not known."""
     first = values[0] if values else BOTTOM
     if all(value is first or value == first for value in values[1:]):
         return first
@@ -236,19 +236,19 @@ def _one_container(atoms: Value) -> Value:
 
 
 def one_sequence(atoms: Value) -> Value:
-    """Many possible lists become one whose items come any number of times."""
+    """Join many possible lists to one whose items come any number of times."""
     items = [item for atom in atoms if isinstance(atom, Seq) for item in atom.items]
     return (*(atom for atom in atoms if not isinstance(atom, Seq)), open_sequence(items))
 
 
 def one_map(atoms: Value) -> Value:
-    """Many possible maps become one that may hold the entries of each."""
+    """Join many possible maps to one that may hold the entries of each."""
     entries = [entry for atom in atoms if isinstance(atom, Map) for entry in atom.entries]
     return (*(atom for atom in atoms if not isinstance(atom, Map)), as_one_map(entries, True))
 
 
 def as_one_map(entries: Iterable[tuple[Value, Value]], is_open: bool) -> Map:
-    """Entries of equal keys have one value; too many keys become one that is not known."""
+    """Merge entries of equal keys to one value; too many keys become one that is not known."""
     found: dict[Value, Value] = {}
     for key, value in entries:
         found[key] = join(found[key], value) if key in found else value
@@ -259,7 +259,7 @@ def as_one_map(entries: Iterable[tuple[Value, Value]], is_open: bool) -> Map:
 
 
 def open_sequence(items: Iterable[Value]) -> Seq:
-    """A list whose ``items`` come in any order, any number of times: equal ones and those that are not known once."""
+    """Make a list whose ``items`` come in any order and number; equal ones and those not known once."""
     found: dict[Value, None] = {}
     unknown_one: Value | None = None
     for item in items:
@@ -272,24 +272,24 @@ def open_sequence(items: Iterable[Value]) -> Seq:
 
 
 def _one_unknown(atoms: Iterable[Atom]) -> Value:
-    """Of several things that are not known one is enough."""
+    """Keep one of several things that are not known."""
     found = tuple(atoms)
     first = next((atom for atom in found if isinstance(atom, Unknown)), None)
     return found if first is None else tuple(a for a in found if a is first or not isinstance(a, Unknown))
 
 
 def unknown(why: str) -> Value:
-    """A value that is not known, whose only alternative says ``why``."""
+    """Make a value that is not known, whose only alternative says ``why``."""
     return (Unknown(why),)
 
 
 def literal(value: str) -> Value:
-    """A value that is exactly this text; an empty one has no parts."""
+    """Make a value that is exactly this text; an empty one has no parts."""
     return (Text((value,)) if value else Text(()),)
 
 
 def as_parts(atom: Atom) -> tuple[Part | NodeNamePart, ...]:
-    """An alternative as a piece of text."""
+    """Return an alternative as a piece of text."""
     if isinstance(atom, Text):
         return atom.parts
     if isinstance(atom, bool):
@@ -312,7 +312,7 @@ def _parameter_parts(param: Param) -> tuple[Part, ...]:
 
 
 def concatenated(*values: Value) -> Value:
-    """Every way to put one alternative of each behind another."""
+    """Return every way to put one alternative of each behind another."""
     results: list[tuple[Part | NodeNamePart, ...]] = [()]
     for value in values:
         size = sum(len(part) if isinstance(part, str) else 1 for parts in results for part in parts)
@@ -328,14 +328,14 @@ def concatenated(*values: Value) -> Value:
 
 
 def spread(atom: Atom) -> list[tuple[Part | NodeNamePart, ...]]:
-    """``as_parts``, once for each default of a parameter."""
+    """Return ``as_parts``, once for each default of a parameter."""
     if isinstance(atom, Param) and len(atom.default) > 1:
         return [as_parts(atom._replace(known=(each,))) for each in atom.default]
     return [as_parts(atom)]
 
 
 def plain(atom: Atom) -> str | None:
-    """The text of a literal; ``None`` if it is not one."""
+    """Return the text of a literal; ``None`` if it is not one."""
     if isinstance(atom, Text) and all(isinstance(part, str) for part in atom.parts):
         return "".join(str(part) for part in atom.parts)
     if isinstance(atom, bool):
@@ -346,7 +346,7 @@ def plain(atom: Atom) -> str | None:
 
 
 def truth(value: Value) -> bool | None:
-    """Whether ``value`` is certainly true or false."""
+    """Return whether ``value`` is certainly true or false."""
     found = {_truth(atom) for atom in value}
     return found.pop() if len(found) == 1 else None
 

@@ -12,7 +12,7 @@ from nodl.infer.cpp.syntax import Node, children, text
 
 
 def variable(run: Machine, name: str, frame: Frame) -> Value:
-    """Local variable, member, constant, enumerator or function of that name."""
+    """Return the local variable, member, constant, enumerator or function of that name."""
     owner = frame.owner_of(name)
     if owner is not None:
         target = owner.aliases.get(name)
@@ -33,7 +33,7 @@ def variable(run: Machine, name: str, frame: Frame) -> Value:
 
 
 def _argument(run: Machine, written: str, frame: Frame) -> Value:
-    """A parameter of a template that stands for a value, as the argument is written."""
+    """Return a parameter of a template that stands for a value, as the argument is written."""
     if re.fullmatch(r"-?\d+", written):
         return (int(written),)
     if written in ("true", "false"):
@@ -43,7 +43,7 @@ def _argument(run: Machine, written: str, frame: Frame) -> Value:
 
 
 def current_object(frame: Frame | None) -> Obj | None:
-    """What ``this`` is, in a lambda that of the function around it; ``None`` outside of methods."""
+    """Return what ``this`` is, in a lambda that of the function around it; ``None`` outside of methods."""
     while frame is not None:
         if frame.this is not None:
             return frame.this
@@ -68,7 +68,7 @@ def member(run: Machine, owner: Obj, name: str, seen: Class | None = None) -> Va
 
 
 def static_member(run: Machine, cls: object, name: str) -> Value:
-    """What a static field holds; its initial value when it is asked for first."""
+    """Return what a static field holds; its initial value when it is read first."""
 
     from nodl.infer.cpp.running.objects import default_value
 
@@ -103,7 +103,7 @@ def _initial(run: Machine, value: Node | None, written: str, frame: Frame) -> Va
 
 
 def constant(run: Machine, name: str, frame: Frame) -> Value | None:
-    """Global, static member, enumerator or functions of that name; ``None`` if none is found."""
+    """Return the global, static member, enumerator or functions of that name; ``None`` if none is found."""
     from nodl.infer.cpp.running.objects import default_value
 
     static = static_by_name(run, name, frame)
@@ -139,7 +139,10 @@ def constant(run: Machine, name: str, frame: Frame) -> Value | None:
 
 
 def static_by_name(run: Machine, name: str, frame: Frame) -> tuple[Class, str] | None:
-    """The class that ``Foo::x`` is a static member of; of ``x`` alone, where a class has one outside of its methods."""
+    """Return the class that ``Foo::x`` is a static member of.
+
+    Of ``x`` alone, if a class has one outside of its methods.
+    """
     head, separator, last = name.rpartition("::")
     if separator:
         cls = run.class_of(run.type_of(head, frame), frame)
@@ -152,8 +155,10 @@ def static_by_name(run: Machine, name: str, frame: Frame) -> tuple[Class, str] |
 
 
 def declared_type(run: Machine, node: Node, frame: Frame) -> tuple[Type, bool]:
-    """The type that a variable or member was declared with, ``NO_TYPE`` if that is not known; whether it is a pointer,
-    or as a local variable a reference."""
+    """Return the declared type of a variable or member, ``NO_TYPE`` if not known.
+
+    And whether it is a pointer, or as a local variable a reference.
+    """
     name, this = text(node).removeprefix("this->"), current_object(frame)
     owner = frame.owner_of(name)
     if owner is not None:
@@ -174,7 +179,7 @@ def declared_type(run: Machine, node: Node, frame: Frame) -> tuple[Type, bool]:
 
 
 def is_pointer(run: Machine, node: Node, frame: Frame) -> bool:
-    """Whether a variable or member was declared as a pointer, and not as a reference."""
+    """Return whether a variable or member was declared as a pointer, and not as a reference."""
     kind, marked = declared_type(run, node, frame)
     return kind.pointer or (marked and not _is_reference(run, node, frame))
 
