@@ -280,7 +280,7 @@ def mixed_enclaves(processes: Iterable[PlannedProcess]) -> tuple[Pair, ...]:
 
 
 def on_zenoh(plan: LaunchPlan, environment: Mapping[str, str]) -> frozenset[str]:
-    """Enclaves with a process on Zenoh, or with the launcher's own node, in ``environment``, on it."""
+    """Return enclaves with a process on Zenoh, or with the launcher's own node, in ``environment``, on it."""
     found = {item.enclave.path for item in plan.processes if item.enclave and item.middleware == ZENOH}
     if plan.launcher is not None and middleware_of(environment, plan.distro) == ZENOH:
         found.add(plan.launcher.enclave)

@@ -46,10 +46,10 @@ class ProcessSpec(NamedTuple):
         return ("/bin/sh", "-c", " ".join(self.cmd)) if self.shell else self.cmd
 
     def encoded(self) -> tuple[list[bytes], dict[bytes, bytes], bytes]:
-        """Command line, environment and working directory as the kernel takes them.
+        """Encode command line, environment and working directory as the kernel takes them.
 
         :raises OSError: EINVAL, with the text that no process can be started with: a NUL character, an environment
-            variable without a name or with ``=`` in it, a character that the locale's encoding does not have.
+        variable without a name or with ``=`` in it, a character that the locale's encoding does not have.
         """
         environment = {}
         for name, value in self.environment.items():

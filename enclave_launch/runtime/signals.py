@@ -12,7 +12,7 @@ from enclave_launch.errors import RuntimeFailure
 
 
 def require_signals() -> None:
-    """Only the main thread can take the signals of a process, and only one that runs no loop can block."""
+    """Refuse to block if signals cannot be taken: only the main thread can, and only one that runs no loop."""
     if threading.current_thread() is not threading.main_thread():
         raise RuntimeFailure(
             "run() takes the signals of the process, which only its main thread can; "
@@ -26,7 +26,7 @@ def require_signals() -> None:
 
 @contextmanager
 def signals_to(on_signal: Callable[[Signals], None]) -> Iterator[None]:
-    """SIGHUP only where nobody (nohup) asked us to ignore it."""
+    """Handle signals within the block; SIGHUP only if nobody (nohup) requested to ignore it."""
     loop = asyncio.get_running_loop()
     ignored = {SIGHUP} if getsignal(SIGHUP) is SIG_IGN else set()
     numbers = [number for number in (SIGINT, SIGTERM, SIGQUIT, SIGHUP) if number not in ignored]

@@ -117,7 +117,7 @@ class ZenohRouter:
             self._thread.join()
 
     def wait(self) -> None:
-        """Until a router with the present rules answers. :raises RuntimeFailure: none does in time."""
+        """Wait until a router with the present rules answers. :raises RuntimeFailure: none does in time."""
         end = time.monotonic() + _PATIENCE
         answer = self._look()
         while answer is not RouterAnswer.PRESENT:
@@ -186,7 +186,7 @@ class ZenohRouter:
         )  # fmt: skip
 
     def _follow(self, process: subprocess.Popen[bytes], seen: object) -> None:
-        """Until it has to be started again, or all is over."""
+        """Follow the router until it has to be started again, or all is over."""
         refused = ""
         while not self._stop.wait(_LOOK):
             if process.poll() is not None and not self._answered.is_set():

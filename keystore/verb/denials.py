@@ -28,7 +28,7 @@ OPTIONS: common.Table = (
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Tells each refusal once; returns 1 where there is one. Raises a ``KeystoreError`` for what cannot be read."""
+    """Report each refusal once; return 1 if there is one. Raises a ``KeystoreError`` for what cannot be read."""
     explainer, found = RouterLogExplainer(arguments.keystore), []
     for said in filter(None, map(explainer.read, _lines(arguments.log))):
         found.append(said)

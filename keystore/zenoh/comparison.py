@@ -68,7 +68,7 @@ def read_configuration(text: bytes, place: str) -> ZenohConfiguration:
 
 
 def differences(before: ZenohConfiguration, after: ZenohConfiguration) -> Iterator[ZenohDifference]:
-    """What ``after`` has otherwise: settings, who is admitted, and what each of them may do."""
+    """Return what ``after`` has otherwise: settings, who is admitted, and what each of them may do."""
     yield from _settings(before.settings, after.settings)
     for name in sorted(before.admitted.keys() | after.admitted.keys()):
         old, new = before.admitted.get(name), after.admitted.get(name)
@@ -102,7 +102,7 @@ def _rights(
 
 
 def _grouped(permissions: Iterable[MessagePermission]) -> dict[str, set[MessagePermission]]:
-    """By what they are about, in words."""
+    """Group by what they are about, in words."""
     found: dict[str, set[MessagePermission]] = defaultdict(set)
     for one in permissions:
         about = meaning(one.flow, one.message, one.key)
@@ -112,7 +112,7 @@ def _grouped(permissions: Iterable[MessagePermission]) -> dict[str, set[MessageP
 
 
 def _words(about: Meaning) -> str:
-    """Tokens belong to what they tell of."""
+    """Put tokens to what they are about."""
     return str(about._replace(node="", enclave="") if about.use else about)
 
 
@@ -122,7 +122,7 @@ def _messages(permissions: Iterable[MessagePermission]) -> str:
 
 
 def _named(control: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
-    """Subject -> common names."""
+    """Map each subject to common names."""
     return {
         str(subject["id"]): tuple(map(str, subject.get("cert_common_names") or (EVERYBODY,)))
         for subject in control.get("subjects") or ()
@@ -143,7 +143,7 @@ def _admitted(
 
 
 def _permissions(rule: Mapping[str, Any]) -> Iterator[MessagePermission]:
-    """A rule without flows is for both."""
+    """Return permissions; a rule without flows is for both."""
     allowed = rule["permission"] == "allow"
     for flow in rule.get("flows") or ("ingress", "egress"):
         for message in rule["messages"]:

@@ -32,7 +32,7 @@ class TlsFiles(NamedTuple):
 
 
 def session_configuration(router: Sequence[str], files: TlsFiles) -> bytes:
-    """``router``: endpoints such as ``tls/localhost:7447``."""
+    """Return a session's configuration. ``router``: endpoints such as ``tls/localhost:7447``."""
     content = {
         "mode": "client",
         "connect": {
@@ -62,8 +62,10 @@ TIMESTAMPING: dict[str, Any] = {"enabled": {"router": True, "peer": True, "clien
 
 
 def transport(tls: dict[str, Any]) -> dict[str, Any]:
-    """Only TLS; no shared memory, of which access control knows nothing; the patience of rmw_zenoh's own files for many
-    nodes that start together."""
+    """Return the transport: only TLS; no shared memory, of which access control knows nothing.
+
+    With the patience of rmw_zenoh's own files for many nodes that start together.
+    """
     return {
         "unicast": {"open_timeout": 60_000, "accept_timeout": 60_000, "accept_pending": 10_000, "max_sessions": 10_000},
         "link": {"protocols": ["tls"], "tx": {"lease": 60_000, "keep_alive": 2}, "tls": tls},
@@ -72,8 +74,10 @@ def transport(tls: dict[str, Any]) -> dict[str, Any]:
 
 
 def json_bytes(content: dict[str, Any]) -> bytes:
-    """JSON is JSON5. A line for each setting, and for each entry of a list of the access control: two versions can be
-    compared line by line. The same content gives the same bytes."""
+    """Write JSON, which is JSON5, with a line for each setting and each entry of a list of the access control.
+
+    Two versions can be compared line by line. The same content gives the same bytes.
+    """
     return (_lines(content, 2) + "\n").encode()
 
 
@@ -102,7 +106,7 @@ class Subject(NamedTuple):
 def router_configuration(
     listen: Sequence[str], files: TlsFiles, subjects: Sequence[Subject], metadata: dict[str, Any]
 ) -> bytes:
-    """``metadata`` says what else the file was made from; Zenoh only carries it."""
+    """Return a router's configuration; ``metadata`` says what else the file was made from, Zenoh only carries it."""
     content = {
         "mode": "router",
         "metadata": metadata,
@@ -125,7 +129,9 @@ def router_configuration(
 
 
 def access_control(subjects: Sequence[Subject]) -> dict[str, Any]:
-    """An enclave without rules is named nowhere: nothing matches it, so everything is denied."""
+    """Return the access control; an enclave without rules is named nowhere: nothing matches it, so everything is
+    denied.
+    """
     served = [subject for subject in subjects if subject.rules]
     return {
         "enabled": True,
@@ -159,7 +165,7 @@ class RouterAddress(NamedTuple):
 
     @classmethod
     def parse(cls, text: str) -> RouterAddress:
-        """``HOST``, ``HOST:PORT`` or ``[IPv6]:PORT``. Raises ``InvalidInputError``."""
+        """Parse ``HOST``, ``HOST:PORT`` or ``[IPv6]:PORT``; raises ``InvalidInputError``."""
         match = _ADDRESS.match(text)
         port = int(match[3] or DEFAULT_PORT) if match else 0
         if match is None or not 0 < port < 65536 or len(match[1] or match[2]) > 253:

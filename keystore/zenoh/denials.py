@@ -63,7 +63,7 @@ class RouterLogExplainer:
         self._granted: dict[str, frozenset[Meaning]] = {}
 
     def read(self, line: str) -> Explanation | None:
-        """What this line tells for the first time."""
+        """Return what this line says for the first time."""
         found = self._log.read(line)
         if isinstance(found, TurnedAway):
             return self._once((found.why,), Explanation(f"a client ({found.said})", "", found.why, ""))
@@ -73,7 +73,7 @@ class RouterLogExplainer:
         return self._once((found.name, said.what, said.why), said)
 
     def _once(self, key: tuple[str, ...], said: Explanation) -> Explanation | None:
-        """A token and the messages that follow it are one refusal."""
+        """Join a token and the messages that follow it to one refusal."""
         if key in self._told:
             return None
         self._told.add(key)
@@ -112,7 +112,7 @@ class RouterLogExplainer:
         )
 
     def _grants(self, enclave: str) -> frozenset[Meaning]:
-        """From what is signed, not from the router's file, which may be of before."""
+        """Read grants from what is signed, not from the router's file, which may be an earlier one."""
         if enclave not in self._granted:
             try:
                 address = present_address(self._view) or RouterAddress()
@@ -156,7 +156,7 @@ def _stranger(found: Dropped, what: str, former: str) -> Explanation:
 
 
 def _policy(enclave: str, about: Meaning) -> str:
-    """ "" for a name that no policy may grant."""
+    """Return the policy's line, "" for a name that no policy may grant."""
     assert about.use is not None, "asked before"
     operation, name = operation_of(about.use, about.name)
     namespace, _, node = about.node.rpartition("/")

@@ -56,7 +56,7 @@ class RouterFile(NamedTuple):
 
 
 def session_content(view: KeystoreView, enclave: str, address: RouterAddress) -> bytes:
-    """The session configuration for a process in ``enclave``, whose files it names by their path."""
+    """Return the session configuration for a process in ``enclave``, whose files it names by their path."""
     directory = f"{view.root}/{layout.enclave_directory(enclave)}"
     authorities = f"{directory}/{Role.IDENTITY.value}.cert.pem"
     files = TlsFiles(authorities, f"{directory}/{layout.CERT}", f"{directory}/{layout.KEY}")
@@ -64,7 +64,9 @@ def session_content(view: KeystoreView, enclave: str, address: RouterAddress) ->
 
 
 def present_address(view: KeystoreView) -> RouterAddress | None:
-    """As the router's file has it; None without one. Raises DamagedKeystoreError for a file that is not ours."""
+    """Return the address in the router's file; None without one. Raises DamagedKeystoreError for a file that is not
+    ours.
+    """
     text = safe_files.read_if_there(view.root, layout.ZENOH_ROUTER)
     if text is None:
         return None
@@ -78,7 +80,7 @@ def present_address(view: KeystoreView) -> RouterAddress | None:
 
 
 def router_file(view: KeystoreView, enclaves: Iterable[str], address: RouterAddress) -> RouterFile:
-    """The router's configuration for these enclaves. Raises a KeystoreError for what concerns all of them."""
+    """Return the router's configuration for these enclaves; raises a KeystoreError for what concerns all of them."""
     register = read_register(view.root)
     revoked = frozenset(revoked_serials(view))
     subjects: list[Subject] = []
@@ -102,7 +104,8 @@ def router_file(view: KeystoreView, enclaves: Iterable[str], address: RouterAddr
 
 
 def identity_problem(view: KeystoreView, due: datetime) -> str | None:
-    """What is wrong with the router's key pair: it has to be whole, private, by the CA in use, and hold until ``due``.
+    """Return what is wrong with the router's key pair: it has to be whole, private, by the CA in use, and hold until
+    ``due``.
 
     Raises UnsafeKeystoreError for a key that somebody else could have written.
     """
@@ -121,7 +124,9 @@ def identity_problem(view: KeystoreView, due: datetime) -> str | None:
 
 
 def router_key(view: KeystoreView) -> bytes | None:
-    """None for a missing one, and for one that others could read: whoever has it can play the router."""
+    """Return the key; None for a missing one, and for one that others could read: whoever has it can play
+    the router.
+    """
     path = view.root / layout.ZENOH_ROUTER_KEY
     if not os.path.lexists(path) or stat.S_IMODE(os.lstat(path).st_mode) & 0o077:
         return None
@@ -129,7 +134,9 @@ def router_key(view: KeystoreView) -> bytes | None:
 
 
 def _trust(view: KeystoreView) -> str:
-    """Of all identity CAs: the router reads them when it starts, so another one has to change its file."""
+    """Return the certificates of all identity CAs: the router reads them when it starts, so another one changes its
+    file.
+    """
     return hashlib.sha256(b"".join(ca.der for ca in view.ca_bundle(Role.IDENTITY))).hexdigest()
 
 
@@ -157,7 +164,7 @@ def _subject(
 def _common_name(
     register: Register | None, revoked: frozenset[int], enclave: str, facts: CertificateFacts
 ) -> str:
-    """Zenoh knows no CRL: a name is served only while no certificate with it is revoked."""
+    """Return the name, only while no certificate with it is revoked: Zenoh knows no CRL."""
     name = facts.common_name
     if name is None:
         raise DamagedKeystoreError("its certificate has no common name")
@@ -184,7 +191,7 @@ def _topics(grant: Grant, qualifier: Qualifier) -> TopicSets:
 
 
 def _domains(grant: Grant) -> Domains:
-    """Of all that it allows; our own documents have one set of domains."""
+    """Return the domains of all that it allows; our own documents have one set of domains."""
     allowed = [rule for rule in grant.rules if rule.qualifier is Qualifier.ALLOW]
     spans = [span for rule in allowed for span in rule.domains]
     return Domains((low, HIGHEST_ID if high is None else high) for low, high in spans)

@@ -61,8 +61,11 @@ def grants_of_policy(policy: EnclavePolicy, types: Types = MappingProxyType({}))
 
 
 def grants_of_topics(allow: TopicSets, deny: TopicSets, types: Types = MappingProxyType({})) -> Grants:
-    """``deny``: denials of names that ``allow`` grants by a wildcard. Deny rules do not hold on Zenoh (a message on
-    ``0/**`` passes a denial of ``0/secret/**``), so such a wildcard is a gap as a whole."""
+    """Return grants of topics. ``deny``: denials of names that ``allow`` grants by a wildcard.
+
+    Deny rules do not hold on Zenoh (a message on ``0/**`` passes a denial of ``0/secret/**``), so such a wildcard is
+    a gap as a whole.
+    """
     found: dict[Use, list[str]] = {use: [] for use in Use}
     gaps: list[str] = []
     published, subscribed = set(allow.publish), set(allow.subscribe)

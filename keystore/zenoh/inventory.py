@@ -54,7 +54,9 @@ def compare(before: KeystoreView, after: KeystoreView) -> list[FileDifference]:
 
 
 def _read(view: KeystoreView, file: str, roots: Iterable[Path] = ()) -> ZenohConfiguration:
-    """``roots``: of two keystores that are compared; where each lies does not count, nor that one is a copy."""
+    """Read a file. ``roots``: of two keystores that are compared; where each lies does not count, nor that one is a
+    copy.
+    """
     text = safe_files.read_if_there(view.root, file) or b"{}"
     for root in roots:
         text = text.replace(f'"{root}/'.encode(), b'"KEYSTORE/')

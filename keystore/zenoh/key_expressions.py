@@ -31,20 +31,21 @@ class NotExpressible(PolicyError):
 
 
 def domain_chunks(domains: Domains) -> tuple[str, ...]:
-    """One chunk for each domain, ``*`` for all of them."""
+    """Return one chunk for each domain, ``*`` for all of them."""
     if domains == Domains.every():
         return ("*",)
     return tuple(str(number) for first, last in domains.ranges for number in range(first, last + 1))
 
 
 def type_chunk(ros_type: str) -> str | None:
-    """``std_msgs/msg/String`` -> ``std_msgs::msg::dds_::String_``; None for what is not such a name."""
+    """Return ``std_msgs/msg/String`` as ``std_msgs::msg::dds_::String_``; None for what is not such a name."""
     match = _TYPE.match(ros_type)
     return f"{match[1]}::{match[2]}::dds_::{match[3]}_" if match else None
 
 
 def name_expressions(name: str) -> tuple[str, ...]:
-    """An absolute name of a policy as chunks, without the first ``/``. ``*`` crosses ``/`` there, as in fnmatch.
+    """Return an absolute name of a policy as chunks, without the first ``/``. ``*`` crosses ``/`` there, as in
+    fnmatch.
 
     Raises ``NotExpressible`` for ``?``, ``[...]`` and more than three ``*`` inside of chunks.
     """
@@ -65,7 +66,7 @@ def name_expressions(name: str) -> tuple[str, ...]:
 
 
 def _star(before: str, after: str) -> tuple[str, ...]:
-    """What a ``*`` between these texts can be: within its chunk, or across some."""
+    """Return what a ``*`` between these texts can be: within its chunk, or across some."""
     if before.endswith("/") and (not after or after.startswith("/")):
         return ("*/**",)
     if not after:
@@ -74,7 +75,7 @@ def _star(before: str, after: str) -> tuple[str, ...]:
 
 
 def _canonical(expression: str) -> str:
-    """Zenoh refuses other spellings: ``**/*`` is ``*/**``, ``$*`` alone is ``*``."""
+    """Write in the only spelling that Zenoh accepts: ``**/*`` is ``*/**``, ``$*`` alone is ``*``."""
     chunks: list[str] = []
     run: list[str] = []
     for chunk in (*expression.split("/"), ""):
@@ -90,30 +91,32 @@ def _canonical(expression: str) -> str:
 
 
 def data_keys(domains: Iterable[str], name: str, types: Iterable[str]) -> Iterator[str]:
-    """The keys of a topic or service: ``types`` are chunks of ``type_chunk``, none for any type. The hash stays
-    open, so that a new definition of a message needs no new rules."""
+    """Return the keys of a topic or service: ``types`` are chunks of ``type_chunk``, none for any type.
+
+    The hash stays open, so that a new definition of a message needs no new rules.
+    """
     tails = [f"{one}/*" for one in types] or ["*/*"]
     for domain, expression, tail in product(domains, name_expressions(name), tails):
         yield _canonical(f"{domain}/{expression}/{tail}")
 
 
 def history(key: str) -> str:
-    """Where a subscription asks for what was published before, and for what it missed."""
+    """Return where a subscription requests what was published before, and what it missed."""
     return f"{key}/@adv/**"
 
 
 def cache(key: str) -> str:
-    """Where a transient local publisher answers, and says that it is there."""
+    """Return where a transient local publisher answers, and says that it is there."""
     return f"{key}/@adv/pub/**"
 
 
 def mangled(name: str) -> str:
-    """An absolute name as one chunk of a token: ``/front/camera`` -> ``%front%camera``."""
+    """Return an absolute name as one chunk of a token: ``/front/camera`` as ``%front%camera``."""
     return name.replace("/", "%")
 
 
 def node_tokens(domains: Iterable[str], enclave: str) -> Iterator[str]:
-    """With which the nodes of an enclave say that they are there."""
+    """Return the tokens with which the nodes of an enclave say that they are there."""
     for domain in domains:
         yield f"{_GRAPH}/{domain}/*/*/*/NN/{mangled(enclave)}/*/*"
 
@@ -121,7 +124,7 @@ def node_tokens(domains: Iterable[str], enclave: str) -> Iterator[str]:
 def endpoint_tokens(
     domains: Iterable[str], kind: str, enclave: str, name: str, types: Iterable[str]
 ) -> Iterator[str]:
-    """The same for a publisher (``MP``), subscription (``MS``), server (``SS``) or client (``SC``)."""
+    """Return the same for a publisher (``MP``), subscription (``MS``), server (``SS``) or client (``SC``)."""
     chunk = re.sub(r"\*+", "$*", mangled(name))
     tails = [f"{one}/*/*" for one in types] or ["*/*/*"]
     for domain, tail in product(domains, tails):
@@ -129,5 +132,5 @@ def endpoint_tokens(
 
 
 def graph(domains: Iterable[str]) -> Iterator[str]:
-    """All tokens of a domain: what rmw_zenoh asks for when a context begins."""
+    """Return all tokens of a domain: what rmw_zenoh requests when a context begins."""
     return (f"{_GRAPH}/{domain}/**" for domain in domains)

@@ -67,8 +67,10 @@ class Meaning(NamedTuple):
 
 
 def meaning(flow: str, message: str, key: str) -> Meaning | None:
-    """Of a message (``put``, ``declare_subscriber`` ...) that arrives at the router (``ingress``) or leaves it
-    (``egress``); None for what ROS has nothing like."""
+    """Return the meaning of a message (``put``, ``declare_subscriber`` ...); None for what ROS has nothing like.
+
+    The message arrives at the router (``ingress``) or leaves it (``egress``).
+    """
     if key.startswith("@"):
         return _of_graph(key)
     data, _, history = key.partition("/@adv/")
@@ -89,7 +91,7 @@ def meaning(flow: str, message: str, key: str) -> Meaning | None:
 
 
 def operation_of(use: Use, name: str) -> tuple[Operation, str]:
-    """As a policy says it: a part of an action counts for the action."""
+    """Return the operation as a policy says it: a part of an action counts for the action."""
     service, topic = _ACTION_SERVICE.match(name), _ACTION_TOPIC.match(name)
     if service is not None and use in (Use.CALL, Use.SERVE):
         return Operation.CALL if use is Use.CALL else Operation.EXECUTE, service[1]
@@ -99,13 +101,13 @@ def operation_of(use: Use, name: str) -> tuple[Operation, str]:
 
 
 def type_name(chunk: str) -> str:
-    """``std_msgs::msg::dds_::String_`` -> ``std_msgs/msg/String``; "" for a chunk that leaves it open."""
+    """Return ``std_msgs::msg::dds_::String_`` as ``std_msgs/msg/String``; "" for a chunk that leaves it open."""
     match = _TYPE.match(chunk)
     return f"{match[1]}/{match[2]}/{match[3]}" if match else ""
 
 
 def _name_and_type(chunks: list[str]) -> tuple[str, str]:
-    """``0/**`` has neither: it is about all names."""
+    """Split into name and type; ``0/**`` has neither: it is about all names."""
     if len(chunks) < 4 or "**" in chunks[-2:]:
         return _ros_name("/".join(chunks[1:])), ""
     return _ros_name("/".join(chunks[1:-2])), chunks[-2]

@@ -27,7 +27,7 @@ class AccessRule(NamedTuple):
     keys: tuple[str, ...]
 
     def block(self, subject: str) -> dict[str, Any]:
-        """The entry of ``access_control.rules``."""
+        """Return the entry of ``access_control.rules``."""
         return {
             "id": f"{subject} {self.name}",
             "permission": "allow",
@@ -69,7 +69,7 @@ _TABLE = (
 
 
 def access_rules(enclave: str, grants: Grants, domains: Domains) -> tuple[AccessRule, ...]:
-    """What the sessions with the certificate of ``enclave`` may send and get; none without a grant."""
+    """Return what the sessions with the certificate of ``enclave`` may send and get; none without a grant."""
     if not any(grants.names.values()):
         return ()
     chunks = domain_chunks(domains)
@@ -85,8 +85,10 @@ def access_rules(enclave: str, grants: Grants, domains: Domains) -> tuple[Access
 
 
 def _graph(enclave: str, grants: Grants, chunks: tuple[str, ...]) -> Iterator[AccessRule]:
-    """Tokens of what its nodes are and may do, in the name of the enclave; the graph of its domains to look at, which
-    rmw_zenoh asks for as a whole (``ros_discovery_info`` is granted to everyone on DDS, too)."""
+    """Return tokens of what its nodes are and may do, in the name of the enclave, and the graph of its domains.
+
+    rmw_zenoh requests the graph as a whole (``ros_discovery_info`` is granted to everyone on DDS, too).
+    """
     own = (*key_expressions.node_tokens(chunks, enclave), *_endpoints(enclave, grants, chunks))
     everything = tuple(key_expressions.graph(chunks))
     yield AccessRule("be seen", "ingress", ("liveliness_token",), own)

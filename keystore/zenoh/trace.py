@@ -70,7 +70,7 @@ class RouterLog:
         self._judged: dict[str, Dropped | None] = {}
 
     def read(self, line: str) -> Dropped | TurnedAway | None:
-        """What this line tells; mostly nothing."""
+        """Return what this line says; mostly nothing."""
         if "interceptor" not in line and "zenoh_link_tls" not in line:
             return None
         text = _COLOUR.sub("", line).rstrip()

@@ -18,7 +18,7 @@ from keystore.zenoh.key_expressions import type_chunk
 def types_of_interface(
     operation: Operation, name: str, ros_type: str
 ) -> Iterator[tuple[Use, str, str | None]]:
-    """What an interface of this type means for each of its topics and services: use, name, type chunk.
+    """Return what an interface of this type means for each of its topics and services: use, name, type chunk.
 
     Source for actions: rosidl (``Fibonacci_SendGoal``, ``Fibonacci_FeedbackMessage``), rcl_action's names.
     """
@@ -36,7 +36,7 @@ def types_of_interface(
 
 
 def united_types(known: Iterable[tuple[Use, str, str | None]]) -> Types:
-    """By use and name; a name is left out as soon as one of its types is not known, or it holds a wildcard."""
+    """Unite by use and name; a name is left out as soon as one of its types is not known, or it holds a wildcard."""
     found: dict[tuple[Use, str], set[str | None]] = {}
     for use, name, chunk in known:
         found.setdefault((use, name), set()).add(chunk)
@@ -48,12 +48,14 @@ def united_types(known: Iterable[tuple[Use, str, str | None]]) -> Types:
 
 
 def types_text(types: Types) -> tuple[tuple[str, tuple[str, ...]], ...]:
-    """As a share keeps them: ``publish /chatter`` and its type chunks."""
+    """Write as a share keeps them: ``publish /chatter`` and its type chunks."""
     return tuple((f"{use.value} {name}", chunks) for (use, name), chunks in sorted(types.items()))
 
 
 def types_of_shares(enclave: str, shares: Iterable[Share]) -> Types:
-    """Of all launches that share an enclave. Raises ``PolicyError`` for a name that no ROS node can have."""
+    """Return the types of all launches that share an enclave; raises ``PolicyError`` for a name that no ROS node can
+    have.
+    """
     known: list[tuple[Use, str, str | None]] = []
     for share in shares:
         own = dict(share.types)

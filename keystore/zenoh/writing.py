@@ -61,7 +61,7 @@ def write_zenoh(
     router: str | None = None,
     options: ProvisionOptions | None = None,
 ) -> ZenohReport:
-    """Session files for ``enclaves``; the router serves them and those that had one before. Idempotent.
+    """Write session files for ``enclaves``; the router serves them and those that had one before. Idempotent.
 
     ``router``: where it is (``HOST:PORT``); None: as before, ``localhost:7447`` for the first time.
 
@@ -84,8 +84,11 @@ def write_zenoh(
 
 
 def matching_enclaves(keystore: Path | str, patterns: Sequence[str] | None) -> list[str]:
-    """Those that match one of ``patterns`` (``/robot1/*``); without patterns all, but none more where some are on Zenoh
-    already. Raises InvalidInputError for a pattern that none matches."""
+    """Return those that match one of ``patterns`` (``/robot1/*``).
+
+    Without patterns all, but none more if some are on Zenoh already. Raises InvalidInputError for a pattern that none
+    matches.
+    """
     view = keystore_at(keystore)
     if patterns is None:
         return [] if view.has_zenoh_router else view.enclaves()
@@ -117,8 +120,10 @@ def _signed_elsewhere(
 
 
 def session_differences(keystore: Path | str, enclave: str, address: RouterAddress) -> tuple[str, ...]:
-    """Why the session file of an enclave is not what ``write_zenoh`` left; empty when it is. Cheap: asked before each
-    process."""
+    """Return why the session file of an enclave is not what ``write_zenoh`` left; empty if it is.
+
+    Cheap: evaluated before each process.
+    """
     view = KeystoreView(resolve_root(keystore))
     if safe_files.read_if_there(view.root, layout.zenoh_session(enclave)) == session_content(
         view, enclave, address
@@ -128,7 +133,7 @@ def session_differences(keystore: Path | str, enclave: str, address: RouterAddre
 
 
 def router_differences(keystore: Path | str) -> tuple[str, ...]:
-    """Why the router's file must not be used: it is not what follows from the keystore."""
+    """Return why the router's file must not be used: it is not what follows from the keystore."""
     view = KeystoreView(resolve_root(keystore))
     address = present_address(view)
     if address is None:
@@ -147,7 +152,7 @@ RESTART = (
 def _as_wanted(
     view: KeystoreView, names: list[str], address: RouterAddress, options: ProvisionOptions
 ) -> RouterFile | None:
-    """What the router serves, when nothing is to be written. Asked before each secured launch."""
+    """Return what the router serves, if nothing is to be written. Evaluated before each secured launch."""
     if _stale_sessions(view, names, address):
         return None
     if _serves_no_router(view):
@@ -195,7 +200,7 @@ def _write(
 def _issue(
     view: KeystoreView, address: RouterAddress, access: CaAccess, now: datetime
 ) -> tuple[IssuedCertificate, dict[str, bytes]]:
-    """A certificate for the router's host; its key stays unless it is missing or others could read it."""
+    """Issue a certificate for the router's host; its key stays unless it is missing or others could read it."""
     view.refuse_ended(now, Role.IDENTITY)
     authority = view.authority(Role.IDENTITY, access)
     key = router_key(view)

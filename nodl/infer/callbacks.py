@@ -59,7 +59,9 @@ def _call_back(run: Run, callback: object, arity: int | None, widen_texts: bool)
 
 
 def _expect_escaped(run: Run, expected: set[object]) -> None:
-    """Expect that code which was handed a class or an object makes objects of it and calls its methods, in any order."""
+    """Expect that code which was handed a class or an object makes objects of it and calls its methods, in
+    any order.
+    """
     for atom in list(run.escaped):
         if atom in expected:
             continue

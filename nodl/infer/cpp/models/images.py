@@ -40,7 +40,9 @@ _TRANSPORTS = {
 
 
 def _image_publisher(run: Machine, record: AllocatedNode, base: Value, call: Call) -> None:
-    """Model image_transport/src/publisher.cpp: one publisher for each installed plugin, below the image's final name."""
+    """Model image_transport/src/publisher.cpp: one publisher for each installed plugin, below the image's
+    final name.
+    """
     run.endpoint(record, PUB, base, _IMAGE, call)
     for topic in concatenated(base):
         for plugin, kind in list(_TRANSPORTS.items())[:3]:

@@ -193,7 +193,9 @@ _action("generic_client", CALL)
 @library_method(f"rclcpp::{SRV.value}", "configure_introspection")
 @library_method(f"rclcpp::{CLI.value}", "configure_introspection")
 def _introspection(run: Machine, call: Call) -> Value:
-    """Add the publisher beside a service that is made if introspection is on (rcl/src/rcl/service_event_publisher.c)."""
+    """Add the publisher beside a service that is made if introspection is on
+    (rcl/src/rcl/service_event_publisher.c).
+    """
     data = call.this.data
     if data.get("record") is not None:
         name = concatenated(data["name"], literal("/_service_event"))

@@ -79,6 +79,8 @@ _TABLE = tuple(
 
 
 def is_of_c(name: str, headers: Iterable[str]) -> bool:
-    """Return whether one of ``headers``, as ``#include`` names them, is a header of C that defines the type ``name``."""
+    """Return whether one of ``headers``, as ``#include`` names them, is a header of C that defines the type
+    ``name``.
+    """
     fitting = [header for header, names in _TABLE if names.fullmatch(name)]
     return any(pattern.fullmatch(header) for pattern in fitting for header in headers) if fitting else False

@@ -92,7 +92,9 @@ def _points_elsewhere(run: Machine, name: Node, value: Value, frame: Frame) -> N
 
 
 def _assigned(run: Machine, targets: Sequence[Obj], value: Value, node: Node, frame: Frame) -> bool:
-    """Run ``object = value``, by the operator of its class, else member by member; return whether that could be done."""
+    """Run ``object = value``, by the operator of its class, else member by member; return whether that
+    could be done.
+    """
     from nodl.infer.cpp.running.invocation import call_methods
 
     for target in targets:
