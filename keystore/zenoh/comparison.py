@@ -112,7 +112,7 @@ def _grouped(permissions: Iterable[MessagePermission]) -> dict[str, set[MessageP
 
 
 def _words(about: Meaning) -> str:
-    """Put tokens to what they are about."""
+    """Name what it is about; tokens by what they belong to."""
     return str(about._replace(node="", enclave="") if about.use else about)
 
 

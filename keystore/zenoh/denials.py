@@ -156,7 +156,7 @@ def _stranger(found: Dropped, what: str, former: str) -> Explanation:
 
 
 def _policy(enclave: str, about: Meaning) -> str:
-    """Return the policy's line, "" for a name that no policy may grant."""
+    """Return a policy that grants it; "" for a name that no policy may grant."""
     assert about.use is not None, "asked before"
     operation, name = operation_of(about.use, about.name)
     namespace, _, node = about.node.rpartition("/")

@@ -134,9 +134,7 @@ def router_key(view: KeystoreView) -> bytes | None:
 
 
 def _trust(view: KeystoreView) -> str:
-    """Return the certificates of all identity CAs: the router reads them when it starts, so another one changes its
-    file.
-    """
+    """Return a digest of all identity CAs: the router reads them when it starts, so another one changes its file."""
     return hashlib.sha256(b"".join(ca.der for ca in view.ca_bundle(Role.IDENTITY))).hexdigest()
 
 
