@@ -21,12 +21,13 @@ class ProgramInputs(NamedTuple):
     """``values`` by input name (``--topic``, ``-t``, ``$VARIABLE``).
 
     ``bare_words``: there are words that may be positional arguments; ``short_flags``: there are flags
-    with one dash, which may be another spelling of any option.
+    with one dash, which may be another spelling of any option; ``all_leading``: no word stands behind an option.
     """
 
     values: Mapping[str, str] = MappingProxyType({})
     bare_words: bool = False
     short_flags: bool = False
+    all_leading: bool = False
 
     def doubtful(self, template: NameTemplate) -> NameTemplate:
         """Return ``template`` with an unknown part for each input that the command line may set unseen."""
@@ -35,6 +36,8 @@ class ProgramInputs(NamedTuple):
     def _doubted(self, part: Part) -> Part:
         if not isinstance(part, ParameterPart) or part.name in self.values:
             return part
+        if part.name[1:-1].isdigit() and self.all_leading:
+            return part  # fewer words than places
         shortened = any(len(name) > 2 and part.name.startswith(name) for name in self.values)  # argparse
         if (part.name[:1] == "<" and self.bare_words) or (
             part.name[:1] == "-" and (self.short_flags or shortened)
@@ -59,12 +62,13 @@ def program_inputs(process: ResolvedProcess) -> ProgramInputs:
         if _is_flag(word):
             name, equals, value = word.partition("=")
             values[name] = value if equals or _is_flag(following) else following
-    leading = takewhile(lambda word: not _is_flag(word), words)  # behind an option places tell nothing
+    leading = [*takewhile(lambda word: not _is_flag(word), words)]  # behind an option places tell nothing
     values.update((f"<{place}>", word) for place, word in enumerate(leading, 1))
     return ProgramInputs(
         values,
         bare_words=any(not _is_flag(word) for word in words),
         short_flags=any(_is_flag(word) and not word.startswith("--") for word in words),
+        all_leading=len(leading) == len(words),
     )
 
 

@@ -189,6 +189,9 @@ class _Reader:
             return
         elif isinstance(node, ast.Assign) and any(last_name(each) == "__all__" for each in node.targets):
             return
+        elif isinstance(node, ast.If) and last_name(node.test) == "TYPE_CHECKING":
+            self.block(node.orelse, scope, (*around, node))
+            return
         elif isinstance(node, ast.AnnAssign):
             self._each([node.target, *([node.value] if node.value else [])], scope, (*around, node))
             return

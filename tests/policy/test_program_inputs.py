@@ -72,6 +72,7 @@ KNOWN = {
     "another option that begins likewise": ("--topic", process("--topic-type", "x"), "/chatter"),
     "a positional argument by its place": ("<1>", process("loud", "other"), "/loud"),
     "the next by its place": ("<2>", process("other", "loud"), "/loud"),
+    "a place after the last word": ("<2>", process("loud"), "/chatter"),
     "what follows ROS arguments": ("--topic", process("--ros-args", "--", "--topic", "loud"), "/loud"),
     "a variable": ("$TOPIC", process(environment={"TOPIC": "loud"}), "/loud"),
     "a variable that nobody sets": ("$TOPIC", process(environment={"OTHER": "x"}), "/chatter"),
@@ -90,6 +91,10 @@ DOUBTFUL = {
     "a positional argument": ("<topic>", process("loud")),
     "a word after a flag that may take no value": ("<topic>", process("--verbose", "loud")),
     "a place beside options, of which one may take the word": ("<1>", process("--verbose", "loud")),
+    "a place after the last word, with an option whose value it may be": (
+        "<2>",
+        process("a", "--verbose", "b"),
+    ),
     "an option, shortened": ("--topic", process("--top", "loud")),
     "an option, shortened, with =": ("--topic", process("--top=loud")),
     "an option that may have a short spelling": ("--topic", process("-t", "loud")),

@@ -10,9 +10,10 @@ from collections.abc import Sequence as Sequences
 from contextlib import suppress
 from typing import Any
 
+from nodl.infer.findings import NodeRecord, OptionDefaults
 from nodl.infer.interpreter.frames import Arguments, Frame
 from nodl.infer.interpreter.run import Run
-from nodl.infer.text import Hole, Text, TextAtom, common_text, concatenations, make_text
+from nodl.infer.text import Hole, Input, Text, TextAtom, common_text, concatenations, make_text
 from nodl.infer.values import (
     ANY,
     BOTTOM,
@@ -105,12 +106,28 @@ def formatted(value: Value, spec: str | None) -> list[TextAtom]:
 def _each_formatted(value: Value, spec: str | None, write: Callable[[Any], str]) -> list[TextAtom]:
     texts: list[TextAtom] = []
     for atom in value:
+        if spec == "d" and isinstance(atom, Text) and _is_whole_number(atom):
+            texts.append(atom)
+            continue
         if spec is None or not isinstance(atom, str | int | float) or _WIDE.search(spec):
             texts.append(_hole("formatted text"))
             continue
         with suppress(ValueError, TypeError, OverflowError):  # an error at run time, no text
             texts.append(write(atom))
     return texts or [_hole("formatted text")]
+
+
+def _is_whole_number(text: Text) -> bool:
+    """Return True for an input that the program declares as a whole number: written plainly, it is its own text."""
+    piece = text.pieces[0]
+    if (
+        len(text.pieces) > 1
+        or not isinstance(piece, Input)
+        or not isinstance(piece.owner, NodeRecord | OptionDefaults)
+    ):
+        return False
+    default = piece.owner.default(piece.name)
+    return bool(default) and all(type(atom) is int for atom in default)
 
 
 def percent(left: Value, right: Value) -> Value:
@@ -144,7 +161,8 @@ def _percent_one(template: str, right: Value) -> list[TextAtom]:
 def _percent_text(match: re.Match[str], value: Value) -> list[TextAtom]:
     if match["type"] == "s" and not match["flags"]:
         return as_texts(value)
-    return _each_formatted(value, match["flags"], lambda atom: f"%{match['flags']}{match['type']}" % atom)
+    spec = "d" if match["type"] in "di" and not match["flags"] else match["flags"]
+    return _each_formatted(value, spec, lambda atom: f"%{match['flags']}{match['type']}" % atom)
 
 
 def str_format(template: TextAtom, args: Arguments) -> list[TextAtom]:

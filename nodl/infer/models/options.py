@@ -26,12 +26,17 @@ from nodl.infer.values import (
 
 PARSER = "argparse.ArgumentParser"
 NAMESPACE = "argparse.Namespace"
+_COUNT = "positional arguments"
+_NOT_TOLD = unknown("which word of the command line it is")
 _KEEP_TEXT = frozenset({"builtins.str", "builtins.int"})  # types that leave a well-written value as it is
 
 
 def made_parser(run: Run, call: Call) -> Value:
     """Model ``ArgumentParser(...)``: the object that collects the options declared on it."""
-    return (run.library_object(call, PARSER),)
+    parser = run.library_object(call, PARSER)
+    inherits = "parents" in call.args.keywords
+    run.state.store(parser, _COUNT, unknown("positional arguments of parents") if inherits else (0,))
+    return (parser,)
 
 
 def _add_argument(run: Run, parser: Instance, call: Call) -> Value:
@@ -41,13 +46,37 @@ def _add_argument(run: Run, parser: Instance, call: Call) -> Value:
     long = next((flag for flag in flags if flag.startswith("--")), flags[0])
     dest = sole(call.args.keywords.get("dest", (long.lstrip("-").replace("-", "_"),)))
     default = call.args.keywords.get("default", BOTTOM)
-    name = long if long.startswith("-") else f"<{long}>"
+    owner = parser.cells.get("parser", (parser,))[0]
+    assert isinstance(owner, Instance)
+    name = long if long.startswith("-") else _place(run, owner, long, call)
     run.options.declare(name, tuple(atom for atom in default if atom is not None))
     if isinstance(dest, str):
-        owner = parser.cells.get("parser", (parser,))[0]
-        assert isinstance(owner, Instance)
         run.state.store(owner, "dest " + dest, _parsed(run, name, call))
     return ANY
+
+
+def _place(run: Run, parser: Instance, name: str, call: Call) -> str:
+    """Return ``<1>`` for the first word of the command line, or ``<name>`` where its place is not certain.
+
+    argparse gives each positional argument one word in turn; an optional one takes its word only after all others have
+    theirs, and so is certain only at the end.
+    """
+    before = sole(parser.cells.get(_COUNT, BOTTOM))
+    nargs = sole(call.args.keywords.get("nargs", NONE))
+    if type(before) is not int:
+        _forget_places(run, parser)
+    elif nargs in (None, "?"):
+        run.state.store(parser, _COUNT, (before + 1,) if nargs is None else _NOT_TOLD)
+        return f"<{before + 1}>"
+    run.state.store(parser, _COUNT, _NOT_TOLD)
+    return f"<{name}>"
+
+
+def _forget_places(run: Run, parser: Instance) -> None:
+    for cell, value in list(parser.cells.items()):
+        found = input_of(sole(value))
+        if cell.startswith("dest ") and found is not None and found.name.startswith("<"):
+            run.state.store(parser, cell, _NOT_TOLD)
 
 
 def _parsed(run: Run, name: str, call: Call) -> Value:

@@ -10,6 +10,11 @@ from tests.nodl.infer.conftest import Infer
 
 NodeBody = Callable[..., list[str]]
 
+POSITIONAL = (
+    "import argparse\np = argparse.ArgumentParser()\np.add_argument({})\nself.P(p.parse_args().topic)"
+)
+NUMBER = "n = self.declare_parameter('n', {}).value\nself.P({})"
+
 CASES: dict[str, tuple[str, list[str]]] = {
     "constant": ("self.P('a')", ["a"]),
     "variable": ("x = 'a'; x = x + '/b'; self.P(x)", ["a/b"]),
@@ -68,6 +73,21 @@ CASES: dict[str, tuple[str, list[str]]] = {
         "self.P(p.parse_args().topic)",
         ["param:--topic"],
     ),
+    "first word of argparse": (POSITIONAL.format("'topic'"), ["param:<1>"]),
+    "an optional word of argparse": (POSITIONAL.format("'topic', nargs='?', default='a'"), ["param:<1>"]),
+    "the next word of argparse": (POSITIONAL.format("'n', type=int)\np.add_argument('topic'"), ["param:<2>"]),
+    "a word after several": (POSITIONAL.format("'n', nargs='*')\np.add_argument('topic'"), ["param:<topic>"]),
+    "an optional word before another": (POSITIONAL.format("'topic', nargs='?')\np.add_argument('n'"), ["?"]),
+    "a word that may be the second": (
+        "import argparse\np = argparse.ArgumentParser()\nif self.flag:\n    p.add_argument('n')\n"
+        "p.add_argument('topic')\nself.P(p.parse_args().topic)",
+        ["param:<topic>"],
+    ),
+    "%d of a whole number": (NUMBER.format("1", "'r%d/a' % n"), ["rparam:n/a"]),
+    "format d of a whole number": (NUMBER.format("1", "'r{:d}/a'.format(n)"), ["rparam:n/a"]),
+    "f-string with d of a whole number": (NUMBER.format("1", "f'r{n:d}/a'"), ["rparam:n/a"]),
+    "%d of what may be a fraction": (NUMBER.format("1.5", "'r%d/a' % n"), ["r?/a"]),
+    "%02d of a whole number": (NUMBER.format("1", "'r%02d/a' % n"), ["r?/a"]),
     "environment": ("import os\nself.P(os.environ.get('TOPIC', 'a'))", ["param:$TOPIC"]),
     "environment without a default": ("import os\nself.P(os.environ['TOPIC'])", ["param:$TOPIC"]),
     "node name in a name": ("self.P(self.get_name() + '/a')", ["{node}/a"]),

@@ -62,6 +62,17 @@ def test_what_only_values_forbid_is_a_gap(body: str, main: str, infer: Infer) ->
     assert any("make() was not reached" in why for why in _gaps(infer, body, main, "DEBUG = False"))
 
 
+@pytest.mark.parametrize("test", ["typing.TYPE_CHECKING", "TYPE_CHECKING"])
+def test_what_only_a_type_checker_reads_is_no_gap(test: str, infer: Infer) -> None:
+    before = f"import typing\n    from typing import TYPE_CHECKING\n    if {test}:\n        import makes_interfaces"
+    other = "import rclpy\nif __name__ == '__main__':\n    rclpy.create_node('m').create_publisher(int, 'a', 1)"
+    files = {"makes_interfaces.py": other}
+    assert not infer(PROGRAM.format(body="pass", main="N()", before=before), files).gaps
+    run_time = before.replace(f"if {test}", "DEBUG = False\n    if DEBUG")
+    (gap,) = infer(PROGRAM.format(body="pass", main="N()", before=run_time), files).gaps
+    assert "the module makes_interfaces was not followed" in gap.why
+
+
 def test_each_caller_counts_for_itself(infer: Infer) -> None:
     body = "self.make('a') if self.kind == 'loud' else None"
     assert not _gaps(infer, body, "N('loud')")
