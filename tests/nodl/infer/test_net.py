@@ -65,7 +65,9 @@ def test_what_only_values_forbid_is_a_gap(body: str, main: str, infer: Infer) ->
 @pytest.mark.parametrize("test", ["typing.TYPE_CHECKING", "TYPE_CHECKING"])
 def test_what_only_a_type_checker_reads_is_no_gap(test: str, infer: Infer) -> None:
     before = f"import typing\n    from typing import TYPE_CHECKING\n    if {test}:\n        import makes_interfaces"
-    other = "import rclpy\nif __name__ == '__main__':\n    rclpy.create_node('m').create_publisher(int, 'a', 1)"
+    other = (
+        "import rclpy\nif __name__ == '__main__':\n    rclpy.create_node('m').create_publisher(int, 'a', 1)"
+    )
     files = {"makes_interfaces.py": other}
     assert not infer(PROGRAM.format(body="pass", main="N()", before=before), files).gaps
     run_time = before.replace(f"if {test}", "DEBUG = False\n    if DEBUG")
