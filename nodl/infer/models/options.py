@@ -75,7 +75,12 @@ def _place(run: Run, parser: Instance, name: str, call: Call) -> str:
 def _forget_places(run: Run, parser: Instance) -> None:
     for cell, value in list(parser.cells.items()):
         found = input_of(sole(value))
-        if isinstance(cell, str) and cell.startswith("dest ") and found is not None and found.name.startswith("<"):
+        if (
+            isinstance(cell, str)
+            and cell.startswith("dest ")
+            and found is not None
+            and found.name.startswith("<")
+        ):
             run.state.store(parser, cell, _NOT_TOLD)
 
 
