@@ -3,9 +3,8 @@ ends in one line as it does later."""
 
 from __future__ import annotations
 
+import sys
 from importlib import import_module
-
-from enclave_common.command_line import guarded
 
 
 def secure_launch() -> int:
@@ -29,4 +28,9 @@ def secure_nodl() -> int:
 
 
 def _run(command: str, module: str) -> int:
-    return guarded(command, lambda: int(import_module(module).main()))
+    try:
+        guarded = import_module("enclave_common.command_line").guarded
+        return int(guarded(command, lambda: int(import_module(module).main())))
+    except KeyboardInterrupt:  # while that module was imported
+        print(f"{command}: interrupted", file=sys.stderr)
+        return 130
