@@ -224,7 +224,7 @@ class PlanProvider:
                 wrong = (*wrong, *router.differences(enclave))
         except KeystoreError as error:
             raise ProvisionError(
-                f"enclave {enclave} can no longer be read, though it was provisioned for this launch: {error}"
+                f"enclave {enclave} can no longer be read, although it was provisioned for this launch: {error}"
             ) from error
         if wrong:
             raise ProvisionError(

@@ -68,7 +68,7 @@ class Code(str, Enum):
     PATTERN_ACCEPTED = "pattern-accepted", "A partly known name became a wildcard"
     PERMISSIONS_LARGE = "permissions-large", "The permissions of an enclave come near what DDS can carry"
     POLICY_ANSWERS = "policy-answers", "The policy file closes a gap of the manifest"
-    POLICY_DENIES_NEED = "policy-denies-need", "The policy file takes away what a node needs"
+    POLICY_DENIES_NEED = "policy-denies-need", "The policy file denies what a node needs"
     POLICY_ENCLAVE_UNUSED = (
         "policy-enclave-unused",
         "The policy file has an enclave that this launch does not use",

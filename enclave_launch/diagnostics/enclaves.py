@@ -227,7 +227,7 @@ def launcher_apart(
 def enclave_on_both(enclave: str) -> Diagnostic:
     """Report an enclave with processes on both middlewares: one key may do the same on both."""
     text = (
-        f"enclave {enclave} has processes on DDS and on Zenoh: whoever holds its key may do the same on both, and what "
+        f"enclave {enclave} has processes on DDS and on Zenoh: its key permits the same on both, and what "
         "only one of them checks (types and node tokens on Zenoh, permissions by each peer on DDS) the other does not"
     )
     return Diagnostic(Code.MIDDLEWARES_APART, enclave, text, None, "give them enclaves of their own")

@@ -113,7 +113,7 @@ def parameters_unknown(process: str, path: str, why: str, place: SourceLocation)
 
 def program_not_installed(program: str) -> Diagnostic:
     """Warn, with ``--allow-missing-packages``, for ``$(command ...)``."""
-    text = f"program '{program}' is not installed; a placeholder stands for what it would write"
+    text = f"program '{program}' is not installed; a placeholder replaces its output"
     return Diagnostic(Code.PROGRAM_NOT_INSTALLED, program, text)
 
 

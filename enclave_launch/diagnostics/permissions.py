@@ -53,7 +53,7 @@ def record_lacks(
         )
     if unknown:
         texts.append(f"may lack what another description leaves open: {some_of(unknown, _INTERFACES, '; ')}")
-    remedy = "record again while somebody uses it, as some names exist only while somebody reads another"
+    remedy = "record again while it is used: some names exist only while another one is subscribed"
     if lacks:
         remedy = f"--also unseen grants the names that were never seen; or {remedy}"
     text = f"the record of {program} ({record}) {'; it '.join(texts)}"
@@ -93,7 +93,7 @@ def recording_incomplete(node: str, why: str, manifest: str, place: SourceLocati
     """Report an incomplete record.
 
     :param manifest: the file that ``--learn`` wrote, with the reason in it"""
-    remedy = "record it once more where it gets so far (--learn); runs are united"
+    remedy = "record it again in a run that gets so far (--learn); runs are merged"
     return Diagnostic(
         Code.RECORDING_INCOMPLETE,
         node,

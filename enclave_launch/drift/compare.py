@@ -27,7 +27,7 @@ from nodl.node_interface import EndpointKind
 
 _TOPICS = (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION)
 _REACH_IT = (
-    "look where it talks: with ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST if its nodes use the loopback interface only, "
+    "observe it with ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST if its nodes use the loopback interface only, "
     "else with its ROS_DOMAIN_ID, ROS_STATIC_PEERS and CYCLONEDDS_URI"
 )
 _OR_PLAN_IT = "or plan it: in the launch file or its manifests; or accept it"

@@ -63,9 +63,7 @@ class Process(_Strict, frozen=True):
     package: Optional[str] = _described("null for executable actions and nodes given without a package")
     executable: str = _described("executable name; the first word of an executable action")
     namespace: Optional[str] = _described("as launch shows it; null for executable actions")
-    name: Optional[str] = _described(
-        "node name, the manifest's where launch gives none; null for executables"
-    )
+    name: Optional[str] = _described("node name, the manifest's if launch gives none; null for executables")
     fqn: Optional[str] = Field(...)
     cmd: list[str] = _described("what would be executed; holds --enclave only under --secure")
     remaps: list[tuple[str, str]] = _described("from, to; global rules before the node's own")
@@ -149,7 +147,7 @@ class Node(_Strict, frozen=True):
     fqn: str
     enclave: str
     program: str = _described("package/executable or package/plugin")
-    parameters: Optional[list[str]] = _described("all that it declares; null where that is not known", None)
+    parameters: Optional[list[str]] = _described("all that it declares; null if that is not known", None)
     interfaces: list[Interface]
 
 

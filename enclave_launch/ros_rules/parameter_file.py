@@ -258,7 +258,7 @@ class _FileReader:
     def _name_parameter(self, text: str, line: int) -> None:
         if self._mapping_began:
             if self._at >= len(self._section.names):
-                raise _refused(line, "a mapping stands where a parameter or a node must be named first")
+                raise _refused(line, "a mapping where a parameter or a node name is expected")
             self._group.text, self._group.count = self._section.names[self._at], self._group.count + 1
             self._mapping_began = False
         if not self._group.count:

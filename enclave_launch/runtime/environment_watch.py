@@ -43,8 +43,8 @@ class Unplanned(NamedTuple):
     def __str__(self) -> str:
         who = "" if self.pid == self.watched.pid else f" (its descendant with pid {self.pid})"
         return (
-            f"{self.watched.name}{who} does not run with the environment that was planned: {self.why}; it was ended, "
-            "since it would not be secured. What stands between launch and the program changes it"
+            f"{self.watched.name}{who} does not run with the environment that was planned: {self.why}; it was "
+            "stopped, since it would not be secured. Something between launch and the program changes it"
         )
 
 

@@ -73,8 +73,8 @@ def _report_unseen(folder: Path, options: argparse.Namespace) -> None:
         _say(f"warning: {about}: never seen: {some_of(names, _NAMES, '; ')}")
     if found:
         _say(
-            "record again while somebody uses what was never seen, or grant it with --also unseen (--explain shows who "
-            "has it)"
+            "record again while these are used, or grant them with --also unseen (--explain shows which description "
+            "has them)"
         )
 
 

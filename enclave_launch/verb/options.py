@@ -75,9 +75,9 @@ LATE: tuple[Option, ...] = (
 )
 POLICY: tuple[Option, ...] = (
     ("--nodl FILE|DIR", PATHS,
-     "use this NoDL manifest, or those of a folder, where definitions conflict (repeatable)"),
+     "use this NoDL manifest, or those of a folder, if definitions conflict (repeatable)"),
     ("--missing-nodl", one_of("infer", "analysis", "library", "error"),
-     "nodes without a manifest: infer from their source, else ask the library (default), only one of the two, "
+     "nodes without a manifest: infer from their source, else take the library (default), only one of the two, "
      "or an error"),
     ("--library DIR", PATHS,
      "documents of your own that add to or correct the library (repeatable; docs/library.md)"),
@@ -91,9 +91,9 @@ POLICY: tuple[Option, ...] = (
      "grant every node also: clock (use_sim_time set at run time), logger-services, service-events "
      "(service introspection), unseen (names that a record lacks and another description has) (repeatable)"),
     ("--accept-prefix NAME", TEXTS,
-     "a launch prefix that keeps the environment, though it is not known to (repeatable; 'shell' for shells)"),
+     "a launch prefix that keeps the environment, although it is not known to (repeatable; 'shell' for shells)"),
     ("--accept-middleware NAME", TEXTS,
-     "an RMW_IMPLEMENTATION that reads enclaves, though it is not known to (repeatable)"),
+     "an RMW_IMPLEMENTATION that reads enclaves, although it is not known to (repeatable)"),
     ("--policy FILE", PATH, "SROS2 policy merged over the derived one"),
 )  # fmt: skip
 LOOKING: tuple[Option, ...] = (
@@ -143,7 +143,7 @@ RUNNING: tuple[Option, ...] = (
     ("-a --show-all-subprocesses-output", FLAG,
      "show all output of the processes on the screen (sets OVERRIDE_LAUNCH_PROCESS_OUTPUT)"),
     ("--launch-prefix COMMAND", TEXT, "put this before the commands of all processes"),
-    ("--launch-prefix-filter REGEX", TEXT, "only where the executable's name matches"),
+    ("--launch-prefix-filter REGEX", TEXT, "only if the executable's name matches"),
 )  # fmt: skip
 RECORDING: tuple[Option, ...] = (
     ("--learn DIR", PATH,

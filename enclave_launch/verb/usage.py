@@ -97,7 +97,7 @@ def unsecured_notice(environment: Mapping[str, str]) -> str:
     """Return one line about what a launch without ``--secure`` means."""
     if environment.get("ROS_SECURITY_ENABLE") == "true":
         return "without --secure: no process gets an enclave from here, each follows the ROS_SECURITY_ variables it has"
-    return "unsecured: whoever reaches this DDS domain can read and write all that these processes say (no --secure)"
+    return "unsecured: anyone in this DDS domain can read and write all messages of these processes (no --secure)"
 
 
 PERMISSIVE_NOTICE = (

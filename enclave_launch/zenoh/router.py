@@ -147,8 +147,8 @@ class ZenohRouter:
                 f"(with {CONFIGURATION}={self._place.configuration})"
             )
         return (
-            f"at {where}, where the Zenoh router should be, {answer.value} answers: end it, or give the router another "
-            "place with secure-keystore zenoh KEYSTORE --router HOST:PORT"
+            f"at {where}, where the Zenoh router should be, {answer.value} answers: stop it, or give the router "
+            "another place with secure-keystore zenoh KEYSTORE --router HOST:PORT"
         )
 
     def _start(self) -> None:

@@ -75,7 +75,7 @@ class DomainRule:
         if self.allow_unauthenticated_participants and self.rtps_protection_kind is not Protection.NONE:
             raise InvalidInputError(
                 "governance: allow_unauthenticated_participants needs rtps_protection_kind NONE; "
-                "Fast DDS refuses the document otherwise, and no such participant could be heard"
+                "Fast DDS refuses the document otherwise, and such a participant could not communicate"
             )
 
 

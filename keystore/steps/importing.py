@@ -272,7 +272,7 @@ def _refuse_earlier(found: _Bundle, present: Manifest) -> None:
     if found.manifest.number <= present.number:
         raise UnsafeKeystoreError(
             f"{found.place} is number {found.manifest.number}, but {present.number} is in force here: an earlier "
-            "bundle may give back what was taken away or revoked since. Export again where the CA is"
+            "bundle may restore rights that were removed or revoked since. Export again where the CA is"
         )
     issuers = [one.authorities[Role.IDENTITY][:1] for one in (found.manifest, present)]
     if issuers[0] == issuers[1] and found.manifest.crl_number < present.crl_number:

@@ -92,7 +92,7 @@ def _report_hosts_that_left(arguments: argparse.Namespace, hosts: Iterable[str])
     for host, enclaves in hosts_that_left(arguments.keystore, hosts).items():
         text = (
             f"host {host} is not in {arguments.hosts} any more and has good keys of {', '.join(enclaves)}: revoke "
-            "them (secure-keystore remove), also where an enclave lives elsewhere now (renew --new-keys --revoke-old)"
+            "them (secure-keystore remove), also if an enclave is on another host now (renew --new-keys --revoke-old)"
         )
         common.warn([text], arguments)
         bundle = arguments.output / f"{host}{SUFFIX}"

@@ -218,7 +218,7 @@ class _EnclaveCheck:
             yield self.leaf(Severity.ERROR, "leaf-is-ca", text)
         yield from self._key_usage(facts.extension(x509.KeyUsage))
         if facts.extension(x509.ExtendedKeyUsage) is None:
-            text = "nothing says that its key may not sign documents: where it is certified by a permissions CA, it can"
+            text = "its certificate does not forbid its key to sign documents: if a permissions CA certified it, it can"
             yield self.leaf(Severity.WARNING, "no-extended-key-usage", text)
 
     def _key_usage(self, usage: x509.KeyUsage | None) -> Iterator[Finding]:
@@ -306,7 +306,7 @@ class _EnclaveCheck:
         if others := sorted({grant.subject_name for grant in grants} - {mine.subject_name}):
             yield self._finding(
                 Severity.EXPOSURE, "foreign-grant", layout.PERMISSIONS,
-                f"also grants to {', '.join(map(printable, others[:4]))}, whoever holds that subject",
+                f"also grants to {', '.join(map(printable, others[:4]))}, so to any participant of that name",
                 self._renew(),
             )  # fmt: skip
         if any("*" in (*rule.publish, *rule.subscribe) for rule in mine.rules):

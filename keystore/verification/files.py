@@ -147,7 +147,7 @@ def _check_file(root: Path, relative: str, info: os.stat_result) -> Iterator[Fin
     if secret and info.st_nlink > 1:
         yield Finding(
             Severity.ERROR, "hard-link", relative,
-            f"the same file has {info.st_nlink} names; whoever reads one of the others has the key",
+            f"the same file has {info.st_nlink} names; reading one of the others gives the key",
             repair.run_on(root, "find / -xdev -samefile", relative, "then renew --new-keys --revoke-old"),
         )  # fmt: skip
     if relative in _KNOWN or name in layout.ENCLAVE_FILES:
@@ -191,7 +191,7 @@ def _check_owner(root: Path, relative: str, info: os.stat_result, *, private: bo
     if private and info.st_mode & 0o077 and not info.st_mode & 0o022:
         yield Finding(
             Severity.ERROR, "readable-by-others", relative,
-            f"others can read it (mode {safe_files.mode_text(info)}); whoever did holds the key",
+            f"others can read it (mode {safe_files.mode_text(info)}); anyone who did has the key",
             repair.run_on(root, "chmod go-rwx", relative, "a key that was read wants a new one: renew --new-keys"),
         )  # fmt: skip
 

@@ -73,7 +73,7 @@ def check_strength(root: Path, governance: Governance, required: Governance | No
     for weakness in weaknesses(governance):
         yield Finding(
             Severity.EXPOSURE, "governance-weak", layout.GOVERNANCE, f"weaker than the default: {weakness}",
-            f"{again}; where it is meant so: verify --require-governance FILE",
+            f"{again}; if that is intended: verify --require-governance FILE",
         )  # fmt: skip
 
 

@@ -135,5 +135,5 @@ def check_permissions_issued(
     )
     yield Finding(
         Severity.ERROR, "permissions-not-last", f"{layout.enclave_directory(enclave)}/{layout.PERMISSIONS}",
-        f"{what}: it may permit what was taken away since", repair.grant_again(view.root, enclave),
+        f"{what}: it may permit what was removed since", repair.grant_again(view.root, enclave),
     )  # fmt: skip

@@ -39,7 +39,7 @@ _HANDSHAKE = (
     ("extended key usage", "its certificate is that of a server, such as the router's: it is for no client"),
     ("invalid peer certificate", "the router does not accept its certificate"),
     ("no certificates", "it has no certificate: it was started without its zenoh.json5, or only looked who is there"),
-    ("InvalidContentType", "it does not speak TLS: it was started without its zenoh.json5"),
+    ("InvalidContentType", "it does not use TLS: it was started without its zenoh.json5"),
 )  # fmt: skip
 """By what the TLS of Zenoh 1.8 and 1.10 says; the first counts."""
 

@@ -32,7 +32,7 @@ _TOLD = 40
 
 def check_zenoh(view: KeystoreView, now: datetime) -> Iterator[Finding]:
     """Check the files of a keystore with a Zenoh router."""
-    fix = repair.run(view.root, "zenoh", "--enclave", "/none", note="writes all of them anew")
+    fix = repair.run(view.root, "zenoh", "--enclave", "/none", note="writes all of them again")
     try:
         address = present_address(view)
         assert address is not None, "the keystore has a router's file"

@@ -29,7 +29,7 @@ _FIRST_PART = "/_action/send_goal"
 class EndpointRole(Enum):
     """Why an endpoint is there."""
 
-    OWN = "asked for by the program"
+    OWN = "requested by the program"
     BUILT_IN = "every node has it"
     LIFECYCLE = "every lifecycle node has it"
     CONTAINER = "every component container has it"

@@ -126,5 +126,5 @@ def test_a_program_that_is_not_installed_is_a_placeholder_when_packages_may_be_m
     found = evaluate(tmp_path / "a.launch.xml", host=PlanHost(allow_missing_packages=True))
     assert " ".join(found.processes[0].cmd).startswith("/missing/bin/no-such-xacro <output of no-such-xacro")
     assert tuple(map(str, found.warnings)) == (
-        "program 'no-such-xacro' is not installed; a placeholder stands for what it would write",
+        "program 'no-such-xacro' is not installed; a placeholder replaces its output",
     )

@@ -149,7 +149,7 @@ FILES: dict[str, object] = {
     '/n: {ros__parameters: {"": 1}}': "a key is empty",
     "/n: {ros__parameters: {? [a] : 1}}": "a list cannot be a key",
     "? [a]\n: {ros__parameters: {a: 1}}": "a list cannot be a key",
-    "/n: {ros__parameters: {a: 1}, m: {ros__parameters: {b: 1}}}": "a parameter or a node must be named first",
+    "/n: {ros__parameters: {a: 1}, m: {ros__parameters: {b: 1}}}": "a parameter or a node name is expected",
     "a b: {ros__parameters: {x: 1}}": "names no node",
     "1n: {ros__parameters: {x: 1}}": "names no node",
     "/: {ros__parameters: {x: 1}}": "names no node",

@@ -154,7 +154,7 @@ def _lines(contents: ReportContents, scope: Mapping[str, Any], at: str) -> Itera
         )
     yield from ("", "## Check it", "")
     yield "`statement.json` is an in-toto statement that names every file by its SHA-256; `statement.dsse.json` is the "
-    yield "same, signed, where a key was given. Apart from a signature, the same input and time give the same bytes."
+    yield "same, signed, if a key was given. Apart from a signature, the same input and time give the same bytes."
 
 
 def statement(files: Mapping[str, bytes], judged: Judged, checked: list[str]) -> bytes:

@@ -50,7 +50,7 @@ PARTS = (
     EvidencePart(
         "Keys and algorithms",
         ("keys.json",),
-        "every certificate of the keystore with its algorithm, its end and where its private key is",
+        "every certificate of the keystore with its algorithm, its expiry and where its private key is",
         (
             "CRA Annex I part I (2)(e): confidentiality by state of the art mechanisms",
             "IEC 62443-3-3 SR 1.8, 62443-4-2 CR 1.8: public key infrastructure certificates",

@@ -116,7 +116,8 @@ def _observed(
     if not _in_sight(found_there):
         return graph, found
     print(
-        "secure-plan drift: observed on the loopback interface, where the planned nodes talk", file=sys.stderr
+        "secure-plan drift: observed on the loopback interface, where the planned nodes communicate",
+        file=sys.stderr,
     )
     return graph_there, found_there
 

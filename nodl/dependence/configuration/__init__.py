@@ -48,7 +48,7 @@ def read_configuration(kind: str, file: str, situation: Situation, place: Source
         return of_file(root, situation.distro)
     if kind == "ros_gz_bridge":
         return of_configuration(root)
-    return Configured(gaps=(Gap(place, f"nobody here can read a file of kind {kind!r}"),))
+    return Configured(gaps=(Gap(place, f"there is no reader for files of kind {kind!r}"),))
 
 
 def _read(file: str) -> YamlValue:
