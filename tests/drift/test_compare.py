@@ -258,11 +258,11 @@ def test_two_ends_whose_quality_does_not_meet_are_found_and_those_that_meet_are_
     best_effort, latched = Quality(reliability="BEST_EFFORT"), Quality(durability="TRANSIENT_LOCAL")
     assert told(Quality(), best_effort) == [] and told(latched, Quality()) == []
     assert told(best_effort, Quality()) == [
-        "rt/chatter: /talker and /listener do not meet: reliability: BEST_EFFORT is offered, RELIABLE asked for"
+        "rt/chatter: /talker and /listener do not meet: reliability: BEST_EFFORT is offered, RELIABLE requested"
     ]
     assert len(told(Quality(), latched)) == 1
     assert told(Quality(deadline=2_000_000_000), Quality(deadline=1_000_000_000)) == [
-        "rt/chatter: /talker and /listener do not meet: deadline: 2 s is offered, 1 s asked for"
+        "rt/chatter: /talker and /listener do not meet: deadline: 2 s is offered, 1 s requested"
     ]
     assert told(Quality(deadline=1), Quality(deadline=1)) == []
     assert len(told(Quality(ownership="EXCLUSIVE"), Quality())) == 1

@@ -297,7 +297,7 @@ def test_the_verb_says_what_it_wrote_and_how_to_start_the_router(
     root = filled(tmp_path / "ks")
     assert main(["zenoh", str(root), "--enclave", "/a"]) == 0
     said = capsys.readouterr().out
-    assert "enclaves/a/zenoh.json5 written" in said and "router of 1 enclaves at tls/localhost:7447" in said
+    assert "enclaves/a/zenoh.json5 written" in said and "router of 1 enclave at tls/localhost:7447" in said
     assert f"ZENOH_ROUTER_CONFIG_URI={root}/zenoh/router.json5 ros2 run rmw_zenoh_cpp rmw_zenohd" in said
     assert main(["zenoh", str(root), "--router", "nowhere at all"]) == 2
     assert main(["zenoh", str(root), "--enclave", "/x"]) == 2

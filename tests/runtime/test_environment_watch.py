@@ -127,7 +127,7 @@ def test_a_node_whose_prefix_drops_its_enclave_is_ended(tmp_path: Path) -> None:
         )
 
     refused = run("env -u ROS_SECURITY_ENABLE")
-    assert refused.returncode == 1 and "ROS_SECURITY_ENABLE is not set; it was ended" in refused.stdout
+    assert refused.returncode == 1 and "ROS_SECURITY_ENABLE is not set; it was stopped" in refused.stdout
     kept = run("env MORE=1")
     assert kept.returncode == 0, kept.stdout
     assert "was ended" not in kept.stdout
