@@ -15,7 +15,7 @@ from datetime import datetime, timezone
 from time import process_time
 
 from enclave_launch.policy import RunningNode, derive_policy
-from enclave_launch.policy.explanation import explain
+from enclave_launch.report.explained import explain
 from enclave_launch.source_location import SourceLocation
 from keystore.formats.domains import Domains
 from keystore.formats.permissions import permissions_document

@@ -88,7 +88,7 @@ UPWARD = {
 
 # Stages of the flow that decide only: they may not import what acts.
 PURE = {
-    "enclave_launch/enclave": ("enclave_launch.runtime", "enclave_launch.verb", "subprocess", "asyncio"),
+    "enclave_launch/enclave.py": ("enclave_launch.runtime", "enclave_launch.verb", "subprocess", "asyncio"),
     "enclave_launch/policy": ("enclave_launch.runtime", "enclave_launch.verb", "subprocess", "asyncio"),
     "enclave_launch/deployment": ("enclave_launch.runtime", "enclave_launch.verb", "subprocess", "asyncio"),
     "enclave_launch/drift": ("enclave_launch.runtime", "enclave_launch.verb", "subprocess", "asyncio"),
@@ -105,7 +105,8 @@ def imports_of(path: Path) -> Iterator[str]:
 
 
 def sources(folder: str) -> list[Path]:
-    return sorted((ROOT / folder).rglob("*.py"))
+    path = ROOT / folder
+    return [path] if path.is_file() else sorted(path.rglob("*.py"))
 
 
 @pytest.mark.parametrize("package", PACKAGES)

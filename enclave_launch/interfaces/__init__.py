@@ -17,7 +17,7 @@ from enclave_common.words import counted
 from enclave_launch.errors import ManifestError, translated
 from enclave_launch.interfaces.descriptions import ProgramDescription, ProgramStart, meeting
 from enclave_launch.interfaces.library_access import LibraryAccess
-from enclave_launch.interfaces.started_program import StartedProgram
+from enclave_launch.interfaces.situation import StartedProgram
 from enclave_launch.options import ResolveOptions
 from enclave_launch.plan import Found, InterfaceOrigin, Missing
 from enclave_launch.policy.node_permissions import UNSEEN

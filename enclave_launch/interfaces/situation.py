@@ -17,6 +17,7 @@ from enclave_launch.ros_rules.ros_arguments import parse_ros_arguments
 from nodl.dependence import Situation
 from nodl.node_interface import NodeInterface
 from nodl.remap import NodeNames
+from nodl.source_ref import SourceRef
 
 
 def situation_of(
@@ -67,3 +68,36 @@ def _remap(node: RunningNode) -> Callable[[str], str]:
     """Return a function from topics of the node's code to final names. That raises ``InvalidNameError``."""
     names = NodeNames(node.name, node.namespace, node.rules)
     return lambda name: names.topic(name).name
+
+
+class StartedProgram:
+    """One process, or one component with the container that loads it."""
+
+    def __init__(
+        self, started: ResolvedProcess | ResolvedComponent, container: ResolvedProcess | None, distro: str
+    ) -> None:
+        self._started = started
+        self._container = container
+        self._distro = distro
+
+    def parameters(self, node: str | None) -> Mapping[str, object]:
+        """Return what launch sets for the node that the source calls ``node``."""
+        return self._situation(node).parameters
+
+    def final_name(self, node: str | None) -> tuple[str | None, str | None]:
+        """Return the node's name and namespace under the remap rules of the launch."""
+        situation = self._situation(node)
+        return situation.node, situation.namespace
+
+    def _situation(self, node: str | None) -> Situation:
+        started = self._started
+        interface = NodeInterface(
+            package=started.package,
+            executable=None,
+            plugin=None,
+            name=node or "unnamed",
+            namespace="/",
+            endpoints=(),
+            source=SourceRef(str(started.location)),
+        )
+        return situation_of(started, self._container, interface, self._distro)

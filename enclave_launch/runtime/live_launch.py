@@ -14,11 +14,12 @@ import asyncio
 import os
 import socket
 import sys
+import threading
 import traceback
-from collections.abc import Sequence
-from contextlib import AsyncExitStack
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AsyncExitStack, contextmanager
 from datetime import datetime, timezone
-from signal import SIGINT, Signals
+from signal import SIG_IGN, SIGHUP, SIGINT, SIGQUIT, SIGTERM, Signals, getsignal
 from typing import Any
 
 from enclave_launch.description.events.event import IncludeLaunchDescription, Shutdown
@@ -59,7 +60,6 @@ from enclave_launch.runtime.run_events import (
     RunEvent,
     unobserved,
 )
-from enclave_launch.runtime.signals import require_signals, signals_to
 from enclave_launch.runtime.sinks import ScreenSink, SinkWriter
 from enclave_launch.runtime.warden_process import WardenProcess
 
@@ -373,3 +373,31 @@ class DescribedLaunch(LiveLaunch):
 
 class _Over(Exception):
     """Nothing is left to wait for."""
+
+
+def require_signals() -> None:
+    """Only the main thread can take the signals of a process, and only one that runs no loop can block."""
+    if threading.current_thread() is not threading.main_thread():
+        raise RuntimeFailure(
+            "run() takes the signals of the process, which only its main thread can; "
+            "in another thread use asyncio.run(run_async(...))"
+        )
+    if asyncio._get_running_loop() is not None:
+        raise RuntimeFailure(
+            "run() would block the event loop that is running here; await run_async(...) instead"
+        )
+
+
+@contextmanager
+def signals_to(on_signal: Callable[[Signals], None]) -> Iterator[None]:
+    """SIGHUP only where nobody (nohup) asked us to ignore it."""
+    loop = asyncio.get_running_loop()
+    ignored = {SIGHUP} if getsignal(SIGHUP) is SIG_IGN else set()
+    numbers = [number for number in (SIGINT, SIGTERM, SIGQUIT, SIGHUP) if number not in ignored]
+    for number in numbers:
+        loop.add_signal_handler(number, on_signal, number)
+    try:
+        yield
+    finally:
+        for number in numbers:
+            loop.remove_signal_handler(number)

@@ -9,10 +9,10 @@ import pytest
 
 from enclave_launch.policy import PolicyOptions, RunningNode, derive_policy
 from enclave_launch.policy.derivation import allowed_names
-from enclave_launch.policy.explanation import explain
 from enclave_launch.policy.launcher import LAUNCHER_ENCLAVE, launcher_node
 from enclave_launch.policy.sharing import gains_by_sharing
 from enclave_launch.process import LauncherCall
+from enclave_launch.report.explained import explain
 from enclave_launch.source_location import SourceLocation
 from keystore.formats.permissions import dds_rules
 from keystore.formats.policy_xml import PolicyDocument, parse_policy, read_policy

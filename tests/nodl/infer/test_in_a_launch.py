@@ -17,7 +17,7 @@ from enclave_launch.errors import ManifestError
 from enclave_launch.flow import provision, resolve
 from enclave_launch.options import ResolveOptions
 from enclave_launch.plan import LaunchPlan
-from enclave_launch.policy.explanation import explain
+from enclave_launch.report.explained import explain
 
 REPEATER = Path(__file__).parents[3] / "fixtures" / "programs" / "repeater.py"
 SITE = f"lib/python{sys.version_info.major}.{sys.version_info.minor}/site-packages"
