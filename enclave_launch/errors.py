@@ -65,13 +65,13 @@ class RuntimeFailure(EnclaveLaunchError):
 
 
 @contextmanager
-def translated(caught: type[Exception], told: type[EnclaveLaunchError], before: str = "") -> Iterator[None]:
-    """Raise ``told`` in the place of ``caught``: in its own words, those of the operating system without the rest."""
+def translated(caught: type[Exception], raised: type[EnclaveLaunchError], before: str = "") -> Iterator[None]:
+    """Raise ``raised`` in the place of ``caught``: in its own words, those of the operating system without the rest."""
     try:
         yield
     except caught as error:
         words = error.strerror if isinstance(error, OSError) else error
-        raise told(f"{before}{words}") from error
+        raise raised(f"{before}{words}") from error
 
 
 def keystore_errors() -> AbstractContextManager[None]:

@@ -166,11 +166,13 @@ def provision(
         raise ManifestError("\n".join((*map(str, plan.problems), "nothing was started or written")))
     chosen = options or SecurityOptions()
     settings = SecuritySettings(os.path.abspath(keystore), chosen.strategy)
-    asked = chosen.keystore or ProvisionOptions()
-    asked = asked._replace(launch=asked.launch or LaunchHold(settings.keystore, launch_owner(plan)))
-    asked = asked._replace(guid_halves=halves(mixed_enclaves(plan.processes)))
-    wanted, report, zenoh = provision_plan(settings, plan, with_domains(plan, asked, os.environ))
-    return ProvisionedLaunch(plan, settings, report, wanted, asked, zenoh)
+    requested = chosen.keystore or ProvisionOptions()
+    requested = requested._replace(
+        launch=requested.launch or LaunchHold(settings.keystore, launch_owner(plan))
+    )
+    requested = requested._replace(guid_halves=halves(mixed_enclaves(plan.processes)))
+    wanted, report, zenoh = provision_plan(settings, plan, with_domains(plan, requested, os.environ))
+    return ProvisionedLaunch(plan, settings, report, wanted, requested, zenoh)
 
 
 def run(launch: Launch, *, options: RunSettings | None = None) -> int:

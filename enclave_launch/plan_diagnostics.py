@@ -64,8 +64,8 @@ def problems(
 
 
 def _missing(missing: Missing, place: SourceLocation) -> Diagnostic:
-    told = node_name_unknown if missing.unnamed else no_manifest
-    return told(missing.subject, missing.why, place)
+    diagnostic = node_name_unknown if missing.unnamed else no_manifest
+    return diagnostic(missing.subject, missing.why, place)
 
 
 def notes(

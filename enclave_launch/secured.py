@@ -41,13 +41,13 @@ from keystore.steps.sharing import shared_enclaves
 
 class ProvisionedLaunch(NamedTuple):
     """``report`` tells what was done to the keystore; ``settings`` how processes are pointed at it;
-    ``options`` are those ``asked`` for, with what the plan decided."""
+    ``options`` are those ``requested``, with what the plan decided."""
 
     plan: LaunchPlan
     settings: SecuritySettings
     report: ProvisionReport
     options: ProvisionOptions
-    asked: ProvisionOptions
+    requested: ProvisionOptions
     zenoh: LaunchRouter | None = None
     """The router of processes on Zenoh."""
 
@@ -188,7 +188,7 @@ class PlanProvider:
             if policy.path in before:  # to extend is not to repair
                 self._check(before[policy.path])
             # What came late may be in another domain.
-            self._options = with_domains(self._plan, self._launch.asked, os.environ)
+            self._options = with_domains(self._plan, self._launch.requested, os.environ)
             if on_zenoh(self._plan, os.environ):
                 self._extend_zenoh(process)
             else:

@@ -19,11 +19,11 @@ def read_only(*names: str) -> Callable[[type[_Class]], type[_Class]]:
     """Make attributes of a class properties, as upstream's are: a launch file cannot set them, and its own subclass may
     have properties of those names. The class itself keeps the values under private names (``self.__name``)."""
 
-    def of(kept: type[_Class]) -> type[_Class]:
+    def of(cls: type[_Class]) -> type[_Class]:
         for name in names:
-            private = f"_{kept.__name__}__{name}"
-            setattr(kept, private, vars(kept)[name])
-            setattr(kept, name, property(attrgetter(private)))
-        return kept
+            private = f"_{cls.__name__}__{name}"
+            setattr(cls, private, vars(cls)[name])
+            setattr(cls, name, property(attrgetter(private)))
+        return cls
 
     return of

@@ -137,8 +137,8 @@ def domain_not_served(process: str, domain: int, served: str, place: SourceLocat
     """Report a process in a domain that the permissions do not cover.
 
     :param served: the domains of ``--domain-id``"""
-    asked = "--domain-id (ProvisionOptions.domains)"
-    text = f"{process} is in domain {domain}, but {asked} permits {served} only"
+    option = "--domain-id (ProvisionOptions.domains)"
+    text = f"{process} is in domain {domain}, but {option} permits {served} only"
     return Diagnostic(
         Code.DOMAIN_NOT_SERVED, process, text, place, "add the domain there, or leave it out here"
     )

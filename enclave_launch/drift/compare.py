@@ -304,11 +304,11 @@ class _Comparison:
         for end in self._ends():
             by_topic.setdefault(end.endpoint.topic, ([], []))[end.endpoint.writes].append(end)
         for topic, (readers, writers) in sorted(by_topic.items()):
-            told: set[tuple[str, str, str]] = set()
+            reported: set[tuple[str, str, str]] = set()
             for writer, reader in product(writers, readers):
                 for found in _between(topic, writer, reader):
-                    if found.key[1:] not in told:
-                        told.add(found.key[1:])
+                    if found.key[1:] not in reported:
+                        reported.add(found.key[1:])
                         yield found
 
     def _ends(self) -> Iterator[_End]:

@@ -47,23 +47,25 @@ class Steady:
     def __init__(self, patience: SettlingTimes | None = None) -> None:
         self._patience = patience or SettlingTimes()
         self._since: dict[Key, float] = {}
-        self._told: dict[Key, DriftFinding] = {}
+        self._reported: dict[Key, DriftFinding] = {}
         self._went: dict[str, float] = {}
         """Kind → when one of it was last over."""
 
     @property
     def standing(self) -> tuple[DriftFinding, ...]:
         """Return what was reported and still holds."""
-        return tuple(self._told.values())
+        return tuple(self._reported.values())
 
     def at(self, now: float, findings: Iterable[DriftFinding]) -> Change:
         """Return what is to be reported at ``now``."""
         found = {each.key: each for each in findings}
         self._went.update({key[0]: now for key in self._since if key not in found})
         self._since = {key: self._since.get(key, now) for key in found}
-        new = {key: each for key, each in found.items() if key not in self._told and self._stands(now, each)}
-        over = [self._told.pop(key) for key in list(self._told) if key not in found]
-        self._told.update(new)
+        new = {
+            key: each for key, each in found.items() if key not in self._reported and self._stands(now, each)
+        }
+        over = [self._reported.pop(key) for key in list(self._reported) if key not in found]
+        self._reported.update(new)
         return Change(tuple(new.values()), tuple(over))
 
     def _stands(self, now: float, finding: DriftFinding) -> bool:

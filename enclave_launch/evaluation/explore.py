@@ -46,7 +46,7 @@ class Explorer:
         self._fired: set[int] = set()  # handlers that have run; each is supposed once
         self._depth = 0
         self._made_up: set[int] = set()  # events that we only suppose
-        self._kept: list[object] = []  # keeps ids unique
+        self._kept_alive: list[object] = []  # keeps ids unique
         self._noted: set[int] = set()  # handlers and timers that are in the host's reactions
 
     def run(self) -> None:
@@ -107,7 +107,7 @@ class Explorer:
 
     def _emit_made_up(self, event: Event, mark: str | None) -> None:
         self._made_up.add(id(event))
-        self._kept.append(event)
+        self._kept_alive.append(event)
         self._context._event_queue.put_nowait(event, mark)
 
     def _run(self, handler: Handler, event: Event, mark: str | None) -> None:
@@ -125,7 +125,7 @@ class Explorer:
 
     def _remember(self, handler: Handler) -> None:
         self._fired.add(id(handler))
-        self._kept.append(handler)
+        self._kept_alive.append(handler)
 
     def _note(self, handler: Handler, event: Event | None) -> None:
         """Record a reaction, for engines that carry the plan out without launch and know nothing of the file's
@@ -137,7 +137,7 @@ class Explorer:
         if id(subject) in self._noted:
             return
         self._noted.add(id(subject))
-        self._kept.append(subject)
+        self._kept_alive.append(subject)
         name = type(handler).__name__
         what = (_label(handler, event) if event is not None else None) or name
         if handler.computes():

@@ -191,8 +191,8 @@ class _Collector:
         if len(sets) > 1:
             parameters = {each for each in (endpoint.name, *endpoint.readings) if not each.is_literal}
             where = SourceLocation.read(str(endpoint.source))
-            told = record_undecided(self._fqn, sorted(granted), sorted(map(str, parameters)), where)
-            self._result.warnings.append(told)
+            warning = record_undecided(self._fqn, sorted(granted), sorted(map(str, parameters)), where)
+            self._result.warnings.append(warning)
 
     def _filled(self, template: NameTemplate) -> tuple[NameTemplate, ...]:
         inputs = self._node.inputs
@@ -316,8 +316,8 @@ class _Collector:
         note = f"a pattern, because {why}; accepted by --accept-patterns"
         reason = Reason(self._fqn, "declared", place, str(endpoint.name), (), note, endpoint.type)
         self._result.permissions.append(Permission(operation, name, reason))
-        told = pattern_accepted(self._fqn, operation.verb, name, note, SourceLocation.read(place))
-        self._result.warnings.append(told)
+        warning = pattern_accepted(self._fqn, operation.verb, name, note, SourceLocation.read(place))
+        self._result.warnings.append(warning)
 
     def _impossible(self, error: InvalidNameError) -> None:
         impossible = node_name_impossible(self._fqn, str(error), self._node.location)

@@ -103,9 +103,9 @@ def plan_graph(document: Mapping[str, Any], root: str = "") -> EnclaveGraph:
     :param root: prefix to strip from paths, so that they read as a person would type them"""
     members = tuple(sorted(_members(document, root)))
     reasons: dict[_Key, list[UseReason]] = dict(_reasons(document, members, root))
-    asked = {(enclave, operation, name) for enclave, _, operation, name in reasons}
+    requested = {(enclave, operation, name) for enclave, _, operation, name in reasons}
     for enclave, operation, name in _granted(document):
-        if (enclave, operation, name) not in asked:
+        if (enclave, operation, name) not in requested:
             reasons[enclave, None, operation, name] = []
     channels = _channels(reasons)
     number_of = {(channel.kind, channel.name): number for number, channel in enumerate(channels)}

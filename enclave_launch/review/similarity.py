@@ -52,9 +52,11 @@ def splits(plan: PlanDocument) -> list[Split]:
     """Return enclaves in which nodes may do what only others request, those that save most first."""
     found = []
     for path in plan.enclaves:
-        asked = plan.own(path)
+        requested = plan.own(path)
         units = plan.units_of(path)
-        saved = tuple((unit, tuple(sorted(asked - own))) for unit, own in units.items() if asked - own)
+        saved = tuple(
+            (unit, tuple(sorted(requested - own))) for unit, own in units.items() if requested - own
+        )
         if len(units) > 1 and saved:
             found.append(Split(path, saved))
     return sorted(found, key=lambda split: (-split.gain, split.enclave))

@@ -98,10 +98,10 @@ def companion_first(companion: LaunchCompanion | None, observe: Observer) -> Obs
     others."""
     if companion is None:
         return observe
-    told = companion
+    inner = companion
 
     def both(event: RunEvent) -> None:
-        told.happened(event)
+        inner.happened(event)
         observe(event)
 
     return both

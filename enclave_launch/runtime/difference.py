@@ -45,8 +45,8 @@ def _compared(
     nearest = min(alike, key=lambda other: len(_different(came, facts(other))))
     was = facts(nearest)
     names = _different(came, was)
-    told = "; ".join(f"planned {name} {_shown(was[name])}, came {_shown(came[name])}" for name in names)
-    return f"{told} ({_why(nearest)})" if told else _NOT_FORESEEN
+    differing = "; ".join(f"planned {name} {_shown(was[name])}, came {_shown(came[name])}" for name in names)
+    return f"{differing} ({_why(nearest)})" if differing else _NOT_FORESEEN
 
 
 def _why(planned: ResolvedProcess | ResolvedComponent) -> str:

@@ -69,13 +69,13 @@ class LaunchLog:
             return
         for sink, render in ((self.screen, self._on_screen), (self.launch_file, self._in_file)):
             line = render(level, printable(name), printable_lines(message))
-            self.write(sink, (line + "\n").encode(errors="replace"), kept=True)
+            self.write(sink, (line + "\n").encode(errors="replace"), logged=True)
 
-    def write(self, sink: Sink, lines: bytes, *, kept: bool) -> None:
-        """Queue whole lines. ``kept``: a file gets them too, so a screen that cannot follow may do without."""
+    def write(self, sink: Sink, lines: bytes, *, logged: bool) -> None:
+        """Queue whole lines. ``logged``: a file gets them too, so a screen that cannot follow may do without."""
         if sink is not self.screen:
             self._writers.files.write(sink, lines)
-        elif self._shows_less and kept:
+        elif self._shows_less and logged:
             self._not_shown += lines.count(b"\n")
         else:
             self._writers.screen.write(sink, lines)

@@ -311,8 +311,8 @@ class LiveLaunch:
         """Log the error as launch does, with its place in the launch file if evaluation knows it."""
         self._failed = True
         file = self._source.launch_file
-        told = error if isinstance(error, EnclaveLaunchError) else launch_file_error(error, file)
-        message = f"Caught exception in launch (see debug for traceback): {told}"
+        reported = error if isinstance(error, EnclaveLaunchError) else launch_file_error(error, file)
+        message = f"Caught exception in launch (see debug for traceback): {reported}"
         if self._settings.debug:
             self.say("DEBUG", "".join(traceback.format_exception(error)))
         self.say("ERROR", message)

@@ -316,14 +316,14 @@ class ProcessTree:
 def _open_streams(emulate_tty: bool) -> tuple[int, int, list[tuple[int, int]]]:
     """Open the child's end of its standard input and ours, and both ends of its two outputs; all or none."""
     with contextlib.ExitStack() as opened:
-        stdin, ours = _kept(opened, os.pipe())
-        outputs = [_kept(opened, _open_output(emulate_tty)) for _ in range(2)]
+        stdin, ours = _closed_with(opened, os.pipe())
+        outputs = [_closed_with(opened, _open_output(emulate_tty)) for _ in range(2)]
         opened.pop_all()
     os.set_blocking(ours, False)
     return stdin, ours, outputs
 
 
-def _kept(opened: contextlib.ExitStack, pair: tuple[int, int]) -> tuple[int, int]:
+def _closed_with(opened: contextlib.ExitStack, pair: tuple[int, int]) -> tuple[int, int]:
     for descriptor in pair:
         opened.callback(os.close, descriptor)
     return pair

@@ -84,7 +84,7 @@ class OutputRouter:
             lines = lines.decode(errors="replace").encode()
         for sink, timed in self._sinks[stream]:
             text = self._render(lines, f"{time.time():.7f} " if timed else "")
-            self._log.write(sink, text, kept=len(self._sinks[stream]) > 1)
+            self._log.write(sink, text, logged=len(self._sinks[stream]) > 1)
 
     def _render(self, lines: bytes, time_stamp: str) -> bytes:
         if self._render_line is None:

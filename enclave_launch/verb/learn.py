@@ -53,9 +53,9 @@ def learn_launch(target: LaunchTarget, options: argparse.Namespace, start: Start
         return status
 
     status = record(patience)
-    if options.learn_parameters and (asked := questions(folder)):
-        _say(f"a second run, with marker values for {asked.shown}")
-        status = max(status, record(patience or 5.0, MarkerRun(asked)))
+    if options.learn_parameters and (found := questions(folder)):
+        _say(f"a second run, with marker values for {found.shown}")
+        status = max(status, record(patience or 5.0, MarkerRun(found)))
     _report(write_manifests(folder), folder)
     if installed("nodl.infer") and options.missing_nodl == "infer":
         _report_unseen(folder, options)

@@ -102,11 +102,11 @@ def show_plan(plan: LaunchPlan, options: argparse.Namespace, keystore: str | Non
     if options.format == "tree" and not options.explain and not options.dump_params:
         return _show_tree(plan, options)
     text = _plan_text(plan, options, keystore)
-    told = (*plan.problems, *plan.warnings)
-    if options.explain and told:
+    diagnostics = (*plan.problems, *plan.warnings)
+    if options.explain and diagnostics:
         warn(f"problems: {len(plan.problems)}, warnings: {len(plan.warnings)}; --dry-run shows them")
     elif options.format == "policy" or options.dump_params:  # the JSON holds them
-        warn(*told)
+        warn(*diagnostics)
     sys.stdout.write(short_paths(text, os.getcwd()) if options.explain else text)
     return 0
 

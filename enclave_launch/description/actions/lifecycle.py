@@ -147,14 +147,14 @@ class OnStateTransition(EventHandler):
         if not isinstance(target_lifecycle_node, (LifecycleNode, type(None))):
             raise RuntimeError("OnStateTransition requires a 'LifecycleNode' action as the target")
         self.__target_lifecycle_node = target_lifecycle_node
-        self.__asked = (transition, start_state, goal_state)
+        self.__wanted = (transition, start_state, goal_state)
         super().__init__(matcher=matcher or self.__given_values_match, entities=entities, **kwargs)
 
     def __given_values_match(self, event: Event) -> bool:
         if not isinstance(event, StateTransition) or self.__target_lifecycle_node not in (None, event.action):
             return False
-        told = (event.transition, event.start_state, event.goal_state)
-        return all(asked in (None, value) for asked, value in zip(self.__asked, told, strict=True))
+        happened = (event.transition, event.start_state, event.goal_state)
+        return all(wanted in (None, value) for wanted, value in zip(self.__wanted, happened, strict=True))
 
     def foresee(self, started: Sequence[Any]) -> Event | None:
         """Return the first transition of a started lifecycle node that this handler would answer."""

@@ -37,8 +37,8 @@ def run(options: argparse.Namespace) -> int:
     """Print the findings. Returns 1 for an error that nobody accepted (``--strict``: for any finding)."""
     found = judged(read_plan(options.words, options), options.expect, options.keystore, options.within)
     sys.stdout.write(_text(found, options.format, options.verbose))
-    open_ones = [told for told, accepted in found if accepted is None]
-    return 1 if any(options.strict or told.severity == "error" for told in open_ones) else 0
+    open_ones = [finding for finding, accepted in found if accepted is None]
+    return 1 if any(options.strict or finding.severity == "error" for finding in open_ones) else 0
 
 
 def _text(found: list[tuple[PlanFinding, str | None]], form: str, verbose: bool) -> str:

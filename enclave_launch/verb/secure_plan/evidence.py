@@ -72,7 +72,7 @@ def run(options: argparse.Namespace) -> int:
     said = statement(files, found, [check["code"] for check in scope["checked"]])
     signed = _signed(said, options) if options.sign_key is not None else {}
     _write(folder, {**files, "statement.json": said, **signed})
-    return 1 if any(told.severity == "error" for told, accepted in found if accepted is None) else 0
+    return 1 if any(finding.severity == "error" for finding, accepted in found if accepted is None) else 0
 
 
 def _new_folder(folder: Path) -> Path:
@@ -86,7 +86,7 @@ def _new_folder(folder: Path) -> Path:
 
 
 def _examine(options: argparse.Namespace) -> Examined:
-    now, keystore = _moment(options.at), options.keystore
+    now, keystore = _time(options.at), options.keystore
     document = read_plan(options.words, options)
     components = _bill_of_materials(options.sbom) if options.sbom is not None else None
     found = judged(document, options.expect, keystore, options.within, now)
@@ -99,7 +99,7 @@ def _examine(options: argparse.Namespace) -> Examined:
     return examined._replace(keys=_keys(keystore), defaults=_defaults(keystore, now))
 
 
-def _moment(text: str | None) -> datetime:
+def _time(text: str | None) -> datetime:
     """Return ``--at``, else ``SOURCE_DATE_EPOCH`` (reproducible-builds.org), else now."""
     epoch = os.environ.get("SOURCE_DATE_EPOCH", "")
     try:

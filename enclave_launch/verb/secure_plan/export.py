@@ -153,19 +153,19 @@ def _refuse_separate_networks(placement: Placement, engine: Engine, host_network
 
 def _report(processes: list[DeployedProcess], engine: Engine, setup: list[str]) -> None:
     """Warn about what works only if the host is prepared for it."""
-    told = []
+    warnings = []
     for one in processes:
         if one.needs.devices and not one.needs.groups and engine is not Engine.KUBERNETES:
-            told.append(
+            warnings.append(
                 f"{one.fqn or one.process} may open {', '.join(one.needs.devices)} only if every user may: name the "
                 "group of the device in the hosts file (needs: groups: [video])"
             )
         homes = home_paths(one, tuple(setup)) if engine is Engine.SYSTEMD else ()
         if homes:
-            told.append(
+            warnings.append(
                 f"{one.fqn or one.process} reads below a home directory: {', '.join(homes)} is left readable"
             )
-    for text in told:
+    for text in warnings:
         print(f"secure-plan: warning: {message(text)}", file=sys.stderr)
 
 

@@ -49,7 +49,7 @@ def judged(
     findings = [*check_plan(document), *rule_findings(document, expected.never)]
     if keystore is not None:
         findings += _of_keystore(document, keystore, within, now)
-    return [(told, expected.reason_to_accept(told)) for told in findings]
+    return [(finding, expected.reason_to_accept(finding)) for finding in findings]
 
 
 def _of_keystore(
