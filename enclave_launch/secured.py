@@ -63,7 +63,7 @@ class ProvisionedLaunch(NamedTuple):
 
     @property
     def secret_variables(self) -> frozenset[str]:
-        """Environment variables with secrets of the CA: no process may see them."""
+        """Return the environment variables with secrets of the CA: no process may see them."""
         given = (self.options.access.passphrase, self.options.access.pin)
         return frozenset(secret.variable for secret in given if secret is not None and secret.variable)
 

@@ -33,23 +33,23 @@ class EndpointKind(str, Enum):
 
     @property
     def family(self) -> str:
-        """``topic``, ``service`` or ``action``: the elements of NoDL v1."""
+        """Return ``topic``, ``service`` or ``action``, the element of NoDL v1."""
         family, divided, _ = self.value.partition("_")
         return family if divided else "topic"
 
     @property
     def role(self) -> str:
-        """``publisher``, ``subscription``, ``server`` or ``client``: the roles of NoDL v1."""
+        """Return ``publisher``, ``subscription``, ``server`` or ``client``, the role in NoDL v1."""
         return self.value.rpartition("_")[2]
 
     @property
     def type_folder(self) -> str:
-        """``msg``, ``srv`` or ``action``: the middle part of its interface types."""
+        """Return ``msg``, ``srv`` or ``action``, the middle part of its interface types."""
         return {"topic": "msg", "service": "srv", "action": "action"}[self.family]
 
     @property
     def category(self) -> str:
-        """``publishers``, ``service_servers`` ...: the lists of NoDL v2."""
+        """Return ``publishers``, ``service_servers`` ..., the list of NoDL v2."""
         return f"{self.value}s"
 
 

@@ -159,7 +159,7 @@ class Action(LaunchDescriptionEntity):
                 _tell_completion(self, context)
 
     def execute(self, context: LaunchContext) -> list[LaunchDescriptionEntity] | None:
-        """Carry it out, and give the entities to visit next. The base does nothing."""
+        """Execute the action and return the entities to visit next. The base does nothing."""
         return None
 
 

@@ -80,7 +80,7 @@ launch_config = LaunchConfig()
 
 
 def log_launch_config(*, logger: logging.Logger | None = None) -> None:
-    """Say where the log files of this run are."""
+    """Log where the log files of this run are."""
     (logger or get_logger()).info("All log files can be found below %s", launch_config.log_dir)
 
 

@@ -54,7 +54,7 @@ class Changes(NamedTuple):
 
     @property
     def rights_grew(self) -> bool:
-        """Some enclave may do something that it could not do before; a new enclave is all new rights."""
+        """Return True if some enclave may do something that it could not do before; a new enclave is all new rights."""
         return any(change.added for change in self.enclaves) or any(change.more for change in self.files)
 
     @property

@@ -376,7 +376,9 @@ class _Over(Exception):
 
 
 def require_signals() -> None:
-    """Only the main thread can take the signals of a process, and only one that runs no loop can block."""
+    """Check that this is the main thread, which takes the signals, and that no event loop runs that we would block.
+
+    :raises RuntimeFailure: it is not, or one does."""
     if threading.current_thread() is not threading.main_thread():
         raise RuntimeFailure(
             "run() takes the signals of the process, which only its main thread can; "
@@ -390,7 +392,7 @@ def require_signals() -> None:
 
 @contextmanager
 def signals_to(on_signal: Callable[[Signals], None]) -> Iterator[None]:
-    """SIGHUP only where nobody (nohup) asked us to ignore it."""
+    """Call ``on_signal`` for the signals that end a launch; for SIGHUP unless it is ignored (nohup)."""
     loop = asyncio.get_running_loop()
     ignored = {SIGHUP} if getsignal(SIGHUP) is SIG_IGN else set()
     numbers = [number for number in (SIGINT, SIGTERM, SIGQUIT, SIGHUP) if number not in ignored]

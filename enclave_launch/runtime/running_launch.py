@@ -62,7 +62,7 @@ class RunningProcess(NamedTuple):
 
     @property
     def name(self) -> str:
-        """Unique within the launch: ``talker-1``."""
+        """Return the name, unique within the launch: ``talker-1``."""
         return self.process.process_name
 
 
@@ -139,7 +139,7 @@ class RunningLaunch:
 
     @property
     def processes(self) -> Mapping[str, RunningProcess]:
-        """By process name, in the order in which the launch came to them; a snapshot."""
+        """Return a snapshot of the processes by name, in the order in which the launch came to them."""
         with self._changed:
             return MappingProxyType(dict(self._processes))
 
@@ -150,7 +150,7 @@ class RunningLaunch:
 
     @property
     def is_recorded(self) -> bool:
-        """Are endpoints told as they are made (``RunSettings.record``)?"""
+        """Return True if endpoints are reported as they are made (``RunSettings.record``)."""
         return self._recorded
 
     @property

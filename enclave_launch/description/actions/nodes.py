@@ -141,8 +141,8 @@ class Node(ExecuteProcess):
 
     @property
     def node_name(self) -> str:
-        """Fully qualified, with placeholders for what launch does not know. Raises ``RuntimeError`` before
-        the action was executed."""
+        """Return the fully qualified name, with placeholders for what launch does not know. Raises ``RuntimeError``
+        before the action was executed."""
         if self.__final_name is None:
             raise RuntimeError("cannot access 'node_name' before executing action")
         return self.__final_name

@@ -83,7 +83,7 @@ class TimerAction(Action):
         return self._completed_future
 
     def cancel(self) -> None:
-        """Never fire; harmless if it already has, or was never started."""
+        """Cancel the timer; harmless if it has fired or was never started."""
         self.__canceled = True
         for future in (self._canceled_future, self._completed_future):
             if future is not None and not future.done():
@@ -109,7 +109,7 @@ class TimerAction(Action):
         self._schedule(context, self.performed_period, mark)
 
     def _schedule(self, context: LaunchContext, seconds: float, mark: str | None) -> None:
-        """Have ``_fire`` called; timers on another clock override this."""
+        """Schedule ``_fire``; timers on another clock override this."""
         context.asyncio_loop.call_later(seconds, self._fire, context, mark)
 
     def _fire(self, context: LaunchContext, mark: str | None) -> None:

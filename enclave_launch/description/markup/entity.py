@@ -41,7 +41,7 @@ class Entity:
 
     @property
     def source_location(self) -> SourceLocation | None:
-        """File, line and element name (ours; upstream has no positions)."""
+        """Return file, line and element name (ours; upstream has no positions)."""
         return None
 
     @property
