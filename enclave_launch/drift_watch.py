@@ -138,11 +138,11 @@ class DriftWatch(LaunchCompanion):
 
 
 class _Observer:
-    """The process that looks, and the newest graph that it told. :raises RuntimeFailure: it cannot look."""
+    """The process that looks, and the newest graph that it sent. :raises RuntimeFailure: it cannot look."""
 
     def __init__(self, domain: int, enclave_directory: Path | None) -> None:
         directory = [f"--enclave-directory={enclave_directory}"] if enclave_directory else []
-        # It is told its enclave by its arguments: no override may reach it.
+        # Its arguments name its enclave: no override may reach it.
         environment = {key: text for key, text in os.environ.items() if not key.startswith("ROS_SECURITY_")}
         self._process = subprocess.Popen(
             [sys.executable, "-m", "nodl.graph.follow", str(domain), *directory],

@@ -1,7 +1,7 @@
 """The enclave path of one process, from what its launch file says.
 
 Takes a ``ResolvedProcess`` (with its ``EnclaveRequest``), gives an ``EnclaveAssignment``; next is the policy.
-Pure: nothing here touches the world.
+Performs no I/O.
 
 Rules, from the design article "ROS 2 Security Enclaves" (section Runtime):
 

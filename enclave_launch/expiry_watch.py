@@ -127,4 +127,4 @@ def _ends(launch: ProvisionedLaunch) -> list[Expiry]:
     try:
         return list(expires_soon(keystore, _FOREVER, enclaves=enclaves, known=launch.report.validities))
     except KeystoreError:
-        return []  # whatever is wrong with it is told where it is used
+        return []  # whatever is wrong with it is reported where it is used

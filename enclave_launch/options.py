@@ -108,7 +108,7 @@ class SecurityOptions(NamedTuple):
 
 
 class Deadline:
-    """A moment at which a launch is ended in order, to be started anew by whoever set it.
+    """A moment at which a launch is ended in order, to be started again by whoever set it.
 
     ``reached`` once the launch was ended because of it, and for nothing else."""
 

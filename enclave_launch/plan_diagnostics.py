@@ -1,4 +1,4 @@
-"""What is to be told of a plan: problems, at which ``--secure`` stops and a dry run only warns, and notes.
+"""The diagnostics of a plan: problems, at which ``--secure`` stops and a dry run only warns, and notes.
 
 What could not be found out stands in the plan as a value with a reason; here it becomes a diagnostic.
 """

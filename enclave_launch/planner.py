@@ -1,6 +1,6 @@
 """From an evaluation to the plan: assign enclaves, join interfaces with final names, derive the policy.
 
-Takes an ``Evaluation`` and a way to look up node interfaces; gives a ``LaunchPlan``. Pure: the look-up is handed in.
+Takes an ``Evaluation`` and a way to look up node interfaces; gives a ``LaunchPlan``. Performs no I/O.
 """
 
 from __future__ import annotations

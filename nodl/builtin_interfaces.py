@@ -6,7 +6,7 @@ where that is known from. A node of unknown library gets the rows of both. What 
 asks for it (topic statistics, service introspection) is not here: a manifest has to name it; logger services are
 a row with a condition. A name with ``*`` is of a helper node whose name nobody can foresee.
 ``ros_discovery_info`` is a matter of DDS permissions, not of ROS names, and has its place there.
-Pure; read by policy derivation and by the reports of inference.
+Read by policy derivation and by the reports of inference.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Names of nodes, namespaces, topics, services and actions: validity and expansion, as rcl has them.
 
-Pure text in, text out. Used by manifests (what may be written), by inference (what code may say) and
+Used by manifests (what may be written), by inference (what code may say) and
 by policy derivation (what a name becomes once launch has decided node name and namespace).
 
 Rules from ros2/design articles/topic_and_service_names, rcl ``validate_topic_name.c`` and

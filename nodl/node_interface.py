@@ -2,7 +2,7 @@
 
 Every source of knowledge (NoDL v1, NoDL v2, inference from Python or C++) ends in these values;
 whoever derives permissions from them no longer asks where they came from, but can always tell
-(``source``). Pure data: nothing here touches the world.
+(``source``).
 """
 
 from __future__ import annotations

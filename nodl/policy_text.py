@@ -1,4 +1,4 @@
-"""The text of an SROS2 policy (version 0.2.0). Pure. Schema: ros2/sros2 ``policy/schemas/policy.xsd``."""
+"""The text of an SROS2 policy (version 0.2.0). Schema: ros2/sros2 ``policy/schemas/policy.xsd``."""
 
 from __future__ import annotations
 

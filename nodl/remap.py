@@ -1,6 +1,6 @@
 """Remap rules as rcl reads and applies them: ``[NODE:]MATCH:=REPLACEMENT``.
 
-Text of rules in, resolved names out; pure. Launch passes rules on unchecked, so a bad rule is only
+Performs no I/O. Launch passes rules on unchecked, so a bad rule is only
 noticed by the started process; ``parse_rule`` notices it before.
 
 Rules from ros2/rcl ``arguments.c`` and ``lexer.c`` (what parses), ``remap.c`` and

@@ -1,4 +1,4 @@
-"""XML text -> elements with line numbers and their text. Pure; for NoDL v1, robot descriptions and behavior trees.
+"""XML text -> elements with line numbers and their text; for NoDL v1, robot descriptions and behavior trees.
 
 Nothing outside the document is ever read, and nothing in it can grow: a DOCTYPE, where entities would be
 declared, is refused.

@@ -1,8 +1,8 @@
 """Variables of a process that decide whether its enclave is used: those we set, those that could undo them, its domain.
 
-The runtime lays its own values over ``ROS_SECURITY_*``, so a launch file cannot take the enclave away through them; it
-is told that they have no effect. Configurations of a DDS with security properties of their own are refused: which of
-the two would win is a matter of the DDS and its version.
+The runtime lays its own values over ``ROS_SECURITY_*``, so a launch file cannot take the enclave away through them; a
+warning says that they have no effect. Configurations of a DDS with security properties of their own are refused: which
+of the two would win is a matter of the DDS and its version.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Conditions: what decides, at each visit anew, whether an action is executed."""
+"""Conditions: decide at each visit whether an action is executed."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class Condition:
-    """True when its predicate is; without a predicate it is false. Evaluated anew at each visit."""
+    """True when its predicate is; without a predicate it is false. Evaluated at each visit."""
 
     def __init__(self, *, predicate: Callable[[LaunchContext], bool] | None = None) -> None:
         self._predicate = predicate

@@ -45,7 +45,7 @@ class LaunchDescriptionEntity:
 
     source_location: SourceLocation | None = None
     scan_role: ScanRole | None = None
-    built_by_front_end = False  # built anew for each evaluation, unlike what a Python file builds
+    built_by_front_end = False  # built for each evaluation, unlike what a Python file builds
 
     def describe(self) -> str:
         raise NotImplementedError()

@@ -1,4 +1,4 @@
-"""What a person is told about a launch: typed values, each worded in this room and nowhere else.
+"""Diagnostics of a launch: typed values, each worded in this room and nowhere else.
 
 A ``Diagnostic`` is a value like any other: reports print it, programs ask for its ``code`` and ``location`` (JSON,
 SARIF), tests compare it. Whether it stops ``--secure`` is said by the list it stands in (``LaunchPlan.problems`` or

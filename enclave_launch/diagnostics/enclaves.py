@@ -1,4 +1,4 @@
-"""What is told of processes and their enclaves. Performs no I/O."""
+"""Diagnostics of processes and their enclaves. Performs no I/O."""
 
 from __future__ import annotations
 

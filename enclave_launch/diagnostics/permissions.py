@@ -1,4 +1,4 @@
-"""What is told of interfaces, and of the permissions that follow from them. Performs no I/O."""
+"""Diagnostics of interfaces and of their permissions. Performs no I/O."""
 
 from __future__ import annotations
 

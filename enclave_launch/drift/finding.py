@@ -48,7 +48,7 @@ class Level(str, Enum):
 
 
 class FindingCertainty(Enum):
-    """When a finding may be told: discovery comes in pieces."""
+    """When a finding may be reported: discovery comes in pieces."""
 
     FACT = "what was announced says so"
     WHEN_SETTLED = "unless more is discovered"

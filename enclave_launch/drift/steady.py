@@ -1,8 +1,8 @@
-"""Findings over time → those that stand, each told once. Pure: moments are handed in.
+"""Findings over time → those that stand, each reported once. Performs no I/O; the time is handed in.
 
 What was announced is a fact at once. What discovery could still take back has to stand for ``settle`` seconds. What is
-missing may still come: it is told after ``absence`` seconds. As long as findings of one kind go by themselves the
-system is still starting, and those that are left get their time anew.
+missing may still come: it is reported after ``absence`` seconds. As long as findings of one kind go by themselves the
+system is still starting, and the time of those that are left begins again.
 """
 
 from __future__ import annotations
@@ -16,8 +16,10 @@ Key = tuple[str, str, str, str]
 
 
 class SettlingTimes(NamedTuple):
-    """Seconds; ``longest``: told then, whatever others of its kind do. 50 secured processes that started at once on two
-    cores with a load of 140 took more than two minutes to authenticate each other, one after another."""
+    """Seconds; ``longest``: reported then, whatever others of its kind do.
+
+    50 secured processes that started at once on two cores with a load of 140 took more than two minutes to authenticate
+    each other, one after another."""
 
     settle: float = 30.0
     absence: float = 120.0
@@ -32,7 +34,7 @@ class SettlingTimes(NamedTuple):
 
 
 class Change(NamedTuple):
-    """``over``: what was told before and is no longer so."""
+    """``over``: what was reported and is no longer so."""
 
     new: tuple[DriftFinding, ...] = ()
     over: tuple[DriftFinding, ...] = ()

@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from enclave_launch.host.plan_host import PlanHost
 
 
-_LONGEST_CHAIN = 100  # events of which each leads to the next: a timer that starts itself anew never ends
+_LONGEST_CHAIN = 100  # events of which each leads to the next: a timer that restarts itself never ends
 
 
 class Explorer:
@@ -42,7 +42,7 @@ class Explorer:
     def __init__(self, context: LaunchContext, host: PlanHost) -> None:
         self._context = context
         self._host = host
-        self._announced = 0  # processes whose start has been told
+        self._announced = 0  # processes whose start was announced
         self._fired: set[int] = set()  # handlers that have run; each is supposed once
         self._depth = 0
         self._made_up: set[int] = set()  # events that we only suppose

@@ -30,7 +30,7 @@ MISSING_PREFIX = "/missing"
 
 
 class HostOptions(NamedTuple):
-    """What an evaluation is told of the world, in a dry run and live alike.
+    """What an evaluation knows of the world, in a dry run and live.
 
     ``distro``: whose rules to follow, ``None`` for that of the environment. ``anonymous_seed``: two hosts with the same
     seed give the same names at random, in the same order.

@@ -351,7 +351,7 @@ def _parameter_note(template: NameTemplate, node: RunningNode) -> str:
 
 
 def _expand_pattern(names: NodeNames, text: str) -> str:
-    """Expand a name with ``*`` in it as if each were a letter; remap rules cannot be told to match."""
+    """Expand a name with ``*`` in it as if each were a letter; whether remap rules match is not known."""
     stand_in = "STAR_OF_A_PATTERN"
     return names.expand(text.replace("*", stand_in)).replace(stand_in, "*")
 

@@ -2,7 +2,7 @@
 
 Inference may find a topic name that is an input of the program: ``--topic`` of its command line,
 ``<argument>``, ``$VARIABLE`` (see ``nodl.name_template.ParameterPart``). The value that launch passes
-counts; where it cannot be told, the default in the source must not be believed.
+counts; if it is not known, the default in the source must not be believed.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Questions that a reviewer asks of a plan, answered without running anything. Pure: values in, values out.
+"""Questions that a reviewer asks of a plan, answered without running anything. Performs no I/O.
 
 document.py           a plan, fresh or read back from the dry run's JSON, as what a review needs of it
 changes.py            two plans -> what was added, removed and moved, and whether rights grew

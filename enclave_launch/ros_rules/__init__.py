@@ -1,5 +1,5 @@
 """What ROS 2 itself fixes: how rcl reads a command line and a parameter file, how names join, what releases differ in.
 
-Pure rules over text, below everything else: ``distro`` is the table of the releases, ``namespaces`` joins names,
+Rules over text, below everything else: ``distro`` is the table of the releases, ``namespaces`` joins names,
 ``ros_arguments`` and ``rcl_parameters`` read what rcl reads.
 """

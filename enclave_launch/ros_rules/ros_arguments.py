@@ -1,6 +1,6 @@
 """What rcl finds on a node's command line: remap rules, parameter sources, the enclave.
 
-Command line in, values out; pure. launch never looks into ``args`` and ``ros_args``, but the process does.
+Performs no I/O. launch never looks into ``args`` and ``ros_args``, but the process does.
 Rules from ros2/rcl ``arguments.c``: ROS arguments stand between ``--ros-args`` and ``--`` (or the end);
 outside of them a word with ``:=`` is still taken as a remap rule (deprecated there).
 """

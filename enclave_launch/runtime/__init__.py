@@ -1,7 +1,7 @@
 """Starts what evaluation decided and keeps it running: processes, their output, events, the end.
 
 live_launch       the event loop that drives all of the below (overlap: what is the whole program's)
-running_launch    a launch beside the program that started it; run_events: what it is told
+running_launch    a launch beside the program that started it; run_events: what it observes
 live_host         the evaluation's seam to the world, live
 gate              its enclave, complete before a process starts; difference: what came instead of the planned, in words
 environment_watch whether what runs has the environment that was planned

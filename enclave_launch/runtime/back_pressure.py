@@ -2,7 +2,7 @@
 
 Streams that go to a file wait for the files. Streams that go to the screen wait for the screen; but one that stays full
 for ``PATIENCE`` seconds (Ctrl-S, a slow link) holds up only the streams that go nowhere else. The others go on into
-their logs, and the screen is told how many lines it lacks.
+their logs, and the screen shows how many lines it lacks.
 """
 
 from __future__ import annotations

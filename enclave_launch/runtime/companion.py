@@ -1,4 +1,4 @@
-"""Who goes along with a launch: may change what each process is started with, and is told what happens.
+"""Who goes along with a launch: may change what each process is started with, and sees what happens.
 
 Stronger than an observer of events (``run_events``): its answers are awaited, and it lives from before the first
 process until after the last. The runtime knows only this; recorders, audits and the like are handed in.

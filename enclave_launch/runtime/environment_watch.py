@@ -78,7 +78,7 @@ def environment_of(pid: int) -> dict[str, str] | None:
 
 
 class EnvironmentWatch:
-    """``running`` gives the processes of this moment; ``ended`` is told of each that had to be killed."""
+    """``running`` returns the processes that run; ``ended`` is called with each that had to be killed."""
 
     def __init__(self, running: Callable[[], list[Watched]], ended: Callable[[Unplanned], None]) -> None:
         self._running = running

@@ -91,7 +91,7 @@ def component_identity(component: ResolvedComponent) -> tuple[object, ...]:
 
 
 class PlannedGate:
-    """``say_late`` is told of each process that ``allow_late`` lets through."""
+    """``say_late`` is called with each process that ``allow_late`` lets through."""
 
     def __init__(
         self,

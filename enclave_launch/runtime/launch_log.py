@@ -38,7 +38,7 @@ class Writers(NamedTuple):
 class LaunchLog:
     """Sinks of one run. ``directory`` is where launch.log and the processes' own logs are.
 
-    ``limit``: bytes after which a log file is begun anew, ``None`` for never.
+    ``limit``: bytes after which a new log file is begun, ``None`` for never.
 
     :raises RuntimeFailure: a format in ``environment`` that cannot be used.
     """

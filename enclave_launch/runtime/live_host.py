@@ -36,8 +36,8 @@ from enclave_launch.runtime.run_events import Observer, ProcessOver, ProcessPlan
 
 
 class LiveHost(BaseHost):
-    """``secrets``: variables that no child may see. ``fail`` is told why the launch cannot go on. ``services`` raises
-    ``RuntimeFailure`` where a launch that was not looked at before needs rclpy, and there is none."""
+    """``secrets``: variables that no child may see. ``fail`` is called with why the launch cannot go on. ``services``
+    raises ``RuntimeFailure`` if a launch that was not evaluated before needs rclpy, and there is none."""
 
     def __init__(
         self,

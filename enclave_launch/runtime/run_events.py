@@ -1,4 +1,4 @@
-"""What happens in a run, as values for programs that watch it; told in order, in the launch's thread."""
+"""What happens in a run, as values for programs that watch it; in order, in the launch's thread."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from nodl.node_interface import EndpointKind
 
 class LaunchStarted(NamedTuple):
     """Evaluation begins. ``log_directory``: where launch.log and the processes' own logs are; ``recorded``: endpoints
-    will be told as they are made."""
+    will be reported as they are made."""
 
     log_directory: str
     recorded: bool = False

@@ -115,7 +115,7 @@ def _check_before_keys_are_made(plan: LaunchPlan, keystore: str) -> None:
 
     :raises EnclaveLaunchError: as ``run``."""
     if plan.problems:
-        return  # told first, by ``provision``
+        return  # ``provision`` reports them
     check_programs(plan.evaluation.processes)
     if on_zenoh(plan, os.environ):
         zenoh_start().check(plan, keystore)

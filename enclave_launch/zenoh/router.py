@@ -1,7 +1,7 @@
 """The Zenoh router of a launch: ``rmw_zenohd``, started before the first process and ended after the last.
 
 One router serves a keystore. Where one answers already, it is used if it is the keystore's and knows the present
-rules: its certificate is issued anew with each change of them, so who connects can tell. A router of ours is started
+rules: each change of them comes with a new certificate, so who connects sees it. A router of ours is started
 again when its file changes, and when it ends by itself; clients come back to it by themselves.
 """
 

@@ -34,7 +34,7 @@ Buckets = dict[tuple["type[Event] | None", int], dict[int, "Handler"]]
 
 
 class EventQueue:
-    """Events with the mark (``on_event``) in force when they were emitted. ``wake`` is told of each."""
+    """Events with the mark (``on_event``) in force when they were emitted. ``wake`` is called with each."""
 
     def __init__(self) -> None:
         self._events: deque[QueuedEvent] = deque()
