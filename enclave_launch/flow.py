@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING
 
 from enclave_launch.add_ons import zenoh_planning
 from enclave_launch.admission.middleware import halves, middleware_of, why_not
-from enclave_launch.diagnostics import Diagnostic
+from enclave_launch.diagnostics import Diagnostic, refusal
 from enclave_launch.diagnostics.enclaves import middleware_refused
 from enclave_launch.diagnostics.evaluation import program_not_executable
 from enclave_launch.errors import LaunchFileError, ManifestError
@@ -163,7 +163,7 @@ def provision(
     )
 
     if plan.problems:
-        raise ManifestError("\n".join((*map(str, plan.problems), "nothing was started or written")))
+        raise ManifestError(refusal(plan.problems))
     chosen = options or SecurityOptions()
     settings = SecuritySettings(os.path.abspath(keystore), chosen.strategy)
     requested = chosen.keystore or ProvisionOptions()

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from enclave_launch.admission.variables import domain_of
-from enclave_launch.diagnostics import Diagnostic
+from enclave_launch.diagnostics import Diagnostic, refusal
 from enclave_launch.diagnostics.enclaves import domain_not_served
 from enclave_launch.errors import ManifestError
 from enclave_launch.plan import LaunchPlan, enclave_domains
@@ -26,7 +26,7 @@ def with_domains(
     if options.domains is not None:
         refused = list(not_served(plan, options.domains))
         if refused:
-            raise ManifestError("\n".join((*map(str, refused), "nothing was started or written")))
+            raise ManifestError(refusal(refused))
         return options
     by_enclave = {path: set(domains) for path, domains in enclave_domains(plan.processes).items()}
     if plan.launcher is not None:

@@ -7,7 +7,9 @@ SARIF), tests compare it. Whether it stops ``--secure`` is said by the list it s
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from enum import Enum
+from itertools import groupby
 from typing import NamedTuple
 
 from enclave_launch.source_location import SourceLocation
@@ -127,3 +129,16 @@ class Diagnostic(NamedTuple):
             place += f"<{self.location.element}> "
         remedy = f"; {self.remedy}" if self.remedy else ""
         return f"{place}{self.text}{remedy}"
+
+
+def refusal(problems: Iterable[Diagnostic]) -> str:
+    """Return what a secured start is refused for, as one message; neighbours with the same remedy share it."""
+    lines: list[str] = []
+    for remedy, group in groupby(problems, lambda problem: problem.remedy):
+        alike = list(group)
+        if remedy and len(alike) > 1:
+            lines += [str(problem._replace(remedy="")) for problem in alike]
+            lines.append(f"for each of these {len(alike)}: {remedy}")
+        else:
+            lines += map(str, alike)
+    return "\n".join((*lines, "nothing was started or written"))

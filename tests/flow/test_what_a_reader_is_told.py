@@ -41,6 +41,19 @@ def test_the_tree_tells_what_was_inferred(secure_launch: SecureLaunch, write: Wr
     assert "publish: /chatter /greeting" in tree
 
 
+def test_a_refusal_of_several_nodes_says_once_what_to_do(
+    secure_launch: SecureLaunch, write: Write, workspace: Path, tmp_path: Path
+) -> None:
+    one, other = '<node pkg="robot" exec="engine"/>', '<node pkg="robot" exec="engine" name="second"/>'
+    refused = secure_launch(
+        "--secure", "--keystore", tmp_path / "ks", "--prefix", workspace, write(one + other)
+    )
+    assert refused.returncode == 1 and refused.stderr.count("no NoDL manifest for robot/engine") == 2
+    assert refused.stderr.count("--learn") == 1 and "for each of these 2: let it run once" in refused.stderr
+    alone = secure_launch("--secure", "--keystore", tmp_path / "ks", "--prefix", workspace, write(one))
+    assert "for each" not in alone.stderr and "; let it run once with --learn" in alone.stderr
+
+
 @pytest.mark.parametrize("way", [("--format", "policy"), ("--dump-params",)])
 def test_what_is_not_known_is_told_beside_every_other_output(
     way: tuple[str, ...], secure_launch: SecureLaunch, write: Write, workspace: Path
