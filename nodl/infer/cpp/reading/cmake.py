@@ -208,7 +208,12 @@ class BuildReader:
     def _do_file(self, given: list[str], variables: dict[str, str]) -> None:
         if given[0] in ("GLOB", "GLOB_RECURSE") and len(given) > 2:
             patterns = [absolute(word, variables) for word in given[2:] if word not in _GLOB_OPTIONS]
-            found = [glob.glob(recursive_pattern(each, given[0]), recursive=True) for each in patterns]
+            recursive = given[0] == "GLOB_RECURSE"  # elsewhere ** is what * is
+            found = [
+                glob.glob(recursive_pattern(each) if recursive else each, recursive=recursive)
+                for each in patterns
+                if near(each, variables)
+            ]
             variables[given[1]] = ";".join(file for files in found for file in sorted(files))
 
     def _do_aux_source_directory(self, given: list[str], variables: dict[str, str]) -> None:
@@ -388,10 +393,16 @@ def absolute(word: str, variables: dict[str, str]) -> str:
     return os.path.normpath(os.path.join(variables.get("CMAKE_CURRENT_SOURCE_DIR", ""), word))
 
 
-def recursive_pattern(pattern: str, how: str) -> str:
-    """Return for ``GLOB_RECURSE`` the pattern with ``**`` before the file name; else the pattern as it is."""
+def near(pattern: str, variables: dict[str, str]) -> bool:
+    """Return True if a pattern and the sources have a folder in common; ``/**/*`` is left of ``${UNKNOWN}/**/*``."""
+    fixed = re.split(r"[*?\[]", pattern, maxsplit=1)[0]
+    return os.path.commonpath([fixed, os.path.abspath(variables["CMAKE_CURRENT_SOURCE_DIR"])]) != "/"
+
+
+def recursive_pattern(pattern: str) -> str:
+    """Return a pattern of ``GLOB_RECURSE`` with ``**`` before the file name."""
     folder, name = os.path.split(pattern)
-    return os.path.join(folder, "**", name) if how == "GLOB_RECURSE" else pattern
+    return os.path.join(folder.replace("**", "*"), "**", name)
 
 
 def compile_definitions(words: list[str], only_flags: bool = False) -> dict[str, str]:

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from nodl.infer import infer_paths
+from nodl.infer.cpp.reading.cmake import read_build
 from tests.nodl.infer.cpp.workspace import HEAD, endpoints, gaps, in_class, infer, names, package
 
 pytest.importorskip("tree_sitter_cpp", reason="the extra cpp is not installed")
@@ -324,3 +325,18 @@ def test_a_key_that_a_map_does_not_have_makes_an_entry(tmp_path: Path) -> None:
 def test_a_key_that_is_only_read_is_in_the_map_afterwards(tmp_path: Path) -> None:
     body = f'm_["a"]; int n = m_["b"]; for (auto & [k, v] : m_) {{ {PUB}(k, 1); }}'
     assert names(infer(tmp_path, in_class(body, "std::map<std::string, int> m_;"))) == ["a", "b"]
+
+
+def test_a_pattern_with_an_unknown_variable_reads_nothing_outside_the_workspace(tmp_path: Path) -> None:
+    """``${GENERATED}/**/*`` becomes ``/**/*``: every file of the machine."""
+    folder = tmp_path / "demo"
+    files = {"src/main.cpp": in_class(f'{PUB}("a", 1);'), "more/b.cpp": "", "more/deep/c.cpp": ""}
+    package(folder, files, "file(GLOB_RECURSE found ${GENERATED}/*.cpp)\nadd_executable(node src/main.cpp ${found})")
+    assert names(infer_paths([folder])) == ["a"]
+    patterns = ("GLOB_RECURSE found more/*.cpp", "GLOB found more/**/*.cpp", "GLOB found ${GENERATED}/**/*.cpp")
+    assert [len(_sources(folder, pattern)) for pattern in patterns] == [2, 1, 0]
+
+
+def _sources(folder: Path, pattern: str) -> list[str]:
+    (folder / "CMakeLists.txt").write_text(f"file({pattern})\nadd_executable(node ${{found}})")
+    return read_build(str(folder)).targets["node"].sources
