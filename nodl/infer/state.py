@@ -126,7 +126,9 @@ class ProgramState:
             mark = len(self._trail)
             if alternative():
                 outcomes.append(self._written(mark))
-            self._undo(mark)
+                self._undo(mark)
+            else:
+                self._leave(mark)
             self.stamp = stamp
         self.depth -= 1
         self.forks -= 1
@@ -185,6 +187,13 @@ class ProgramState:
                 cells.pop(key, None)
             else:
                 cells[key] = old
+
+    def _leave(self, mark: int) -> None:
+        """Undo a branch that ends in a jump. What it wrote stays on the trail, for ``join_seen`` where the jump leads."""
+        left = {(id(cells), key): (cells, key) for cells, key, _ in self._trail[mark:]}
+        held = [(cells, key, cells[key]) for cells, key in left.values() if key in cells]
+        self._undo(mark)
+        self._trail += held
 
     def _merge(self, outcomes: list[Written]) -> None:
         places = outcomes[0] if len(outcomes) == 1 else {k: v for found in outcomes for k, v in found.items()}

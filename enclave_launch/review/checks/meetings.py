@@ -113,18 +113,32 @@ def _one_edit(one: str, two: str) -> bool:
 
 
 def types(plan: PlanDocument, document: Document) -> Iterator[PlanFinding]:
-    """Yield names with different interface types: those endpoints never match."""
+    """Yield names with different interface types: those endpoints never match.
+
+    Several types at one place of a program are alternatives (a table of types, a parameter that decides): such an
+    endpoint differs from another only if none of them fits."""
     found: dict[tuple[str, str], dict[str, list[_User]]] = {}
     for (operation, name), users in _users(document).items():
-        for user in users:
-            if user.interface["type"] and "*" not in name:
-                by_type = found.setdefault((KIND_OF[operation], name), {})
-                by_type.setdefault(user.interface["type"], []).append(user)
+        if "*" in name:
+            continue
+        for alternatives in _by_place(users).values():
+            written = " or ".join(sorted({user.interface["type"] for user in alternatives}))
+            found.setdefault((KIND_OF[operation], name), {}).setdefault(written, []).extend(alternatives)
     for (kind, name), by_type in sorted(found.items()):
         for one, two in combinations(sorted(by_type), 2):
-            who, other = _nodes(by_type[one]), _nodes(by_type[two])
-            text = f"{kind} {name} is {one} for {who} and {two} for {other}"
-            yield finding("types-differ", name, text, _first_place(by_type[two]))
+            if set(one.split(" or ")).isdisjoint(two.split(" or ")):
+                who, other = _nodes(by_type[one]), _nodes(by_type[two])
+                text = f"{kind} {name} is {one} for {who} and {two} for {other}"
+                yield finding("types-differ", name, text, _first_place(by_type[two]))
+
+
+def _by_place(users: list[_User]) -> dict[tuple[str, str], list[_User]]:
+    """Users with a known type, by node and place."""
+    found: dict[tuple[str, str], list[_User]] = {}
+    for user in users:
+        if user.interface["type"]:
+            found.setdefault((user.node, user.interface["place"]), []).append(user)
+    return found
 
 
 def qos(plan: PlanDocument, document: Document) -> Iterator[PlanFinding]:

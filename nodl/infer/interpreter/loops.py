@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable
 from functools import partial
+from typing import NamedTuple
 
 from nodl.infer.interpreter.assign import assign, store_item
 from nodl.infer.interpreter.conditions import decide, narrowed
@@ -38,29 +39,43 @@ def may_unroll(run: Run, count: int) -> bool:
     return count * run.unrolled <= (MAX_UNROLLED_AGAIN if run.repeated else MAX_UNROLLED)
 
 
-def _looped(run: Run, node: Loop, frame: Frame, turns: Callable[[], tuple[bool, bool]]) -> bool:
-    """Run the ``turns`` of a loop, which say whether control can pass it, and whether at its end; then its ``else``."""
+class _Turns(NamedTuple):
+    """What the turns of a loop may come to: control passes it; its end is reached; a ``break`` leaves it."""
+
+    passes: bool
+    finished: bool
+    left: bool
+
+
+def _looped(run: Run, node: Loop, frame: Frame, turns: Callable[[], _Turns]) -> bool:
+    """Run the ``turns`` of a loop, then its ``else``, which a ``break`` skips."""
     before, loop_forks = frame.unsettled, frame.loop_forks
     frame.unsettled = False
     frame.loop_forks = run.state.forks
-    passes, finished = turns()
+    outcome = turns()
     frame.unsettled, frame.loop_forks = before, loop_forks
     frame.jump = ""
-    if passes and finished and node.orelse:
-        return run.execute(node.orelse, frame)
-    return passes
+    if outcome.passes and outcome.finished and node.orelse:
+        if not outcome.left:
+            return run.execute(node.orelse, frame)
+        run.state.maybe(lambda: run.execute(node.orelse, frame))
+    return outcome.passes
 
 
-def _for(run: Run, node: For, iterated: Value, frame: Frame) -> tuple[bool, bool]:
-    passes = finished = True
+def _breaks(node: Loop) -> bool:
+    return any(isinstance(inner, ast.Break) for inner in ast.walk(node))
+
+
+def _for(run: Run, node: For, iterated: Value, frame: Frame) -> _Turns:
+    outcome = _Turns(passes=True, finished=True, left=False)
     items = elements(run, iterated, node, frame)
     exact = items.exact or ()
     if items.exact is not None and may_unroll(run, len(exact)):
         run.unrolled *= len(exact) or 1
-        passes, finished = _unrolled(run, node, exact, frame)
+        outcome = _unrolled(run, node, exact, frame)
         run.unrolled //= len(exact) or 1
-        if not passes or elements(run, iterated, node, frame) == items:
-            return passes, finished
+        if not outcome.passes or elements(run, iterated, node, frame) == items:
+            return outcome
 
     def turn() -> bool:  # what is iterated over may change meanwhile
         element = elements(run, iterated, node, frame).any_element()
@@ -70,24 +85,24 @@ def _for(run: Run, node: For, iterated: Value, frame: Frame) -> tuple[bool, bool
         return run.execute(node.body, frame)
 
     fixpoint(run, frame, turn)
-    return True, finished
+    return _Turns(True, outcome.finished, outcome.left or _breaks(node))
 
 
-def _unrolled(run: Run, node: For, exact: tuple[Value, ...], frame: Frame) -> tuple[bool, bool]:
-    """Run one turn after the other; can control pass the loop, and may it have run to its end?"""
+def _unrolled(run: Run, node: For, exact: tuple[Value, ...], frame: Frame) -> _Turns:
+    """Run one turn after the other."""
     start = run.state.mark()
-    broken, outcome = False, (True, True)
+    broken, passes = False, True
     run.state.depth += 1
     for index, element in enumerate(exact):
         passes, jumped = _followed(run, node, index, element, frame)
         broken = broken or jumped
         if not passes:
-            outcome = broken or frame.jump == "break", broken
             break
     run.state.depth -= 1
+    left = broken or (not passes and frame.jump == "break")
     if broken:
         run.state.join_seen(start)
-    return outcome
+    return _Turns(passes or left, passes or broken, left)
 
 
 def _followed(run: Run, node: For, index: int, element: Value, frame: Frame) -> tuple[bool, bool]:
@@ -105,9 +120,9 @@ def _followed(run: Run, node: For, index: int, element: Value, frame: Frame) -> 
     return passes or frame.jump == "continue", False
 
 
-def _while(run: Run, node: ast.While, frame: Frame) -> tuple[bool, bool]:
+def _while(run: Run, node: ast.While, frame: Frame) -> _Turns:
     if decide(run, node.test, frame) is False:
-        return True, True
+        return _Turns(passes=True, finished=True, left=False)
     broken = False
 
     def turn() -> bool:
@@ -118,11 +133,8 @@ def _while(run: Run, node: ast.While, frame: Frame) -> tuple[bool, bool]:
         return passes
 
     fixpoint(run, frame, turn)
-    endless = isinstance(node.test, ast.Constant)
-    return (
-        broken or not endless,
-        not endless,
-    )  # without a break only return or an exception leaves ``while True``
+    endless = isinstance(node.test, ast.Constant)  # only break, return or an exception leaves ``while True``
+    return _Turns(broken or not endless, not endless, _breaks(node))
 
 
 def fixpoint(run: Run, frame: Frame, turn: Callable[[], bool]) -> None:

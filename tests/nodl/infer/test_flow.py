@@ -54,6 +54,38 @@ CASES: dict[str, tuple[str, list[str]]] = {
     "try": ("x = 'a'\ntry:\n    x = 'b'\n    int(sys.argv[1])\n    x = 'd'\nexcept ValueError:\n    pass\nself.P(x)",
             ["a", "b", "d"]),
     "finally": ("try:\n    x = 'a'\nfinally:\n    self.P('b')\nself.P(x)", ["a", "b"]),
+    "written before a break": (
+        "x = 'a'\nfor i in range(3):\n    if sys.argv[i]:\n        x = 'b'\n        break\nself.P(x)", ["a", "b"]
+    ),
+    "written before a break of an unknown loop": (
+        "x = 'a'\nfor y in sys.argv:\n    if y:\n        x = 'b'\n        break\nself.P(x)", ["a", "b"]
+    ),
+    "written before a continue": (
+        "x = 'a'\nfor i in range(3):\n    if sys.argv[i]:\n        x = 'b'\n        continue\n    x = 'c'\nself.P(x)",
+        ["a", "b", "c"],
+    ),
+    "written before a return": (
+        "self.x = 'a'\ndef f():\n    if sys.argv[1]:\n        self.x = 'b'\n        return\nf()\nself.P(self.x)",
+        ["a", "b"],
+    ),
+    "written before a raise": (
+        "x = 'a'\ntry:\n    if sys.argv[1]:\n        x = 'b'\n        raise ValueError()\nexcept ValueError:\n    pass\n"
+        "self.P(x)",
+        ["a", "b"],
+    ),
+    "another try, else an error": (
+        "for i in range(3):\n    if sys.argv[i]: break\nelse:\n    raise RuntimeError()\nself.P('a')", ["a"]
+    ),
+    "the else of a loop that a break may leave": (
+        "x = 'a'\nfor i in range(3):\n    if sys.argv[i]:\n        x = 'b'\n        break\nelse:\n    x = 'c'\nself.P(x)",
+        ["a", "b", "c"],
+    ),
+    "the else of a loop that no break leaves": (
+        "x = 'a'\nfor i in range(3):\n    if i == 3: break\nelse:\n    x = 'c'\nself.P(x)", ["c"]
+    ),
+    "the else of a loop that a break leaves": (
+        "x = 'a'\nfor i in range(3):\n    if i == 2: break\nelse:\n    x = 'c'\nself.P(x)", ["a"]
+    ),
     "early return": ("def f():\n    if sys.argv[1]: return 'a'\n    return 'b'\nself.P(f())", ["a", "b"]),
     "closure": ("x = 'a'\ndef f():\n    return x + '/b'\nself.P(f())", ["a/b"]),
     "nonlocal": ("x = 'a'\ndef f():\n    nonlocal x\n    x = 'b'\nf()\nself.P(x)", ["b"]),
