@@ -331,9 +331,17 @@ def test_a_pattern_with_an_unknown_variable_reads_nothing_outside_the_workspace(
     """``${GENERATED}/**/*`` becomes ``/**/*``: every file of the machine."""
     folder = tmp_path / "demo"
     files = {"src/main.cpp": in_class(f'{PUB}("a", 1);'), "more/b.cpp": "", "more/deep/c.cpp": ""}
-    package(folder, files, "file(GLOB_RECURSE found ${GENERATED}/*.cpp)\nadd_executable(node src/main.cpp ${found})")
+    package(
+        folder,
+        files,
+        "file(GLOB_RECURSE found ${GENERATED}/*.cpp)\nadd_executable(node src/main.cpp ${found})",
+    )
     assert names(infer_paths([folder])) == ["a"]
-    patterns = ("GLOB_RECURSE found more/*.cpp", "GLOB found more/**/*.cpp", "GLOB found ${GENERATED}/**/*.cpp")
+    patterns = (
+        "GLOB_RECURSE found more/*.cpp",
+        "GLOB found more/**/*.cpp",
+        "GLOB found ${GENERATED}/**/*.cpp",
+    )
     assert [len(_sources(folder, pattern)) for pattern in patterns] == [2, 1, 0]
 
 
