@@ -125,7 +125,7 @@ class ProgramState:
         for alternative in alternatives:
             mark = len(self._trail)
             if alternative():
-                outcomes.append(self._written(mark))
+                outcomes.append(self.written(mark))
                 self._undo(mark)
             else:
                 self._leave(mark)
@@ -151,6 +151,11 @@ class ProgramState:
             if value:
                 self.write(cells, key, value)
 
+    def settle(self, mark: int, outcomes: list[Written]) -> None:
+        """Continue from ``mark`` with any of ``outcomes``."""
+        self._undo(mark)
+        self._merge(outcomes)
+
     def join_head(self, mark: int, widen_texts: bool) -> bool:
         """End of one turn of a loop: join with the state at ``mark``. True: nothing new, a fixpoint."""
         stable = True
@@ -173,7 +178,8 @@ class ProgramState:
             self.write(cells, key, joined)
         return stable
 
-    def _written(self, mark: int) -> Written:
+    def written(self, mark: int) -> Written:
+        """Return each cell written since ``mark`` as it is now."""
         self.work += len(self._trail) - mark
         return {
             (id(cells), key): (cells, key, cells[key])
@@ -189,7 +195,7 @@ class ProgramState:
                 cells[key] = old
 
     def _leave(self, mark: int) -> None:
-        """Undo a branch that ends in a jump. What it wrote stays on the trail, for ``join_seen`` where the jump leads."""
+        """Undo a branch that ends in a jump. Its values stay on the trail for ``join_seen`` where the jump leads."""
         left = {(id(cells), key): (cells, key) for cells, key, _ in self._trail[mark:]}
         held = [(cells, key, cells[key]) for cells, key in left.values() if key in cells]
         self._undo(mark)

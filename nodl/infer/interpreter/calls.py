@@ -140,14 +140,14 @@ def _run_body(run: Run, function: FunctionValue, cells: LocalCells, call: Call) 
     frame.forks = frame.loop_forks = run.state.forks
     run.entries.setdefault(function.node, {})[call.node] = None
     run.stack.append(function.node)
-    mark = run.state.mark()
+    frame.mark = run.state.mark()
     node = function.node
     if isinstance(node, ast.Lambda):
         frame.returned = run.evaluate(node.body, frame)
     else:
         passes = run.execute(node.body, frame)
         if frame.early:
-            run.state.join_seen(mark, None if cells.shared else cells)
+            _settle(run, node, frame, passes)
         if passes:
             frame.returned = join(frame.returned, NONE)
     if cells.shared:
@@ -159,6 +159,18 @@ def _run_body(run: Run, function: FunctionValue, cells: LocalCells, call: Call) 
     if frame.yielded is not None:
         return frame.yielded or ANY
     return frame.returned  # nothing, if no path comes back
+
+
+def _settle(run: Run, node: ast.AST, frame: Frame, passes: bool) -> None:
+    """Some path left early: go on with what each return and the end leave, where no handler can run in between."""
+    ends = [*frame.exits, run.state.written(frame.mark)] if passes else frame.exits
+    if ends and not any(isinstance(inner, _RUNS_MORE) for inner in ast.walk(node)):
+        run.state.settle(frame.mark, ends)
+    else:
+        run.state.join_seen(frame.mark, None if frame.captured else frame.cells)
+
+
+_RUNS_MORE = (ast.Try, ast.With, ast.AsyncWith, ast.Yield, ast.YieldFrom)
 
 
 def call_bound(run: Run, method: BoundMethod, call: Call) -> Value:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterable
 
+from nodl.infer.state import Written
 from nodl.infer.values import BOTTOM, FunctionValue, LocalCells, ModuleValue, Value, join
 from nodl.source_ref import SourceRef
 
@@ -13,8 +14,8 @@ class Frame:
     """The variables of a running function, class body or module."""
 
     __slots__ = (
-        "again", "cells", "closure", "depth", "early", "entry", "forks", "function", "globals", "is_class",
-        "is_comprehension", "jump", "loop_forks", "module", "nonlocals", "returned", "unsettled", "yielded",
+        "again", "cells", "closure", "depth", "early", "entry", "exits", "forks", "function", "globals", "is_class",
+        "is_comprehension", "jump", "loop_forks", "mark", "module", "nonlocals", "returned", "unsettled", "yielded",
     )  # fmt: skip
 
     def __init__(self, module: ModuleValue, cells: dict[object, Value], closure: Frame | None, depth: int):
@@ -27,6 +28,8 @@ class Frame:
         self.returned: Value = BOTTOM
         self.yielded: Value | None = None
         self.early = False  # some path left before the end
+        self.mark = 0  # of the state, when the frame was entered
+        self.exits: list[Written] = []  # what was written since, at each return that leaves early
         self.unsettled = False  # a break or continue that may have happened, since the loop asked last
         self.jump = ""  # the break or continue that certainly ended the latest statement
         self.forks = 0  # undecided branches when the frame was entered, and when its innermost loop was

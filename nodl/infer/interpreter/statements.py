@@ -98,6 +98,8 @@ def _return(run: Run, node: ast.Return, frame: Frame) -> bool:
     value = NONE if node.value is None else run.evaluate(node.value, frame)
     frame.returned = join(frame.returned, value)
     _leave(run, frame)
+    if frame.early:
+        frame.exits.append(run.state.written(frame.mark))
     return False
 
 
@@ -175,6 +177,8 @@ def _delete(run: Run, node: ast.Delete, frame: Frame) -> bool:
 def run_try(run: Run, node: Any, frame: Frame) -> bool:
     """Run each handler after any part of the body; it sees every value written on the way."""
     mark, returned = run.state.mark(), frame.returned
+    early, unsettled = frame.early, frame.unsettled
+    frame.early = frame.unsettled = False
     run.state.depth += 1
     passes = run.execute(node.body, frame)
     run.state.depth -= 1
@@ -182,13 +186,15 @@ def run_try(run: Run, node: Any, frame: Frame) -> bool:
         passes = run.execute(node.orelse, frame)
     if node.handlers and not all(_cannot_fail(statement) for statement in node.body):
         passes = _perhaps_handled(run, node.handlers, passes, mark, frame)
+    left = frame.early or frame.unsettled or not passes
+    frame.early, frame.unsettled = frame.early or early, frame.unsettled or unsettled
     if not node.finalbody:
         return passes
     jump, within = frame.jump, frame.returned
     frame.returned = (
         returned  # where ``finally`` returns itself, what the statement returned is replaced by that
     )
-    if not passes:
+    if left:
         run.state.join_seen(mark)
     done = run.execute(node.finalbody, frame)
     if done:

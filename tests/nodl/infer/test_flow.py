@@ -68,16 +68,27 @@ CASES: dict[str, tuple[str, list[str]]] = {
         "self.x = 'a'\ndef f():\n    if sys.argv[1]:\n        self.x = 'b'\n        return\nf()\nself.P(self.x)",
         ["a", "b"],
     ),
+    "what every way out of a function writes anew": (
+        "self.x = 'a'\ndef f():\n    if sys.argv[1]:\n        self.x = 'b'\n        return\n"
+        "    self.x = 'c'\nf()\nself.P(self.x)",
+        ["b", "c"],
+    ),
+    "a way out that finally still changes": (
+        "self.x = 'a'\ndef f():\n    try:\n        if sys.argv[1]: return\n        self.x = 'c'\n    finally:\n"
+        "        self.x += '/d'\nf()\nself.P(self.x)",
+        ["a", "a/d", "c", "c/d"],  # a and c: with whatever it was on the way
+    ),
     "written before a raise": (
-        "x = 'a'\ntry:\n    if sys.argv[1]:\n        x = 'b'\n        raise ValueError()\nexcept ValueError:\n    pass\n"
-        "self.P(x)",
+        "x = 'a'\ntry:\n    if sys.argv[1]:\n        x = 'b'\n        raise ValueError()\n"
+        "except ValueError:\n    pass\nself.P(x)",
         ["a", "b"],
     ),
     "another try, else an error": (
         "for i in range(3):\n    if sys.argv[i]: break\nelse:\n    raise RuntimeError()\nself.P('a')", ["a"]
     ),
     "the else of a loop that a break may leave": (
-        "x = 'a'\nfor i in range(3):\n    if sys.argv[i]:\n        x = 'b'\n        break\nelse:\n    x = 'c'\nself.P(x)",
+        "x = 'a'\nfor i in range(3):\n    if sys.argv[i]:\n        x = 'b'\n        break\n"
+        "else:\n    x = 'c'\nself.P(x)",
         ["a", "b", "c"],
     ),
     "the else of a loop that no break leaves": (

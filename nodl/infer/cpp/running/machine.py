@@ -131,7 +131,10 @@ class Machine:
         return handler(self, node, frame)
 
     def _misread(self, node: Node, frame: Frame) -> Value:
-        """Run the parts of what the parser did not understand in an expression; its value is not known."""
+        """What the parser did not understand in an expression: its parts are run, its value is not known. What it
+        writes is a gap: ``(a = b, c)``."""
+        if any(child.is_error and b"=" in (child.text or b"") for child in node.children):
+            self.gap(node, frame, "this C++ could not be parsed, and writes something")
         for child in node.named_children:
             for each in child.named_children if child.is_error else [child]:
                 self.evaluate(each, frame)

@@ -4,7 +4,7 @@ calls that were run before, whose outcome is the same where all that they read i
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 from nodl.infer.cpp.running.values import BOTTOM, Noted, NoteLog, Value, bounded, hold, join
 
@@ -12,6 +12,7 @@ MEMORY_DEPTH = 20
 """Paths of calls are whole up to this depth (``Frame.path``): then the same path means the same callers."""
 Cell = tuple[object, str]
 Changes = dict[Cell, Value]
+Held = TypeVar("Held")
 _ABSENT: Value = (("absent",),)
 _LOOKED_AT_IN_A_STEP = 64
 
@@ -33,6 +34,7 @@ class AbstractStore:
         self._trail: list[tuple[Cell, Value]] = []
         self._reads: set[Cell] | None = None
         self._history: Changes | None = None
+        self._held: dict[Cell, Value | None] | None = None
         self.log = NoteLog()
 
     def get(self, cell: Cell) -> Value | None:
@@ -86,6 +88,26 @@ class AbstractStore:
             self._cells[cell] = value
             if self._history is not None:
                 self._remember(cell, value)
+            if self._held is not None:
+                self._hold(cell, None if old is _ABSENT else join(old, value))
+
+    def held_during(self, action: Callable[[], Held]) -> tuple[Held, Changes]:
+        """Run ``action``; what it gives, and every value that cells held meanwhile which were there before."""
+        outer, self._held = self._held, {}
+        try:
+            given = action()
+        finally:
+            held, self._held = self._held, outer
+            for cell, value in held.items() if outer is not None else ():
+                self._hold(cell, value)
+        return given, {cell: value for cell, value in held.items() if value is not None}
+
+    def _hold(self, cell: Cell, value: Value | None) -> None:
+        """``None``: the cell is new, and so nothing that an exception leaves behind."""
+        assert self._held is not None
+        before = self._held.setdefault(cell, value)
+        if before is not None and value is not None and before is not value:
+            self._held[cell] = join(before, value)
 
     def others_run(self) -> None:
         """Expect from now on that others run at any time: they find all values that cells have from here on."""

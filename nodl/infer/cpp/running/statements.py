@@ -18,6 +18,7 @@ from nodl.infer.cpp.running.machine import (
     StatementHandler,
     statement,
 )
+from nodl.infer.cpp.running.memory import Changes
 from nodl.infer.cpp.running.objects import declared_value, fields_of
 from nodl.infer.cpp.running.references import bind_reference
 from nodl.infer.cpp.running.values import BOTTOM, Const, Group, Obj, Seq, Value, join, truth, unknown
@@ -252,14 +253,15 @@ def _falling(run: Machine, cases: list[Node], frame: Frame) -> int:
 
 @statement("try_statement")
 def try_statement(run: Machine, node: Node, frame: Frame) -> int:
-    """Runs the body, and after it none or any one of the catch clauses."""
-    outcome = run.execute(field_of(node, "body"), frame)
+    """Runs the body, and after it none or any one of the catch clauses, which may find it half done."""
+    outcome, held = run.store.held_during(partial(run.execute, field_of(node, "body"), frame))
     catches = [child for child in children(node) if child.type == "catch_clause"]
     after: list[Callable[[], int]] = [lambda: outcome]
-    return run.branches([*after, *(partial(_caught, run, clause, frame) for clause in catches)])
+    return run.branches([*after, *(partial(_caught, run, clause, held, frame) for clause in catches)])
 
 
-def _caught(run: Machine, clause: Node, frame: Frame) -> int:
+def _caught(run: Machine, clause: Node, held: Changes, frame: Frame) -> int:
+    run.store.merge([{}, held])
     for each in (n for n in walk(clause) if n.type == "parameter_declaration"):
         declared = field_of(each, "declarator")
         if declared is not None:

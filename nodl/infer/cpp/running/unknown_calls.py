@@ -111,9 +111,10 @@ def changed_by_standard(run: Machine, name: str, given: Sequence[Node], frame: F
     seen: set[str] = set()
     targets = [target for each in given for target in _variables(each)]
     if name == "std::swap":
-        either = join(*(run.evaluate(target, frame) for target in targets))
-        for target in targets:
-            assign(run, target, either, frame)
+        values = [run.evaluate(target, frame) for target in targets]
+        crossed = values[::-1] if len(values) == len(given) == 2 else [join(*values)] * len(values)
+        for target, value in zip(targets, crossed, strict=True):
+            assign(run, target, value, frame)
         return
     if name == "std::replace" and _replaced(run, given, targets, frame):
         return

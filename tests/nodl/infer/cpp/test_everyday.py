@@ -348,3 +348,34 @@ def test_a_pattern_with_an_unknown_variable_reads_nothing_outside_the_workspace(
 def _sources(folder: Path, pattern: str) -> list[str]:
     (folder / "CMakeLists.txt").write_text(f"file({pattern})\nadd_executable(node ${{found}})")
     return read_build(str(folder)).targets["node"].sources
+
+
+HALF_DONE = {
+    "before a throw": ('if (rand()) { x = "b"; throw std::runtime_error("e"); }', ["a", "b"]),
+    "before a call that may throw": ('x = "b"; risky(); x = "c";', ["a", "b", "c"]),
+    "in a method that throws": ('Item i; i.t = "a"; try { i.set(); } catch (...) { } x = i.t;', ["a", "b"]),
+    "of an object made meanwhile": ('Item made; made.t = "b"; risky();', ["a"]),
+}
+
+
+@pytest.mark.parametrize(("body", "made"), HALF_DONE.values(), ids=HALF_DONE)
+def test_a_catch_finds_what_was_written_before_the_exception(
+    body: str, made: list[str], tmp_path: Path
+) -> None:
+    before = (
+        'void risky();\nstruct Item { std::string t; void set() { if (rand()) { t = "b"; throw 1; } } };\n'
+    )
+    program = f'std::string x = "a"; try {{ {body} }} catch (...) {{ }} {PUB}(x, 1);'
+    assert names(infer(tmp_path, in_class(program, before=before))) == made
+
+
+def test_swapped_texts_are_each_others(tmp_path: Path) -> None:
+    body = f'std::string a = "x", b = "y"; std::swap(a, b); {PUB}(a + "1", 1); {PUB}(b + "2", 1);'
+    assert names(infer(tmp_path, in_class(body))) == ["x2", "y1"]
+
+
+def test_a_write_that_the_parser_does_not_understand_is_a_gap(tmp_path: Path) -> None:
+    misread = infer(tmp_path / "1", in_class(f'std::string x; (x="a", x+="b"); {PUB}(x, 1);'))
+    assert gaps(misread) == ["this C++ could not be parsed, and writes something"]
+    read = infer(tmp_path / "2", in_class(f'std::string x; x = "a", x += "b"; {PUB}(x, 1);'))
+    assert (names(read), gaps(read)) == (["ab"], [])
