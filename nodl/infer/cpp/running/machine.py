@@ -131,7 +131,7 @@ class Machine:
         return handler(self, node, frame)
 
     def _misread(self, node: Node, frame: Frame) -> Value:
-        """What the parser did not understand in an expression: its parts are run, its value is not known. What it
+        """Run the parts of what the parser did not understand in an expression; its value is not known, and what it
         writes is a gap: ``(a = b, c)``."""
         if any(child.is_error and b"=" in (child.text or b"") for child in node.children):
             self.gap(node, frame, "this C++ could not be parsed, and writes something")
