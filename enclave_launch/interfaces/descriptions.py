@@ -8,14 +8,15 @@
 4. If source and library are both complete and one gives a part of the other's names, that one is used; if each gives
    names that the other lacks, both are. A library document counts here only if it was written for this version.
 5. A record proves what is there, never what is not: names that another description has beyond it are reported, and
-   granted with ``--also unseen``.
+   granted with ``--also unseen``. Where runs leave open what a recorded name comes from, a complete description
+   that has some of its readings decides.
 
 Takes the descriptions of one start, gives ``Found``. Performs no I/O.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence, Set
 from typing import NamedTuple
 
 from enclave_launch.plan import Described, Found, InterfaceOrigin, Named
@@ -74,7 +75,8 @@ def meeting(
         return Found(only.interfaces, only.origin, only.doubt)
     judged = [_Judged(each, *_names(each, start)) for each in descriptions]
     base, others = _chosen(judged, also_unseen)
-    interfaces, names = base.description.interfaces, base.names
+    interfaces = tuple(_decided(each, judged, start) for each in base.description.interfaces)
+    names = base.names
     for other in others:
         interfaces = _united(interfaces, other.description.interfaces, names.keys(), start)
         names = {**other.names, **names}
@@ -153,6 +155,41 @@ def names_of(node: RunningNode, distro: str) -> tuple[dict[Named, str], tuple[st
     )
 
 
+def _decided(interface: NodeInterface, judged: Sequence[_Judged], start: ProgramStart) -> NodeInterface:
+    """Return ``interface`` without the readings of recorded names that no complete description has.
+
+    They stay if it has none of them: then it says nothing of this name.
+    """
+    if not any(endpoint.readings for endpoint in interface.endpoints):
+        return interface
+    complete = [
+        each.names.keys()
+        for each in judged
+        if each.complete
+        and not each.description.doubt
+        and each.description.origin is not InterfaceOrigin.RECORDED
+    ]
+    endpoints = tuple(_with_readings_of(each, interface, complete, start) for each in interface.endpoints)
+    return interface._replace(endpoints=endpoints)
+
+
+def _with_readings_of(
+    endpoint: Endpoint, interface: NodeInterface, complete: Iterable[Set[Named]], start: ProgramStart
+) -> Endpoint:
+    held = [
+        reading
+        for reading in (endpoint.name, *endpoint.readings)
+        if any(
+            (names := _names_of_endpoint(endpoint._replace(name=reading, readings=()), interface, start))
+            and names <= known
+            for known in complete
+        )
+    ]
+    return (
+        endpoint._replace(name=held[0], readings=tuple(held[1:])) if held and endpoint.readings else endpoint
+    )
+
+
 def _united(
     interfaces: Iterable[NodeInterface],
     others: Iterable[NodeInterface],
@@ -174,13 +211,17 @@ def _united(
 
 
 def _beyond(interface: NodeInterface, known: frozenset[Named], start: ProgramStart) -> Iterator[Endpoint]:
+    for endpoint in interface.endpoints:
+        if not _names_of_endpoint(endpoint, interface, start) <= known:
+            yield endpoint
+
+
+def _names_of_endpoint(endpoint: Endpoint, interface: NodeInterface, start: ProgramStart) -> Set[Named]:
+    """Return the final names of one endpoint of ``interface``; none if something of it is open."""
     try:
         node = start.node(interface)
     except UnknownNodeName:
-        return
-    for endpoint in interface.endpoints:
-        names, still = names_of(
-            node._replace(interface=interface._replace(endpoints=(endpoint,), gaps=())), start.distro
-        )
-        if not still and not names.keys() <= known:
-            yield endpoint
+        return frozenset()
+    alone = node._replace(interface=interface._replace(endpoints=(endpoint,), gaps=()))
+    names, still = names_of(alone, start.distro)
+    return frozenset() if still else names.keys()

@@ -419,6 +419,31 @@ def test_a_coincidence_of_values_is_not_a_rule(
     assert ("record-undecided" in codes(plan)) is told
 
 
+@pytest.mark.parametrize(
+    ("topic", "granted"),
+    [
+        ("node.declare_parameter('label', 'status').value", ["/warehouse"]),
+        ("'status'", ["/status"]),
+        ("'other'", ["/status", "/warehouse"]),
+        ("open('topic').read()", ["/status", "/warehouse"]),
+    ],
+)
+def test_a_source_that_has_one_reading_of_a_recorded_name_decides(
+    launch: Launch,
+    install: Callable[..., Path],
+    document: Callable[..., Path],
+    topic: str,
+    granted: list[str],
+) -> None:
+    """Nothing is decided by a source that has neither, or that leaves something open."""
+    install("pkg", "prog", source=PYTHON.format(topic=topic))
+    own = document("pkg/prog", "status", AFTER_ONE_RUN)
+    node = '<node pkg="pkg" exec="prog" name="n"><param name="label" value="warehouse"/></node>'
+    plan = launch(node, library_folders=(own,))
+    assert allowed(plan, "publish") == granted
+    assert ("record-undecided" in codes(plan)) is (len(granted) > 1)
+
+
 def test_what_others_leave_open_a_record_may_lack(
     launch: Launch, install: Callable[..., Path], document: Callable[..., Path]
 ) -> None:
