@@ -1,4 +1,4 @@
-"""What is not installed, in one line that says how to get it: a Python package, or a room of ours.
+"""Report what is not installed and how to get it: a Python package, or an add-on.
 
 The main job (evaluate, assign enclaves, look manifests up, derive the policy, provision, run) works without the
 add-ons: inference, recording, observation, review and reports, deployment, Zenoh. A distribution may leave them out.

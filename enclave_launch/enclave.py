@@ -42,7 +42,7 @@ class EnclaveScope(str, Enum):
 
 
 class AssignmentReason(str, Enum):
-    """Why a process has its enclave; the value is the text shown in the tree."""
+    """The reason why a process has its enclave; the value is the text shown in the tree."""
 
     __str__ = str.__str__
 

@@ -53,7 +53,7 @@ class LaunchFileError(EnclaveLaunchError):
 
 
 class ManifestError(EnclaveLaunchError):
-    """What a node talks to is not known, or its NoDL document cannot be used."""
+    """The interfaces of a node are not known, or its NoDL document cannot be used."""
 
 
 class ProvisionError(EnclaveLaunchError):

@@ -28,7 +28,7 @@ _FOREVER = timedelta(days=36500)
 
 
 class Notice(NamedTuple):
-    """What to say, and when."""
+    """A warning, and when to give it."""
 
     at: datetime
     text: str

@@ -1,4 +1,4 @@
-"""What callers of the flow may choose, one type for each of its calls. ``None`` and the defaults are what
+"""Options of the flow, one type for each of its calls. ``None`` and the defaults are what
 ``secure-launch`` does without options.
 """
 
@@ -46,11 +46,13 @@ class _ResolveOptions(NamedTuple):
 
 
 class ResolveOptions(_ResolveOptions):
-    """How to resolve. ``prefixes`` are searched before ``AMENT_PREFIX_PATH``; ``distro`` ``None``: ``ROS_DISTRO``,
-    else the newest; ``manifests`` win where NoDL definitions conflict. Nodes without a manifest: ``infer`` lets their
-    sources be analysed, ``library`` the library be asked, whose documents in ``library_folders`` come first;
-    ``source_folders``: where sources of compiled nodes lie, besides the workspaces of the prefixes; ``progress`` is
-    told which program is analysed next."""
+    """Options of ``resolve``.
+
+    ``prefixes`` are searched before ``AMENT_PREFIX_PATH``; ``distro`` ``None``: ``ROS_DISTRO``, else the newest;
+    ``manifests`` win where NoDL definitions conflict. Nodes without a manifest: ``infer`` lets their sources be
+    analysed, ``library`` the library be asked, whose documents in ``library_folders`` come first; ``source_folders``:
+    where sources of compiled nodes lie, besides the workspaces of the prefixes; ``progress`` is called
+    with each program that is analysed."""
 
     __slots__ = ()
 
@@ -100,8 +102,8 @@ def _read_policy(path: Path) -> PolicyDocument:
 
 
 class SecurityOptions(NamedTuple):
-    """How to provision: the keystore's own options (``None``: its defaults, for the domain in ``ROS_DOMAIN_ID``), and
-    the strategy that the processes are told."""
+    """Options of ``provision``: the keystore's own (``None``: its defaults, for the domain in ``ROS_DOMAIN_ID``), and
+    the strategy of the processes (``ROS_SECURITY_STRATEGY``)."""
 
     strategy: str = "Enforce"
     keystore: ProvisionOptions | None = None
@@ -119,8 +121,10 @@ class Deadline:
 
 
 class RunSettings(NamedTuple):
-    """How to run. ``secrets``: environment variables that no process of the launch sees; ``log_limit``: bytes after
-    which a log file becomes ``<name>.1`` and a new one is begun, ``None`` for never; ``deadline``: when to end it, as
+    """Options of ``run``.
+
+    ``secrets``: environment variables that no process of the launch sees; ``log_limit``: bytes after which a log file
+    becomes ``<name>.1`` and a new one is begun, ``None`` for never; ``deadline``: when to end it, as
     ``expiry_watch.renewal_deadline`` gives it.
 
     ``record``: every endpoint that a node makes, or is refused, is an event of the launch. ``None``: of secured

@@ -56,7 +56,7 @@ Named = tuple[Operation, str]
 
 
 class Described(NamedTuple):
-    """What one source of knowledge says of a program under one start.
+    """A description of a program, applied to one start.
 
     ``source``: the file that says it; ``names``: each with the place that says it; ``open``: what it leaves open;
     ``used``: the plan grants what it says; ``doubt``: it was written for another version.
@@ -197,7 +197,7 @@ class PlannedComponent(NamedTuple):
 
 
 class LaunchPlan(NamedTuple):
-    """What a launch file starts, in which enclaves, with which permissions.
+    """The processes of a launch file, their enclaves and permissions.
 
     ``problems`` are what ``--secure`` refuses to start with; ``warnings`` are for the reader.
     """
@@ -239,7 +239,7 @@ class PlanOptions(NamedTuple):
 
 
 class LaunchSource(NamedTuple):
-    """What was asked for: enough to evaluate it once more, live, with the same results.
+    """The requested launch: enough to evaluate it once more, live, with the same results.
 
     ``launch_file`` and ``prefixes`` are absolute; ``launch_configurations`` are set before the file is included;
     ``host_options`` are those of the evaluation's host; ``user_code_results`` are the
@@ -255,7 +255,7 @@ class LaunchSource(NamedTuple):
 
 
 class EvaluatedLaunch(NamedTuple):
-    """What a launch file would start, before anything is decided about enclaves."""
+    """An evaluated launch file, before anything is decided about enclaves."""
 
     source: LaunchSource
     evaluation: Evaluation

@@ -21,7 +21,7 @@ ProcessKind = Literal["node", "lifecycle_node", "container", "executable"]
 
 
 class EnclaveRequest(NamedTuple):
-    """What the launch file says about the enclave of one process.
+    """The enclave of one process as the launch file requests it.
 
     ``attribute``: the performed text of ``enclave=``; ``None`` when absent.
     ``scope``: the enclave scope in force (absolute), ``None`` when nothing was pushed.
@@ -126,7 +126,7 @@ class Unforeseeable(NamedTuple):
 
 
 class Reaction(NamedTuple):
-    """What the launch itself does when something happens, whatever that starts: an event handler or a timer.
+    """A reaction of the launch itself, whatever it starts: an event handler or a timer.
 
     ``ends_with``: the process at whose end it ends the launch, where that is all it does (``on_exit="shutdown"``).
     """

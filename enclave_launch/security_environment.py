@@ -1,4 +1,4 @@
-"""What turns a planned process into a secured one: arguments and variables that rcl reads. Performs no I/O.
+"""Arguments and variables that turn a planned process into a secured one. Performs no I/O.
 
 Source: rcl/src/rcl/security.c and arguments.c. A node gets ``--enclave`` (the last one given wins, so ours is
 appended only where the user wrote none); an ``executable`` action, whose command line is not ours to extend, gets

@@ -1,4 +1,4 @@
-"""Which DDS domains the permissions of each enclave are for: those of its own processes.
+"""Choose the DDS domains of each enclave's permissions: those of its own processes.
 
 Takes a plan, gives the keystore's options; what cannot be served is refused with both places named. Performs no I/O.
 """

@@ -1,4 +1,4 @@
-"""Where in which launch file an action was written, and through which includes we came there."""
+"""The place of an action in its launch file, and the includes that lead there."""
 
 from __future__ import annotations
 

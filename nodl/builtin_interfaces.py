@@ -21,7 +21,7 @@ DISTROS = ("foxy", "galactic", "humble", "iron", "jazzy", "kilted", "lyrical", "
 
 
 class BuiltinCondition(Enum):
-    """What must hold for a row; the value is the text for a reader."""
+    """The condition of a row; the value is the text for a reader."""
 
     ALWAYS = "every node"
     SIM_TIME = "use_sim_time is true"

@@ -1,4 +1,4 @@
-"""Which NoDL describes the nodes of an executable or component.
+"""Find the NoDL that describes the nodes of an executable or component.
 
 Takes package and executable (or plugin), gives their ``NodeInterface`` values, or tells where it looked.
 Sources, the first that knows the executable decides:

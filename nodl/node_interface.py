@@ -1,4 +1,4 @@
-"""What one node talks to, before any launch file renames it.
+"""The interfaces of one node, before any launch file renames it.
 
 Every source of knowledge (NoDL v1, NoDL v2, inference from Python or C++) ends in these values;
 whoever derives permissions from them no longer asks where they came from, but can always tell
@@ -54,7 +54,7 @@ class EndpointKind(str, Enum):
 
 
 class Certainty(str, Enum):
-    """How far a name can be trusted."""
+    """The degree to which a name can be trusted."""
 
     __str__ = str.__str__
 
@@ -95,7 +95,7 @@ class Gap(NamedTuple):
 
 
 class ClientLibrary(str, Enum):
-    """Which ROS client library a node is written with; decides its built-in interfaces."""
+    """The ROS client library of a node; decides its built-in interfaces."""
 
     __str__ = str.__str__
 

@@ -29,7 +29,7 @@ _LONGEST_PART = "cancel_goal"
 
 
 class RemapKind(str, Enum):
-    """What a rule applies to; the value of a name rule is its written prefix."""
+    """The target of a rule; the value of a name rule is its written prefix."""
 
     __str__ = str.__str__
 

@@ -1,4 +1,4 @@
-"""Where a statement about a node was read: the evidence behind every permission."""
+"""The place where a statement about a node was read: the evidence behind every permission."""
 
 from __future__ import annotations
 

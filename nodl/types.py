@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 @unique
 class PubSubRole(Enum):
-    """Which ends of a topic a node has."""
+    """The ends of a topic that a node has."""
 
     PUBLISHER = "publisher"
     SUBSCRIPTION = "subscription"
@@ -20,7 +20,7 @@ class PubSubRole(Enum):
 
 @unique
 class ServerClientRole(Enum):
-    """Which ends of a service or action a node has."""
+    """The ends of a service or action that a node has."""
 
     SERVER = "server"
     CLIENT = "client"

@@ -1,4 +1,4 @@
-"""What must hold before a process may start secured: nothing on its way takes the enclave away again.
+"""Admit a process to a secured start: nothing on its way takes the enclave away again.
 
 ``wrappers``: what stands between us and the program keeps its environment. ``middleware``: its RMW reads enclaves.
 ``variables``: nothing in its environment turns security off; its DDS domain. The plan asks before anything is signed.
@@ -19,7 +19,7 @@ __all__ = ["AdmissionOptions", "notes", "prefix_refusals", "refusals"]
 
 
 class AdmissionOptions(NamedTuple):
-    """What somebody vouches for by name: launch prefixes (``shell`` for shells), and middlewares."""
+    """Options by which somebody vouches for names: launch prefixes (``shell`` for shells), and middlewares."""
 
     prefixes: frozenset[str] = frozenset()
     middlewares: frozenset[str] = frozenset()

@@ -1,4 +1,4 @@
-"""Which middlewares read enclaves, and which two cannot authenticate each other.
+"""Middlewares: which read enclaves, and which two cannot authenticate each other.
 
 rcl hands every middleware the path of the enclave; what it does with it is its own business.
 
@@ -26,7 +26,7 @@ _DEFAULT_OF = {"galactic": "rmw_cyclonedds_cpp"}
 
 
 class Vendor(str, Enum):
-    """Whose DDS speaks; decides who can authenticate whom."""
+    """The vendor of a DDS; decides who can authenticate whom."""
 
     __str__ = str.__str__
 

@@ -31,7 +31,7 @@ ZENOH_CLEARED = (
     "ROS_STATIC_PEERS",
     "ROS_LOCALHOST_ONLY",
 )
-"""What could lead a process on Zenoh past its configuration. Set to nothing, which counts as not set
+"""Variables that could lead a process on Zenoh past its configuration. Set to nothing, which counts as not set
 (rcutils_get_env; rmw_zenoh_cpp zenoh_config.cpp, rcl discovery_options.c)."""
 _CONFIGURATIONS = (
     "CYCLONEDDS_URI",

@@ -1,4 +1,4 @@
-"""What stands between us and a program: launch prefixes and shells, and whether the environment comes through.
+"""Programs between us and a process: launch prefixes and shells, and whether the environment comes through.
 
 rcl finds the enclave through variables; a prefix that drops them starts the program unsecured. So a prefix must be
 in the reviewed table below, every program of it (``nice -n 5 gdb --args``), or be accepted by name. Performs no I/O.

@@ -28,7 +28,7 @@ class Declared(NamedTuple):
 
 
 class DeclaredArguments(NamedTuple):
-    """What a description declares by name, and the argument names of all includes in it.
+    """The arguments that a description declares, and the argument names of all includes in it.
 
     A ``None`` among the names: that include has a name which needs a context.
     """

@@ -29,7 +29,7 @@ _BUILDERS = (
 
 
 class ScanRole(Enum):
-    """What an entity is for the scan of a description's arguments."""
+    """The role of an entity in the scan of a description's arguments."""
 
     ARGUMENT = "argument"
     INCLUDE = "include"

@@ -25,7 +25,7 @@ class _Substitution(Protocol):
 
 
 class ContextState(NamedTuple):
-    """What ``LaunchContext.save`` keeps. Nothing in it is shared with the context but the values themselves."""
+    """The state that ``LaunchContext.save`` saves; it shares nothing with the context but the values themselves."""
 
     configurations: dict[str, Any]
     configurations_stack: list[dict[str, Any]]

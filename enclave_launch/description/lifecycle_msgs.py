@@ -71,7 +71,7 @@ class Transition:
 
 @dataclass
 class TransitionEvent:
-    """What a lifecycle node publishes on ``~/transition_event``. ``timestamp`` is in nanoseconds."""
+    """The message that a lifecycle node publishes on ``~/transition_event``. ``timestamp`` is in nanoseconds."""
 
     timestamp: int = 0
     transition: Transition = field(default_factory=Transition)

@@ -1,4 +1,4 @@
-"""Where in the launch files an entity stands, and through which includes we came there."""
+"""Find the place of an entity in the launch files, and the includes that lead there."""
 
 from __future__ import annotations
 

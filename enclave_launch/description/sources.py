@@ -1,4 +1,4 @@
-"""Where a launch description comes from: a launch file of some kind, or a script."""
+"""Sources of a launch description: a launch file of some kind, or a script."""
 
 from __future__ import annotations
 

@@ -99,7 +99,7 @@ class _Signature:
 
 
 class _Templates:
-    """What actions and substitutions with declared templates have in common."""
+    """Base of actions and substitutions with declared templates."""
 
     _declared: ClassVar[dict[str, Template]] = {}
     __signature__ = _Signature()

@@ -1,4 +1,4 @@
-"""Where upstream has each public name, and in which module of ours it is.
+"""The upstream module of each public name, and ours.
 
 Launch files and third-party helpers import from upstream's packages and from the modules below them. ``install``
 builds modules of these names from this table; nothing else in this package cares where upstream has a name.

@@ -1,4 +1,4 @@
-"""What evaluation tells of a launch file and the world it is read in. Performs no I/O."""
+"""Diagnostics of evaluation: of a launch file and the world it is read in. Performs no I/O."""
 
 from __future__ import annotations
 

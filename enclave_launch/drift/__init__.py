@@ -1,4 +1,4 @@
-"""What runs, held against what was planned. Performs no I/O.
+"""Compare what runs with what was planned. Performs no I/O.
 
 expected.py   the dry run's JSON → what the plan expects in one domain
 finding.py    one difference, how sure it is, and its words

@@ -11,7 +11,7 @@ from nodl.graph.model import Graph
 
 
 class Kind(str, Enum):
-    """What is different; the value is stable, for programs."""
+    """The kind of difference; the value is stable, for programs."""
 
     UNPLANNED_PROCESS = "unplanned-process"
     UNPLANNED_NODE = "unplanned-node"
@@ -48,7 +48,7 @@ class Level(str, Enum):
 
 
 class FindingCertainty(Enum):
-    """When a finding may be reported: discovery comes in pieces."""
+    """The time at which a finding may be reported: discovery comes in pieces."""
 
     FACT = "what was announced says so"
     WHEN_SETTLED = "unless more is discovered"

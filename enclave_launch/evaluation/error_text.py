@@ -1,4 +1,4 @@
-"""What a person reads of an exception that a launch file, its parser or launch raised.
+"""Word an exception that a launch file, its parser or launch raised.
 
 Texts of launch stay as they are, for they are searched for on the web; the class in front of them goes where it says
 nothing more. What Python raised in the user's own code keeps its class, as in a traceback. The place is not repeated.

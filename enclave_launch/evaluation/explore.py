@@ -1,4 +1,4 @@
-"""What only events would start: the second half of a dry run.
+"""Explore what only events would start: the second half of a dry run.
 
 After the visit of the launch file, first comes what happens in every run, in order: events that the file
 emitted itself, completions, process starts, timers by due time. Then each remaining handler is given a made-up

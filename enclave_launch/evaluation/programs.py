@@ -1,4 +1,4 @@
-"""What launch would only notice when it spawns: programs that are not there.
+"""Find missing programs before launch would notice them, when it spawns.
 
 Looks at the file system; asked before anything starts.
 """

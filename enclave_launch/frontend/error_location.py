@@ -1,4 +1,4 @@
-"""Where in which file an exception came from. The exception keeps its type and text; the place rides along.
+"""Locate an exception in its file. The exception keeps its type and text; the place rides along.
 
 Upstream's errors carry no position, and library callers catch them by type, so the position is an attribute
 of the exception object. Read by the evaluation when it turns the exception into a ``LaunchFileError``.

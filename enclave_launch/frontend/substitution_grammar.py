@@ -125,7 +125,7 @@ def print_template(template: Template) -> str:
 
 
 class _Context(NamedTuple):
-    """How text looks in one place of the grammar, and in the calls that stand there."""
+    """The form of text in one place of the grammar, and in the calls that stand there."""
 
     rule: str
     text: re.Pattern[str]  # a whole run of text

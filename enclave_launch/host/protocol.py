@@ -1,4 +1,4 @@
-"""What evaluation may ask of the world.
+"""The interface of evaluation to the world.
 
 Actions and substitutions do not look a package up, run a command, write a file or start a process themselves:
 they ask ``context.host``. ``PlanHost`` records and writes nothing (the dry run); the runtime's host does it
@@ -30,7 +30,7 @@ MISSING_PREFIX = "/missing"
 
 
 class HostOptions(NamedTuple):
-    """What an evaluation knows of the world, in a dry run and live.
+    """Properties of the world that an evaluation knows, in a dry run and live.
 
     ``distro``: whose rules to follow, ``None`` for that of the environment. ``anonymous_seed``: two hosts with the same
     seed give the same names at random, in the same order.
@@ -43,7 +43,7 @@ class HostOptions(NamedTuple):
 
 
 class CommandResult(NamedTuple):
-    """What a command gave: its exit status and what it wrote."""
+    """The result of a command: its exit status and what it wrote."""
 
     returncode: int
     stdout: str
@@ -51,7 +51,7 @@ class CommandResult(NamedTuple):
 
 
 class Completion(Protocol):
-    """What tells that a process has ended. ``asyncio.Future`` is one."""
+    """A future of a process's end. ``asyncio.Future`` is one."""
 
     def done(self) -> bool: ...
     def add_done_callback(self, callback: Callable[[Any], object], /) -> None: ...
@@ -85,7 +85,7 @@ class UserCodeResults(Protocol):
 
 
 class DescriptionSource(Protocol):
-    """Where a launch description comes from."""
+    """The source of a launch description."""
 
     def location_without_context(self) -> str | None: ...
     def try_get_launch_description_without_context(self) -> Any: ...
@@ -102,7 +102,7 @@ class LoadedDescriptions(Protocol):
 
 
 class Host(Protocol):
-    """What evaluation may ask of the world."""
+    """The world as evaluation reaches it."""
 
     release: Release
     no_python: bool

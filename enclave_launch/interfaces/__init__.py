@@ -44,7 +44,7 @@ _CONTAINER_NODE_NAME = "ComponentManager"
 
 
 class _Subject(NamedTuple):
-    """What is asked for: an executable or a plugin of a package."""
+    """The subject of a look-up: an executable or a plugin of a package."""
 
     package: str | None
     executable: str | None = None
@@ -55,7 +55,7 @@ class _Subject(NamedTuple):
 
 
 class _Known(NamedTuple):
-    """What describes a program; ``of_this_start``: another start of it has to be looked up again."""
+    """The descriptions of a program; ``of_this_start``: another start of it has to be looked up again."""
 
     descriptions: tuple[ProgramDescription, ...]
     searched: tuple[str, ...] = ()

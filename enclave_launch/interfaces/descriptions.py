@@ -1,4 +1,4 @@
-"""Where the descriptions of a program meet: one rule says what the plan takes from which.
+"""Join the descriptions of a program by one rule that says what the plan takes from which.
 
 1. Each description is applied to this start (parameters, arguments, remap rules); one that leaves nothing open there is
    complete.

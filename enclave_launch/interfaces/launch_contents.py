@@ -1,4 +1,4 @@
-"""What one node of a launch must know of the others: the robot description, and the controllers that spawners load.
+"""The contents of a launch that its nodes depend on: the robot description, and the controllers that spawners load.
 
 Takes the evaluation, gives ``nodl.dependence.Launched``. Reads the parameter files that spawners name.
 

@@ -1,4 +1,4 @@
-"""How launch starts a node, as descriptions that depend on it need it: final names, parameters, words, packages.
+"""The start of a node, as descriptions that depend on it need it: final names, parameters, words, packages.
 
 Takes a process or component of the evaluation, gives ``nodl.dependence.Situation``; next is the interface that a
 description has there. Reads the parameter files on the command line.

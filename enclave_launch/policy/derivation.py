@@ -44,7 +44,7 @@ LIST_NAMES: dict[Operation, ListName] = {
     Operation.CALL: "call_actions",
     Operation.EXECUTE: "serve_actions",
 }
-"""How the operations are called where names are listed for people and programs."""
+"""The names of the operations in lists for people and programs."""
 
 
 def allowed_names(enclave: EnclavePolicy) -> dict[str, list[str]]:

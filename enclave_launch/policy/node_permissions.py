@@ -1,4 +1,4 @@
-"""What one running node needs: each of its names, final, with the reason.
+"""The permissions of one running node: each of its final names, with the reason.
 
 Takes a ``RunningNode``, gives ``NodePermissions``; ``derivation`` collects them by enclave. Performs no I/O.
 Order of things as in rcl: the name's parameters are filled in, it is expanded under the node's final name
@@ -73,7 +73,7 @@ recorded node the names that only its other descriptions have (``interfaces.desc
 
 
 class Reason(NamedTuple):
-    """Why a permission is there. ``place``: file:line of the manifest, source or policy, or a table row.
+    """The reason for a permission. ``place``: file:line of the manifest, source or policy, or a table row.
 
     ``written`` is the name as found there; ``rules`` the remap rules that changed it; ``note`` what else
     a reader should know; ``type`` the interface's, empty where it is not known; ``qos`` what is known of it.

@@ -1,4 +1,4 @@
-"""What launch tells a program besides ROS arguments: options, positional words, environment. Performs no I/O.
+"""The inputs of a program besides ROS arguments: options, positional words, environment. Performs no I/O.
 
 Inference may find a topic name that is an input of the program: ``--topic`` of its command line,
 ``<argument>``, ``$VARIABLE`` (see ``nodl.name_template.ParameterPart``). The value that launch passes

@@ -1,4 +1,4 @@
-"""What nodes gain by sharing an enclave: the design article's concern about composition, made visible.
+"""Rights that nodes gain by sharing an enclave: the design article's concern about composition, made visible.
 
 DDS enforces the union of an enclave; in a container all nodes even share memory. Only reads.
 """

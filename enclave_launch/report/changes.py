@@ -1,4 +1,4 @@
-"""What differs between two plans, as text for a terminal, as Markdown for a pull request and as plain values."""
+"""Render the differences of two plans, as text for a terminal, as Markdown for a pull request and as plain values."""
 
 from __future__ import annotations
 

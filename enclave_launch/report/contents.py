@@ -1,4 +1,4 @@
-"""What a report for people shows of a plan, as values; ``markdown.py`` and ``html/`` give them a form."""
+"""The contents of a report on a plan, as values; ``markdown.py`` and ``html/`` give them a form."""
 
 from __future__ import annotations
 

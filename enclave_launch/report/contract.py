@@ -32,7 +32,7 @@ class _Strict(BaseModel, extra="forbid", frozen=True):
 
 
 class Respawn(_Strict, frozen=True):
-    """When a process that ended is started again."""
+    """The restart of a process that ended."""
 
     delay: float = _described("seconds")
     retries: int = _described("how often at most, -1 without a limit")
@@ -105,7 +105,7 @@ class Component(_Strict, frozen=True):
 
 
 class Enclave(_Strict, frozen=True):
-    """What one enclave may do: final names, sorted."""
+    """The permissions of one enclave: final names, sorted."""
 
     nodes: list[str]
     permissions_unknown: list[str] = _described(

@@ -23,7 +23,7 @@ NO_ENCLAVE = ""
 
 
 class UseReason(NamedTuple):
-    """Why a permission is there. ``place``: file and line of the description, or a row of a table."""
+    """The reason for a permission. ``place``: file and line of the description, or a row of a table."""
 
     place: str
     written: str
@@ -63,7 +63,7 @@ class Channel(NamedTuple):
 
 
 class ChannelUse(NamedTuple):
-    """What one member does with one channel, both by number; ``member`` is ``None`` where only the enclave's policy
+    """The use of one channel by one member, both by number; ``member`` is ``None`` where only the enclave's policy
     says so and no node of it asks for it."""
 
     member: int | None

@@ -1,4 +1,4 @@
-"""How text for people is laid out: for the width of a terminal, whole in a pipe; always without control characters."""
+"""Lay out text for people: for the width of a terminal, whole in a pipe; always without control characters."""
 
 from __future__ import annotations
 

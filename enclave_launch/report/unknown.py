@@ -1,4 +1,4 @@
-"""What a plan does not know: processes and components without interfaces, by enclave. Only reads."""
+"""The gaps of a plan: processes and components without interfaces, by enclave. Only reads."""
 
 from __future__ import annotations
 

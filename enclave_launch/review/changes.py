@@ -1,4 +1,4 @@
-"""What differs between two plans, and whether anybody may do more than before. Performs no I/O.
+"""Compare two plans: the differences, and whether anybody may do more than before. Performs no I/O.
 
 Read as a review reads it: enclaves and nodes that came and went, nodes that moved to another enclave, permissions of
 each enclave that were added and removed, and the flows between enclaves that this opens or closes.

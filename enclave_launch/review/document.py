@@ -29,7 +29,7 @@ KIND_OF: Mapping[str, Kind] = {
     "call_actions": "action",
     "serve_actions": "action",
 }
-"""What a name is that an operation is about."""
+"""The kind of name of each operation."""
 
 
 class GrantedName(NamedTuple):

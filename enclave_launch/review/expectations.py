@@ -1,4 +1,4 @@
-"""What a repository expects of its plans: flows that must never be, and findings that somebody accepted.
+"""The expectations of a repository on its plans: flows that must never be, and findings that somebody accepted.
 
 A file ``enclaves.review.yaml`` beside the launch files, under version control:
 

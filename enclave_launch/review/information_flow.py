@@ -1,4 +1,4 @@
-"""Which enclave can influence which, directly and over others. Performs no I/O.
+"""Find which enclaves can influence which, directly and over others. Performs no I/O.
 
 The question of the design article "ROS 2 Security Enclaves" and of the paper's future work: a permission says what one
 participant may do, but a message that it reads can change what it writes. So influence is transitive: whoever publishes
@@ -136,7 +136,7 @@ def _parts(grant: GrantedName) -> list[tuple[GrantedName, GrantedName]]:
 
 
 class _Takers:
-    """Who holds a grant that meets another: a look-up, and a comparison only where wildcards are."""
+    """Finds the holders of grants that meet another: a look-up, and a comparison only where wildcards are."""
 
     def __init__(self, grants: Mapping[str, Iterable[GrantedName]]) -> None:
         self._holders: dict[GrantedName, set[str]] = {}

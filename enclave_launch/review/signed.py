@@ -1,4 +1,4 @@
-"""What a keystore has signed, as a review sees it; and a plan's permissions as they would come back from being signed.
+"""The signed permissions of a keystore as a review sees them, and those of a plan as if they were signed.
 
 DDS knows topics only: a service is two of them, an action eight. Read back, a topic that belongs to an action may count
 to it or stand alone, so both sides of a comparison go the same way through ``permissions_names``. Performs no I/O.

@@ -1,4 +1,4 @@
-"""What upstream's actions are about to start, in our terms: a ``ResolvedProcess`` for enclave and policy.
+"""Describe what upstream's actions are about to start: a ``ResolvedProcess`` for enclave and policy.
 
 Reads an action of real launch at the moment its extension point is called: names, namespace and remap rules
 are final then. Next: ``session``. Touches nothing.
@@ -33,9 +33,9 @@ if TYPE_CHECKING:
     from enclave_launch.ros2.session import EnclaveSession
 
 KEY = "enclave_launch_session"
-"""Where a secured launch is kept: in launch's own context, so that several launches in one program stay apart."""
+"""The place of a secured launch in launch's own context, so that several launches in one program stay apart."""
 ATTRIBUTE = "_enclave_launch_enclave"
-"""Where an action keeps its ``enclave=`` (``attributes``)."""
+"""The attribute of an action that holds its ``enclave=`` (``attributes``)."""
 
 
 def session_of(context: Any) -> EnclaveSession | None:

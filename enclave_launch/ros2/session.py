@@ -42,7 +42,7 @@ _NEEDS_PLAN = (
 
 
 class _NoAdapter:
-    """What launch_ros keeps as ``ros_adapter`` (launch_ros/ros_adapters.py), where launch's ROS node has no enclave:
+    """The ``ros_adapter`` of launch_ros (launch_ros/ros_adapters.py), where launch's ROS node has no enclave:
     asking for it is an error, not an unsecured node."""
 
     @property

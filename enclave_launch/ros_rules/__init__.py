@@ -1,5 +1,5 @@
-"""What ROS 2 itself fixes: how rcl reads a command line and a parameter file, how names join, what releases differ in.
+"""Rules that ROS 2 itself fixes: for command lines, parameter files, names and the differences of releases.
 
-Rules over text, below everything else: ``distro`` is the table of the releases, ``namespaces`` joins names,
+Below everything else: ``distro`` is the table of the releases, ``namespaces`` joins names,
 ``ros_arguments`` and ``rcl_parameters`` read what rcl reads.
 """

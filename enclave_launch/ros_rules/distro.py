@@ -1,4 +1,4 @@
-"""What differs between ROS 2 releases, in one table.
+"""The differences of ROS 2 releases, in one table.
 
 A feature belongs to the version of ``launch``, ``launch_ros`` or ``rcl`` that brought it, not to the
 distribution: every release gets fixes. Where the ament index holds the installed packages their version

@@ -1,4 +1,4 @@
-"""How namespaces join, and the enclave scope that follows from pushed namespaces and enclaves.
+"""Join namespaces, and find the enclave scope that follows from pushed namespaces and enclaves.
 
 The launch configurations ``ros_namespace`` (upstream's) and ``ros_enclave_scope`` (ours) carry the scope, so
 groups and includes scope both alike. ``ros_enclave_scope`` is set by the first explicit push of an enclave;

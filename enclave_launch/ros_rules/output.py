@@ -1,4 +1,4 @@
-"""Where the output of a process goes: ``output=`` of a process action.
+"""Route the output of a process: ``output=`` of a process action.
 
 Rules and messages of launch/logging/__init__.py (``get_output_loggers``).
 """

@@ -37,7 +37,7 @@ _LONGEST_TOKEN, _LONGEST_NODE_NAME = 244, 255
 
 
 class RefusedParameters(ValueError):
-    """What rcl's initialisation fails with, in our words and with the line."""
+    """An error of rcl's initialisation, in our words and with the line."""
 
 
 @lru_cache(maxsize=256)

@@ -44,7 +44,7 @@ class UnreadableParameters(Exception):
 
 
 class ResolvedParameters(NamedTuple):
-    """What a node sees; ``unread`` are files that may say more, each with the reason."""
+    """The parameters that a node sees; ``unread`` are files that may say more, each with the reason."""
 
     values: dict[str, ParameterValue]
     unread: tuple[tuple[str, str], ...] = ()

@@ -1,4 +1,4 @@
-"""What rcl finds on a node's command line: remap rules, parameter sources, the enclave.
+"""Read a node's command line as rcl does: remap rules, parameter sources, the enclave.
 
 Performs no I/O. launch never looks into ``args`` and ``ros_args``, but the process does.
 Rules from ros2/rcl ``arguments.c``: ROS arguments stand between ``--ros-args`` and ``--`` (or the end);

@@ -1,4 +1,4 @@
-"""Who waits when lines come faster than they can be written. Lives in the event loop.
+"""Back pressure: decide who waits if lines come faster than they can be written. Runs in the event loop.
 
 Streams that go to a file wait for the files. Streams that go to the screen wait for the screen; but one that stays full
 for ``PATIENCE`` seconds (Ctrl-S, a slow link) holds up only the streams that go nowhere else. The others go on into

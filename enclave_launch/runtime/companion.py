@@ -1,4 +1,4 @@
-"""Who goes along with a launch: may change what each process is started with, and sees what happens.
+"""Companions of a launch: each may change what each process is started with, and sees what happens.
 
 Stronger than an observer of events (``run_events``): its answers are awaited, and it lives from before the first
 process until after the last. The runtime knows only this; recorders, audits and the like are handed in.
@@ -16,7 +16,7 @@ from enclave_launch.runtime.run_events import Observer, RunEvent
 
 
 class LaunchControl(Protocol):
-    """What a companion may do to the launch."""
+    """The launch as a companion controls it."""
 
     def say(self, level: Level, message: str) -> None:
         """Write a line to the launch log."""

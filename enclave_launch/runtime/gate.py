@@ -18,7 +18,7 @@ from enclave_launch.runtime.difference import compared, compared_component
 
 
 class StartAdditions(NamedTuple):
-    """What a process gets for its enclave: ``arguments`` end its command line, ``environment`` is laid over."""
+    """Additions to a process for its enclave: ``arguments`` end its command line, ``environment`` is laid over."""
 
     arguments: tuple[str, ...] = ()
     environment: Mapping[str, str] = MappingProxyType({})
@@ -44,7 +44,7 @@ class EnclaveGate(Protocol):
 
 
 class Provider(Protocol):
-    """What makes enclaves complete: implemented over a plan and a keystore."""
+    """Completes enclaves before a start; implemented over a plan and a keystore."""
 
     def granted(self, process: ResolvedProcess) -> StartAdditions | None:
         """Return the additions if they need no work, None for every process that is not in the plan."""
@@ -58,7 +58,7 @@ class Provider(Protocol):
 
 
 class LateProcess(RuntimeFailure):
-    """What is about to start is not what was planned: it wants permissions that nobody signed."""
+    """A process about to start is not what was planned: it needs permissions that nobody signed."""
 
 
 def identity(process: ResolvedProcess) -> tuple[object, ...]:

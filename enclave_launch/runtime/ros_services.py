@@ -1,4 +1,4 @@
-"""What only a ROS node can do for a launch: load components, ask for lifecycle transitions, hear of state
+"""Calls of the launcher's own ROS node: load components, ask for lifecycle transitions, hear of state
 changes.
 
 Needs rclpy, which is imported when a launch needs it and never otherwise. The node has a context of its

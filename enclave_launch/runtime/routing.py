@@ -1,4 +1,4 @@
-"""Which stream of a process goes where, and how a line of it looks there. Performs no I/O of its own.
+"""Route each stream of a process to its sinks, and render its lines there. Performs no I/O of its own.
 
 Rules of launch/logging/__init__.py (``get_output_loggers``) and launch/actions/execute_local.py. Lines are
 rendered by the chunk, not one by one: tens of megabytes a second pass without a Python loop over lines.

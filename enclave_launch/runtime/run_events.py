@@ -1,4 +1,4 @@
-"""What happens in a run, as values for programs that watch it; in order, in the launch's thread."""
+"""The events of a run, as values for programs that watch it; in order, in the launch's thread."""
 
 from __future__ import annotations
 
@@ -54,11 +54,11 @@ class ProcessOver(NamedTuple):
 
 
 class AskedEndpoint(NamedTuple):
-    """What a node asked rcl for. ``node`` and ``name`` are final, after all rules; ``written`` as the source has it.
+    """An endpoint that a node requested of rcl.
 
-    ``component``: ``package/plugin`` of the composable node that asked, empty for nodes of the program itself. An
-    action is one endpoint.
-    """
+    ``node`` and ``name`` are final, after all rules; ``written`` as the source has it. ``component``:
+    ``package/plugin`` of the composable node that asked, empty for nodes of the program itself. An action is one
+    endpoint."""
 
     node: str
     kind: EndpointKind
@@ -87,7 +87,7 @@ class EndpointRefused(NamedTuple):
 
 
 class LaunchFailed(NamedTuple):
-    """Why the launch cannot go on; it is shutting down."""
+    """The launch cannot go on and is shutting down."""
 
     reason: str
 

@@ -1,4 +1,4 @@
-"""Where lines end up: the screen and files, each written by a thread of its own, so that a stopped terminal holds up
+"""Sinks of lines: the screen and files, each written by a thread of its own, so that a stopped terminal holds up
 neither the robot nor its logs.
 
 ``SinkWriter.write`` only queues. Above ``HIGH_WATER`` queued bytes it says so (``on_full``) and below ``LOW_WATER``
@@ -21,7 +21,7 @@ FLUSH_TIMEOUT = 5.0  # seconds that a blocked screen may hold up our end
 
 
 class Sink(Protocol):
-    """Where a ``SinkWriter`` puts what was queued."""
+    """The destination of what a ``SinkWriter`` queues."""
 
     def write(self, data: bytes) -> None:
         """Write all of ``data``, in the writer's thread. Failures disable the sink; they never reach a

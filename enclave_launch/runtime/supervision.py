@@ -69,7 +69,7 @@ class Watcher(Protocol):
 
 
 class ProcessEnd(NamedTuple):
-    """How the last incarnation ended. ``returncode`` is None when none could be started."""
+    """The end of the last incarnation. ``returncode`` is None when none could be started."""
 
     returncode: int | None
     asked_to_end: bool

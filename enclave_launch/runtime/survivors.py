@@ -1,4 +1,4 @@
-"""What is left when the warden itself is killed: found and ended by the launcher. Touches the world.
+"""Find and end the processes that are left when the warden itself is killed.
 
 Children of a warden die with it. What they had moved into sessions of their own (daemons) does not, and would go to
 init. Two things keep it in reach: the launcher is a second child subreaper (prctl(2)), so that such processes become

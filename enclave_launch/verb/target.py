@@ -1,4 +1,4 @@
-"""What to launch: the positional words of ``secure-launch``, as ``ros2 launch`` understands them.
+"""The launch file and arguments: the positional words of ``secure-launch``, as ``ros2 launch`` understands them.
 
 Source: ros2launch/ros2launch/command/launch.py and api/api.py. One word is a file; two are a package and a file
 below its share directory, unless the first is a file that exists: then arguments follow.

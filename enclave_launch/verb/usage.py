@@ -1,4 +1,4 @@
-"""Which options make sense together: one that would have no effect is wrong usage, never passed over.
+"""Check that options make sense together: one that would have no effect is wrong usage.
 
 Somebody who writes ``--keystore`` believes that the robot starts secured. Performs no I/O.
 """

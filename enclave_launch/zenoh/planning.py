@@ -1,4 +1,4 @@
-"""Who of a plan is on DDS and who on Zenoh, and what follows from it. Only reads the plan.
+"""Report what follows from processes on Zenoh in a plan. Only reads the plan.
 
 Nodes on the two never meet. What the launcher itself must call and cannot reach is refused; all else is reported, since
 a bridge may stand between them.

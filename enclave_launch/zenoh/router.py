@@ -46,7 +46,7 @@ class RouterPlace(NamedTuple):
 
 
 class RouterAnswer(Enum):
-    """Who answers where the router should be."""
+    """The one who answers at the router's address."""
 
     NOBODY = "nobody"
     STRANGER = "a program that is not this keystore's router"

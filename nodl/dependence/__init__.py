@@ -1,4 +1,4 @@
-"""What of a described node depends on how launch starts it: parameters, arguments, plugins, the distribution.
+"""The dependence of a described node on its start: parameters, arguments, plugins, the distribution.
 
 A NoDL v2 document lists plain names. Our section of its ``codegen`` may say beside them which of them follow a
 parameter, exist only under a condition, or repeat for each entry of a list; which plugins and further nodes the program
@@ -41,8 +41,10 @@ class When(NamedTuple):
 
 
 class Variation(NamedTuple):
-    """How one listed endpoint varies. ``name``: a template (empty: as listed). ``each``: a list parameter, or a pattern
-    of parameter names with one ``*``; the endpoint repeats for each entry, which the name calls ``$(item)``."""
+    """The variation of one listed endpoint.
+
+    ``name``: a template (empty: as listed). ``each``: a list parameter, or a pattern of parameter names with one ``*``;
+    the endpoint repeats for each entry, which the name calls ``$(item)``."""
 
     name: str = ""
     each: str = ""
@@ -108,7 +110,7 @@ class Configuration(NamedTuple):
 
 
 class StatedGap(NamedTuple):
-    """What the document says it does not know."""
+    """A gap that the document names."""
 
     why: str
     each: str = ""

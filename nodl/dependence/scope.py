@@ -1,4 +1,4 @@
-"""What a template or a condition of a document means in one situation: parameters, options, ``$(...)``.
+"""Evaluate a template or a condition of a document in one situation: parameters, options, ``$(...)``.
 
     $(param NAME [DEFAULT])      the parameter's value; DEFAULT, else the document's, when launch sets none
     $(option NAME [DEFAULT])     the value of a command-line option that the document declares

@@ -75,7 +75,7 @@ def claimed_enclave(user_data: bytes) -> str:
 
 
 class Attribution(str, Enum):
-    """How it is known whose an endpoint is."""
+    """The evidence for the owner of an endpoint."""
 
     LIST = "ros_discovery_info"
     ALONE = "the only node of its participant"

@@ -1,4 +1,4 @@
-"""Which observer is used, and how long it looks. Acts."""
+"""Choose an observer, and how long it looks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a node was started: from the command line of its process, or from the plan of a launch file. Performs no I/O.
+"""Find how a node was started, from the command line of its process or the plan of a launch file. Performs no I/O.
 
 A plan is the JSON of ``secure-launch --dry-run --format json`` (docs/dry-run-json.md).
 """

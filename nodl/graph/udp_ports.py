@@ -1,5 +1,5 @@
-"""Which process of this machine receives at a UDP address: ``/proc/net/udp`` has the socket, ``/proc/<pid>/fd`` who
-holds it. For participants that do not say their pid, as secured ones on Cyclone DDS. Acts.
+"""Find the local process that receives at a UDP address: ``/proc/net/udp`` has the socket, ``/proc/<pid>/fd`` who holds
+it. For participants that do not say their pid, as secured ones on Cyclone DDS. Acts.
 
 Only processes whose descriptors may be read are found: of the same user, or all for root.
 """

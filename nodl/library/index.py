@@ -1,4 +1,4 @@
-"""What a folder of documents knows, without opening them: an index file, or a scan of the folder.
+"""The index of a folder of documents: an index file, or a scan of the folder.
 
 The index of the library that ships with us is ``index.json`` beside the documents; a test holds it to them, and
 ``secure-nodl library index`` writes it anew. Folders of users are scanned: they are small, and change.

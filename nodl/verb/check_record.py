@@ -123,7 +123,7 @@ def _recorded(files: Iterable[Path]) -> tuple[list[AskedNode], list[str]]:
 
 
 class _Known(NamedTuple):
-    """Where descriptions come from; ``folders`` with sources."""
+    """The sources of descriptions; ``folders`` with source code."""
 
     lookup: ManifestLookup
     prefixes: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""What to run: command, name, directory and environment of one process."""
+"""The program of one process: command, name, directory and environment."""
 
 from __future__ import annotations
 

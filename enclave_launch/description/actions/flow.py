@@ -1,4 +1,4 @@
-"""What to visit next: ``group``, ``for``, ``for_each``, and functions of Python launch files."""
+"""Actions that decide what is visited next: ``group``, ``for``, ``for_each``, and functions of Python launch files."""
 
 from __future__ import annotations
 

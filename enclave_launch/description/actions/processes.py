@@ -371,7 +371,7 @@ def split_words(template: Iterable[Substitution]) -> list[SomeSubstitutionsType]
 
 
 class OnProcessStart(OnActionEventBase):
-    """When a process has started. The target must be an ``ExecuteProcess``, or a node."""
+    """Handler of a process's start. The target must be an ``ExecuteProcess``, or a node."""
 
     def __init__(self, *, target_action: ActionMatcher = None, on_start: OnEvent, **kwargs: Any) -> None:
         super().__init__(
@@ -384,7 +384,7 @@ class OnProcessStart(OnActionEventBase):
 
 
 class OnProcessExit(OnActionEventBase):
-    """When a process has exited, also each time before it is respawned."""
+    """Handler of a process's exit, also before each respawn."""
 
     def __init__(self, *, target_action: ActionMatcher = None, on_exit: OnEvent, **kwargs: Any) -> None:
         super().__init__(
@@ -401,7 +401,7 @@ class OnProcessExit(OnActionEventBase):
 
 
 class OnProcessIO(OnActionEventBase):
-    """When a process writes, or is written to: one callback ``(event)`` for each stream."""
+    """Handler of a process's output and input: one callback ``(event)`` for each stream."""
 
     def __init__(
         self,

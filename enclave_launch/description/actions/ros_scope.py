@@ -1,4 +1,4 @@
-"""What holds for every node and component launched in this scope: ``push_ros_namespace``, ``push_ros_enclave``,
+"""Actions that hold for every node and component of the scope: ``push_ros_namespace``, ``push_ros_enclave``,
 ``set_remap``, ``set_parameter``, ``set_parameters_from_file``; and ``set_use_sim_time`` of launch's own node.
 """
 

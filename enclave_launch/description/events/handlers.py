@@ -209,7 +209,7 @@ def _checked(on_event: Any) -> list[LaunchDescriptionEntity | None]:
 
 
 class OnExecutionComplete(OnActionEventBase):
-    """When an action has been carried out; for processes and timers: has ended."""
+    """Handler of an action's completion; for processes and timers: of their end."""
 
     def __init__(self, *, target_action: ActionMatcher = None, on_completion: OnEvent, **kwargs: Any) -> None:
         super().__init__(
@@ -251,7 +251,7 @@ class OnIncludeLaunchDescription(BaseEventHandler):
 
 
 class OnShutdown(BaseEventHandler):
-    """When the launch begins to end."""
+    """Handler of the launch's shutdown."""
 
     event_class = Shutdown
 

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class Handler(Protocol):
-    """What the table asks of a handler."""
+    """The interface that the table needs of a handler."""
 
     target: object | None
     internal: bool

@@ -90,7 +90,7 @@ class Entity:
 
 
 class Parser(Protocol):
-    """What elements ask of the front end that reads them; ``markup.parser.Parser`` is one."""
+    """The interface that elements need of the front end that reads them; ``markup.parser.Parser`` is one."""
 
     def parse_action(self, entity: Entity) -> Any: ...
     def parse_substitution(self, value: str) -> Any: ...

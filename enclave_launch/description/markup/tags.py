@@ -1,4 +1,4 @@
-"""Which module of ours registers each element and each substitution of XML and YAML launch files; its import.
+"""Import the module that registers an element or substitution of XML and YAML launch files.
 
 Upstream imports every installed extension before the first file is parsed. Here a name that is not registered yet
 brings in the one module of ours that has it, then all of ours, then the entry points of other installed packages. The

@@ -1,4 +1,4 @@
-"""What users wrap parameters in: a typed value, a single rule, a file."""
+"""Parameters as users describe them: a typed value, a single rule, a file."""
 
 from __future__ import annotations
 

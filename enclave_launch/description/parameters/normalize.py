@@ -1,4 +1,4 @@
-"""What users write as ``parameters=`` brought into one shape, without a context.
+"""Normalize what users write as ``parameters=``, without a context.
 
 A normalized file is a ``ParameterFile``; a normalized dict maps tuples of substitutions to
 

@@ -27,7 +27,7 @@ PREDICATE = "https://in-toto.io/attestation/test-result/v0.1"
 
 
 class Examined(NamedTuple):
-    """What the evidence is about. ``keys``, ``defaults`` and ``components`` are ``None`` where nothing was given to
+    """The subject of the evidence. ``keys``, ``defaults`` and ``components`` are ``None`` where nothing was given to
     look at; ``rules``: every code that the checks can give, with its meaning."""
 
     document: Mapping[str, Any]

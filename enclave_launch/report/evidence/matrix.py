@@ -1,4 +1,4 @@
-"""Who may do what, and why: one row for each permission of each enclave and each node that asks for it."""
+"""The access control matrix: one row for each permission of each enclave and each node that asks for it."""
 
 from __future__ import annotations
 

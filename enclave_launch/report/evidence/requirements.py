@@ -1,4 +1,4 @@
-"""Which part of the evidence supports which requirement.
+"""The requirements that each part of the evidence supports.
 
 Regulation (EU) 2024/2847 (Cyber Resilience Act), Annex I; IEC 62443-3-3:2013 (SR) and 62443-4-2:2019 (CR), whose
 numbers agree where both are named; ISO 10218-1:2025 and -2:2025, which ask that threats to safety from unauthorised

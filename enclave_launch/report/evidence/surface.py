@@ -1,4 +1,4 @@
-"""What can be reached: from other enclaves, from outside of the launch, and by programs that nothing confines."""
+"""The attack surface: what other enclaves, others than the launch, and programs without an enclave can reach."""
 
 from __future__ import annotations
 

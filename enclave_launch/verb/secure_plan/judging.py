@@ -1,4 +1,4 @@
-"""What ``check`` finds in a plan, each finding with the reason why the repository accepts it, if it does."""
+"""Judge a plan for ``check``: each finding with the reason why the repository accepts it, if it does."""
 
 from __future__ import annotations
 

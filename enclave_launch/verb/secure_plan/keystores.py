@@ -1,4 +1,4 @@
-"""What the verbs ask of a keystore. Reads only; every error is a ``ProvisionError`` in the keystore's own words."""
+"""Read a keystore for the verbs; every error is a ``ProvisionError`` in the keystore's own words."""
 
 from __future__ import annotations
 

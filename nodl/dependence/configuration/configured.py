@@ -1,4 +1,4 @@
-"""What a configuration file of a tool asks for."""
+"""The interfaces that a configuration file of a tool requests."""
 
 from __future__ import annotations
 

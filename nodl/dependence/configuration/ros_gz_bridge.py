@@ -1,4 +1,4 @@
-"""What ``ros_gz_bridge`` bridges: the entries of its YAML file, or the words of ``parameter_bridge``'s command line.
+"""The bridges of ``ros_gz_bridge``: the entries of its YAML file, or the words of ``parameter_bridge``'s command line.
 
 Source: gazebosim/ros_gz jazzy, ``bridge_config.cpp``, ``ros_gz_bridge.cpp``, ``parameter_bridge.cpp``: of two
 directions each is one endpoint, an entry that the bridge itself would refuse is a gap.
