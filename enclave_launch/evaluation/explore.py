@@ -199,7 +199,7 @@ class Explorer:
             if handler.internal or id(handler) in self._fired or not isinstance(handler, EventHandler):
                 continue
             if handler.entities:
-                what = f"entities of {type(handler).__name__}, whose event cannot be told"
+                what = f"entities of {type(handler).__name__}, whose event is not known"
                 self._host.unforeseeable(Unforeseeable(what, self._place(handler)))
 
     def _place(self, handler: Handler) -> Any:

@@ -235,5 +235,5 @@ def test_a_handler_that_nothing_reaches_is_reported(launch_py: Any) -> None:
         entities = [RegisterEventHandler(EventHandler(matcher=event_named("from.outside"), entities=[EP(cmd=["x"])]))]
     """)
     assert [item.what for item in found.unforeseeable] == [
-        "entities of EventHandler, whose event cannot be told"
+        "entities of EventHandler, whose event is not known"
     ]

@@ -84,7 +84,7 @@ def test_subjects_as_sros2_writes_them(root: Path, tmp_path: Path) -> None:
     assert found(root, "compatible-subjects") == []
     kit.filled(tmp_path / "other", ["/a"], subjects=SubjectScheme.COMPATIBLE)
     (one,) = found(tmp_path / "other", "compatible-subjects")
-    assert one.severity is Severity.NOTE and "1 enclaves" in one.message and one.repair.count(" /a ") == 1
+    assert one.severity is Severity.NOTE and "1 enclave with" in one.message and one.repair.count(" /a ") == 1
 
 
 def test_a_domain_that_no_permissions_name(root: Path) -> None:

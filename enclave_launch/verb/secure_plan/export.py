@@ -113,8 +113,8 @@ def _refuse_problems(document: Mapping[str, Any]) -> None:
     zenoh = sorted(one["process"] for one in document["processes"] if one.get("middleware") == ZENOH)
     if zenoh:
         raise ManifestError(
-            f"{', '.join(zenoh)} on Zenoh ({ZENOH}): without a router and its files they would run unprotected, and no "
-            "engine is told of these yet; nothing was written. Start them with secure-launch (docs/zenoh.md)"
+            f"{', '.join(zenoh)} on Zenoh ({ZENOH}): without a router and its files they would run unprotected, and "
+            "export does not write these yet; nothing was written. Start them with secure-launch (docs/zenoh.md)"
         )
 
 
