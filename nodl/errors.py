@@ -23,13 +23,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
-from typing_extensions import Self
-
 from nodl.source_ref import SourceRef
 from nodl.types import Node
 
 if TYPE_CHECKING:
     from lxml import etree
+    from typing_extensions import Self
 
 
 class NoDLError(Exception):

@@ -1,4 +1,4 @@
-"""The main job works without the add-ons, alone or all removed; nodl and keystore work without enclave_launch."""
+"""The main job works without the add-ons, alone or all removed."""
 
 from __future__ import annotations
 
@@ -41,7 +41,6 @@ CORE_TESTS = (
     "tests/policy/test_derivation.py",
     "tests/test_enclave_assignment.py",
 )
-MANIFEST = ROOT / "fixtures/demo_ws/share/demo_nodes/demo_nodes.nodl.xml"
 TALKER = "talker_listener.launch.xml"
 
 # add-on -> a command line that needs it
@@ -141,20 +140,6 @@ def test_a_keystore_with_a_zenoh_router_says_that_its_rules_do_not_follow_withou
     assert (tmp_path / "ks/zenoh/router.json5").read_bytes() == rules
     assert python(whole, "keystore.verb", "zenoh", keystore).returncode == 0
     assert python(whole, "keystore.verb", "verify", keystore).returncode == 0
-
-
-@pytest.mark.parametrize(
-    ("package", "words"),
-    [("keystore", ("create", "ks")), ("nodl", ("validate", str(MANIFEST)))],
-)
-def test_keystore_and_nodl_work_alone(package: str, words: tuple[str, ...], tmp_path: Path) -> None:
-    folder = tmp_path / "installed"
-    for each in ("enclave_common", package):
-        shutil.copytree(ROOT / each, folder / each, ignore=shutil.ignore_patterns("__pycache__"))
-    helped = python(folder, f"{package}.verb", "--help")
-    assert helped.returncode == 0 and "not part of this installation" not in helped.stdout, helped.stderr
-    ran = python(folder, f"{package}.verb", *words)
-    assert ran.returncode == 0, ran.stderr
 
 
 def test_the_tests_of_the_core_pass_without_all_add_ons(tmp_path: Path) -> None:
