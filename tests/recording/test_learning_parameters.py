@@ -76,7 +76,7 @@ def test_a_lifecycle_node_that_was_never_active_is_incomplete(stand_in: Path, tm
     (file,) = (tmp_path / "learnt").glob("*.nodl.yaml")
     assert "incomplete:\n    - 'a lifecycle node that was never active" in file.read_text()
     (warning,) = [each for each in plan_of(tmp_path).warnings if each.code is Code.RECORDING_INCOMPLETE]
-    assert "node /life is learnt incompletely" in str(warning) and "record it once more" in str(warning)
+    assert "node /life is learnt incompletely" in str(warning) and "record it again" in str(warning)
 
 
 def plan_of(folder: Path) -> LaunchPlan:
