@@ -37,18 +37,64 @@ def interfaces_of(
     With ``start`` the names of further nodes, which the parameters of the first do not reach, are filled in.
     """
     found: list[NodeInterface] = []
-    for index, record in enumerate(findings.nodes):
+    for record in findings.nodes:
         made = _of_node(record, package, executable, plugin)
-        if start is not None and (index or record.arguments):
-            made = [_filled(each, start) for each in made]
+        if start is not None and _needs_start(record, findings):
+            made = [_filled(each, record, findings, start) for each in made]
         found += made
     if found:
         found[0] = found[0]._replace(gaps=tuple(dict.fromkeys((*found[0].gaps, *program_gaps(findings)))))
     return found
 
 
-def _filled(interface: NodeInterface, start: Start) -> NodeInterface:
-    parameters = start.parameters(interface.name)
+def depends_on_start(findings: ProgramFindings) -> bool:
+    """Return whether another launch of the program may get other interfaces from ``interfaces_of``."""
+    return any(_needs_start(record, findings) for record in findings.nodes)
+
+
+def _needs_start(record: AllocatedNode, findings: ProgramFindings) -> bool:
+    """Return whether a plan, which knows one node's parameters at a time, could not fill in the names of ``record``."""
+    names = {
+        part.name
+        for found in record.endpoints
+        for template in _templates(found.name, record)
+        for part in template.parts
+        if isinstance(part, ParameterPart)
+    }
+    is_first = record is findings.nodes[0]
+    return bool(names) and (
+        not is_first or bool(record.arguments) or bool(names & _foreign(record, findings).keys())
+    )
+
+
+def _foreign(record: AllocatedNode, findings: ProgramFindings) -> dict[str, str | None]:
+    """Return the parameters that only another node of the program declares, with that node's name in the source."""
+    return {
+        parameter: name
+        for other in findings.nodes
+        if other is not record
+        for name in (_name(other),)
+        for parameter in other.parameters
+        if parameter not in record.parameters
+    }
+
+
+def _name(record: AllocatedNode) -> str | None:
+    names = _texts(record.names, record)
+    return names[0] if len(names) == 1 else None
+
+
+def _filled(
+    interface: NodeInterface, record: AllocatedNode, findings: ProgramFindings, start: Start
+) -> NodeInterface:
+    foreign = _foreign(record, findings)
+    parameters = {
+        name: value for name, value in start.parameters(interface.name).items() if name not in foreign
+    }
+    for parameter, node in foreign.items():
+        given = start.parameters(node)
+        if parameter in given:
+            parameters[parameter] = given[parameter]
     endpoints = tuple(
         endpoint._replace(name=template)
         for endpoint in interface.endpoints

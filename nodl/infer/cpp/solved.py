@@ -17,7 +17,7 @@ from nodl.infer.cpp.entry import CppSupportMissing, Entry, Solved, failure
 from nodl.infer.cpp.parallel import each_in_parallel
 from nodl.infer.cpp.program import Sources, run_program
 from nodl.infer.cpp.reading.declarations import FileIndex, FunctionParameter
-from nodl.infer.cpp.results import interfaces_of, program_gaps
+from nodl.infer.cpp.results import depends_on_start, interfaces_of, program_gaps
 from nodl.infer.cpp.syntax import text
 from nodl.infer.start import LaunchKey, Start
 from nodl.node_interface import Gap
@@ -56,7 +56,7 @@ def _solved(sources: Sources, key: LaunchKey, entry: Entry, start: Start | None)
         gaps=tuple(program_gaps(findings)),
         dead=tuple(Gap(answer.source, answer.reason) for answer in findings.answers if answer.dead),
         classes=tuple(sorted(findings.classes)),
-        consulted=findings.consulted,
+        consulted=findings.consulted or depends_on_start(findings),
     )
     read = (*findings.files, *sources.unreadable)
     return Made(solved, {name: sources.digests[name] for name in read})

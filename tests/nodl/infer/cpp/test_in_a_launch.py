@@ -174,3 +174,39 @@ def test_what_is_easiest_to_close_is_told_first(workspace: Path) -> None:
     texts = [problem.text for problem in planned.problems]
     assert len(texts) == 3
     assert texts == sorted(texts, key=len)
+
+
+TWO_NODES = (
+    HEAD
+    + """
+int main(int argc, char ** argv) {
+  rclcpp::init(argc, argv);
+  auto inner = std::make_shared<rclcpp::Node>("inner");
+  auto outer = std::make_shared<rclcpp::Node>("outer");
+  std::string channel = inner->declare_parameter<std::string>("channel", "data");
+  auto out = outer->create_publisher<std_msgs::msg::Bool>("/cloud/" + channel, 1);
+  auto in = inner->create_publisher<std_msgs::msg::Bool>("/" + outer->declare_parameter<std::string>("back", "b"), 1);
+  rclcpp::spin(inner);
+}
+"""
+)
+TWICE = """
+<launch>
+  <node pkg="demo" exec="filter_node" namespace="a"><param name="channel" value="one"/></node>
+  <node pkg="demo" exec="filter_node" namespace="b"><param name="channel" value="two"/><param from="{file}"/></node>
+</launch>
+"""
+
+
+def test_a_name_from_a_parameter_of_another_node_follows_each_start(tmp_path: Path) -> None:
+    """Two starts of one program have their own values, and a parameter file tells which node has one."""
+    package(
+        tmp_path / "src/demo", {"src/filter.cpp": TWO_NODES}, "add_executable(filter_node src/filter.cpp)\n"
+    )
+    install(tmp_path)
+    file = tmp_path / "of_outer.yaml"
+    write(file, "/b/outer:\n  ros__parameters: {back: other, channel: not_mine}\n")
+    found = plan(tmp_path, TWICE.format(file=file))
+    assert not found.problems
+    assert all(may(found, name) for name in ("/cloud/one", "/cloud/two", "/b", "/other"))
+    assert not any(may(found, name) for name in ("/cloud/data", "/cloud/not_mine"))
