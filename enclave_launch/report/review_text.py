@@ -64,8 +64,8 @@ _FOLDED = frozenset({
     "program-not-installed", "remap-dead", "wildcard",
 })  # fmt: skip
 """Codes with one cause and often many subjects; what is wrong with a keystore is reported one by one."""
-_SUMMED_UP = frozenset({"enclave-shared", "library-version"})
-"""Codes of which a plan has many that are as they are meant to be."""
+_SUMMED_UP = frozenset({"ends-not-judged", "enclave-shared", "library-version", "no-subscriber"})
+"""Codes of which a plan has many that are as they are meant to be, or that follow from a finding that is printed."""
 
 
 def _folded(ordered: Judged, verbose: bool) -> Iterator[tuple[PlanFinding, str | None, list[PlanFinding]]]:

@@ -50,6 +50,11 @@ def codes(checked: dict[str, Any]) -> set[str]:
             ({"publish": ["/robot1/cmd_vel"]}, {"subscribe": ["/robot2/cmd_vel"]}),
         ),
         (
+            "nearly-the-same-name",
+            ({"publish": ["/lora/rxt"]}, {"subscribe": ["/lora/txt"]}),
+            ({"publish": ["/lora/rx"]}, {"subscribe": ["/lora/tx"]}),
+        ),
+        (
             "types-differ",
             ({"publish": ["/x std_msgs/msg/String"]}, {"subscribe": ["/x std_msgs/msg/Int32"]}),
             ({"publish": ["/x std_msgs/msg/String"]}, {"subscribe": ["/x std_msgs/msg/String"]}),
@@ -62,6 +67,23 @@ def test_a_check_finds_what_it_is_for_and_not_its_neighbour(
 ) -> None:
     assert code in codes(two(*triggers))
     assert code not in codes(two(*does_not))
+
+
+def test_several_types_at_one_place_are_alternatives() -> None:
+    string, number = "std_msgs/msg/String", "std_msgs/msg/Int32"
+    published = [(string, "logger.py:8"), (number, "logger.py:8")]
+    assert "types-differ" not in codes(_of_types([*published, (string, "driver.py:3")]))
+    assert "types-differ" in codes(_of_types([*published, ("std_msgs/msg/Bool", "driver.py:3")]))
+    assert "types-differ" in codes(_of_types([(string, "logger.py:8"), (number, "logger.py:9")]))
+
+
+def _of_types(given: list[tuple[str, str]]) -> dict[str, Any]:
+    """One node that publishes ``/x`` with these types at these places."""
+    checked = document({"/a": {"/n": {"publish": [f"/x {kind}" for kind, _ in given]}}})
+    interfaces = [each for each in checked["nodes"][0]["interfaces"] if not each["built_in"]]
+    for interface, (_, place) in zip(interfaces, given, strict=True):
+        interface["place"] = place
+    return checked
 
 
 def test_a_node_name_that_two_nodes_have() -> None:

@@ -48,3 +48,9 @@ def test_every_code_has_a_section_of_its_own_in_the_documentation() -> None:
         code for line in page.splitlines() if line.startswith("### ") for code in line[4:].split(", ")
     ]
     assert sorted(headings) == sorted(MEANINGS)
+
+
+def test_what_nobody_hears_is_counted_and_what_nobody_says_is_printed() -> None:
+    text = findings_text([told("no-subscriber", "/debug"), told("no-publisher", "/scan")])
+    assert "[no-publisher]" in text and "[no-subscriber]" not in text
+    assert text.endswith("0 errors, 2 warnings (1 no-subscriber; -v lists them)\n")

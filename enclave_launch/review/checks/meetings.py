@@ -96,7 +96,14 @@ def _nearly(one: str, two: str) -> bool:
         return True
     if len(one) < _SHORTEST or abs(len(one) - len(two)) > 1 or _digits(one) != _digits(two):
         return False
-    return _one_edit(one, two)
+    return _one_edit(one, two) and not _other_end(one, two)
+
+
+def _other_end(one: str, two: str) -> bool:
+    """Return True for names that differ in a word of one or two letters: ``rx`` and ``tx``, ``x`` and ``y``."""
+    words = [name.replace("_", "/").split("/") for name in (one, two)]
+    differing = [pair for pair in zip(*words, strict=False) if pair[0] != pair[1]]
+    return len(words[0]) == len(words[1]) and all(len(word) < 3 for pair in differing for word in pair)
 
 
 def _digits(name: str) -> str:

@@ -93,6 +93,7 @@ class _Pass:
     def __init__(self, file: str, symbols: Mapping[str, str], complete: bool, include: Include):
         self.result = Preprocessed(file)
         self.macros = {name: Macro(None, value) for name, value in {**_STANDARD, **symbols}.items()}
+        self.bodies: dict[str, str] = {}  # by name: all that it was ever defined as in this file
         self.complete = complete
         self.include = include
         self.stack: list[_Conditional] = []
@@ -215,6 +216,7 @@ class _Pass:
         if uncertain and before is not None:
             body = f"{before.body} {body}"  # either may be meant: who asks what an uncertain one leads to reads both
         self.macros[match[1]] = Macro(parameters, body, uncertain)
+        self.bodies[match[1]] = f"{self.bodies.get(match[1], '')} {body}"
 
     def _undefine(self, name: str) -> None:
         """Forget a macro; one that is undefined under an open condition may still be there."""
@@ -262,13 +264,20 @@ class _Pass:
                 and not match[1].startswith(("PLUGINLIB_EXPORT", "RCLCPP_COMPONENTS_REG", "CLASS_LOADER_REG"))
             ):
                 if not _HARMLESS_MACROS.match(match[1]) and not _follows(lines, index):
-                    self.result.unknown_macros.append((index + 1, match[1]))
+                    self._standing_alone(match[1], index + 1)
                 if not line.rstrip().endswith(";"):
                     lines[index] = ""
             stripped = lines[index].strip()
             if stripped:
                 before = "#" if stripped.startswith("#") else stripped[-1]
         return "\n".join(lines)
+
+    def _standing_alone(self, name: str, number: int) -> None:
+        """Note a macro: one that this file defines is judged by all of its definitions, another is not known."""
+        if name in self.bodies:
+            self.result.open_macros.append((number, name, self.bodies[name]))
+        else:
+            self.result.unknown_macros.append((number, name))
 
 
 def _follows(lines: list[str], index: int) -> bool:

@@ -379,3 +379,27 @@ def test_a_write_that_the_parser_does_not_understand_is_a_gap(tmp_path: Path) ->
     assert gaps(misread) == ["this C++ could not be parsed, and writes something"]
     read = infer(tmp_path / "2", in_class(f'std::string x; x = "a", x += "b"; {PUB}(x, 1);'))
     assert (names(read), gaps(read)) == (["ab"], [])
+
+
+GUARDED = """#ifdef DEMO_DEBUG
+#define GUARD(x) if (!(x)) abort()
+#else
+#define GUARD(x) {DEFINITION}
+#endif
+"""
+MACROS = {
+    "in every branch": (GUARDED.replace("{DEFINITION}", "{}"), "", []),
+    "and undefines it": (GUARDED.replace("{DEFINITION}", "assert(x)"), "#undef GUARD", []),
+    "as a publisher": (
+        GUARDED.replace("{DEFINITION}", f'{PUB}("b", 1)'),
+        "#undef GUARD",
+        ["what the macro GUARD stands for here is not known; it may make interfaces"],
+    ),
+    "nowhere": ("", "", ["the macro GUARD is not in reach: what it stands for is not known"]),
+}
+
+
+@pytest.mark.parametrize(("before", "after", "told"), MACROS.values(), ids=MACROS)
+def test_a_macro_that_the_file_defines(before: str, after: str, told: list[str], tmp_path: Path) -> None:
+    source = in_class(f'int x = 1; {PUB}("a", 1);\n  GUARD(x > 0);\n', before=before) + after
+    assert sorted(set(gaps(infer(tmp_path, source)))) == told
