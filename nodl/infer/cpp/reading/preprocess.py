@@ -273,9 +273,10 @@ class _Pass:
         return "\n".join(lines)
 
     def _standing_alone(self, name: str, number: int) -> None:
-        """Note a macro: one that this file defines is judged by all of its definitions, another is not known."""
-        if name in self.bodies:
-            self.result.open_macros.append((number, name, self.bodies[name]))
+        """Note a macro: one that this file or its headers define is judged by that, another is not known."""
+        if name in self.bodies or name in self.macros:
+            included = self.macros[name].body if name in self.macros else ""
+            self.result.open_macros.append((number, name, f"{self.bodies.get(name, '')} {included}"))
         else:
             self.result.unknown_macros.append((number, name))
 

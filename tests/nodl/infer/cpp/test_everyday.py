@@ -403,3 +403,13 @@ MACROS = {
 def test_a_macro_that_the_file_defines(before: str, after: str, told: list[str], tmp_path: Path) -> None:
     source = in_class(f'int x = 1; {PUB}("a", 1);\n  GUARD(x > 0);\n', before=before) + after
     assert sorted(set(gaps(infer(tmp_path, source)))) == told
+
+
+@pytest.mark.parametrize("name", MACROS)
+def test_a_macro_of_a_header(name: str, tmp_path: Path) -> None:
+    before, _, told = MACROS[name]
+    files = {
+        "src/g.hpp": before,
+        "src/main.cpp": in_class("\n  GUARD(x > 0);\n", before='#include "g.hpp"\n'),
+    }
+    assert sorted(set(gaps(infer_paths([package(tmp_path / "demo", files)])))) == told
