@@ -16,8 +16,8 @@ from enclave_launch.recording.listeners import Listener
 from enclave_launch.recording.recording import Unrecorded
 from keystore.formats.permissions_patterns import covers, has_wildcard
 from keystore.formats.policy import Operation, Rule
-from nodl.record.asked import EndpointRole, role_of
 from nodl.record.lines import EndpointMade, Line
+from nodl.record.requested import EndpointRole, role_of
 
 
 class Refusal(NamedTuple):

@@ -21,9 +21,9 @@ from enclave_launch.recording.patches import Patch
 from enclave_launch.recording.reasons import MIXED_MIDDLEWARES, NOT_AS_PLANNED, Cause, cause_of
 from enclave_launch.recording.remedies import Remedies
 from enclave_launch.runtime.run_events import ProcessOutput, RunEvent
-from nodl.record.asked import REFUSED, Asked, EndpointRole, role_of
 from nodl.record.assembly import RecordedNode, RecordedProcess
 from nodl.record.lines import EndpointMade, Initialised, Line, NodeMade
+from nodl.record.requested import REFUSED, EndpointRole, RequestedEndpoint, role_of
 
 _PATIENCE = 0.3
 """Seconds to wait for what a middleware prints about a participant that was not made: it goes another way."""
@@ -36,7 +36,7 @@ class Denial(NamedTuple):
 
     process: str
     need: Need
-    asked: Asked
+    asked: RequestedEndpoint
     described: Description
     granted: bool
     patch: Patch | None

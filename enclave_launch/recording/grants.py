@@ -21,9 +21,9 @@ from keystore.formats.permissions import DdsRules, dds_rules
 from keystore.formats.permissions_names import dds_topics, full_name
 from keystore.formats.permissions_patterns import covers, has_wildcard
 from keystore.formats.policy import Operation, Qualifier, Rule
-from nodl.record.asked import Asked, EndpointRole, asked_endpoint, role_of
 from nodl.record.assembly import RecordedNode, RecordedProcess
 from nodl.record.lines import EndpointMade
+from nodl.record.requested import EndpointRole, RequestedEndpoint, requested_endpoint, role_of
 
 WORDS = {
     Operation.PUBLISH: "publish topic",
@@ -89,9 +89,9 @@ class PlannedGrants:
 
     def need(
         self, process: RecordedProcess, node: RecordedNode, line: EndpointMade
-    ) -> tuple[Need, Asked] | None:
+    ) -> tuple[Need, RequestedEndpoint] | None:
         """Return the permission for what ``line`` asked for, None if nothing is enforced or no name is known."""
-        enclave, asked = self.enclave_of(process), asked_endpoint(process, node, line)
+        enclave, asked = self.enclave_of(process), requested_endpoint(process, node, line)
         if enclave is None or asked is None or not asked.final:
             return None
         return Need(enclave, node.fqn, OPERATIONS[asked.kind], asked.final), asked

@@ -1,6 +1,6 @@
 """Who hears of a recording while it grows; and the listener of every one, which tells the launch of recorded endpoints.
 
-What an endpoint is says ``nodl.record.asked``.
+What an endpoint is says ``nodl.record.requested``.
 """
 
 from __future__ import annotations
@@ -8,10 +8,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from enclave_launch.runtime.companion import LaunchControl
-from enclave_launch.runtime.run_events import AskedEndpoint, EndpointCreated, EndpointRefused, RunEvent
-from nodl.record.asked import Asked, asked_endpoint
+from enclave_launch.runtime.run_events import EndpointCreated, EndpointRefused, EndpointRequested, RunEvent
 from nodl.record.assembly import RecordedNode
 from nodl.record.lines import EndpointMade, Line
+from nodl.record.requested import RequestedEndpoint, requested_endpoint
 
 if TYPE_CHECKING:
     from enclave_launch.recording.recording import Recording
@@ -49,7 +49,7 @@ class EndpointEvents(Listener):
         if not isinstance(line, EndpointMade):
             return
         process, node = self._recording.record.node_of(line)
-        asked = asked_endpoint(process, node, line)
+        asked = requested_endpoint(process, node, line)
         if asked is None or process.started is None:
             return
         name, pid, endpoint = process.started.process, process.started.pid, _endpoint(asked, node, line)
@@ -59,8 +59,8 @@ class EndpointEvents(Listener):
             self._launch.tell(EndpointRefused(name, pid, endpoint, asked.error))
 
 
-def _endpoint(asked: Asked, node: RecordedNode, line: EndpointMade) -> AskedEndpoint:
+def _endpoint(asked: RequestedEndpoint, node: RecordedNode, line: EndpointMade) -> EndpointRequested:
     component = f"{node.component.package}/{node.component.plugin}" if node.component else ""
-    return AskedEndpoint(
+    return EndpointRequested(
         node.fqn or line.fqn, asked.kind, asked.final or asked.written, asked.written, asked.type, component
     )

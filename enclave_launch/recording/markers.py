@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 from enclave_launch.policy.program_inputs import own_words
 from enclave_launch.process import ResolvedProcess
-from nodl.record.asked import all_asked
 from nodl.record.assembly import read_record
 from nodl.record.learning import observation_of
 from nodl.record.origins import MARKER, possible_sources
+from nodl.record.requested import all_requested
 
 
 class Questions(NamedTuple):
@@ -47,7 +47,7 @@ def questions(folder: Path) -> Questions:
     """
     found: dict[tuple[str, str], set[str]] = {}
     for path in sorted(folder.glob("records/*.record")):
-        for node in all_asked(read_record(path.read_bytes()).attributed()):
+        for node in all_requested(read_record(path.read_bytes()).attributed()):
             if not node.executable:
                 continue
             seen = observation_of(node)

@@ -17,7 +17,7 @@ from enclave_launch.review.document import KIND_OF
 from nodl.document.v2_schema import NAME_PATTERN, TYPE_PATTERN
 from nodl.names import split_fqn
 from nodl.node_interface import EndpointKind
-from nodl.record.asked import Asked
+from nodl.record.requested import RequestedEndpoint
 
 _HISTORY = {1: "KEEP_LAST", 2: "KEEP_ALL"}
 
@@ -31,7 +31,7 @@ class Patch(NamedTuple):
     text: str
 
 
-def manifest_patch(file: str, text: str, line: int, asked: Asked) -> Patch | None:
+def manifest_patch(file: str, text: str, line: int, asked: RequestedEndpoint) -> Patch | None:
     """Add one entry to the manifest ``text`` of ``file`` for the node that begins at ``line``.
 
     Returns None if the name or the shape of the file does not let a line be added safely.
@@ -44,7 +44,9 @@ def manifest_patch(file: str, text: str, line: int, asked: Asked) -> Patch | Non
     return Patch(file, _diff(file, text, added), "start the launch again", added)
 
 
-def policy_patch(enclave: str, node: str, asked: Asked, file: str, text: str = "") -> Patch | None:
+def policy_patch(
+    enclave: str, node: str, asked: RequestedEndpoint, file: str, text: str = ""
+) -> Patch | None:
     """Return the change of a policy file that adds the one permission to what is derived.
 
     ``text`` is what stands in ``file``; ``None`` if its shape does not let an enclave be added safely.
@@ -88,7 +90,7 @@ def _diff(file: str, before: str, after: str) -> str:
     )
 
 
-def _into_v2(text: str, asked: Asked) -> str | None:
+def _into_v2(text: str, asked: RequestedEndpoint) -> str | None:
     category = asked.kind.category
     head = re.search(rf"^{category}:[ \t]*(#.*)?$", text, re.MULTILINE)
     empty = re.search(rf"^{category}:[ \t]*\[[ \t]*\][ \t]*$", text, re.MULTILINE)
@@ -105,7 +107,7 @@ def _into_v2(text: str, asked: Asked) -> str | None:
     return f"{text[: head.end()]}\n{first[1]}- {_v2_entry(asked)}{text[head.end() :]}"
 
 
-def _v2_entry(asked: Asked) -> str:
+def _v2_entry(asked: RequestedEndpoint) -> str:
     fields = f"name: '{asked.name}', type: {asked.type}"  # ~, y or no are something else without quotes
     if asked.kind not in (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION):
         return f"{{{fields}}}"
@@ -117,7 +119,7 @@ def _v2_entry(asked: Asked) -> str:
     return f"{{{fields}, qos: {{{qos}}}}}"
 
 
-def _into_v1(text: str, line: int, asked: Asked) -> str | None:
+def _into_v1(text: str, line: int, asked: RequestedEndpoint) -> str | None:
     """Add the entry before the end of the ``node`` element that begins at ``line``, counted from 1."""
     lines = text.splitlines(keepends=True)
     for number in range(max(line - 1, 0), len(lines)):

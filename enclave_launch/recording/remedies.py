@@ -24,7 +24,7 @@ from nodl.ament_index import search_prefixes
 from nodl.document import RESOURCE_TYPE, V1_SUFFIX, V2_SUFFIXES, parse_document
 from nodl.errors import NoDLError
 from nodl.library import SHIPPED
-from nodl.record.asked import Asked
+from nodl.record.requested import RequestedEndpoint
 
 
 class Remedies:
@@ -36,7 +36,7 @@ class Remedies:
         self._texts: dict[str, str] = {}
         """Files as the patches so far leave them."""
 
-    def patch(self, need: Need, asked: Asked, described: Description) -> Patch | None:
+    def patch(self, need: Need, asked: RequestedEndpoint, described: Description) -> Patch | None:
         """Return the first change that grants ``need``: of the node's manifest, else of a policy file."""
         if self._grants.denied(need):
             return None
@@ -58,7 +58,9 @@ class Remedies:
             return ()
         return tuple(f"{operation.verb} {name}" for operation, name in sorted(found))
 
-    def _candidates(self, need: Need, asked: Asked, described: Description) -> Iterator[tuple[Patch, bool]]:
+    def _candidates(
+        self, need: Need, asked: RequestedEndpoint, described: Description
+    ) -> Iterator[tuple[Patch, bool]]:
         source = described.node.interface.source if described.node is not None else None
         if source is not None and _is_manifest(source.file):
             text = self._text(source.file)

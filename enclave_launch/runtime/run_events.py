@@ -53,7 +53,7 @@ class ProcessOver(NamedTuple):
     failed: bool
 
 
-class AskedEndpoint(NamedTuple):
+class EndpointRequested(NamedTuple):
     """An endpoint that a node requested of rcl.
 
     ``node`` and ``name`` are final, after all rules; ``written`` as the source has it. ``component``:
@@ -74,7 +74,7 @@ class EndpointCreated(NamedTuple):
 
     name: str
     pid: int
-    endpoint: AskedEndpoint
+    endpoint: EndpointRequested
 
 
 class EndpointRefused(NamedTuple):
@@ -82,7 +82,7 @@ class EndpointRefused(NamedTuple):
 
     name: str
     pid: int
-    endpoint: AskedEndpoint
+    endpoint: EndpointRequested
     reason: tuple[str, ...]
 
 

@@ -23,8 +23,8 @@ from enclave_launch.errors import RuntimeFailure
 from enclave_launch.process import ResolvedProcess
 from enclave_launch.runtime.live_launch import LiveLaunch
 from enclave_launch.runtime.run_events import (
-    AskedEndpoint,
     EndpointCreated,
+    EndpointRequested,
     LaunchStarted,
     Observer,
     ProcessExited,
@@ -58,7 +58,7 @@ class RunningProcess(NamedTuple):
     starts: int = 0
     failed: bool = False
     output: bytes = b""
-    endpoints: tuple[AskedEndpoint, ...] = ()
+    endpoints: tuple[EndpointRequested, ...] = ()
 
     @property
     def name(self) -> str:

@@ -16,10 +16,10 @@ from nodl.graph.observation import Observed
 from nodl.graph.starts import StartedNode, start_for, start_of_command
 from nodl.names import split_fqn
 from nodl.node_interface import ClientLibrary, EndpointKind
-from nodl.record.asked import Asked, AskedNode
 from nodl.record.learning import OBSERVED, Learnt, learn_from
 from nodl.record.lines import RecordedRun
 from nodl.record.origins import arguments_as_inputs
+from nodl.record.requested import RequestedEndpoint, RequestedNode
 from nodl.record.written import final_names, written_names
 
 _WITHOUT_PROGRAM = "the program is not known: give the launch file, or observe on the machine that runs it"
@@ -46,7 +46,7 @@ def learn_observed(runs: Sequence[Observed]) -> LearntFromGraph:
     """Learn from all ``runs`` together; their order does not matter."""
     left_out: list[str] = []
     placed = [each for observed in runs for each in _placed(observed, left_out)]
-    by_run: dict[str, tuple[RecordedRun, list[AskedNode]]] = {}
+    by_run: dict[str, tuple[RecordedRun, list[RequestedNode]]] = {}
     for each in placed:
         others = [other for other in placed if _same_program(each, other)]
         _, nodes = by_run.setdefault(each.run.id, (each.run, []))
@@ -99,7 +99,7 @@ def _known_name(placed: _Placed, others: Iterable[_Placed]) -> str:
     return own or (shown.pop() if len(shown) == 1 else "")
 
 
-def _asked(placed: _Placed, others: Sequence[_Placed], left_out: list[str]) -> AskedNode:
+def _asked(placed: _Placed, others: Sequence[_Placed], left_out: list[str]) -> RequestedNode:
     namespace, _ = split_fqn(placed.node.fqn)
     start, rules = placed.start, placed.start.rules
     moved = any(rule.kind.value == "__ns" for rule in (*rules.local, *rules.process))
@@ -113,7 +113,7 @@ def _asked(placed: _Placed, others: Sequence[_Placed], left_out: list[str]) -> A
             left_out.append(f"{shown} has no ROS type")
         elif not every.has(interface):
             endpoints.append(_endpoint(interface, placed, others))
-    return AskedNode(
+    return RequestedNode(
         package=start.package,
         executable=start.executable,
         plugin=start.plugin,
@@ -135,7 +135,7 @@ def _asked(placed: _Placed, others: Sequence[_Placed], left_out: list[str]) -> A
     )
 
 
-def _endpoint(interface: SeenInterface, placed: _Placed, others: Sequence[_Placed]) -> Asked:
+def _endpoint(interface: SeenInterface, placed: _Placed, others: Sequence[_Placed]) -> RequestedEndpoint:
     fqn = placed.node.fqn
     found = written_names(interface.kind, interface.name, fqn, placed.start.rules)
     given = _values(placed.start)
@@ -143,7 +143,7 @@ def _endpoint(interface: SeenInterface, placed: _Placed, others: Sequence[_Place
     left = by_parameter[:1] or list(_left(interface.kind, found, others))
     name = left[0] if left else interface.name
     quality = interface.endpoints[0].quality.rmw_numbers if interface.endpoints else ()
-    return Asked(
+    return RequestedEndpoint(
         interface.kind, name, name, interface.name, interface.type, 0, quality, spellings=tuple(left[1:])
     )
 

@@ -16,8 +16,8 @@ from nodl.builtin_interfaces import LOGGER_SERVICES
 from nodl.name_template import NameTemplate
 from nodl.names import InvalidNameError, split_fqn
 from nodl.node_interface import RANDOM_ENDING, Endpoint, EndpointKind, NodeInterface
-from nodl.record.asked import Asked, AskedNode
 from nodl.record.origins import arguments_as_inputs
+from nodl.record.requested import RequestedEndpoint, RequestedNode
 from nodl.remap import NodeNames
 
 
@@ -67,7 +67,7 @@ class _Described(NamedTuple):
         return "*" in self.shown
 
 
-def compare(node: AskedNode, interfaces: Sequence[NodeInterface]) -> Comparison:
+def compare(node: RequestedNode, interfaces: Sequence[NodeInterface]) -> Comparison:
     """Hold the one of ``interfaces`` that describes ``node`` against its record."""
     interface = _matching(node, interfaces)
     if interface is None:
@@ -93,19 +93,19 @@ def compare(node: AskedNode, interfaces: Sequence[NodeInterface]) -> Comparison:
     return Comparison(agreed, tuple(dict.fromkeys(differences)))
 
 
-def _logger_services(node: AskedNode) -> tuple[str, ...]:
+def _logger_services(node: RequestedNode) -> tuple[str, ...]:
     """Return the logger services, an attribute of the recorded node and not endpoints of its own."""
     return tuple(f"{node.fqn}/{name}" for name in LOGGER_SERVICES)
 
 
-def _matching(node: AskedNode, interfaces: Sequence[NodeInterface]) -> NodeInterface | None:
+def _matching(node: RequestedNode, interfaces: Sequence[NodeInterface]) -> NodeInterface | None:
     same = [each for each in interfaces if _is_named(node, each.name)]
     if len(same) > 1:
         same = [each for each in same if (each.namespace or "") == node.namespace] or same
     return same[0] if same else (interfaces[0] if len(interfaces) == 1 else None)
 
 
-def _is_named(node: AskedNode, described: str | None) -> bool:
+def _is_named(node: RequestedNode, described: str | None) -> bool:
     """Return True if ``described`` is the node's name, or has a random ending and begins as it does."""
     if described is None or not described.endswith(RANDOM_ENDING):
         return described == node.name
@@ -113,13 +113,13 @@ def _is_named(node: AskedNode, described: str | None) -> bool:
     return node.name.startswith(stem) or split_fqn(node.fqn)[1].startswith(stem)
 
 
-def _granted(node: AskedNode) -> list[Asked]:
+def _granted(node: RequestedNode) -> list[RequestedEndpoint]:
     """Return what rcl took, or refused: names that it calls invalid are not asked of anybody."""
     seen = {(each.kind, each.final): each for each in node.endpoints if each.rc in (0, 1) and each.final}
     return list(seen.values())
 
 
-def _about_the_node(node: AskedNode, interface: NodeInterface) -> Iterable[Difference]:
+def _about_the_node(node: RequestedNode, interface: NodeInterface) -> Iterable[Difference]:
     wrong = partial(Difference, Verdict.WRONG, node.fqn, None)
     if interface.name and node.name and not _is_named(node, interface.name):
         yield wrong(f"node name {interface.name}", f"recorded: {node.name}")
@@ -130,11 +130,13 @@ def _about_the_node(node: AskedNode, interface: NodeInterface) -> Iterable[Diffe
         yield wrong(said, "the record says otherwise")
 
 
-def _difference(verdict: Verdict, node: AskedNode, asked: Asked) -> Difference:
+def _difference(verdict: Verdict, node: RequestedNode, asked: RequestedEndpoint) -> Difference:
     return Difference(verdict, node.fqn, asked.kind, asked.final, f"written {asked.written!r}, {asked.type}")
 
 
-def _types(node: AskedNode, asked: Iterable[Asked], described: Sequence[_Described]) -> Iterable[Difference]:
+def _types(
+    node: RequestedNode, asked: Iterable[RequestedEndpoint], described: Sequence[_Described]
+) -> Iterable[Difference]:
     for each in asked:
         found = _find(each, described)
         if found is None or found.is_pattern:
@@ -145,20 +147,20 @@ def _types(node: AskedNode, asked: Iterable[Asked], described: Sequence[_Describ
 
 
 def _never_seen(
-    node: AskedNode, asked: Sequence[Asked], described: Iterable[_Described]
+    node: RequestedNode, asked: Sequence[RequestedEndpoint], described: Iterable[_Described]
 ) -> Iterable[Difference]:
     for item in described:
         if not any(item.kind is each.kind and item.pattern.fullmatch(each.final) for each in asked):
             yield Difference(Verdict.NEVER_SEEN, node.fqn, item.kind, item.shown, str(item.endpoint.source))
 
 
-def _find(asked: Asked, described: Iterable[_Described]) -> _Described | None:
+def _find(asked: RequestedEndpoint, described: Iterable[_Described]) -> _Described | None:
     """Return the one that is named so, rather than one whose pattern fits."""
     fitting = [e for e in described if e.kind is asked.kind and e.pattern.fullmatch(asked.final)]
     return min(fitting, key=lambda each: each.is_pattern, default=None)
 
 
-def _described(node: AskedNode, endpoint: Endpoint) -> Iterable[_Described]:
+def _described(node: RequestedNode, endpoint: Endpoint) -> Iterable[_Described]:
     inputs = {**arguments_as_inputs(node.arguments), **node.parameters}
     readings = (endpoint.name, *endpoint.readings)
     for template in (each for reading in readings for each in reading.fill_each(inputs)):
@@ -170,7 +172,7 @@ def _described(node: AskedNode, endpoint: Endpoint) -> Iterable[_Described]:
 _STAND_IN = "STAR_OF_A_PATTERN"
 
 
-def _finals(node: AskedNode, kind: EndpointKind, template: NameTemplate) -> set[str]:
+def _finals(node: RequestedNode, kind: EndpointKind, template: NameTemplate) -> set[str]:
     """Return the final name; of an action, with and without its remapping, as the distribution is not known here."""
     namespace, name = split_fqn(node.fqn)
     names = NodeNames(name, namespace, node.rules)

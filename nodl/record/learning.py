@@ -11,11 +11,11 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from nodl.node_interface import ClientLibrary, EndpointKind
-from nodl.record.asked import Asked, AskedNode, all_asked
 from nodl.record.assembly import Record
 from nodl.record.lines import RecordedRun
 from nodl.record.origins import FIXED, MARKER, Name, NameOrigin, Observation, arguments_as_inputs, origins_of
 from nodl.record.readings import with_readings
+from nodl.record.requested import RequestedEndpoint, RequestedNode, all_requested
 
 _NUMBERED = re.compile(r"(.+?)_((?:0x)?(?=[0-9a-f]*[0-9])[0-9a-f]{6,}|[0-9]{3,})\Z")
 _TF_LISTENER = "transform_listener_impl_*"
@@ -25,7 +25,7 @@ _RANDOM = re.compile(r"(static_transform_publisher)_([A-Za-z0-9]+)\Z")  # tf2_ro
 _UNTIL_DECIDED = "both are granted until a run with another value decides (--learn-parameters)"
 
 OBSERVED = "observed"
-"""What ``AskedNode.started_as`` is for a node of the graph, which says nothing of states."""
+"""What ``RequestedNode.started_as`` is for a node of the graph, which says nothing of states."""
 
 
 class LearntEndpoint(NamedTuple):
@@ -87,16 +87,16 @@ class Learnt(NamedTuple):
 
 
 class _Seen(NamedTuple):
-    node: AskedNode
+    node: RequestedNode
     run: RecordedRun
 
 
 def learn(records: Iterable[Record]) -> Learnt:
     """Return what all ``records`` together teach; order does not matter."""
-    return learn_from((record.run, all_asked(record.attributed())) for record in records)
+    return learn_from((record.run, all_requested(record.attributed())) for record in records)
 
 
-def learn_from(runs: Iterable[tuple[RecordedRun, Sequence[AskedNode]]]) -> Learnt:
+def learn_from(runs: Iterable[tuple[RecordedRun, Sequence[RequestedNode]]]) -> Learnt:
     """Learn from runs whose nodes are known otherwise: by observing the graph."""
     groups: dict[ProgramKey, list[_Seen]] = {}
     listeners: set[ProgramKey] = set()
@@ -124,7 +124,7 @@ def learn_from(runs: Iterable[tuple[RecordedRun, Sequence[AskedNode]]]) -> Learn
     )
 
 
-def _unforeseeable(node: AskedNode) -> str:
+def _unforeseeable(node: RequestedNode) -> str:
     """Return the final name as a pattern, if the program makes it of a number or an address: another one in each run.
 
     A number in the source's own name is learnt (``random_name``).
@@ -142,7 +142,7 @@ def _numbered(name: str) -> str:
     return match[1] if match else ""
 
 
-def _key(node: AskedNode) -> ProgramKey:
+def _key(node: RequestedNode) -> ProgramKey:
     name = _numbered(node.name) or node.name
     return ProgramKey(node.package, node.executable, node.plugin, name, node.namespace)
 
@@ -238,7 +238,7 @@ def _common(qualities: Sequence[tuple[int, ...]]) -> tuple[int, ...]:
     return tuple(values[0] if len(set(values)) == 1 else 0 for values in zip(*qualities, strict=True))
 
 
-def observation_of(node: AskedNode, run: str = "") -> Observation:
+def observation_of(node: RequestedNode, run: str = "") -> Observation:
     """Return what ``node`` was given, and the names that it asked for."""
     names = frozenset(_name(asked) for asked in node.endpoints if asked.rc in (0, 1))
     inputs = {**node.parameters, **arguments_as_inputs(node.arguments)}
@@ -246,5 +246,5 @@ def observation_of(node: AskedNode, run: str = "") -> Observation:
     return Observation(inputs, names, run, defaults)
 
 
-def _name(asked: Asked) -> Name:
+def _name(asked: RequestedEndpoint) -> Name:
     return Name(asked.kind, asked.name, asked.type)

@@ -10,10 +10,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from nodl.names import split_fqn
-from nodl.record.asked import Asked, AskedNode
+from nodl.record.requested import RequestedEndpoint, RequestedNode
 
 
-def with_readings(nodes: Sequence[AskedNode]) -> list[AskedNode]:
+def with_readings(nodes: Sequence[RequestedNode]) -> list[RequestedNode]:
     """Return ``nodes``, all of one program, whose endpoints have the likeliest name and the others as ``readings``."""
     found = [[_readings(asked, node) for asked in node.endpoints] for node in nodes]
     return [
@@ -27,11 +27,11 @@ def with_readings(nodes: Sequence[AskedNode]) -> list[AskedNode]:
     ]
 
 
-def _read_as(asked: Asked, readings: Sequence[str]) -> Asked:
+def _read_as(asked: RequestedEndpoint, readings: Sequence[str]) -> RequestedEndpoint:
     return asked._replace(name=readings[0], readings=tuple(readings[1:]))
 
 
-def _readings(asked: Asked, node: AskedNode) -> tuple[str, ...]:
+def _readings(asked: RequestedEndpoint, node: RequestedNode) -> tuple[str, ...]:
     """Return what the source may write, the likeliest first."""
     namespace, own_name = split_fqn(node.fqn)
     texts = set(_texts(node))
@@ -46,7 +46,7 @@ def _readings(asked: Asked, node: AskedNode) -> tuple[str, ...]:
     return (asked.name, below) if named_by_a_value else (below, asked.name)
 
 
-def _texts(node: AskedNode) -> Iterable[str]:
+def _texts(node: RequestedNode) -> Iterable[str]:
     """Yield the texts that the node could read."""
     for value in (*node.parameters.values(), *node.declared.values()):
         yield from (
@@ -57,8 +57,8 @@ def _texts(node: AskedNode) -> Iterable[str]:
 
 def _left(
     readings: tuple[str, ...],
-    node: AskedNode,
-    nodes: Sequence[AskedNode],
+    node: RequestedNode,
+    nodes: Sequence[RequestedNode],
     found: Sequence[Sequence[tuple[str, ...]]],
 ) -> tuple[str, ...]:
     """Return those of ``readings`` that also hold in another place, if one does."""

@@ -25,9 +25,9 @@ from nodl.library import Library, LibraryDocuments
 from nodl.lookup import ManifestLookup
 from nodl.names import split_fqn
 from nodl.node_interface import NodeInterface
-from nodl.record.asked import AskedNode, all_asked
 from nodl.record.assembly import read_record
 from nodl.record.checking import Comparison, Verdict, compare
+from nodl.record.requested import RequestedNode, all_requested
 from nodl.verb import PREFIX, add_verb
 
 _MOST_NODES = 32  # of one program: descriptions may refer to each other
@@ -54,7 +54,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 class Judgement(NamedTuple):
     """``described_by``: one of ``JUDGED``; ``comparison`` ``None``: it says nothing of the node."""
 
-    node: AskedNode
+    node: RequestedNode
     described_by: str
     comparison: Comparison | None
     why: str = ""
@@ -108,14 +108,14 @@ def _files(paths: Iterable[Path]) -> list[Path]:
     return [file for path in paths for file in (sorted(path.rglob("*.record")) if path.is_dir() else [path])]
 
 
-def _recorded(files: Iterable[Path]) -> tuple[list[AskedNode], list[str]]:
-    nodes: list[AskedNode] = []
+def _recorded(files: Iterable[Path]) -> tuple[list[RequestedNode], list[str]]:
+    nodes: list[RequestedNode] = []
     complaints: list[str] = []
     for file in files:
         record = read_record(file.read_bytes())
         nodes += [
             node._replace(distro=record.run.distro)
-            for node in all_asked(record.attributed())
+            for node in all_requested(record.attributed())
             if node.known_start and not node.container
         ]
         complaints += [f"{file}: {complaint.why}" for complaint in record.complaints]
@@ -130,19 +130,19 @@ class _Known(NamedTuple):
     folders: tuple[str, ...]
 
 
-def _judge(node: AskedNode, known: _Known, judges: Iterable[str]) -> Iterable[Judgement]:
+def _judge(node: RequestedNode, known: _Known, judges: Iterable[str]) -> Iterable[Judgement]:
     for judge in judges:
         interfaces, why = _SAYS[judge](node, known)
         described = _at_this_start(node, interfaces)
         yield Judgement(node, judge, compare(node, described) if described else None, why)
 
 
-def _described(node: AskedNode, known: _Known) -> tuple[Sequence[NodeInterface], str]:
+def _described(node: RequestedNode, known: _Known) -> tuple[Sequence[NodeInterface], str]:
     found = known.lookup.find(node.package, executable=node.executable or None, plugin=node.plugin or None)
     return found.found, f"no manifest; looked at {', '.join(found.searched)}"
 
 
-def _inferred(node: AskedNode, known: _Known) -> tuple[Sequence[NodeInterface], str]:
+def _inferred(node: RequestedNode, known: _Known) -> tuple[Sequence[NodeInterface], str]:
     inferred = infer_executable(
         node.package,
         node.executable or None,
@@ -157,7 +157,7 @@ def _inferred(node: AskedNode, known: _Known) -> tuple[Sequence[NodeInterface], 
 class _RecordedStart(NamedTuple):
     """What the launch decided about the recorded node (``nodl.infer.start.Start``)."""
 
-    node: AskedNode
+    node: RequestedNode
 
     def parameters(self, node: str | None) -> Mapping[str, object]:
         return self.node.parameters
@@ -177,12 +177,12 @@ def _sources(prefixes: tuple[str, ...], folders: tuple[str, ...]) -> SourcesInRe
     return SourcesInReach(prefixes, folders)
 
 
-def _of_library(node: AskedNode, known: _Known) -> tuple[Sequence[NodeInterface], str]:
+def _of_library(node: RequestedNode, known: _Known) -> tuple[Sequence[NodeInterface], str]:
     hit = Library().find(node.package, node.plugin or node.executable, distro=node.distro)
     return ((), "the library has no document of it") if hit is None else ((hit.document.interface,), "")
 
 
-def _at_this_start(node: AskedNode, interfaces: Iterable[NodeInterface]) -> list[NodeInterface]:
+def _at_this_start(node: RequestedNode, interfaces: Iterable[NodeInterface]) -> list[NodeInterface]:
     """Apply parameters and words of the launch to descriptions that depend on them, with the nodes they bring."""
     namespace, name = split_fqn(node.fqn)
     situation = Situation(node.distro, name, namespace, node.parameters, node.arguments)

@@ -16,7 +16,7 @@ from enclave_launch.recording.reasons import cause_of
 from keystore.verb import main as keystore_main
 from nodl.document import read_document
 from nodl.node_interface import EndpointKind
-from nodl.record.asked import Asked
+from nodl.record.requested import RequestedEndpoint
 from tests.recording.stand_in_launch import (
     LISTS,
     PACKAGE,
@@ -303,8 +303,8 @@ def test_harmless_lines_explain_nothing() -> None:
     assert cause_of(["process has died"]) is None
 
 
-def asked(kind: str, name: str, final: str = "/n") -> Asked:
-    return Asked(EndpointKind(kind), name, name, final, TYPES[kind], 1)
+def asked(kind: str, name: str, final: str = "/n") -> RequestedEndpoint:
+    return RequestedEndpoint(EndpointKind(kind), name, name, final, TYPES[kind], 1)
 
 
 @pytest.mark.parametrize("kind", sorted(LISTS))

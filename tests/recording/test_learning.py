@@ -22,8 +22,8 @@ from enclave_launch.plan import LaunchPlan
 from enclave_launch.policy.derivation import LIST_NAMES
 from nodl.document import read_document
 from nodl.name_template import NameTemplate, ParameterPart
-from nodl.record.asked import all_asked
 from nodl.record.assembly import Record, read_record
+from nodl.record.requested import all_requested
 from nodl.verb import main as secure_nodl
 from tests.programs import python_program
 from tests.recording.conftest import ROOT, rclpy_python
@@ -90,7 +90,7 @@ def test_nothing_of_the_record_is_lost(learnt: Learnt) -> None:
     record = record_of(learnt)
     assert record.complaints == []
     assert record.silent() == []
-    assert len(all_asked(record.attributed())) == 12
+    assert len(all_requested(record.attributed())) == 12
 
 
 def template(learnt: Learnt, file: str, place: int = 0) -> NameTemplate:

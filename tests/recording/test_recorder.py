@@ -13,17 +13,17 @@ import pytest
 from enclave_launch.errors import RuntimeFailure
 from enclave_launch.recording.build import recorder_library
 from enclave_launch.recording.programs import look_at_command
-from nodl.record.asked import Asked, AskedNode, all_asked
+from nodl.record.requested import RequestedEndpoint, RequestedNode, all_requested
 from tests.recording.conftest import Recorded, RunRecorded
 
 TALKER = "node talker\npublisher chatter std_msgs/msg/String\n"
 
 
-def nodes(recorded: Recorded) -> list[AskedNode]:
-    return all_asked(recorded.record.attributed())
+def nodes(recorded: Recorded) -> list[RequestedNode]:
+    return all_requested(recorded.record.attributed())
 
 
-def own(recorded: Recorded) -> list[Asked]:
+def own(recorded: Recorded) -> list[RequestedEndpoint]:
     return [asked for node in nodes(recorded) for asked in node.endpoints]
 
 

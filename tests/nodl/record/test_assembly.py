@@ -7,7 +7,6 @@ from typing import Any
 import yaml
 
 from nodl.node_interface import EndpointKind
-from nodl.record.asked import AskedNode, all_asked
 from nodl.record.assembly import Record
 from nodl.record.learning import learn
 from nodl.record.lines import (
@@ -21,6 +20,7 @@ from nodl.record.lines import (
     StartedProcess,
 )
 from nodl.record.manifest import manifest_text
+from nodl.record.requested import RequestedNode, all_requested
 
 CPP = "librclcpp.so"
 CONTAINER = StartedProcess(10, "box-1", "rclcpp_components", "component_container", "container", "/box")
@@ -41,8 +41,8 @@ def publisher(pid: int, number: int, name: str, fqn: str) -> EndpointMade:
     )
 
 
-def nodes(*lines: Line) -> list[AskedNode]:
-    return all_asked(Record([RecordedRun("r"), *lines]).attributed())
+def nodes(*lines: Line) -> list[RequestedNode]:
+    return all_requested(Record([RecordedRun("r"), *lines]).attributed())
 
 
 def test_a_node_behind_a_shell_belongs_to_the_process_of_the_launch() -> None:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from nodl.node_interface import ClientLibrary, EndpointKind
-from nodl.record.asked import Asked, AskedNode
 from nodl.record.learning import LearntEndpoint, learn_from
 from nodl.record.lines import RecordedRun
 from nodl.record.origins import Source
+from nodl.record.requested import RequestedEndpoint, RequestedNode
 from nodl.record.written import meant_name
 from nodl.remap import RemapRules
 
@@ -17,13 +17,13 @@ P = EndpointKind.PUBLISHER
 
 def node(
     fqn: str, *written: str, own_namespace: str = "", parameters: Mapping[str, object] | None = None
-) -> AskedNode:
+) -> RequestedNode:
     rules = RemapRules()
     namespace = fqn.rpartition("/")[0]
     finals = [each if each.startswith("/") else f"{namespace}/{each}" for each in written]
     names = [meant_name(P, each, final, fqn, rules).name for each, final in zip(written, finals, strict=True)]
     made = zip(written, names, finals, strict=True)
-    return AskedNode(
+    return RequestedNode(
         package="p",
         executable="x",
         plugin="",
@@ -33,7 +33,7 @@ def node(
         library=ClientLibrary.RCLPY,
         lifecycle=False,
         states=(),
-        endpoints=tuple(Asked(P, each, name, final, "m/msg/A", 0) for each, name, final in made),
+        endpoints=tuple(RequestedEndpoint(P, each, name, final, "m/msg/A", 0) for each, name, final in made),
         parameters=parameters or {},
         arguments=(),
         rules=rules,
@@ -42,13 +42,13 @@ def node(
     )
 
 
-def learnt(*nodes: AskedNode) -> list[LearntEndpoint]:
+def learnt(*nodes: RequestedNode) -> list[LearntEndpoint]:
     runs = [(RecordedRun(f"run{index}"), [each]) for index, each in enumerate(nodes)]
     (found,) = learn_from(runs).nodes
     return list(found.entries)
 
 
-def readings(*nodes: AskedNode) -> set[tuple[str, ...]]:
+def readings(*nodes: RequestedNode) -> set[tuple[str, ...]]:
     return {(entry.name, *entry.readings) for entry in learnt(*nodes)}
 
 

@@ -39,7 +39,7 @@ class EndpointRole(Enum):
     REPEATED = "rcl calls itself"
 
 
-class Asked(NamedTuple):
+class RequestedEndpoint(NamedTuple):
     """One endpoint that the program asked for.
 
     ``written`` as rcl got it, ``name`` as the source means it (``~/x`` for a name made from the node's own),
@@ -68,7 +68,7 @@ class Asked(NamedTuple):
         return self.rc == 0
 
 
-class AskedNode(NamedTuple):
+class RequestedNode(NamedTuple):
     """What one node asked for. ``name`` and ``namespace`` are the source's own, ``fqn`` the final name.
 
     ``parameters``, ``arguments`` and ``rules`` are those that the launch gave it; ``known_start``: whether a line of
@@ -85,7 +85,7 @@ class AskedNode(NamedTuple):
     library: ClientLibrary
     lifecycle: bool
     states: tuple[str, ...]
-    endpoints: tuple[Asked, ...]
+    endpoints: tuple[RequestedEndpoint, ...]
     parameters: Mapping[str, object]
     arguments: tuple[str, ...]
     rules: RemapRules
@@ -133,7 +133,7 @@ def _role_of_server(endpoint: EndpointMade) -> EndpointRole:
     return EndpointRole.LOGGER_SERVICE if last in LOGGER_SERVICES else EndpointRole.OWN
 
 
-def asked_by(process: RecordedProcess, node: RecordedNode) -> AskedNode:
+def requested_by(process: RecordedProcess, node: RecordedNode) -> RequestedNode:
     """Return what ``node`` asked for, with what the launch started there."""
     started, component = process.started, node.component
     rules = _rules(started, component)
@@ -142,7 +142,7 @@ def asked_by(process: RecordedProcess, node: RecordedNode) -> AskedNode:
     endpoints = tuple(_asked(node, roles, rules if started else None))
     package, executable, plugin = _program(process, started, component)
     origin = component or started
-    return AskedNode(
+    return RequestedNode(
         package=package,
         executable=executable,
         plugin=plugin,
@@ -166,7 +166,9 @@ def asked_by(process: RecordedProcess, node: RecordedNode) -> AskedNode:
     )
 
 
-def asked_endpoint(process: RecordedProcess, node: RecordedNode, endpoint: EndpointMade) -> Asked | None:
+def requested_endpoint(
+    process: RecordedProcess, node: RecordedNode, endpoint: EndpointMade
+) -> RequestedEndpoint | None:
     """Return ``endpoint`` of ``node`` by itself, as it comes in.
 
     Returns None for what is only a part of an action, or rcl's call of itself.
@@ -182,9 +184,11 @@ def asked_endpoint(process: RecordedProcess, node: RecordedNode, endpoint: Endpo
     return _own(endpoint, final, node.fqn or endpoint.fqn, rules, set())
 
 
-def all_asked(processes: Iterable[RecordedProcess]) -> list[AskedNode]:
+def all_requested(processes: Iterable[RecordedProcess]) -> list[RequestedNode]:
     """Return every node that could be made, in the order of the record."""
-    return [asked_by(process, node) for process in processes for node in process.nodes.values() if node.fqn]
+    return [
+        requested_by(process, node) for process in processes for node in process.nodes.values() if node.fqn
+    ]
 
 
 def _program(
@@ -204,7 +208,9 @@ def _rules(started: StartedProcess | None, component: LoadedComponent | None) ->
     return RemapRules(process=valid_rules(started.rules if started else ()))
 
 
-def _asked(node: RecordedNode, roles: list[EndpointRole], rules: RemapRules | None) -> Iterable[Asked]:
+def _asked(
+    node: RecordedNode, roles: list[EndpointRole], rules: RemapRules | None
+) -> Iterable[RequestedEndpoint]:
     introspected = {
         endpoint.final.removesuffix(_INTROSPECTION)
         for endpoint, role in zip(node.endpoints, roles, strict=True)
@@ -223,9 +229,9 @@ def _asked(node: RecordedNode, roles: list[EndpointRole], rules: RemapRules | No
 
 def _own(
     endpoint: EndpointMade, final: str, fqn: str, rules: RemapRules | None, introspected: set[str]
-) -> Asked:
+) -> RequestedEndpoint:
     meant = meant_name(endpoint.kind, endpoint.written, final, fqn, rules)
-    return Asked(
+    return RequestedEndpoint(
         endpoint.kind,
         endpoint.written,
         meant.name,

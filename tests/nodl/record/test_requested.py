@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from nodl.node_interface import EndpointKind
-from nodl.record.asked import EndpointRole, role_of
 from nodl.record.lines import EndpointMade
+from nodl.record.requested import EndpointRole, role_of
 from nodl.record.written import meant_name, private_name
 from nodl.remap import RemapRules, parse_rule
 
