@@ -14,7 +14,7 @@ from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.constructors import as_parameter, bind_parameters, is_written_back
 from nodl.infer.cpp.running.contents import copied, handed_over
 from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
-from nodl.infer.cpp.running.memory import MEMORY_DEPTH, CallOutcome
+from nodl.infer.cpp.running.memory import MEMORY_DEPTH, CallOutcome, Changes
 from nodl.infer.cpp.running.overloads import candidates, chosen
 from nodl.infer.cpp.running.unknown_calls import unknown_call
 from nodl.infer.cpp.running.values import Bound, Lambda, Obj, Unknown, Value, join, unknown
@@ -296,6 +296,7 @@ def invoke(
     given = (tuple(values), inner.bindings, inner.conditions, len(run.nodes))
     key = (function, this_object, inner.path)
     outcome = _outcome(run, key, given, inner.depth, lambda: _run_body(run, function, values, inner))
+    write_back(run, function.parameters, outcome.meanwhile, node, frame)
     write_back(run, function.parameters, outcome.parameters, node, frame)
     run.left = node.id if outcome.ends else None
     return outcome.returned
@@ -326,13 +327,20 @@ def _run_body(run: Machine, function: Function, values: Sequence[Value], inner: 
     inner.active, inner.mark = True, run.store.mark()
     run.active.append(function)
     bind_parameters(run, function, values, inner)
-    outcome = run.execute(function.body, inner) if function.body is not None else NEXT
+    written = [p.name for p in function.parameters if is_written_back(p)]
+    held: Changes = {}
+    outcome = NEXT
+    if function.body is not None and written:
+        outcome, held = run.store.held_during(partial(run.execute, function.body, inner))
+    elif function.body is not None:
+        outcome = run.execute(function.body, inner)
     run.settle(inner.mark, inner.exits, bool(outcome & NEXT))
     run.active.pop()
-    left = {p.name: run.store.get((inner, p.name)) for p in function.parameters if is_written_back(p)}
+    left = {name: run.store.get((inner, name)) for name in written}
+    meanwhile = {name: held[inner, name] for name in written if (inner, name) in held}
     ends = not outcome & NEXT and not inner.exits
     inner.active, inner.finished = False, not inner.captured
-    return CallOutcome(_as_returned(run, function, inner), left, ends)
+    return CallOutcome(_as_returned(run, function, inner), left, meanwhile, ends)
 
 
 def _as_returned(run: Machine, function: Function, inner: Frame) -> Value:
@@ -427,7 +435,7 @@ def write_back(
             continue
         if target.type == "call_expression" and not _is_element(target):
             continue
-        value = left[parameter.name]
+        value = left.get(parameter.name)
         if value is not None and value != run.evaluate(target, frame):
             assign(run, target, value, frame)
 

@@ -171,10 +171,12 @@ def _is_local(cell: Cell) -> bool:
 
 
 class CallOutcome(NamedTuple):
-    """``parameters``: what the function leaves in them; ``ends``: it never comes back."""
+    """``parameters``: what the function leaves in them, ``meanwhile`` what they held before, which an exception may
+    leave; ``ends``: it never comes back."""
 
     returned: Value
     parameters: dict[str, Value | None]
+    meanwhile: dict[str, Value]
     ends: bool = False
 
 

@@ -354,6 +354,10 @@ HALF_DONE = {
     "before a throw": ('if (rand()) { x = "b"; throw std::runtime_error("e"); }', ["a", "b"]),
     "before a call that may throw": ('x = "b"; risky(); x = "c";', ["a", "b", "c"]),
     "in a method that throws": ('Item i; i.t = "a"; try { i.set(); } catch (...) { } x = i.t;', ["a", "b"]),
+    "in a function that is given the variable and throws": ("set(x, rand());", ["a", "b"]),
+    "in a function that always throws": ("always(x);", ["a", "b"]),
+    "two calls further": ("further(x);", ["a", "b", "c"]),
+    "of a copy": ("copied(x);", ["a"]),
     "of an object made meanwhile": ('Item made; made.t = "b"; risky();', ["a"]),
 }
 
@@ -364,6 +368,9 @@ def test_a_catch_finds_what_was_written_before_the_exception(
 ) -> None:
     before = (
         'void risky();\nstruct Item { std::string t; void set() { if (rand()) { t = "b"; throw 1; } } };\n'
+        'void set(std::string & s, int n) { if (n) { s = "b"; throw 1; } }\n'
+        'void always(std::string & s) { s = "b"; throw 1; }\nvoid copied(std::string s) { s = "b"; throw 1; }\n'
+        'void further(std::string & s) { set(s, rand()); s = "c"; risky(); }\n'
     )
     program = f'std::string x = "a"; try {{ {body} }} catch (...) {{ }} {PUB}(x, 1);'
     assert names(infer(tmp_path, in_class(program, before=before))) == made

@@ -33,7 +33,7 @@ class Called:
         self.runs += 1
         found = (*(self.store.get(("object", "topic")) or ()), *literal(self.notes["default"]))
         self.store.set(("object", "name"), found)
-        return CallOutcome(found, {}), 1
+        return CallOutcome(found, {}, {}), 1
 
 
 def test_a_call_that_finds_everything_as_it_was_is_not_run_again_and_writes_what_it_wrote() -> None:
