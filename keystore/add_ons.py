@@ -36,7 +36,7 @@ class FileDifference(NamedTuple):
 class ZenohFiles(NamedTuple):
     """The functions of the add-on.
 
-    ``follow`` writes the files anew after a change and returns what to report; ``check`` is its part of ``verify``;
+    ``follow`` writes the files again after a change and returns what to report; ``check`` is its part of ``verify``;
     ``sign`` answers a request in the signing process; ``enforced`` reads what the router's file lets each enclave do;
     ``compare`` lists the differences of two keystores. All but ``sign`` need a keystore with a router's file.
     """

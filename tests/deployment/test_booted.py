@@ -16,7 +16,7 @@ from keystore.steps.host_bundles import pinned
 from keystore.steps.removal import RemoveOptions, remove
 from keystore.steps.renewal import RenewOptions, renew
 from keystore.steps.rollover import Step, roll_over
-from tests.deployment.booted import NotPermitted, booted
+from tests.deployment.booted import booted
 from tests.deployment.robot import KS, Host, node, robot, until, up
 from tests.keystore.kit import options
 
@@ -39,11 +39,8 @@ def host(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Host]:
     for parent in (folder, *folder.parents[:2]):
         os.chmod(parent, 0o755)  # services have users of their own
     (folder / "shared").mkdir()
-    try:
-        with booted(folder / "root", folder / "shared") as machine:
-            yield Host(machine, folder / "shared")
-    except NotPermitted as missing:
-        pytest.skip(f"this machine cannot boot systemd in namespaces: {missing}")
+    with booted(folder / "root", folder / "shared") as machine:
+        yield Host(machine, folder / "shared")
 
 
 @pytest.fixture(scope="module")
