@@ -1,20 +1,18 @@
-"""Programs from their entries to their nodes: kept answers where nothing has changed, else in parallel."""
+"""Programs from their entries to their nodes: cached answers where nothing has changed, else new ones."""
 
 from __future__ import annotations
 
 import gc
 import re
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from functools import partial
 from typing import TypeAlias
 
 from enclave_common.files import text_or_nothing
 from nodl.infer.cpp.cache.answers import Answers, Made
 from nodl.infer.cpp.cache.folder import digest_of
 from nodl.infer.cpp.entry import CppSupportMissing, Entry, Solved, failure
-from nodl.infer.cpp.parallel import each_in_parallel
 from nodl.infer.cpp.program import Sources, run_program
 from nodl.infer.cpp.reading.declarations import FileIndex, FunctionParameter
 from nodl.infer.cpp.results import depends_on_start, interfaces_of, program_gaps
@@ -80,39 +78,25 @@ def _garbage_at_the_end() -> Iterator[None]:
 
 
 def solve_all(sources: Sources, answers: Answers, programs: Sequence[Program]) -> list[Made]:
-    """Solve each of ``programs``: from earlier runs if nothing has changed, the others in parallel."""
-    found = {each: answers.find(("program", *each)) for each in programs}
-    groups = _groups([each for each, made in found.items() if made is None])
-    for group, fresh in zip(groups, each_in_parallel(partial(_solve_group, sources), groups), strict=True):
-        for program, answer in zip(group, fresh, strict=True):
-            answers.keep(("program", *program), answer)
-            found[program] = answer
-    return [made for each in programs if (made := found[each]) is not None]
-
-
-def _groups(programs: Sequence[Program]) -> list[list[Program]]:
-    """Group each program alone, but behind a component the executables that may do nothing but make it."""
-    groups = {each: [each] for each in programs}
+    """Solve each of ``programs``: from earlier runs if nothing has changed; one that only makes a component as that."""
+    found: dict[Program, Made] = {}
     components = [each for each in programs if each[1].cls]
-    for each in programs:
-        made = next((first for first in components if may_only_make(each[1], first[1])), None)
-        if made is not None:
-            groups[made] += groups.pop(each)
-    return list(groups.values())
+    for each in sorted(programs, key=lambda program: not program[1].cls):
+        known = answers.find(("program", *each))
+        if known is None:
+            known = _as_component(each, components, found, sources) or solve(sources, *each)
+            answers.keep(("program", *each), known)
+        found[each] = known
+    return [found[each] for each in programs]
 
 
-def _solve_group(sources: Sources, group: Sequence[Program]) -> list[Made]:
-    first, *others = group
-    answer = solve(sources, *first)
-    return [
-        answer,
-        *(
-            _under(key, answer, sources, entry)
-            if only_makes(entry, first[1], sources)
-            else solve(sources, key, entry)
-            for key, entry in others
-        ),
-    ]
+def _as_component(
+    program: Program, components: Iterable[Program], found: Mapping[Program, Made], sources: Sources
+) -> Made | None:
+    """Return the answer of the component that ``program`` makes and nothing else; ``None`` if it is not so."""
+    key, entry = program
+    made = next((each for each in components if only_makes(entry, each[1], sources)), None)
+    return _under(key, found[made], sources, entry) if made is not None else None
 
 
 def _under(key: LaunchKey, component: Made, sources: Sources, executable: Entry) -> Made:
@@ -136,12 +120,6 @@ _MAIN = re.compile(
 _DEFAULTS = ("rclcpp::NodeOptions()", "NodeOptions()", "{}")
 
 
-def may_only_make(executable: Entry, component: Entry) -> bool:
-    """Return whether it is worth to evaluate ``only_makes``."""
-    file = _main_beside(executable, component)
-    return file is not None and f"<{component.cls}>" in text_or_nothing(file)
-
-
 def _main_beside(executable: Entry, component: Entry) -> str | None:
     """Return the one source that the executable has beside those of the component; ``None`` if that is not all."""
     own = [file for file in executable.files if file not in component.files]
@@ -153,7 +131,9 @@ def _main_beside(executable: Entry, component: Entry) -> str | None:
 def only_makes(executable: Entry, component: Entry, sources: Sources) -> bool:
     """Return whether ``executable`` makes ``component``, as a container would, and nothing else."""
     file, symbols = _main_beside(executable, component), dict(component.symbols)
-    index = sources.index(file, symbols, component.complete) if file is not None else None
+    if file is None or f"<{component.cls}>" not in text_or_nothing(file):
+        return False
+    index = sources.index(file, symbols, component.complete)
     made = _made(index) if index is not None else None
     if index is None or made is None or made["component"] != component.cls:
         return False

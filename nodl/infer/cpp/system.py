@@ -55,48 +55,37 @@ def _infer(files: Sequence[str], sources: Sources, answers: Answers) -> Made:
     """Infer the programs of all files: those that are built, loose ones, then the nodes that nobody makes."""
     workspace, read = sources.workspace, dict[str, str]()
     found: list[Solved] = []
+    made: set[str] = set()
     lasting = True
 
-    def solved(listed: Sequence[tuple[LaunchKey, Entry]]) -> list[Solved]:
+    def solved(search: Callable[[], Iterable[tuple[LaunchKey, Entry]]]) -> list[tuple[Entry, Solved]]:
         nonlocal lasting
-        made = solve_all(sources, answers, listed)
-        for each in made:
+        try:
+            listed = tuple(search())
+        except CppSupportMissing:
+            raise
+        except Exception as error:
+            lasting, why = False, failure("the search for C++ programs", error)
+            found.append(Solved(gaps=(Gap(SourceRef(files[0]), why),)))
+            return []
+        answered = solve_all(sources, answers, listed)
+        for each in answered:
             read.update(each.files)
             lasting = lasting and each.lasting
-        return [each.answer for each in made]
+        return [(entry, each.answer) for (_, entry), each in zip(listed, answered, strict=True)]
 
-    def listed(
-        name: str, programs: Callable[[], Iterable[tuple[LaunchKey, Entry]]]
-    ) -> tuple[tuple[LaunchKey, Entry], ...]:
-        question = (name, tuple(files), tuple(sorted(made)))
-        kept = answers.find(question)
-        if kept is None:
-            try:
-                answer = tuple(programs())
-            except CppSupportMissing:
-                raise
-            except Exception as error:
-                nonlocal lasting
-                lasting, why = False, failure("the search for C++ programs", error)
-                found.append(Solved(gaps=(Gap(SourceRef(files[0]), why),)))
-                return ()
-            kept = Made(answer, dict(sources.digests))
-            answers.keep(question, kept)
-        read.update(kept.files)
-        programs_listed: tuple[tuple[LaunchKey, Entry], ...] = kept.answer
-        return programs_listed
-
-    made: set[str] = set()
-    found += solved(listed("programs", lambda: programs(workspace, sources, set(files))))
-    made.update(name for each in found for name in each.classes)
-    found += solved(listed("loose", lambda: _left_over(workspace, sources, files)))
-    made.update(name for each in found for name in each.classes)
-    unmade = listed("unmade", lambda: _unmade(workspace, sources, files, made))
-    for (_, entry), each in zip(unmade, solved(unmade), strict=True):
+    for search in (
+        lambda: programs(workspace, sources, set(files)),
+        lambda: _left_over(workspace, sources, files),
+    ):
+        for _, each in solved(search):
+            found.append(each)
+            made.update(each.classes)
+    for entry, each in solved(lambda: _unmade(workspace, sources, files, set(made))):
         if entry.cls not in made and not made.issuperset(each.classes):
             made.update(each.classes)
             found.append(each)
-    return Made(tuple(found), read, lasting)
+    return Made(tuple(found), {**sources.digests, **read}, lasting)
 
 
 def workspace_of(files: Iterable[str], prefixes: Sequence[str] = ()) -> Workspace:
