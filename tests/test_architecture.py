@@ -161,18 +161,6 @@ def test_each_room_stands_on_the_rooms_below_it(package: str) -> None:
 # Rooms whose modules do not need each other in a circle, not even for the type checker.
 WITHOUT_CIRCLES = ("description", "evaluation", "frontend", "host", "ros_rules")
 
-# The one circle that is left: evaluating C++ is recursive (a call constructs, a constructor assigns, an assignment
-# calls an operator), and these modules are its parts by subject.
-_CPP = "nodl.infer.cpp.running"
-EVALUATOR = {
-    f"{_CPP}.{name}"
-    for name in (
-        "assignments", "constructors", "hiding", "invocation", "objects", "operators", "standard", "unknown_calls",
-        "variables",
-    )
-}  # fmt: skip
-
-
 def imports_between(files: list[Path], named: Callable[[Path], Iterator[str]]) -> dict[str, set[str]]:
     known = {
         ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path
@@ -193,8 +181,6 @@ def test_the_rooms_of_evaluation_have_no_circle_of_imports() -> None:
 def test_no_modules_import_each_other_in_a_circle_not_even_inside_of_functions() -> None:
     files = [path for package in PACKAGES for path in sources(package)]
     graph = imports_between(files, _modules_imported_by)
-    for name in EVALUATOR:
-        graph[name] -= EVALUATOR
     TopologicalSorter(graph).prepare()
 
 

@@ -22,11 +22,13 @@ from nodl.infer.cpp.reading.parameter_library import listener_of
 from nodl.infer.cpp.reading.preprocess import Preprocessed, preprocess
 from nodl.infer.cpp.reading.project import SourcePackage, Workspace, sources_of
 from nodl.infer.cpp.reading.type_names import Type
-from nodl.infer.cpp.running import calls, expressions, loops, operators, statements  # noqa: F401 (how each runs)
+from nodl.infer.cpp.running import calls, expressions, invocation, loops, operators, statements  # noqa: F401 (how each runs)
 from nodl.infer.cpp.running.callbacks import run_callbacks
 from nodl.infer.cpp.running.constructors import construct
+from nodl.infer.cpp.running.invocation import invoke
 from nodl.infer.cpp.running.machine import Frame, Machine, StepLimitExceeded
 from nodl.infer.cpp.running.values import Seq, Value, unknown
+from nodl.infer.cpp.running.variables import constant
 from nodl.infer.cpp.syntax import line_of
 from nodl.infer.start import Start
 from nodl.source_ref import SourceRef
@@ -172,7 +174,7 @@ def run_program(sources: Sources, entry: Entry, start: Start | None) -> ProgramF
     names.depends = frozenset().union(
         *(p.depends for i in files if (p := sources.workspace.package_of(i.file)) is not None)
     )
-    run = Machine(names, start)
+    run = Machine(names, start, invocation)
     try:
         _start(run, entry)
         run_callbacks(run)
@@ -214,8 +216,6 @@ def _start(run: Machine, entry: Entry) -> None:
 
 def _globals(run: Machine, entry: Entry) -> None:
     """Make variables outside of functions, as happens before main."""
-    from nodl.infer.cpp.running.variables import constant
-
     for file in entry.files:
         index = run.names.files.get(file)
         listed = (each for found in index.globals.values() for each in found) if index is not None else ()
@@ -240,8 +240,6 @@ def _check_order(run: Machine, initialised: Global, mark: int) -> None:
 
 
 def _run_main(run: Machine, function: Function) -> None:
-    from nodl.infer.cpp.running.invocation import invoke
-
     words: Value = (Seq((unknown(ARGUMENT),), open=True),)
     arguments = [unknown("the number of arguments"), words][: len(function.parameters)]
     invoke(run, function, None, arguments, function.node, Frame(function.file, function.scope), ())

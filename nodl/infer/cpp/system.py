@@ -11,7 +11,9 @@ from pathlib import Path
 
 from nodl.infer.cpp.cache.answers import Answers, Made, WatchedStart
 from nodl.infer.cpp.entry import Answer, CppSupportMissing, Entry, Solved, failure
+from nodl.infer.cpp.libraries import NODE_BASES
 from nodl.infer.cpp.program import Sources, registered_components, target_entry
+from nodl.infer.cpp.reading.names import Names
 from nodl.infer.cpp.reading.project import SourcePackage, Workspace, find_packages
 from nodl.infer.cpp.solved import solve, solve_all
 from nodl.infer.cpp.syntax import check_support
@@ -216,9 +218,6 @@ def _left_over(
 def _unmade(
     workspace: Workspace, sources: Sources, files: Sequence[str], made: set[str]
 ) -> Iterable[tuple[LaunchKey, Entry]]:
-    from nodl.infer.cpp.libraries import NODE_BASES
-    from nodl.infer.cpp.reading.names import Names
-
     indexes = [
         i for f in files if not _is_test(f, workspace) and (i := sources.index(f, {}, False)) is not None
     ]

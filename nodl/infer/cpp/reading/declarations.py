@@ -32,6 +32,12 @@ class FunctionParameter:
     type: str
     default: Node | None = None
 
+    @property
+    def written_back(self) -> bool:
+        """Whether what a function writes to the parameter shows in its caller."""
+        marked = self.type.rstrip().endswith(("&", "*"))
+        return marked and "const" not in self.type.split() and bool(self.name)
+
 
 @dataclass(eq=False, slots=True)
 class Function:

@@ -7,9 +7,13 @@ from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
 from nodl.infer.cpp.running.values import (
+    END,
     MAX_LETTERS,
     NPOS,
+    Bound,
     Const,
+    Group,
+    Obj,
     Param,
     Text,
     Unknown,
@@ -17,6 +21,7 @@ from nodl.infer.cpp.running.values import (
     concatenated,
     join,
     literal,
+    number_of,
     plain,
     unknown,
 )
@@ -70,6 +75,38 @@ def arithmetic(operator: str, left: object, right: object) -> Value:
     if isinstance(found, int) and not isinstance(found, bool) and not _INT[0] <= found <= _INT[1]:
         return unknown("a number that is too large for an int")
     return (found,)
+
+
+def computed(operator: str, left: object, right: object) -> Value:
+    """Compute a comparison or arithmetic on two alternatives, enumerators by their number; unknown if undecided."""
+    if operator in ("==", "!="):
+        same = _same(left, right)
+        return unknown("a comparison") if same is None else (same == (operator == "=="),)
+    left, right = number_of(left), number_of(right)
+    return arithmetic(operator, left, right)
+
+
+def _same(left: object, right: object) -> bool | None:
+    if isinstance(left, int | float) and isinstance(right, int | float):
+        return left == right
+    first, second = plain(left), plain(right)
+    if first is not None and second is not None:
+        return first == second
+    if isinstance(left, Const) and isinstance(right, Const) and not {END, NPOS} & {left, right}:
+        return left == right if None in (left.number, right.number) else left.number == right.number
+    if (
+        Const in (type(left), type(right))
+        and isinstance(number_of(left), int)
+        and isinstance(number_of(right), int)
+    ):
+        return number_of(left) == number_of(right)
+    if isinstance(left, Const) and isinstance(right, Const):
+        return left == right
+    if END in (left, right) and isinstance(left if right == END else right, Obj | Group | Text | Bound):
+        return False  # an element that was found
+    if NPOS in (left, right) and isinstance(left if right == NPOS else right, int):
+        return False
+    return None
 
 
 def added(left: Value, right: Value) -> Value:

@@ -5,12 +5,21 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+from nodl.infer.cpp.libraries import LIBRARY_METHODS, Call
 from nodl.infer.cpp.reading.declarations import Class
-from nodl.infer.cpp.running.arithmetic import added, as_type
+from nodl.infer.cpp.running.arithmetic import added, as_type, computed
+from nodl.infer.cpp.running.constructors import in_braces
 from nodl.infer.cpp.running.contents import copied, elements_copied, overwrite
-from nodl.infer.cpp.running.hiding import seen_class, seen_type
 from nodl.infer.cpp.running.machine import Frame, Machine, expression
 from nodl.infer.cpp.running.references import is_plain, through, told
+from nodl.infer.cpp.running.static_types import (
+    current_object,
+    declared_type,
+    is_pointer,
+    seen_class,
+    seen_type,
+    static_by_name,
+)
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     Group,
@@ -22,18 +31,13 @@ from nodl.infer.cpp.running.values import (
     Unknown,
     Value,
     as_one_map,
+    has_text,
     join,
     open_sequence,
     plain,
     unknown,
 )
-from nodl.infer.cpp.running.variables import (
-    current_object,
-    declared_type,
-    is_pointer,
-    static_by_name,
-    static_member,
-)
+from nodl.infer.cpp.running.variables import static_member
 from nodl.infer.cpp.syntax import Node, children, field_of, text, unwrapped
 from nodl.name_template import UnknownPart
 
@@ -41,9 +45,6 @@ from nodl.name_template import UnknownPart
 @expression("assignment_expression")
 def assignment(run: Machine, node: Node, frame: Frame) -> Value:
     """Writes to the left side and gives what was written, before a number took the type of that side."""
-    from nodl.infer.cpp.running.objects import in_braces
-    from nodl.infer.cpp.running.operators import has_text
-
     left, operator = field_of(node, "left"), text(field_of(node, "operator"))
     right = field_of(node, "right")
     if left is None:
@@ -95,12 +96,10 @@ def _assigned(run: Machine, targets: Sequence[Obj], value: Value, node: Node, fr
     """Run ``object = value``, by the operator of its class, else member by member; return whether that
     could be done.
     """
-    from nodl.infer.cpp.running.invocation import call_methods
-
     for target in targets:
         own = run.names.find_methods(target.cls, "operator=")
         if own:
-            call_methods(run, own, target, [value], node, frame, ())
+            run.calls.call_methods(run, own, target, [value], node, frame, ())
         elif all(isinstance(atom, Obj) and atom.cls is not None for atom in value):
             overwrite(run, targets, value)
             break
@@ -122,8 +121,6 @@ def object_class(run: Machine, left: Node, frame: Frame) -> Class | None:
 
 
 def _combined(operator: str, before: Value, value: Value) -> Value:
-    from nodl.infer.cpp.running.operators import computed
-
     if len(before) == 1 and len(value) == 1:
         return computed(operator, before[0], value[0])
     return unknown("a computed value")
@@ -164,8 +161,6 @@ def assign(run: Machine, target: Node, value: Value, frame: Frame) -> None:
 
 def _assign_result(run: Machine, call: Node, value: Value, frame: Frame) -> None:
     """Run ``f() = x``: an option or element of a known library; else what is written is not known."""
-    from nodl.infer.cpp.libraries import LIBRARY_METHODS, Call
-
     function = field_of(call, "function")
     if text(function) in ("std::tie", "tie"):
         for index, each in enumerate(children(field_of(call, "arguments"))):

@@ -12,8 +12,7 @@ from nodl.infer.cpp.libraries import LIBRARY_CLASSES, LIBRARY_FUNCTIONS, NODE_BA
 from nodl.infer.cpp.reading.names import STANDARD_TYPES
 from nodl.infer.cpp.reading.type_names import NO_TYPE
 from nodl.infer.cpp.running.assignments import assign
-from nodl.infer.cpp.running.constructors import construct
-from nodl.infer.cpp.running.hiding import class_around
+from nodl.infer.cpp.running.constructors import cast, construct, is_plain_type, made
 from nodl.infer.cpp.running.invocation import CallSite, call_functions, call_values
 from nodl.infer.cpp.running.machine import Frame, Machine, expression
 from nodl.infer.cpp.running.method_calls import (
@@ -24,12 +23,12 @@ from nodl.infer.cpp.running.method_calls import (
     on_object,
     only_declared,
 )
-from nodl.infer.cpp.running.objects import cast, is_plain_type, made
 from nodl.infer.cpp.running.references import is_plain, keep_references
 from nodl.infer.cpp.running.standard import CASTS, STANDARD, as_algorithm, may_write, writes_elements
+from nodl.infer.cpp.running.static_types import class_around, current_object
 from nodl.infer.cpp.running.unknown_calls import changed_by_standard, unknown_call
 from nodl.infer.cpp.running.values import BOTTOM, Bound, Lambda, Obj, Value, join, unknown
-from nodl.infer.cpp.running.variables import current_object, member, variable
+from nodl.infer.cpp.running.variables import member, variable
 from nodl.infer.cpp.syntax import Node, callee_name, field_of, text, unwrapped
 
 _NAMES = frozenset({

@@ -6,14 +6,14 @@ import re
 
 from nodl.infer.cpp.running.arithmetic import CHANGES_TEXT, added, asked_of_text, changed_text
 from nodl.infer.cpp.running.assignments import assign, with_entry
-from nodl.infer.cpp.running.constructors import construct
+from nodl.infer.cpp.running.constructors import ORDERED, SETS, as_set, construct, made
 from nodl.infer.cpp.running.contents import copied, handed_over, items_of
 from nodl.infer.cpp.running.invocation import CallSite
 from nodl.infer.cpp.running.launch_values import settled_text
 from nodl.infer.cpp.running.machine import Machine
-from nodl.infer.cpp.running.objects import ORDERED, SETS, as_set, made
 from nodl.infer.cpp.running.operators import element
 from nodl.infer.cpp.running.standard import called_now
+from nodl.infer.cpp.running.static_types import declared_type
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     END,
@@ -30,7 +30,6 @@ from nodl.infer.cpp.running.values import (
     plain,
     unknown,
 )
-from nodl.infer.cpp.running.variables import declared_type
 from nodl.infer.cpp.syntax import children, text
 
 

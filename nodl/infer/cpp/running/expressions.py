@@ -6,12 +6,20 @@ import re
 from contextlib import suppress
 
 from nodl.infer.cpp.running.arithmetic import SIZES
-from nodl.infer.cpp.running.constructors import construct
+from nodl.infer.cpp.running.constructors import as_map, cast, construct, made
 from nodl.infer.cpp.running.machine import Frame, Machine, expression
-from nodl.infer.cpp.running.objects import as_map, cast, made
-from nodl.infer.cpp.running.operators import has_text
 from nodl.infer.cpp.running.references import keep_references
-from nodl.infer.cpp.running.values import BOTTOM, Group, Lambda, Seq, Value, concatenated, literal, unknown
+from nodl.infer.cpp.running.values import (
+    BOTTOM,
+    Group,
+    Lambda,
+    Seq,
+    Value,
+    concatenated,
+    has_text,
+    literal,
+    unknown,
+)
 from nodl.infer.cpp.running.variables import variable
 from nodl.infer.cpp.syntax import Node, children, field_of, text, unwrapped, walk
 

@@ -11,14 +11,14 @@ from nodl.infer.cpp.libraries import NODE_METHODS, Call
 from nodl.infer.cpp.reading.declarations import Function, FunctionParameter, parameters_of, type_text
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.assignments import assign
-from nodl.infer.cpp.running.constructors import as_parameter, bind_parameters, is_written_back
+from nodl.infer.cpp.running.constructors import as_parameter, bind_parameters
 from nodl.infer.cpp.running.contents import copied, handed_over
 from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
 from nodl.infer.cpp.running.memory import MEMORY_DEPTH, CallOutcome, Changes
 from nodl.infer.cpp.running.overloads import candidates, chosen
+from nodl.infer.cpp.running.static_types import declared_type
 from nodl.infer.cpp.running.unknown_calls import unknown_call
 from nodl.infer.cpp.running.values import Bound, Lambda, Obj, Unknown, Value, join, unknown
-from nodl.infer.cpp.running.variables import declared_type
 from nodl.infer.cpp.syntax import Node, children, field_of, template_arguments, text, unwrapped
 
 
@@ -151,7 +151,7 @@ def call_lambda(run: Machine, atom: Lambda, values: Sequence[Value], node: Node,
     run.settle(inner.mark, inner.exits, bool(outcome & NEXT))
     inner.active = False
     given = parameters_of(declarator) if declarator is not None else []
-    left = {p.name: run.store.get((inner, p.name)) for p in given if is_written_back(p)}
+    left = {p.name: run.store.get((inner, p.name)) for p in given if p.written_back}
     if left and len(children(field_of(node, "arguments"))) == len(values):
         write_back(run, given, left, node, frame)
     return inner.returned
@@ -327,7 +327,7 @@ def _run_body(run: Machine, function: Function, values: Sequence[Value], inner: 
     inner.active, inner.mark = True, run.store.mark()
     run.active.append(function)
     bind_parameters(run, function, values, inner)
-    written = [p.name for p in function.parameters if is_written_back(p)]
+    written = [p.name for p in function.parameters if p.written_back]
     held: Changes = {}
     outcome = NEXT
     if function.body is not None and written:
@@ -425,7 +425,7 @@ def write_back(
     """Write what a function does to its reference parameters to the caller's variables."""
     given = children(field_of(node, "arguments"))
     for parameter, argument in zip(parameters, given, strict=False):
-        if not is_written_back(parameter):
+        if not parameter.written_back:
             continue
         target = unwrapped(argument)
         if target is not None and target.type == "pointer_expression":

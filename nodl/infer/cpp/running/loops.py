@@ -8,10 +8,10 @@ from functools import partial
 from nodl.infer.cpp.reading.declarations import type_text
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.contents import copied, iterated
-from nodl.infer.cpp.running.hiding import element_type, seen_type
 from nodl.infer.cpp.running.machine import CONTINUE, NEXT, RETURN, Frame, Loop, Machine, statement
 from nodl.infer.cpp.running.references import elements_written
 from nodl.infer.cpp.running.statements import bind_names, condition_value, in_a_block
+from nodl.infer.cpp.running.static_types import element_type, seen_type
 from nodl.infer.cpp.running.values import Value, join, unknown
 from nodl.infer.cpp.syntax import Node, children, field_of, text, unwrapped, walk
 

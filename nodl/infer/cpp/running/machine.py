@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from nodl.infer.cpp.findings import AllocatedNode, Condition, Follows, PossibleEndpoint
 from nodl.infer.cpp.ledger import CREATES, leads_to_interfaces
@@ -77,14 +77,31 @@ def expression(*kinds: str) -> Callable[[ExpressionHandler], ExpressionHandler]:
     return registered(EXPRESSIONS, kinds)
 
 
+class Calls(Protocol):
+    """How functions, closures and methods are called: ``invocation``, for what it stands on itself."""
+
+    def call_values(
+        self, run: Machine, callee: Value, values: Sequence[Value], node: Node, frame: Frame
+    ) -> Value: ...
+
+    def call_lambda(
+        self, run: Machine, atom: Lambda, values: Sequence[Value], node: Node, frame: Frame
+    ) -> Value: ...
+
+    def call_methods(
+        self, run: Machine, methods: Sequence[Function], this_object: Obj | None, values: Sequence[Value], node: Node,
+        frame: Frame, types: Sequence[Type],
+    ) -> Value: ...  # fmt: skip
+
+
 class Machine:
     """The state of one run and what it found: nodes, gaps, dead code, the parameters that decided.
 
     ``start``: ``None`` when there is no launch.
     """
 
-    def __init__(self, names: Names, start: Start | None):
-        self.names, self.start = names, start
+    def __init__(self, names: Names, start: Start | None, calls: Calls):
+        self.names, self.start, self.calls = names, start, calls
         self.store = AbstractStore(self.count)
         self.memory = Memory(self.store)
         self.size = Notes(self.store.log)  # how many nodes and classes the program has, so far

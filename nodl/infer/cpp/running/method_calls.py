@@ -9,12 +9,12 @@ from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.constructors import construct
 from nodl.infer.cpp.running.containers import CONTAINER_METHODS, container_call, is_standard
 from nodl.infer.cpp.running.contents import handed_over
-from nodl.infer.cpp.running.hiding import GIVES_INNER, class_around, class_of_member
 from nodl.infer.cpp.running.invocation import CallSite, call_values, pointed_to
 from nodl.infer.cpp.running.machine import Frame, Machine
+from nodl.infer.cpp.running.static_types import GIVES_INNER, class_around, class_of_member, declared_type
 from nodl.infer.cpp.running.unknown_calls import unknown_call, without_source
 from nodl.infer.cpp.running.values import BOTTOM, Bound, Lambda, Obj, Unknown, Value, join, unknown
-from nodl.infer.cpp.running.variables import declared_type, member
+from nodl.infer.cpp.running.variables import member
 from nodl.infer.cpp.syntax import Node, callee_name, field_of, text, unwrapped
 
 

@@ -6,20 +6,17 @@ import re
 from dataclasses import replace
 
 from nodl.infer.cpp.reading.type_names import Type
-from nodl.infer.cpp.running.arithmetic import added, arithmetic
+from nodl.infer.cpp.running.arithmetic import added, computed
 from nodl.infer.cpp.running.assignments import assign
+from nodl.infer.cpp.running.constructors import default_value
 from nodl.infer.cpp.running.contents import items_of
-from nodl.infer.cpp.running.hiding import class_of_member, seen_type
 from nodl.infer.cpp.running.invocation import by_operator, pointed_to
 from nodl.infer.cpp.running.launch_values import settled_text, text_of
 from nodl.infer.cpp.running.machine import NEXT, Frame, Machine, expression
-from nodl.infer.cpp.running.objects import default_value
+from nodl.infer.cpp.running.static_types import class_of_member, current_object, seen_type
 from nodl.infer.cpp.running.values import (
     BOTTOM,
-    END,
-    NPOS,
     Bound,
-    Const,
     Group,
     Map,
     Obj,
@@ -30,13 +27,15 @@ from nodl.infer.cpp.running.values import (
     Value,
     as_one_map,
     concatenated,
+    has_text,
     join,
     literal,
+    number_of,
     plain,
     truth,
     unknown,
 )
-from nodl.infer.cpp.running.variables import current_object, member
+from nodl.infer.cpp.running.variables import member
 from nodl.infer.cpp.syntax import Node, children, field_of, text
 
 
@@ -87,11 +86,6 @@ def binary(run: Machine, node: Node, frame: Frame) -> Value:
     return unknown(f"the value of {text(node)[:60]}")
 
 
-def has_text(value: Value) -> bool:
-    """Return whether one of the alternatives is a text or a parameter."""
-    return any(isinstance(atom, Text | Param) for atom in value)
-
-
 def _logical(run: Machine, either: bool, left: Value, right_node: Node | None, frame: Frame) -> Value:
     known = truth(left)
     if known is either and known is not None:
@@ -110,43 +104,6 @@ def _logical(run: Machine, either: bool, left: Value, right_node: Node | None, f
     run.branches([second, lambda: NEXT])
     right = truth(found[0])
     return (either,) if right is either else unknown("a condition")
-
-
-def computed(operator: str, left: object, right: object) -> Value:
-    """Compute a comparison or arithmetic on two alternatives, enumerators by their number; unknown if undecided."""
-    if operator in ("==", "!="):
-        same = _same(left, right)
-        return unknown("a comparison") if same is None else (same == (operator == "=="),)
-    left, right = number_of(left), number_of(right)
-    return arithmetic(operator, left, right)
-
-
-def number_of(atom: object) -> object:
-    """Return an enumerator as its number."""
-    return atom.number if isinstance(atom, Const) and atom.number is not None else atom
-
-
-def _same(left: object, right: object) -> bool | None:
-    if isinstance(left, int | float) and isinstance(right, int | float):
-        return left == right
-    first, second = plain(left), plain(right)
-    if first is not None and second is not None:
-        return first == second
-    if isinstance(left, Const) and isinstance(right, Const) and not {END, NPOS} & {left, right}:
-        return left == right if None in (left.number, right.number) else left.number == right.number
-    if (
-        Const in (type(left), type(right))
-        and isinstance(number_of(left), int)
-        and isinstance(number_of(right), int)
-    ):
-        return number_of(left) == number_of(right)
-    if isinstance(left, Const) and isinstance(right, Const):
-        return left == right
-    if END in (left, right) and isinstance(left if right == END else right, Obj | Group | Text | Bound):
-        return False  # an element that was found
-    if NPOS in (left, right) and isinstance(left if right == NPOS else right, int):
-        return False
-    return None
 
 
 _MANIPULATORS = re.compile(

@@ -6,10 +6,11 @@ import re
 from collections.abc import Callable, Sequence
 from functools import partial
 
+from nodl.infer.cpp.libraries import Call, library_class
 from nodl.infer.cpp.reading.declarations import parameters_of
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.reading.writes import writes_of
-from nodl.infer.cpp.running.constructors import is_written_back
+from nodl.infer.cpp.running.constructors import text_of
 from nodl.infer.cpp.running.contents import items_of
 from nodl.infer.cpp.running.machine import NEXT, Frame, Machine, registered
 from nodl.infer.cpp.running.values import (
@@ -26,6 +27,7 @@ from nodl.infer.cpp.running.values import (
     concatenated,
     join,
     literal,
+    number_of,
     plain,
     truth,
     unknown,
@@ -66,15 +68,11 @@ def _standard(*names: str) -> Callable[[Standard], Standard]:
 
 @_standard("std::string", "std::string_view", "string", "std::filesystem::path", "std::quoted")
 def _text(run: Machine, values: Sequence[Value], node: Node, frame: Frame) -> Value:
-    from nodl.infer.cpp.running.objects import text_of
-
     return text_of(run, values) if values else literal("")
 
 
 @_standard("std::to_string")
 def _to_string(run: Machine, values: Sequence[Value], node: Node, frame: Frame) -> Value:
-    from nodl.infer.cpp.running.operators import number_of
-
     if any(isinstance(atom, Text) and plain(atom) is not None for value in values for atom in value):
         return unknown("the number of a letter")
     numbers = tuple(map(number_of, values[0])) if values else BOTTOM
@@ -130,13 +128,11 @@ def _placeholder(value: Value) -> int:
 @_standard("std::thread", "std::jthread", "std::async", "std::call_once", "std::for_each", "std::transform",
            "std::sort", "std::any_of", "std::all_of", "std::make_heap", "std::generate", "std::invoke")  # fmt: skip
 def _calls_back(run: Machine, values: Sequence[Value], node: Node, frame: Frame) -> Value:
-    from nodl.infer.cpp.running.invocation import call_values
-
     if text(node).startswith("std::invoke") and values:
         is_method = any(isinstance(a, Bound) and a.this is None and a.function.owner for a in values[0])
         first = 2 if is_method else 1
         callee = _bind(run, values[:2], node, frame) if is_method else values[0]
-        return call_values(run, callee, values[first:], node, frame)
+        return run.calls.call_values(run, callee, values[first:], node, frame)
     if text(node).startswith("std::async"):
         run.store.others_run()
     elements = tuple(join(*items_of(run, atom)[0]) for atom in values[0]) if values else ()
@@ -150,11 +146,19 @@ def _calls_back(run: Machine, values: Sequence[Value], node: Node, frame: Frame)
         return unknown("the result of an algorithm")
     for atom in _bind(run, list(values[position:]), node, frame):
         if isinstance(atom, Obj) and atom.data.get("partial"):
-            call_values(run, (atom,), [], node, frame)  # with its arguments
+            run.calls.call_values(run, (atom,), [], node, frame)  # with its arguments
         else:
             run.later([(atom,)], frame)
     run.later([tuple(a for a in value if not isinstance(a, Bound)) for value in values], frame)
     return unknown(f"the result of {text(node.child_by_field_name('function'))[:40]}()")
+
+
+@library_class("std::thread", "std::jthread")
+def _thread(run: Machine, call: Call) -> None:
+    """Run a thread beside what follows."""
+    if call.values:
+        run.store.others_run()
+        _calls_back(run, call.values, call.node, call.frame)
 
 
 _ALGORITHMS = ("std::for_each", "std::transform", "std::sort", "std::any_of", "std::all_of")
@@ -162,21 +166,21 @@ _ALGORITHMS = ("std::for_each", "std::transform", "std::sort", "std::any_of", "s
 
 
 def _once(run: Machine, atom: Lambda, elements: Sequence[Value], node: Node, frame: Frame) -> int:
-    from nodl.infer.cpp.running.invocation import call_values
-
-    call_values(run, (atom,), [join(*elements)] if elements else [], node, frame)
+    run.calls.call_values(run, (atom,), [join(*elements)] if elements else [], node, frame)
     return NEXT
 
 
 @_standard("std::find_if", "std::find")
 def _find_if(run: Machine, values: Sequence[Value], node: Node, frame: Frame) -> Value:
     """Find the element of a list that is exactly known, or its end."""
-    from nodl.infer.cpp.running.invocation import call_values
-
     items, exact = items_of(run, values[0][0]) if values and len(values[0]) == 1 else ([], False)
     for item in items if exact and len(values) > 2 else ():
         called = any(isinstance(atom, Lambda | Bound) for atom in values[2])
-        answer = truth(call_values(run, values[2], [item], node, frame)) if called else same(item, values[2])
+        answer = (
+            truth(run.calls.call_values(run, values[2], [item], node, frame))
+            if called
+            else same(item, values[2])
+        )
         if answer is None:
             return unknown("an element that is looked for")
         if answer:
@@ -235,10 +239,10 @@ def _callable(run: Machine, atom: Obj) -> bool:
 def _writes(run: Machine, atom: object) -> bool:
     if isinstance(atom, Lambda):
         declarator = field_of(atom.node, "declarator")
-        given = [p.name for p in parameters_of(declarator) if is_written_back(p)] if declarator else []
+        given = [p.name for p in parameters_of(declarator) if p.written_back] if declarator else []
         return bool(given) and not writes_of(atom.node).changed.isdisjoint(given)
     if isinstance(atom, Bound):
-        given = [p.name for p in atom.function.parameters if is_written_back(p)]
+        given = [p.name for p in atom.function.parameters if p.written_back]
         return bool(given) and not writes_of(atom.function.node).changed.isdisjoint(given)
     if isinstance(atom, Obj) and atom.data.get("partial"):
         return any(_writes(run, each) for each in atom.data["partial"][0])
@@ -247,10 +251,9 @@ def _writes(run: Machine, atom: object) -> bool:
 
 def called_now(run: Machine, values: Sequence[Value], node: Node, frame: Frame) -> None:
     """Run closures that write to what they captured: they may be called before what follows, or not."""
-    from nodl.infer.cpp.running.invocation import call_lambda
 
     def once(atom: Lambda) -> int:
-        call_lambda(run, atom, [unknown("an argument")] * 8, node, frame)
+        run.calls.call_lambda(run, atom, [unknown("an argument")] * 8, node, frame)
         return NEXT
 
     for atom in (atom for value in values for atom in value if isinstance(atom, Lambda)):

@@ -7,6 +7,7 @@ from functools import partial
 
 from nodl.infer.cpp.reading.collect import declared_names
 from nodl.infer.cpp.reading.declarations import type_text
+from nodl.infer.cpp.running.constructors import declared_value, fields_of
 from nodl.infer.cpp.running.machine import (
     BREAK,
     CONTINUE,
@@ -19,7 +20,6 @@ from nodl.infer.cpp.running.machine import (
     statement,
 )
 from nodl.infer.cpp.running.memory import Changes
-from nodl.infer.cpp.running.objects import declared_value, fields_of
 from nodl.infer.cpp.running.references import bind_reference
 from nodl.infer.cpp.running.values import BOTTOM, Const, Group, Obj, Seq, Value, join, truth, unknown
 from nodl.infer.cpp.running.variables import member

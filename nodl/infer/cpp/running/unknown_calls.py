@@ -8,12 +8,12 @@ from collections.abc import Sequence
 from nodl.infer.cpp.ledger import CREATES
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES, is_harmless_class, is_harmless_function
 from nodl.infer.cpp.running.assignments import assign
+from nodl.infer.cpp.running.constructors import is_plain_type
 from nodl.infer.cpp.running.contents import handed_over, nodes_in
-from nodl.infer.cpp.running.hiding import element_type, seen_type
 from nodl.infer.cpp.running.machine import Frame, Machine
-from nodl.infer.cpp.running.objects import is_plain_type
 from nodl.infer.cpp.running.references import through
 from nodl.infer.cpp.running.standard import called_now
+from nodl.infer.cpp.running.static_types import declared_type, element_type, seen_type
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     Group,
@@ -30,7 +30,6 @@ from nodl.infer.cpp.running.values import (
     plain,
     unknown,
 )
-from nodl.infer.cpp.running.variables import declared_type
 from nodl.infer.cpp.syntax import Node, field_of, text, unwrapped, walk
 from nodl.name_template import ParameterPart, Part
 

@@ -357,3 +357,13 @@ def _truth(atom: Atom) -> bool | None:
     if isinstance(atom, Lambda | Bound):
         return True
     return None
+
+
+def has_text(value: Value) -> bool:
+    """Return whether one of the alternatives is a text or a parameter."""
+    return any(isinstance(atom, Text | Param) for atom in value)
+
+
+def number_of(atom: object) -> object:
+    """Return an enumerator as its number."""
+    return atom.number if isinstance(atom, Const) and atom.number is not None else atom

@@ -5,10 +5,11 @@ from __future__ import annotations
 import re
 
 from nodl.infer.cpp.reading.declarations import Class
-from nodl.infer.cpp.reading.type_names import NO_TYPE, Type
+from nodl.infer.cpp.running.constructors import default_value, made
 from nodl.infer.cpp.running.machine import Frame, Machine
+from nodl.infer.cpp.running.static_types import current_object, static_by_name
 from nodl.infer.cpp.running.values import BOTTOM, NPOS, Bound, Const, Obj, Value, unknown
-from nodl.infer.cpp.syntax import Node, children, text
+from nodl.infer.cpp.syntax import Node, children
 
 
 def variable(run: Machine, name: str, frame: Frame) -> Value:
@@ -42,15 +43,6 @@ def _argument(run: Machine, written: str, frame: Frame) -> Value:
     return found or unknown(f"the value of {written}")
 
 
-def current_object(frame: Frame | None) -> Obj | None:
-    """Return what ``this`` is, in a lambda that of the function around it; ``None`` outside of methods."""
-    while frame is not None:
-        if frame.this is not None:
-            return frame.this
-        frame = frame.outer
-    return None
-
-
 def member(run: Machine, owner: Obj, name: str, seen: Class | None = None) -> Value | None:
     """Return the field ``name`` of ``owner``, looked up in ``seen``; ``None`` if no class in reach has it."""
     value = run.store.get((owner, name))
@@ -69,8 +61,6 @@ def member(run: Machine, owner: Obj, name: str, seen: Class | None = None) -> Va
 
 def static_member(run: Machine, cls: object, name: str) -> Value:
     """Return what a static field holds; its initial value when it is read first."""
-
-    from nodl.infer.cpp.running.objects import default_value
 
     assert isinstance(cls, Class)
     cell = (cls, name)
@@ -95,8 +85,6 @@ def static_member(run: Machine, cls: object, name: str) -> Value:
 
 
 def _initial(run: Machine, value: Node | None, written: str, frame: Frame) -> Value:
-    from nodl.infer.cpp.running.objects import made
-
     if value is not None and value.type in ("initializer_list", "argument_list"):
         return made(run, value, run.type_of(written, frame), children(value), frame)
     return run.evaluate(value, frame)
@@ -104,8 +92,6 @@ def _initial(run: Machine, value: Node | None, written: str, frame: Frame) -> Va
 
 def constant(run: Machine, name: str, frame: Frame) -> Value | None:
     """Return the global, static member, enumerator or functions of that name; ``None`` if none is found."""
-    from nodl.infer.cpp.running.objects import default_value
-
     static = static_by_name(run, name, frame)
     if static is not None:
         return static_member(run, *static)
@@ -136,59 +122,3 @@ def constant(run: Machine, name: str, frame: Frame) -> Value | None:
     if function:
         return tuple(Bound(each, None) for each in function)
     return None
-
-
-def static_by_name(run: Machine, name: str, frame: Frame) -> tuple[Class, str] | None:
-    """Return the class that ``Foo::x`` is a static member of.
-
-    Of ``x`` alone, if a class has one outside of its methods.
-    """
-    head, separator, last = name.rpartition("::")
-    if separator:
-        cls = run.class_of(run.type_of(head, frame), frame)
-    else:
-        cls = run.names.find_class("::".join(frame.scope), (), frame.file) if frame.scope else None
-    for each in run.names.ancestry(cls):
-        if last in each.fields and each.fields[last].static:
-            return each, last
-    return None
-
-
-def declared_type(run: Machine, node: Node, frame: Frame) -> tuple[Type, bool]:
-    """Return the declared type of a variable or member, ``NO_TYPE`` if not known.
-
-    And whether it is a pointer, or as a local variable a reference.
-    """
-    name, this = text(node).removeprefix("this->"), current_object(frame)
-    owner = frame.owner_of(name)
-    if owner is not None:
-        written = owner.types.get(name, "")
-        kind = run.type_of(written, owner)
-        return kind, kind.pointer or written.endswith(("&", "*"))
-    ancestry, bindings = (run.names.ancestry(this.cls), this.bindings) if this is not None else ([], {})
-    for each in ancestry:
-        if name in each.fields:
-            found = each.fields[name]
-            kind = run.names.resolve(found.type, each.scope, each.file, bindings.get(each))
-            return kind, found.pointer or kind.pointer
-    outside = run.names.find_global(name, frame.scope, frame.file)
-    if outside is None:
-        return NO_TYPE, False
-    kind = run.names.resolve(outside.type, outside.scope, outside.file)
-    return kind, outside.pointer or kind.pointer
-
-
-def is_pointer(run: Machine, node: Node, frame: Frame) -> bool:
-    """Return whether a variable or member was declared as a pointer, and not as a reference."""
-    kind, marked = declared_type(run, node, frame)
-    return kind.pointer or (marked and not _is_reference(run, node, frame))
-
-
-def _is_reference(run: Machine, node: Node, frame: Frame) -> bool:
-    name, this = text(node), current_object(frame)
-    owner = frame.owner_of(name)
-    if owner is not None:
-        return owner.types.get(name, "").endswith("&")
-    ancestry = run.names.ancestry(this.cls) if this is not None else []
-    declared = next((cls.fields[name].node for cls in ancestry if name in cls.fields), None)
-    return "&" in text(declared).partition("=")[0]

@@ -12,7 +12,6 @@ from nodl.infer.cpp.reading.names import hidden
 from nodl.infer.cpp.reading.type_names import NO_TYPE, Type
 from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.values import Obj
-from nodl.infer.cpp.running.variables import declared_type
 from nodl.infer.cpp.syntax import Node, callee_name, field_of, template_arguments, text, unwrapped
 
 
@@ -50,6 +49,71 @@ def class_of_member(run: Machine, atom: Obj, name: str, access: Node, frame: Fra
     if seen is None and matters:
         run.gap(access, frame, f"which {name}() is called here is not known: a derived class hides it")
     return seen if seen in ancestry else atom.cls
+
+
+def current_object(frame: Frame | None) -> Obj | None:
+    """Return what ``this`` is, in a lambda that of the function around it; ``None`` outside of methods."""
+    while frame is not None:
+        if frame.this is not None:
+            return frame.this
+        frame = frame.outer
+    return None
+
+
+def static_by_name(run: Machine, name: str, frame: Frame) -> tuple[Class, str] | None:
+    """Return the class that ``Foo::x`` is a static member of.
+
+    Of ``x`` alone, if a class has one outside of its methods.
+    """
+    head, separator, last = name.rpartition("::")
+    if separator:
+        cls = run.class_of(run.type_of(head, frame), frame)
+    else:
+        cls = run.names.find_class("::".join(frame.scope), (), frame.file) if frame.scope else None
+    for each in run.names.ancestry(cls):
+        if last in each.fields and each.fields[last].static:
+            return each, last
+    return None
+
+
+def declared_type(run: Machine, node: Node, frame: Frame) -> tuple[Type, bool]:
+    """Return the declared type of a variable or member, ``NO_TYPE`` if not known.
+
+    And whether it is a pointer, or as a local variable a reference.
+    """
+    name, this = text(node).removeprefix("this->"), current_object(frame)
+    owner = frame.owner_of(name)
+    if owner is not None:
+        written = owner.types.get(name, "")
+        kind = run.type_of(written, owner)
+        return kind, kind.pointer or written.endswith(("&", "*"))
+    ancestry, bindings = (run.names.ancestry(this.cls), this.bindings) if this is not None else ([], {})
+    for each in ancestry:
+        if name in each.fields:
+            found = each.fields[name]
+            kind = run.names.resolve(found.type, each.scope, each.file, bindings.get(each))
+            return kind, found.pointer or kind.pointer
+    outside = run.names.find_global(name, frame.scope, frame.file)
+    if outside is None:
+        return NO_TYPE, False
+    kind = run.names.resolve(outside.type, outside.scope, outside.file)
+    return kind, outside.pointer or kind.pointer
+
+
+def is_pointer(run: Machine, node: Node, frame: Frame) -> bool:
+    """Return whether a variable or member was declared as a pointer, and not as a reference."""
+    kind, marked = declared_type(run, node, frame)
+    return kind.pointer or (marked and not _is_reference(run, node, frame))
+
+
+def _is_reference(run: Machine, node: Node, frame: Frame) -> bool:
+    name, this = text(node), current_object(frame)
+    owner = frame.owner_of(name)
+    if owner is not None:
+        return owner.types.get(name, "").endswith("&")
+    ancestry = run.names.ancestry(this.cls) if this is not None else []
+    declared = next((cls.fields[name].node for cls in ancestry if name in cls.fields), None)
+    return "&" in text(declared).partition("=")[0]
 
 
 def seen_class(run: Machine, node: Node | None, frame: Frame) -> Class | None:
