@@ -161,6 +161,7 @@ def test_each_room_stands_on_the_rooms_below_it(package: str) -> None:
 # Rooms whose modules do not need each other in a circle, not even for the type checker.
 WITHOUT_CIRCLES = ("description", "evaluation", "frontend", "host", "ros_rules")
 
+
 def imports_between(files: list[Path], named: Callable[[Path], Iterator[str]]) -> dict[str, set[str]]:
     known = {
         ".".join(path.relative_to(ROOT).with_suffix("").parts).removesuffix(".__init__"): path
