@@ -31,6 +31,10 @@ CONDITIONS: dict[str, Callable[..., bool]] = {
 """Edits that keep a name where they hold and drop it elsewhere."""
 
 
+PARAMETER_REFERENCE = re.compile(r"\$\(param ([^ ()$]+)(?: ([^ ()$]*))?\)")
+"""``$(param NAME)`` or ``$(param NAME DEFAULT)`` in the text of a template."""
+
+
 class ParameterPart(NamedTuple):
     """The value of the node's parameter ``name``; ``default`` is what the code declares, if known.
 

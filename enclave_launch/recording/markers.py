@@ -1,12 +1,13 @@
 """``--learn-parameters``: a second run of the same launch with marker values, which decides what matching cannot.
 
 Every parameter and argument that may be the source of a recorded name gets a value that nothing else has; names that
-follow come from it, those that do not are fixed. Reads the records of the folder; changes command lines.
+follow come from it, those that do not are fixed. An integer gets one that is slightly larger, as it may be a number of
+things. Reads the records of the folder; changes command lines.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -19,9 +20,9 @@ from nodl.record.requested import all_requested
 
 
 class Questions(NamedTuple):
-    """By program (package, executable): the inputs that some recorded name may come from."""
+    """By program (package, executable): the inputs that some recorded name may come from, with a recorded value."""
 
-    inputs: Mapping[tuple[str, str], frozenset[str]]
+    inputs: Mapping[tuple[str, str], Mapping[str, object]]
 
     def __bool__(self) -> bool:
         return any(self.inputs.values())
@@ -45,15 +46,16 @@ def questions(folder: Path) -> Questions:
 
     Components are left out: their parameters do not come with a command line.
     """
-    found: dict[tuple[str, str], set[str]] = {}
+    found: dict[tuple[str, str], dict[str, object]] = {}
     for path in sorted(folder.glob("records/*.record")):
         for node in all_requested(read_record(path.read_bytes()).attributed()):
             if not node.executable:
                 continue
             seen = observation_of(node)
             sources = {source for name in seen.names for source in possible_sources(name, seen)}
-            found.setdefault((node.package, node.executable), set()).update(s.parameter for s in sources)
-    return Questions({program: frozenset(names) for program, names in found.items()})
+            asked = {name: seen.values[name] for source in sources for name in source.parameters}
+            found.setdefault((node.package, node.executable), {}).update(asked)
+    return Questions(found)
 
 
 class MarkerRun:
@@ -65,10 +67,12 @@ class MarkerRun:
 
     def mark(self, process: ResolvedProcess, cmd: tuple[str, ...]) -> Marked:
         """Return ``cmd`` with a marker for each value in question; later ROS arguments win over earlier ones."""
-        wanted = self._asked.inputs.get(
-            (process.package or "", process.executable.rpartition("/")[2]), frozenset()
-        )
-        given = {name: process.parameters.get(name, "") for name in sorted(wanted) if name[0] not in "<-"}
+        wanted = self._asked.inputs.get((process.package or "", process.executable.rpartition("/")[2]), {})
+        given = {
+            name: process.parameters.get(name, value)
+            for name, value in sorted(wanted.items())
+            if name[0] not in "<-"
+        }
         parameters = {name: self._marker(value) for name, value in given.items()}
         words = own_words(process)
         arguments = list(self._words(words, wanted))
@@ -81,26 +85,28 @@ class MarkerRun:
                 marked += ("-p", f"{name}:={_yaml(value)}")
         return Marked(marked, parameters, tuple(arguments))
 
-    def _words(self, words: Sequence[str], wanted: frozenset[str]) -> Iterator[str]:
+    def _words(self, words: Sequence[str], wanted: Container[str]) -> Iterator[str]:
         before = ""
         for place, word in enumerate(words, 1):
-            option, equals, _ = word.partition("=")
+            option, equals, value = word.partition("=")
             if equals and option in wanted:
-                yield f"{option}={self._next()}"
+                yield f"{option}={self._marked_word(value)}"
             else:
-                yield self._next() if f"<{place}>" in wanted or before in wanted else word
+                yield self._marked_word(word) if f"<{place}>" in wanted or before in wanted else word
             before = word
 
-    def _marker(self, value: object) -> object:
-        return tuple(self._next() for _ in value) if isinstance(value, tuple) else self._next()
+    def _marked_word(self, word: str) -> str:
+        return str(self._marker(int(word) if word.isdecimal() else word))
 
-    def _next(self) -> str:
+    def _marker(self, value: object) -> object:
+        if isinstance(value, tuple):
+            return tuple(self._marker(each) for each in value)
         self._count += 1
-        return f"{MARKER}{self._count}"
+        return value + self._count if isinstance(value, int) else f"{MARKER}{self._count}"
 
 
 def _yaml(value: object) -> str:
-    return f"[{', '.join(value)}]" if isinstance(value, tuple) else str(value)
+    return f"[{', '.join(map(str, value))}]" if isinstance(value, tuple) else str(value)
 
 
 def _with_words(cmd: tuple[str, ...], words: Sequence[str], others: Sequence[str]) -> tuple[str, ...]:

@@ -8,9 +8,10 @@
 
 ``name`` is that of the standard entry, the name that was seen. ``parameter`` gives the node's parameter (or ``<1>``,
 a word of its command line, or ``--option``) whose value the name is, ``each`` says that it is a list, ``prefix`` and
-``suffix`` what the program puts before and after the value, ``default`` the value where nothing is set. ``written`` is
-the source's name where NoDL v2 cannot hold it, ``introspection`` says that the calls of a service are published.
-``undecided`` and ``runs`` are for the reader: plans show them.
+``suffix`` what the program puts before and after the value (there ``$(param NAME)`` is the value of another one),
+``default`` the value where nothing is set. ``written`` is the source's name where NoDL v2 cannot hold it,
+``introspection`` says that the calls of a service are published. ``undecided`` and ``runs`` are for the reader: plans
+show them.
 
 A coincidence of values is not a rule: with ``proof: one run`` the name may as well be fixed, and ``seen`` lists further
 names that came from the same parameter. Where several parameters had the value, ``candidates`` lists them beside the
@@ -27,7 +28,7 @@ from enclave_common.words import counted
 from nodl.builtin_interfaces import LOGGER_SERVICES
 from nodl.document.v2_section import section_of
 from nodl.errors import InvalidElementError
-from nodl.name_template import NameTemplate, ParameterPart
+from nodl.name_template import PARAMETER_REFERENCE, NameTemplate, ParameterPart, Part
 from nodl.names import InvalidNameError, validate_name
 from nodl.node_interface import Endpoint, EndpointKind
 from nodl.yaml_text import YamlList, YamlMap, YamlScalar, YamlValue
@@ -86,7 +87,9 @@ def _note(row: YamlMap) -> str:
     proof = row.items.get("proof")
     texts = [f"recorded in {counted(len(runs), 'run')}"] if runs else []
     if undecided:
-        texts.append(f"undecided whether it is fixed or comes from {' or '.join(undecided)}")
+        parameter = row.items.get("parameter")
+        first = f"comes from {parameter.value}" if isinstance(parameter, YamlScalar) else "is fixed"
+        texts.append(f"undecided whether it {first} or comes from {' or '.join(undecided)}")
     if isinstance(proof, YamlScalar):
         source_is_known = proof.value != ONE_RUN
         texts.append(str(proof.value) if source_is_known else "from the parameter as far as one run shows")
@@ -119,8 +122,17 @@ def _template(fields: _Fields, row: YamlMap) -> NameTemplate:
         given = str(default) if default is not None else None
         part = ParameterPart(str(parameter), given, item)
         prefix, suffix = str(fields.get("prefix") or ""), str(fields.get("suffix") or "")
-        return NameTemplate((*filter(None, (prefix,)), part, *filter(None, (suffix,))))
+        return NameTemplate((*filter(None, (prefix,)), part, *_with_parameters(suffix)))
     return _fixed(str(fields.get("written") or fields["name"]), row)
+
+
+def _with_parameters(text: str) -> Iterator[Part]:
+    place = 0
+    for reference in PARAMETER_REFERENCE.finditer(text):
+        yield from filter(None, (text[place : reference.start()],))
+        yield ParameterPart(reference[1], reference[2])
+        place = reference.end()
+    yield from filter(None, (text[place:],))
 
 
 def _readings(fields: _Fields, row: YamlMap) -> Iterator[NameTemplate]:

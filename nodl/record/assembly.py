@@ -155,7 +155,7 @@ class Record:
         elif isinstance(line, StateEntered):
             process.node(line.node).states.append(line.state)
         elif isinstance(line, ParametersDeclared):
-            process.node(line.node).declared.update(line.texts)
+            process.node(line.node).declared.update(line.values)
         else:
             process.node(line.node).endpoints.append(line)
 

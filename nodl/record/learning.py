@@ -22,7 +22,7 @@ _TF_LISTENER = "transform_listener_impl_*"
 """The node that tf2_ros makes for a ``TransformListener`` that was given none; our section has a word for it."""
 _RANDOM = re.compile(r"(static_transform_publisher)_([A-Za-z0-9]+)\Z")  # tf2_ros, when it is given no name
 
-_UNTIL_DECIDED = "both are granted until a run with another value decides (--learn-parameters)"
+_UNTIL_DECIDED = "all are granted until a run with another value decides (--learn-parameters)"
 
 OBSERVED = "observed"
 """What ``RequestedNode.started_as`` is for a node of the graph, which says nothing of states."""
@@ -176,8 +176,9 @@ def _missing(lifecycle: bool, seen: Sequence[_Seen]) -> Iterable[str]:
 def _notes(entries: Iterable[LearntEndpoint], seen: Sequence[_Seen]) -> Iterable[str]:
     for entry in entries:
         if entry.origin.undecided:
+            first = entry.origin.source or "fixed"
             said = ", ".join(map(str, entry.origin.candidates))
-            yield f"{entry.name}: fixed, or from one of {said}: {_UNTIL_DECIDED}"
+            yield f"{entry.name}: {first}, or from one of {said}: {_UNTIL_DECIDED}"
         elif entry.origin.source and not entry.origin.proven:
             yield f"{entry.name}: fixed, or the value of {entry.origin.source}: {_UNTIL_DECIDED}"
         if entry.spellings:
@@ -242,7 +243,9 @@ def observation_of(node: RequestedNode, run: str = "") -> Observation:
     """Return what ``node`` was given, and the names that it asked for."""
     names = frozenset(_name(asked) for asked in node.endpoints if asked.rc in (0, 1))
     inputs = {**node.parameters, **arguments_as_inputs(node.arguments)}
-    defaults = {n: text for n, text in node.declared.items() if n not in inputs and isinstance(text, str)}
+    defaults = {
+        n: value for n, value in node.declared.items() if n not in inputs and isinstance(value, str | int)
+    }
     return Observation(inputs, names, run, defaults)
 
 

@@ -15,7 +15,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from nodl.node_interface import EndpointKind
-from nodl.record.parameter_event import declared_texts
+from nodl.record.parameter_event import declared_values
 
 
 class Loaded(NamedTuple):
@@ -74,12 +74,12 @@ class StateEntered(NamedTuple):
 
 
 class ParametersDeclared(NamedTuple):
-    """The node says that it declared parameters; ``texts``: those that hold a text or a list of texts."""
+    """The node says that it declared parameters; ``values``: those that could be in a name."""
 
     pid: int
     at: int
     node: int
-    texts: Mapping[str, object]
+    values: Mapping[str, object]
 
 
 class EndpointMade(NamedTuple):
@@ -267,8 +267,8 @@ def _parse(fields: Mapping[str, Any]) -> Line | None:
         named = {**fields, "written": fields.get("name")}
         return EndpointMade(_ENDPOINTS[what], *_values(EndpointMade._fields[1:], named))
     if what == "parameters":
-        texts = declared_texts(bytes.fromhex(_str(fields, "cdr")))
-        return ParametersDeclared._make([*_values(("pid", "at", "node"), fields), texts])
+        values = declared_values(bytes.fromhex(_str(fields, "cdr")))
+        return ParametersDeclared._make([*_values(("pid", "at", "node"), fields), values])
     kind = _KINDS.get(what)
     return kind(*_values(kind._fields, fields)) if kind else None
 

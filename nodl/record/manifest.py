@@ -19,6 +19,7 @@ from nodl.document.v2_schema import NAME_PATTERN
 from nodl.document.v2_section import CATEGORIES, IDENTITY_KEY
 from nodl.node_interface import ClientLibrary
 from nodl.record.learning import LearntEndpoint, LearntNode
+from nodl.record.origins import Source
 
 _HEAD = "# Learnt by secure-launch --learn from what the node requested of librcl; see docs/recording.md.\n"
 _HISTORY = {0: "SYSTEM_DEFAULT", 1: "KEEP_LAST", 2: "KEEP_ALL"}
@@ -151,13 +152,21 @@ def _united(new: dict[str, Any], old: Mapping[str, Any]) -> dict[str, Any]:
     runs = {run["id"] for run in section.get("runs", []) if "id" in run}
     known = {(each["in"], each["name"]) for each in ours}
     learnt_again = {(e.get("in"), e.get("name")) for e in theirs if runs.issuperset(e.get("runs") or ["?"])}
+    seen_elsewhere = {
+        (e.get("in"), e.get("name")): e for e in theirs if (e.get("in"), e.get("name")) not in learnt_again
+    }
     for category in CATEGORIES:
         dropped = {name for listed, name in learnt_again - known if listed == category}
-        united_list = _united_entries(new.get(category), old.get(category), dropped)
+        elsewhere = {name for listed, name in seen_elsewhere if listed == category}
+        united_list = _united_entries(new.get(category), old.get(category), dropped, elsewhere)
         united.pop(category, None)
         if united_list:
             united[category] = united_list
     gone = known | learnt_again
+    ours = [
+        _with_other_runs(each, other) if (other := seen_elsewhere.get((each["in"], each["name"]))) else each
+        for each in ours
+    ]
     section["endpoints"] = [*ours, *(e for e in theirs if (e.get("in"), e.get("name")) not in gone)]
     section["runs"] = _united_runs(section.get("runs", []), _section_of(old).get("runs", []))
     others = old.get("codegen")
@@ -172,13 +181,61 @@ def _section_of(document: Mapping[str, Any]) -> dict[str, Any]:
     return section if isinstance(section, dict) else {}
 
 
-def _united_entries(new: Any, old: Any, dropped: set[Any]) -> list[dict[str, Any]]:
-    """Return the entries of both; ``dropped``: names that the same records explained differently before."""
+_SOURCE = ("parameter", "each", "suffix", "prefix")
+
+
+def _with_other_runs(new: dict[str, Any], old: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the row ``new`` united with ``old``, which has runs whose records are not in the folder.
+
+    Where a run proved the source of a name, that holds; else all that either says may be. A row without runs is a
+    person's and stays.
+    """
+    if not old.get("runs"):
+        return {**new, **old}
+    runs = sorted({*old["runs"], *new["runs"]})
+    proofs = [each.get("proof") not in (None, ONE_RUN) for each in (new, old)]
+    first, other = (old, new) if proofs == [False, True] else (new, old)
+    possible = [*_possible(first), *(each for each in _possible(other) if each not in _possible(first))]
+    known = {name: first[name] for name in _SOURCE if name in first}
+    candidates = [] if any(proofs) else [each for each in possible if each != known]
+    united = {**first, "runs": runs}
+    if any(proofs) and not _possible(new) and not {"suffix", "prefix", "each"} & known.keys():
+        united.setdefault("default", new.get("written", new["name"]))  # seen where nothing is set
+    if len(_possible(first)) < len(possible) and candidates:
+        united["candidates"] = candidates
+        united["undecided"] = [str(Source(**each)) for each in candidates]
+    return united
+
+
+def _possible(row: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Return the sources that a row names."""
+    own = {name: row[name] for name in _SOURCE if name in row}
+    return [*([own] if own else []), *row.get("candidates", ())]
+
+
+def _united_entries(new: Any, old: Any, dropped: set[Any], elsewhere: set[Any]) -> list[dict[str, Any]]:
+    """Return the entries of both; ``dropped``: names that the same records explained differently before.
+
+    ``elsewhere``: names that were seen in runs whose records are not in the folder, too.
+    """
     ours = list(new or ())
     theirs = {each["name"]: each for each in old or () if isinstance(each, dict) and "name" in each}
     kept = [{**theirs.get(each["name"], {}), **each} for each in ours]
+    for each in kept:
+        quality = theirs.get(each["name"], {}).get("qos")
+        if each["name"] in elsewhere and isinstance(quality, dict) and "qos" in each:
+            each["qos"] = _common_quality(each["qos"], quality)
     names = {each["name"] for each in ours} | dropped
     return [*kept, *(each for name, each in theirs.items() if name not in names)]
+
+
+def _common_quality(ours: Mapping[str, Any], theirs: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what both have; the system's default where they differ, as a parameter may decide it."""
+    same = {name: ours[name] == theirs.get(name) for name in ours}
+    common = {name: ours[name] if same[name] else "SYSTEM_DEFAULT" for name in ours if name != "depth"}
+    if common["history"] == "KEEP_LAST":
+        common["depth"] = ours["depth"]
+    return common
 
 
 def _united_runs(new: Iterable[Any], old: Iterable[Any]) -> list[Any]:

@@ -3,8 +3,8 @@
 Measured on nine stacks with ordinary and with hostile values: a name that comes from a parameter is its value
 verbatim, or one entry of it where it is a list, or below every entry of a list (``node_names`` of nav2's
 lifecycle_manager). A name that holds any other value was a coincidence each time there; as programs that build names
-so exist (``/fleet/<fleet>/orders``, ``<prefix>_0``), the value is a candidate. Parameters whose name ends in
-``frame``, ``frame_id`` or ``type`` were never the source of a name.
+so exist (``/fleet/<fleet>/robot_<robot_id>``, ``<prefix>_0``), the value is a candidate, and so is each combination of
+several. Parameters whose name ends in ``frame``, ``frame_id`` or ``type`` were never the source of a name.
 
 One observation gives candidates. A second one with another value decides: the name followed the value (proven), or
 it did not (fixed). Until then both hold: the name that was seen, and the value of each candidate.
@@ -14,14 +14,16 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from itertools import takewhile
+from itertools import islice, takewhile
 from types import MappingProxyType
 from typing import NamedTuple
 
+from nodl.name_template import PARAMETER_REFERENCE
 from nodl.node_interface import EndpointKind
 
 _NEVER = re.compile(r"(frame|frame_id|type)\Z")
 _SEPARATORS = "/_"
+_MOST_COMBINATIONS = 32  # of parameters in one name; real ones have two or three
 _PREFERRED = re.compile(r"(topic|topic_name)\Z")
 
 MARKER = "enclave_launch_marker_"
@@ -57,13 +59,17 @@ class Observation(NamedTuple):
 class Source(NamedTuple):
     """A parameter, or with ``each`` any entry of a list, and what the program puts before and after it.
 
-    ``*`` in ``parameter`` stands for one part of its name.
+    ``*`` in ``parameter`` stands for one part of its name; ``$(param NAME)`` in ``suffix`` for another parameter.
     """
 
     parameter: str
     each: bool = False
     suffix: str = ""
     prefix: str = ""
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        return self.parameter, *(each[1] for each in PARAMETER_REFERENCE.finditer(self.suffix))
 
     def __str__(self) -> str:
         value = f"each of {self.parameter}" if self.each else self.parameter
@@ -73,8 +79,9 @@ class Source(NamedTuple):
 class NameOrigin(NamedTuple):
     """Where a name comes from.
 
-    ``source`` ``None``: fixed in the program, or undecided between ``candidates``. ``proven``: another value was
-    seen to be followed; else one run says so. ``default``: the name where the launch sets nothing, if it was seen.
+    ``source`` ``None``: fixed in the program, or from one of ``candidates``. ``proven``: another value was seen to be
+    followed, by ``source`` and all ``candidates``; else one run says so. ``default``: the name where the launch sets
+    nothing, if it was seen.
     """
 
     source: Source | None = None
@@ -84,7 +91,7 @@ class NameOrigin(NamedTuple):
 
     @property
     def undecided(self) -> bool:
-        return self.source is None and bool(self.candidates)
+        return bool(self.candidates)
 
 
 FIXED = NameOrigin()
@@ -153,8 +160,8 @@ def _origin(name: Name, observations: Sequence[Observation]) -> NameOrigin:
         and not any(_contradicts(name, source, each) for each in observations)
     ]
     followed = [source for source in left if any(_follows(name, source, each) for each in observations)]
-    if len(followed) == 1:
-        return NameOrigin(followed[0], proven=True)
+    if followed:
+        return NameOrigin(followed[0], proven=True, candidates=tuple(followed[1:]))
     if len(left) == 1 and any(_is_telling(left[0], each) for each in seen_in):
         return NameOrigin(left[0])
     return NameOrigin(candidates=tuple(left)) if left else FIXED
@@ -180,10 +187,32 @@ def _names_of_entries(name: Name, seen: Observation) -> Iterable[Source]:
 
 
 def _texts_within(name: Name, seen: Observation) -> Iterable[Source]:
-    """Yield texts that the name holds: by chance more often than not, so that another run has to decide."""
-    for parameter, value in sorted(seen.values.items()):
-        if isinstance(value, str):
-            yield from _within(name.name, parameter, value, each=False)
+    """Yield values that the name holds: by chance more often than not, so that another run has to decide."""
+    values = {parameter: text for parameter, value in sorted(seen.values.items()) if (text := _text(value))}
+    alone = (
+        source
+        for parameter, text in values.items()
+        for source in _within(name.name, parameter, text, each=False)
+    )
+    for source in alone:
+        yield from islice(_with_further(source, values), _MOST_COMBINATIONS)
+
+
+def _with_further(source: Source, values: Mapping[str, str]) -> Iterable[Source]:
+    """Yield ``source``, and what its suffix may be if other parameters have a part in it."""
+    yield source
+    for parameter, text in values.items():
+        if parameter == source.parameter:
+            continue
+        for further in _within(source.suffix, parameter, text, each=False):
+            for rest in _with_further(further, values):
+                yield source._replace(suffix=f"{rest.prefix}$(param {rest.parameter}){rest.suffix}")
+
+
+def _text(value: object) -> str | None:
+    """Return what a value is within a name; integers number robots and sensors."""
+    is_number = isinstance(value, int) and not isinstance(value, bool)
+    return str(value) if is_number or isinstance(value, str) else None
 
 
 def _within(name: str, parameter: str, entry: str, *, each: bool) -> Iterable[Source]:
@@ -212,9 +241,14 @@ def _entries(value: object) -> frozenset[str]:
 
 
 def _values(source: Source, seen: Observation) -> frozenset[str]:
-    value = seen.values.get(source.parameter)
-    entries = _entries(value) if source.each else [value] if isinstance(value, str) else ()
-    return frozenset(f"{source.prefix}{entry}{source.suffix}" for entry in entries)
+    values = seen.values
+    text = _text(values.get(source.parameter))
+    entries = _entries(values.get(source.parameter)) if source.each else () if text is None else (text,)
+    further = {name: _text(values.get(name)) for name in source.parameters[1:]}
+    if None in further.values():
+        return frozenset()
+    suffix = PARAMETER_REFERENCE.sub(lambda reference: further[reference[1]] or "", source.suffix)
+    return frozenset(f"{source.prefix}{entry}{suffix}" for entry in entries)
 
 
 def _contradicts(name: Name, source: Source, other: Observation) -> bool:
@@ -237,8 +271,19 @@ def _with_default(origin: NameOrigin, observations: Sequence[Observation]) -> Na
     """Return ``origin`` with what the program declares where the launch gives nothing."""
     if origin.source is None or origin.source.each:
         return origin
-    declared = {each.defaults.get(origin.source.parameter) for each in observations} - {None}
-    return origin._replace(default=str(declared.pop())) if len(declared) == 1 else origin
+
+    def declared(parameter: str) -> str | None:
+        found = {each.defaults[parameter] for each in observations if parameter in each.defaults}
+        return str(found.pop()) if len(found) == 1 else None
+
+    def with_default(reference: re.Match[str]) -> str:
+        default = declared(reference[1])
+        return reference[0] if default is None else f"$(param {reference[1]} {default})"
+
+    suffix = PARAMETER_REFERENCE.sub(with_default, origin.source.suffix)
+    return origin._replace(
+        source=origin.source._replace(suffix=suffix), default=declared(origin.source.parameter)
+    )
 
 
 def _generalised(found: Mapping[Name, NameOrigin]) -> dict[Name, NameOrigin]:

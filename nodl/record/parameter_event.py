@@ -1,4 +1,4 @@
-"""The texts in a rcl_interfaces/msg/ParameterEvent as it goes over the wire: the parameters that a node declares.
+"""The values in a rcl_interfaces/msg/ParameterEvent, as it goes over the wire, that could be in a name.
 
 Classic CDR (DDSI-RTPS, 10.2): each number stands at a multiple of its size, counted behind the four bytes that say how
 the rest is written; texts and lists have their length before them.
@@ -10,12 +10,13 @@ import struct
 from collections.abc import Mapping
 
 _LONGEST_NAME = 255  # of a ROS name; a longer value is none
-_STRING, _STRING_LIST = 4, 9  # rcl_interfaces/msg/ParameterType
+_INTEGER, _STRING, _STRING_LIST = 2, 4, 9  # rcl_interfaces/msg/ParameterType
 
 
-def declared_texts(event: bytes) -> Mapping[str, object]:
-    """Return by name the declared parameters that hold a text or a list of texts; of an event that was cut, those
-    before.
+def declared_values(event: bytes) -> Mapping[str, object]:
+    """Return by name the declared parameters that hold a text, an integer or a list of texts.
+
+    Of an event that was cut, those before.
     """
     found: dict[str, object] = {}
     if event[:2] not in (b"\0\0", b"\0\1"):
@@ -53,14 +54,14 @@ class _Cursor:
 
     def value(self) -> object:
         """Read a rcl_interfaces/msg/ParameterValue: all its fields are there, whichever counts."""
-        kind, _, _, _ = self.number("B"), self.number("B"), self.number("Q"), self.number("Q")
+        kind, _, integer, _ = self.number("B"), self.number("B"), self.number("q"), self.number("Q")
         text = self.text()
         for form in "BBQQ":
             self._skip_list(form)
         texts = tuple(self.text() for _ in range(self.number("I")))
         if kind == _STRING and len(text) <= _LONGEST_NAME:
             return text
-        return texts if kind == _STRING_LIST else None
+        return {_INTEGER: integer, _STRING_LIST: texts}.get(kind)
 
     def _skip_list(self, form: str) -> None:
         for _ in range(self.number("I")):

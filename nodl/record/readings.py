@@ -7,7 +7,7 @@ the source. Each reading holds until a run under another name or namespace decid
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 
 from nodl.names import split_fqn
 from nodl.record.requested import RequestedEndpoint, RequestedNode
@@ -16,10 +16,14 @@ from nodl.record.requested import RequestedEndpoint, RequestedNode
 def with_readings(nodes: Sequence[RequestedNode]) -> list[RequestedNode]:
     """Return ``nodes``, all of one program, whose endpoints have the likeliest name and the others as ``readings``."""
     found = [[_readings(asked, node) for asked in node.endpoints] for node in nodes]
+    places: dict[str, set[str]] = {}
+    for node, of_node in zip(nodes, found, strict=True):
+        for reading in (reading for readings in of_node for reading in readings):
+            places.setdefault(reading, set()).add(node.fqn)
     return [
         node._replace(
             endpoints=tuple(
-                _read_as(asked, _left(readings, node, nodes, found))
+                _read_as(asked, _left(readings, node, places))
                 for asked, readings in zip(node.endpoints, of_node, strict=True)
             )
         )
@@ -55,20 +59,6 @@ def _texts(node: RequestedNode) -> Iterable[str]:
     yield from node.arguments
 
 
-def _left(
-    readings: tuple[str, ...],
-    node: RequestedNode,
-    nodes: Sequence[RequestedNode],
-    found: Sequence[Sequence[tuple[str, ...]]],
-) -> tuple[str, ...]:
+def _left(readings: tuple[str, ...], node: RequestedNode, places: Mapping[str, Set[str]]) -> tuple[str, ...]:
     """Return those of ``readings`` that also hold in another place, if one does."""
-    if len(readings) == 1:
-        return readings
-    elsewhere = {
-        reading
-        for other, of_other in zip(nodes, found, strict=True)
-        if other.fqn != node.fqn
-        for each in of_other
-        for reading in each
-    }
-    return tuple(each for each in readings if each in elsewhere) or readings
+    return tuple(each for each in readings if len(readings) == 1 or places[each] - {node.fqn}) or readings

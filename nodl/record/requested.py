@@ -72,8 +72,8 @@ class RequestedNode(NamedTuple):
     """What one node asked for. ``name`` and ``namespace`` are the source's own, ``fqn`` the final name.
 
     ``parameters``, ``arguments`` and ``rules`` are those that the launch gave it; ``known_start``: whether a line of
-    the supervisor tells them at all; ``declared``: texts of parameters that the node declared; ``started_as``: what
-    the launch calls it (``node``, ``component`` ...).
+    the supervisor tells them at all; ``declared``: values of parameters that the node declared;
+    ``started_as``: what the launch calls it (``node``, ``component`` ...).
     """
 
     package: str

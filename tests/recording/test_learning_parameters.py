@@ -196,3 +196,18 @@ def test_the_value_of_an_option_is_an_input_as_a_parameter_is(stand_in: Path, tm
     make_workspace(tmp_path / "ws", stand_in, [other])
     (node,) = plan_of(tmp_path).derived.nodes["/"]
     assert "/front" in "\n".join(explained(plan_of(tmp_path), node.fqn))
+
+
+def test_two_values_within_one_name_are_found_and_a_number_stays_a_number(
+    stand_in: Path, tmp_path: Path
+) -> None:
+    program = Program(
+        "agent",
+        "node agent\npublisher robot_%2/status std_msgs/msg/String\nsubscription fleet/%1 std_msgs/msg/String\nwait\n",
+        attributes='args="alpha 1"',
+    )
+    first = learn(tmp_path, stand_in, program)
+    assert first["publisher"].parts == ("robot_1/status",) and first["subscription"].parts == ("fleet/alpha",)
+    names = learn(tmp_path, stand_in, program, "--learn-parameters")
+    assert names["publisher"].parts == ("robot_", ParameterPart("<2>"), "/status")
+    assert names["subscription"].parts == ("fleet/", ParameterPart("<1>"))

@@ -99,6 +99,41 @@ def test_a_name_that_holds_a_value_as_a_word_is_decided_by_another_run(prefix: s
     assert origin(f"{prefix}alpha{suffix}", first, stayed) == FIXED
 
 
+def test_an_integer_within_a_name_is_decided_by_another_run_and_a_truth_value_is_none() -> None:
+    source = Source("robot_id", prefix="robot_", suffix="/status")
+    first = seen({"robot_id": 1, "use_odom": True}, "robot_1/status")
+    assert origin("robot_1/status", first) == NameOrigin(candidates=(source,))
+    followed = seen({"robot_id": 7}, "robot_7/status")
+    assert origin("robot_1/status", first, followed) == NameOrigin(source, proven=True)
+    assert origin("robot_1/status", first, seen({"robot_id": 7}, "robot_1/status")) == FIXED
+    assert origin("robot1", seen({"robot_id": 1}, "robot1")) == FIXED, "not a word of the name"
+
+
+TWO = {"fleet": "alpha", "robot_id": 1}
+FLEET = Source("fleet", prefix="/fleet/", suffix="/robot_1/status")
+BOTH = Source("fleet", prefix="/fleet/", suffix="/robot_$(param robot_id)/status")
+
+
+def test_two_parameters_in_one_name_are_decided_by_runs_that_change_them() -> None:
+    robot = Source("robot_id", prefix="/fleet/alpha/robot_", suffix="/status")
+    name_, first = "/fleet/alpha/robot_1/status", seen(TWO, "/fleet/alpha/robot_1/status")
+    assert origin(name_, first).candidates == (FLEET, BOTH, robot)
+    one_changed = seen({"fleet": "beta", "robot_id": 1}, "/fleet/beta/robot_1/status")
+    assert origin(name_, first, one_changed) == NameOrigin(FLEET, proven=True, candidates=(BOTH,))
+    both_changed = seen({"fleet": "beta", "robot_id": 7}, "/fleet/beta/robot_7/status")
+    assert origin(name_, first, both_changed) == NameOrigin(BOTH, proven=True)
+    only_one_followed = seen({"fleet": "beta", "robot_id": 7}, "/fleet/beta/robot_1/status")
+    assert origin(name_, first, only_one_followed) == NameOrigin(FLEET, proven=True)
+
+
+def test_the_defaults_of_all_parameters_in_a_name_are_kept() -> None:
+    left = declared(TWO, "/fleet/alpha/robot_1/status")
+    given_ = seen({"fleet": "beta", "robot_id": 7}, "/fleet/beta/robot_7/status")
+    expected = BOTH._replace(suffix="/robot_$(param robot_id 1)/status")
+    found = origin("/fleet/alpha/robot_1/status", left, given_)
+    assert found == NameOrigin(expected, proven=True, default="alpha")
+
+
 @pytest.mark.parametrize("before", ["", "/", "~/"])
 def test_a_name_below_a_value_is_decided_by_another_run(before: str) -> None:
     """A camera's name before ``image_raw``: by chance more often than not, and yet what some programs do."""

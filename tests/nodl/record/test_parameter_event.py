@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nodl.record.parameter_event import declared_texts
+from nodl.record.parameter_event import declared_values
 
 Value = bool | int | float | str | list[str]
 
@@ -65,15 +65,15 @@ VALUES = st.one_of(
 
 
 @given(st.dictionaries(TEXTS, VALUES, max_size=5), st.sampled_from("<>"))
-def test_texts_and_lists_of_texts_are_read_and_other_values_passed_over(
+def test_texts_integers_and_lists_of_texts_are_read_and_other_values_passed_over(
     declared: dict[str, Value], order: str
 ) -> None:
     expected = {
         name: tuple(value) if isinstance(value, list) else value
         for name, value in declared.items()
-        if isinstance(value, str | list)
+        if isinstance(value, str | int | list) and not isinstance(value, bool)
     }
-    assert declared_texts(event(declared, order)) == expected
+    assert declared_values(event(declared, order)) == expected
 
 
 @given(st.dictionaries(TEXTS, VALUES, min_size=1, max_size=3), st.data())
@@ -82,17 +82,17 @@ def test_of_an_event_that_was_cut_the_parameters_before_are_read(
 ) -> None:
     whole = event(declared)
     cut = whole[: data.draw(st.integers(0, len(whole)))]
-    assert declared_texts(cut).items() <= declared_texts(whole).items()
+    assert declared_values(cut).items() <= declared_values(whole).items()
 
 
 @given(st.binary(max_size=200))
 def test_no_bytes_are_an_error(data: bytes) -> None:
-    declared_texts(b"\0\1\0\0" + data)
+    declared_values(b"\0\1\0\0" + data)
 
 
 def test_a_value_that_is_too_long_for_a_name_is_passed_over() -> None:
-    assert declared_texts(event({"robot_description": "x" * 300, "topic": "scan"})) == {"topic": "scan"}
+    assert declared_values(event({"robot_description": "x" * 300, "topic": "scan"})) == {"topic": "scan"}
 
 
 def test_another_way_of_writing_is_not_guessed_at() -> None:
-    assert declared_texts(b"\0\7" + event({"topic": "scan"})[2:]) == {}
+    assert declared_values(b"\0\7" + event({"topic": "scan"})[2:]) == {}
