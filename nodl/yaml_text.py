@@ -48,8 +48,11 @@ class YamlMap(NamedTuple):
 YamlValue = YamlScalar | YamlList | YamlMap
 
 
-def parse_yaml(text: bytes, file: str) -> YamlValue:
-    """Parse the one document of ``text``. Raises ``InvalidYAMLError`` with file:line."""
+def parse_yaml(text: bytes, file: str, *, last_counts: bool = False) -> YamlValue:
+    """Parse the one document of ``text``; a key given twice is refused unless the ``last_counts``.
+
+    Raises ``InvalidYAMLError`` with file:line.
+    """
     if len(text) > MAX_BYTES:
         raise InvalidYAMLError.at(SourceRef(file), f"larger than the allowed {MAX_BYTES} bytes")
     try:
@@ -61,12 +64,12 @@ def parse_yaml(text: bytes, file: str) -> YamlValue:
         raise InvalidYAMLError.at(SourceRef(file), f"not readable as YAML: {error}") from None
     if root is None:
         raise InvalidYAMLError.at(SourceRef(file), "the document is empty")
-    return _Builder(file).build(root, 0)
+    return _Builder(file, last_counts).build(root, 0)
 
 
 class _Builder:
-    def __init__(self, file: str):
-        self._file = file
+    def __init__(self, file: str, last_counts: bool):
+        self._file, self._last_counts = file, last_counts
         self._nodes = 0
 
     def build(self, node: yaml.Node, depth: int) -> YamlValue:
@@ -90,7 +93,7 @@ class _Builder:
                 merged.extend(self._merged(value))
                 continue
             key = self._key(key_node)
-            if key in result.items:
+            if key in result.items and not self._last_counts:
                 raise InvalidYAMLError.at(
                     self._at(key_node),
                     f"key {shown(key)} is given twice, first on line {result.keys[key].line}",

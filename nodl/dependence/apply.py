@@ -7,7 +7,8 @@ names, and asks ``Documents`` for plugins and further nodes.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from types import MappingProxyType
 from typing import NamedTuple, Protocol
 
 from nodl.dependence import (
@@ -84,10 +85,18 @@ class _Application:
         self.gaps: list[Gap] = [*interface.gaps]
         self.further: list[NodeInterface] = []
 
-    def describe(self, interface: NodeInterface, plugin: str, notes: tuple[str, ...], depth: int) -> None:
-        """Add what ``interface``, the node itself or a plugin of it, has."""
+    def describe(
+        self,
+        interface: NodeInterface,
+        plugin: str,
+        notes: tuple[str, ...],
+        depth: int,
+        properties: Mapping[str, object] = MappingProxyType({}),
+    ) -> None:
+        """Add what ``interface``, the node itself or a plugin of it with ``properties`` of its own, has."""
         depends = interface.depends or _NOTHING
-        scope = Scope(self._situation, depends.defaults, depends.options, plugin)
+        situation = self._situation._replace(parameters={**self._situation.parameters, **properties})
+        scope = Scope(situation, depends.defaults, depends.options, plugin)
         for endpoint in interface.endpoints:
             if depends.tf_listener is not None and _is_of_tf_listener(endpoint):
                 continue
@@ -234,6 +243,12 @@ class _Application:
                 self._gap(by, f"no document {configuration.document} describes node '{name}'")
             else:
                 self.further.append(described._replace(name=name, own_rules=(f"__node:={name}",)))
+        for plugin in found.plugins:
+            described = self._documents.of_class(plugin.plugin_class)
+            if described is None:
+                self.gaps.append(Gap(plugin.place, f"what the {plugin.what} needs is not known"))
+            else:
+                self.describe(described, "", (f"{plugin.what}, {plugin.place}",), 1, plugin.properties)
 
 
 _LONE = re.compile(r"\$\(param (?:[^ ()$]|\$\([a-z]+\))+\)\Z")

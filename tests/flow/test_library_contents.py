@@ -140,6 +140,43 @@ def test_rviz_gets_what_its_displays_and_tools_name(launch: Launch, tmp_path: Pa
     assert "launch names no rviz file" in problems(launch('<node pkg="rviz2" exec="rviz2" name="rviz2"/>'))
 
 
+def test_displays_and_panels_of_other_packages_are_described_by_documents(
+    launch: Launch, tmp_path: Path
+) -> None:
+    file = tmp_path / "view.rviz"
+    node = f'<node pkg="rviz2" exec="rviz2" args="-d {file}"/>'
+    file.write_text(
+        RVIZ.format(
+            more="- {Class: moveit_rviz_plugin/Trajectory, Trajectory Topic: /arm/path}\n    - Class: rviz/Grid"
+        )
+    )
+    plan = launch(node)
+    assert "/arm/path" in allowed(plan, "subscribe") and not plan.problems
+    file.write_text(
+        "Panels:\n  - Class: nav2_rviz_plugins/Navigation 2\n    Class: nav2_rviz_plugins/Selector\n"
+    )
+    plan = launch(node)
+    assert "/planner_selector" in allowed(plan, "publish") and not plan.problems
+    assert "/navigate_to_pose" not in allowed(plan, "call_actions"), (
+        "rviz takes the last of a key given twice"
+    )
+
+
+def test_a_display_of_moveit_with_a_robot_from_elsewhere_is_not_known(launch: Launch, tmp_path: Path) -> None:
+    file = tmp_path / "view.rviz"
+    node = f'<node pkg="rviz2" exec="rviz2" args="-d {file}"/>'
+    display = (
+        "- {{Class: moveit_rviz_plugin/MotionPlanning, Robot Description: {}, Move Group Namespace: {}}}"
+    )
+    file.write_text(RVIZ.format(more=display.format("robot_description", "''")))
+    plan = launch(node)
+    assert "/move_action" in allowed(plan, "call_actions") and not plan.problems
+    file.write_text(RVIZ.format(more=display.format("other", "''")))
+    assert "another parameter than robot_description" in problems(launch(node))
+    file.write_text(RVIZ.format(more=display.format("robot_description", "/arm")))
+    assert "move_group in a namespace" in problems(launch(node))
+
+
 def test_a_gazebo_bridge_bridges_its_arguments_and_its_file(launch: Launch, tmp_path: Path) -> None:
     file = tmp_path / "bridge.yaml"
     file.write_text(

@@ -41,7 +41,7 @@ def read_configuration(kind: str, file: str, situation: Situation, place: Source
     if kind == "behavior_tree":
         return of_tree(file)
     try:
-        root = _read(file)
+        root = _read(file, last_counts=kind == "rviz")  # as rviz_common's YamlConfigReader does
     except InvalidNoDLError as error:
         return Configured(gaps=(Gap(SourceRef(file), f"{kind} file cannot be used: {error}"),))
     if kind == "rviz":
@@ -51,11 +51,11 @@ def read_configuration(kind: str, file: str, situation: Situation, place: Source
     return Configured(gaps=(Gap(place, f"there is no reader for files of kind {kind!r}"),))
 
 
-def _read(file: str) -> YamlValue:
+def _read(file: str, *, last_counts: bool) -> YamlValue:
     """Read the file. Raises ``InvalidNoDLError``, also for a file that is not there."""
     try:
         if not os.path.isfile(file):
             raise InvalidNoDLError.at(SourceRef(file), "there is no such file")
-        return parse_yaml(read_bytes(file), file)
+        return parse_yaml(read_bytes(file), file, last_counts=last_counts)
     except OSError as error:
         raise InvalidNoDLError.at(SourceRef(file), f"cannot be read: {error.strerror}") from None

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import NamedTuple
 
 from nodl.name_template import NameTemplate
@@ -11,12 +11,25 @@ from nodl.node_interface import Endpoint, EndpointKind, Gap
 from nodl.source_ref import SourceRef
 
 
+class ConfiguredPlugin(NamedTuple):
+    """A plugin that the file names, such as ``display of class 'a/B'`` (``what``), with its properties."""
+
+    what: str
+    plugin_class: str
+    place: SourceRef
+    properties: Mapping[str, object]
+
+
 class Configured(NamedTuple):
-    """``nodes``: names of further nodes that the program makes, of which nothing else is known to differ."""
+    """``nodes``: names of further nodes that the program makes, of which nothing else is known to differ.
+
+    ``plugins``: what documents describe, if they do.
+    """
 
     endpoints: tuple[Endpoint, ...] = ()
     gaps: tuple[Gap, ...] = ()
     nodes: tuple[str, ...] = ()
+    plugins: tuple[ConfiguredPlugin, ...] = ()
 
 
 def collected(parts: Iterable[Endpoint | Gap]) -> Configured:

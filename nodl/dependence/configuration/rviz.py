@@ -1,7 +1,9 @@
 """An ``.rviz`` file: its displays and tools, enabled or not, and what each subscribes, publishes and calls.
 
-A display that is switched off counts too: the file offers it, one click of the user starts it. A class that is not in
-the table is a gap. Source: ros2/rviz jazzy, rviz_default_plugins (displays, tools).
+A display that is switched off counts too: the file offers it, one click of the user starts it. Classes of other packages
+are plugins for a document to describe; their properties are the parameters there, blanks written as ``_``. Classes of
+``rviz/``, in files from ROS 1, exist in no package of ROS 2: rviz2 loads nothing for them. Source: ros2/rviz jazzy,
+rviz_default_plugins (displays, tools), rviz_common (display_group.cpp, failed_display.cpp).
 """
 
 from __future__ import annotations
@@ -9,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from nodl.dependence.configuration.configured import Configured, endpoint_named
+from nodl.dependence.configuration.configured import Configured, ConfiguredPlugin, endpoint_named
 from nodl.names import shown
 from nodl.node_interface import Endpoint, EndpointKind, Gap
 from nodl.source_ref import SourceRef
@@ -53,6 +55,7 @@ _TOOLS = {
     "SetGoal": ("goal_pose", "geometry_msgs/msg/PoseStamped"),
     "SetInitialPose": ("initialpose", "geometry_msgs/msg/PoseWithCovarianceStamped"),
 }
+_OF_ROS_1 = "rviz/"
 _SILENT_DISPLAYS = ("Axes", "Grid", "TF")  # /tf is the listener's, which every rviz2 has
 _SILENT_TOOLS = ("FocusCamera", "Interact", "Measure", "MoveCamera", "Select")
 
@@ -67,7 +70,8 @@ def of_file(root: YamlValue, distro: str) -> Configured:
         reading.tool(tool)
     for panel in _listed(root, "Panels"):
         reading.panel(panel)
-    return Configured(tuple(dict.fromkeys(reading.endpoints)), tuple(reading.gaps))
+    endpoints = tuple(dict.fromkeys(reading.endpoints))
+    return Configured(endpoints, tuple(reading.gaps), plugins=tuple(reading.plugins))
 
 
 @dataclass(slots=True)
@@ -75,6 +79,7 @@ class _Reading:
     distro: str
     endpoints: list[Endpoint] = field(default_factory=list)
     gaps: list[Gap] = field(default_factory=list)
+    plugins: list[ConfiguredPlugin] = field(default_factory=list)
 
     def display(self, display: YamlMap) -> None:
         kind = _text(display, "Class")
@@ -85,7 +90,7 @@ class _Reading:
         elif short == kind or (
             short not in _DISPLAYS and short not in _SPECIAL and short not in _SILENT_DISPLAYS
         ):
-            self._unknown(display, f"display of class {shown(kind)}")
+            self._of_another_package(display, "display", kind)
         elif short in _SPECIAL:
             _SPECIAL[short](self, display)
         elif short in _DISPLAYS:
@@ -101,12 +106,12 @@ class _Reading:
             name, place = _topic(tool, "Topic")
             self._topic(_PUBLISH, name or default, place, type_name, f"tool {kind}")
         elif short == kind or short not in _SILENT_TOOLS:
-            self._unknown(tool, f"tool of class {shown(kind)}")
+            self._of_another_package(tool, "tool", kind)
 
     def panel(self, panel: YamlMap) -> None:
         kind = _text(panel, "Class")
         if not kind.startswith("rviz_common/"):
-            self._unknown(panel, f"panel of class {shown(kind)}")
+            self._of_another_package(panel, "panel", kind)
 
     def robot_model(self, display: YamlMap) -> None:
         if _text(display, "Description Source") != "File":
@@ -168,8 +173,10 @@ class _Reading:
         else:
             self.gaps.append(Gap(place, str(made)))
 
-    def _unknown(self, item: YamlMap, what: str) -> None:
-        self.gaps.append(Gap(item.source, f"what the {what} needs is not known"))
+    def _of_another_package(self, item: YamlMap, what: str, kind: str) -> None:
+        if not kind.startswith(_OF_ROS_1):
+            shown_as = f"{what} of class {shown(kind)}"
+            self.plugins.append(ConfiguredPlugin(shown_as, kind, item.source, dict(_properties(item, ""))))
 
 
 _SPECIAL = {
@@ -187,6 +194,18 @@ def _get(value: YamlValue | None, key: str) -> YamlValue | None:
 def _text(value: YamlMap, key: str) -> str:
     found = _get(value, key)
     return found.value if isinstance(found, YamlScalar) and isinstance(found.value, str) else ""
+
+
+def _properties(item: YamlMap, prefix: str) -> Iterator[tuple[str, object]]:
+    """Yield each property and those below it, ``Planned_Path.Trajectory_Topic``; a topic by its ``Value``."""
+    for key, value in item.items.items():
+        name = f"{prefix}{key.replace(' ', '_')}"
+        if isinstance(value, YamlScalar):
+            yield name, value.value
+        elif isinstance(value, YamlMap):
+            if "Value" in value.items:
+                yield name, _text(value, "Value")
+            yield from _properties(value, f"{name}.")
 
 
 def _topic(display: YamlMap, key: str) -> tuple[str, SourceRef]:
