@@ -1,9 +1,9 @@
 """An ``.rviz`` file: its displays and tools, enabled or not, and what each subscribes, publishes and calls.
 
-A display that is switched off counts too: the file offers it, one click of the user starts it. Classes of other packages
-are plugins for a document to describe; their properties are the parameters there, blanks written as ``_``. Classes
-``rviz/...``, in files from ROS 1, exist in no package of ROS 2: rviz2 loads nothing for them. Source: ros2/rviz jazzy,
-rviz_default_plugins (displays, tools), rviz_common (display_group.cpp, failed_display.cpp).
+A display that is switched off counts too: the file offers it, one click of the user starts it. Classes of other
+packages are plugins for a document to describe; their properties are the parameters there, blanks written as ``_``.
+Classes ``rviz/...``, in files from ROS 1, exist in no package of ROS 2: rviz2 loads nothing for them. Source: ros2/rviz
+jazzy, rviz_default_plugins (displays, tools), rviz_common (display_group.cpp, failed_display.cpp).
 """
 
 from __future__ import annotations
