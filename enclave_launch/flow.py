@@ -25,7 +25,6 @@ from enclave_launch.errors import LaunchFileError, ManifestError
 from enclave_launch.evaluation.evaluate import evaluate
 from enclave_launch.evaluation.programs import missing_programs
 from enclave_launch.host.plan_host import PlanHost
-from enclave_launch.host.protocol import MISSING_PREFIX
 from enclave_launch.host.user_code_results import RecordedResults
 from enclave_launch.interfaces import InterfaceFinder
 from enclave_launch.options import ResolveOptions, RunSettings, SecurityOptions
@@ -37,7 +36,7 @@ from enclave_launch.security_environment import SecuritySettings
 from enclave_launch.served_domains import with_domains
 from keystore.disk.share_files import LaunchHold
 from keystore.steps.options import ProvisionOptions
-from nodl.ament_index import launch_file_path, search_prefixes
+from nodl.ament_index import MISSING_PREFIX, launch_file_path, search_prefixes
 
 if TYPE_CHECKING:
     from enclave_launch.running import Launch

@@ -20,6 +20,9 @@ from typing import NamedTuple
 from enclave_common.files import read_text
 
 PREFIX_VARIABLE = "AMENT_PREFIX_PATH"
+MISSING_PREFIX = "/missing"
+"""``--allow-missing-packages``: package ``p`` is taken to be installed in ``/missing/p``, a program in
+``/missing/bin``."""
 INDEX_FOLDER = os.path.join("share", "ament_index", "resource_index")
 _LAUNCH_FILE = re.compile(r"launch\.(py|xml|ya?ml)$")  # ros2launch/api/api.py, is_launch_file
 _PACKAGE_VERSION = re.compile(r"<version\b[^<>]*>\s*([0-9]+(?:\.[0-9]+)*)\s*</version>")

@@ -20,8 +20,8 @@ from enclave_launch.description.markup.expose import action_parse_methods, subst
 from enclave_launch.description.markup.tags import ELEMENTS, SUBSTITUTIONS
 from enclave_launch.errors import EnclaveLaunchError
 from enclave_launch.frontend.error_location import frames
-from enclave_launch.host.protocol import MISSING_PREFIX
 from nodl.ament_index import (
+    MISSING_PREFIX,
     ExecutableNotInstalledError,
     PackageNotFoundError,
     executables,

@@ -19,9 +19,10 @@ from enclave_launch.diagnostics.evaluation import (
     ros_distro_unknown,
 )
 from enclave_launch.host.environment import environment_snapshot
-from enclave_launch.host.protocol import MISSING_PREFIX, CommandResult, HostOptions
+from enclave_launch.host.protocol import CommandResult, HostOptions
 from enclave_launch.ros_rules.distro import Distro, choose_release
 from nodl import ament_index
+from nodl.ament_index import MISSING_PREFIX
 
 if TYPE_CHECKING:
     from enclave_launch.host.protocol import DescriptionSource, UserCodeResults

@@ -24,10 +24,6 @@ LifecycleNode = Any
 
 T = TypeVar("T")
 
-MISSING_PREFIX = "/missing"
-"""``--allow-missing-packages``: package ``p`` is taken to be installed in ``/missing/p``, a program in
-``/missing/bin``."""
-
 
 class HostOptions(NamedTuple):
     """Properties of the world that an evaluation knows, in a dry run and live.

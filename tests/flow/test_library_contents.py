@@ -137,7 +137,25 @@ def test_rviz_gets_what_its_displays_and_tools_name(launch: Launch, tmp_path: Pa
     assert allowed(plan, "publish") == ["/goal"] and not plan.problems
     file.write_text(RVIZ.format(more="- {Class: my_rviz/Display}"))
     assert "display of class 'my_rviz/Display' needs is not known" in problems(launch(node))
-    assert "launch names no rviz file" in problems(launch('<node pkg="rviz2" exec="rviz2" name="rviz2"/>'))
+
+
+def test_rviz_without_a_file_has_that_of_the_user_else_its_own_default(
+    launch: Launch, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    default = ["/clicked_point", "/goal_pose", "/initialpose"]
+    without = '<node pkg="rviz2" exec="rviz2"/>'
+    not_there = '<node pkg="rviz2" exec="rviz2" args="-d /missing-file.rviz"/>'
+    assert allowed(launch(without), "publish") == allowed(launch(not_there), "publish") == default
+    of_user = tmp_path / ".rviz2" / "default.rviz"
+    of_user.parent.mkdir()
+    of_user.write_text(RVIZ.format(more=""))
+    assert allowed(launch(without), "publish") == ["/goal"]
+    assert allowed(launch(not_there), "publish") == default
+    of_missing_package = (
+        '<node pkg="rviz2" exec="rviz2" args="-d /missing/my_robot/share/my_robot/view.rviz"/>'
+    )
+    assert "there is no such file" in problems(launch(of_missing_package))
 
 
 def test_displays_and_panels_of_other_packages_are_described_by_documents(

@@ -8,12 +8,13 @@ from __future__ import annotations
 import os
 
 from enclave_common.files import read_bytes
+from nodl.ament_index import MISSING_PREFIX
 from nodl.dependence import Situation
+from nodl.dependence.configuration import rviz
 from nodl.dependence.configuration.behavior_tree import of_tree
 from nodl.dependence.configuration.configured import Configured
 from nodl.dependence.configuration.ros2_control import of_robot_description
 from nodl.dependence.configuration.ros_gz_bridge import of_arguments, of_configuration
-from nodl.dependence.configuration.rviz import of_file
 from nodl.errors import InvalidNoDLError
 from nodl.name_template import NameTemplate as NameTemplate
 from nodl.names import InvalidNameError as InvalidNameError
@@ -34,18 +35,22 @@ def read_configuration(kind: str, file: str, situation: Situation, place: Source
         return of_arguments(situation.words, place)
     if kind == "ros2_control":
         return of_robot_description(situation.launched.robot_description, place)
+    if kind == "rviz" and not file:
+        file = os.path.expanduser("~/.rviz2/default.rviz")  # rviz_common: visualization_frame.cpp
     if not file:
         return Configured(
             gaps=(Gap(place, f"launch names no {kind} file, from which its topics would follow"),)
         )
     if kind == "behavior_tree":
         return of_tree(file)
+    if kind == "rviz" and not os.path.isfile(file) and not file.startswith(f"{MISSING_PREFIX}/"):
+        return rviz.default(SourceRef(file))
     try:
         root = _read(file, last_counts=kind == "rviz")  # as rviz_common's YamlConfigReader does
     except InvalidNoDLError as error:
         return Configured(gaps=(Gap(SourceRef(file), f"{kind} file cannot be used: {error}"),))
     if kind == "rviz":
-        return of_file(root, situation.distro)
+        return rviz.of_file(root, situation.distro)
     if kind == "ros_gz_bridge":
         return of_configuration(root)
     return Configured(gaps=(Gap(place, f"there is no reader for files of kind {kind!r}"),))

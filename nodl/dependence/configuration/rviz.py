@@ -55,9 +55,20 @@ _TOOLS = {
     "SetGoal": ("goal_pose", "geometry_msgs/msg/PoseStamped"),
     "SetInitialPose": ("initialpose", "geometry_msgs/msg/PoseWithCovarianceStamped"),
 }
+_TOPICS_OF_DEFAULT = {f"/{name.lstrip('/')}": kind for name, kind in _TOOLS.values()}
 _OF_ROS_1 = "rviz/"
 _SILENT_DISPLAYS = ("Axes", "Grid", "TF")  # /tf is the listener's, which every rviz2 has
 _SILENT_TOOLS = ("FocusCamera", "Interact", "Measure", "MoveCamera", "Select")
+
+
+def default(place: SourceRef) -> Configured:
+    """Return what rviz2 needs for rviz_common/default.rviz, which it takes if the file that it is given does not exist.
+
+    Source: visualization_frame.cpp, ``loadDisplayConfig``.
+    """
+    note = f"the default configuration of rviz2, as {place.file} does not exist"
+    made = (endpoint_named(_PUBLISH, name, kind, place, note) for name, kind in _TOPICS_OF_DEFAULT.items())
+    return Configured(tuple(each for each in made if isinstance(each, Endpoint)))
 
 
 def of_file(root: YamlValue, distro: str) -> Configured:
