@@ -58,7 +58,7 @@ FLOORS: dict[str, tuple[set[str], ...]] = {
         {"source_ref", "types", "names", "ament_index"},
         {"errors", "remap", "name_template"},
         {"node_interface", "ros_arguments", "yaml_text", "xml_text"},
-        {"builtin_interfaces", "policy_text"},
+        {"builtin_interfaces"},
         {"dependence"},
         {"document"},
         {"lookup", "v1_api", "record", "infer"},

@@ -7,13 +7,24 @@ what rcl takes where nobody chose) one named after its first node. Names as the 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
+from xml.sax.saxutils import escape, quoteattr
 
 from nodl.graph.model import Graph, GraphNode, GraphProcess
 from nodl.names import split_fqn
 from nodl.node_interface import EndpointKind
-from nodl.policy_text import Names, policy_text, profile_lines
 
+Names = Mapping[EndpointKind, Iterable[str]]
+
+# group, child, attribute, kind: in the order of the schema
+_GROUPS = (
+    ("topics", "topic", "publish", EndpointKind.PUBLISHER),
+    ("topics", "topic", "subscribe", EndpointKind.SUBSCRIPTION),
+    ("services", "service", "reply", EndpointKind.SERVICE_SERVER),
+    ("services", "service", "request", EndpointKind.SERVICE_CLIENT),
+    ("actions", "action", "execute", EndpointKind.ACTION_SERVER),
+    ("actions", "action", "call", EndpointKind.ACTION_CLIENT),
+)
 Enclaves = dict[str, dict[str, dict[EndpointKind, set[str]]]]
 
 
@@ -27,7 +38,7 @@ def observed_policy(graphs: Iterable[Graph]) -> str:
                 profiles = enclaves.setdefault(_enclave(process, nodes), {})
                 for node in nodes:
                     _add(profiles.setdefault(node.fqn, {}), node)
-    return policy_text({path: _profiles(found) for path, found in sorted(enclaves.items())})
+    return _policy_text({path: _profiles(found) for path, found in sorted(enclaves.items())})
 
 
 def _enclave(process: GraphProcess, nodes: list[GraphNode]) -> str:
@@ -50,5 +61,26 @@ def _profiles(found: dict[str, dict[EndpointKind, set[str]]]) -> list[str]:
     for fqn, names in sorted(found.items()):
         namespace, name = split_fqn(fqn)
         kinds: Names = names
-        lines += profile_lines(namespace, name, kinds)
+        lines += _profile_lines(namespace, name, kinds)
     return lines
+
+
+def _policy_text(enclaves: Mapping[str, Iterable[str]]) -> str:
+    """Render a policy. ``enclaves``: path → the lines of its profiles."""
+    lines = ['<?xml version="1.0" encoding="UTF-8"?>', '<policy version="0.2.0">', "  <enclaves>"]
+    for path, profiles in enclaves.items():
+        lines += [f"    <enclave path={quoteattr(path)}>", "      <profiles>", *profiles]
+        lines += ["      </profiles>", "    </enclave>"]
+    return "\n".join([*lines, "  </enclaves>", "</policy>", ""])
+
+
+def _profile_lines(namespace: str, node: str, names: Names) -> list[str]:
+    """Render the profile of one node; groups without names are left out."""
+    lines = [f"        <profile ns={quoteattr(namespace)} node={quoteattr(node)}>"]
+    for group, child, attribute, kind in _GROUPS:
+        of_kind = sorted(set(names.get(kind, ())))
+        if of_kind:
+            lines.append(f'          <{group} {attribute}="ALLOW">')
+            lines += [f"            <{child}>{escape(name)}</{child}>" for name in of_kind]
+            lines.append(f"          </{group}>")
+    return [*lines, "        </profile>"]

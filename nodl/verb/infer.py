@@ -1,4 +1,4 @@
-"""Infer nodes and their interfaces from source: as text, JSON, policy, or manifests to start from."""
+"""Infer nodes and their interfaces from source: as text, JSON, or manifests to start from."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from nodl.infer.executable import infer_executable
 from nodl.infer.report import written
 from nodl.infer.report.comparison import lacking, to_text
 from nodl.infer.report.expanded import ExpandedSystem, expand
-from nodl.infer.report.nodl_report import to_v1
 from nodl.infer.report.v2_report import open_questions, to_v2
 from nodl.infer.system import InferredSystem, infer_paths
 from nodl.lookup import ManifestLookup
@@ -27,10 +26,8 @@ from nodl.verb import PREFIX, add_verb, encodable, write_documents
 OPTIONS: tuple[Option, ...] = (
     ("subjects PACKAGE|PATH", {"nargs": "+"}, "an installed package, or files and folders"),
     ("-o --output DIR", PATH, "write files into DIR"),
-    ("--format", {"choices": ("text", "json", "policy", "v1", "v2")}, "text (default); with -o: v2"),
+    ("--format", {"choices": ("text", "json", "v2")}, "text (default); with -o: v2"),
     ("--with-gaps", FLAG, "also write v2 documents of nodes that are not known in full; the gaps stand in them"),
-    ("--builtin", FLAG, "also show what every node has"),
-    ("--accept-patterns", FLAG, "allow names known in part as patterns in a policy"),
     ("--compare", FLAG,
      "say what installed manifests lack of that which the sources make; 1: something is missing"),
     PREFIX,
@@ -55,7 +52,7 @@ def run(args: argparse.Namespace) -> int:
     expanded = expand(system)
     chosen = args.format or ("v2" if args.output else "text")
     documents = _documents(chosen, system, expanded, args)
-    if chosen in ("v1", "v2") and not args.quiet:
+    if chosen == "v2" and not args.quiet:
         _tell_guesses(system)
     if args.output:
         write_documents(args.output, documents)
@@ -110,15 +107,12 @@ def _documents(
     chosen: str, system: InferredSystem, expanded: ExpandedSystem, args: argparse.Namespace
 ) -> dict[str, str]:
     if chosen == "json":
-        return {"inferred.json": written.to_json(expanded, built_in=args.builtin)}
-    if chosen == "policy":
-        return {"policy.xml": written.to_policy(expanded, accept_patterns=args.accept_patterns)}
+        return {"inferred.json": written.to_json(expanded)}
     if chosen == "text":
-        text = written.to_text(expanded, built_in=args.builtin)
+        text = written.to_text(expanded)
         here = os.path.join(os.getcwd(), "")
         return {"inferred.txt": text.replace(here, "")}  # as a person would name the files
-
-    return to_v1(system) if chosen == "v1" else to_v2(_writable(system, args.with_gaps))
+    return to_v2(_writable(system, args.with_gaps))
 
 
 def _writable(system: InferredSystem, with_gaps: bool) -> list[NodeInterface]:

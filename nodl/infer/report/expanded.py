@@ -8,10 +8,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
-from nodl.builtin_interfaces import DISTROS, BuiltinCondition, built_in_interfaces
 from nodl.infer.system import InferredSystem
 from nodl.name_template import NameTemplate, UnknownPart
-from nodl.names import InvalidNameError, expand_name, join
+from nodl.names import InvalidNameError, expand_name
 from nodl.node_interface import Certainty, Endpoint, EndpointKind, Gap, NodeInterface
 from nodl.source_ref import SourceRef
 
@@ -27,11 +26,10 @@ class ExpandedInterface(NamedTuple):
     type: str
     certainty: Certainty
     source: SourceRef
-    built_in: bool = False
 
 
 class ExpandedNode(NamedTuple):
-    """A node with all its interfaces, built-in ones included; ``*`` stands for a name that is not known."""
+    """A node with the interfaces that its source makes; ``*`` stands for a name that is not known."""
 
     interface: NodeInterface
     interfaces: tuple[ExpandedInterface, ...]
@@ -68,7 +66,6 @@ def expand(system: InferredSystem) -> ExpandedSystem:
                 if expanded is not None:
                     found.append(expanded)
         unresolved.update(dict.fromkeys(interface.gaps))
-        found.extend(_built_in(interface))
         nodes.append(ExpandedNode(interface, tuple(dict.fromkeys(found)), programs))
     nodes.sort(key=lambda node: (node.namespace, node.name, node.interface.source))
     return ExpandedSystem(tuple(nodes), tuple(sorted(unresolved)))
@@ -114,17 +111,3 @@ def _full_name(template: NameTemplate, node: NodeInterface) -> str:
     text = template.text.replace("*", _STAR)
     full = expand_name(text, namespace=node.namespace or "/", node=node.name or _NODE)
     return full.replace(_STAR, "*").replace(_NODE, "*")
-
-
-# --- built-in interfaces ------------------------------------------------------------------------------------
-
-_OF_EVERY_NODE = {BuiltinCondition.ALWAYS, BuiltinCondition.PARAMETERS, BuiltinCondition.TYPE_DESCRIPTION}
-
-
-def _built_in(node: NodeInterface) -> Iterator[ExpandedInterface]:
-    """Return what every node of a current distribution (iron and later) has, by client library."""
-    base = join(node.namespace or "/", node.name or "*")
-    conditions = _OF_EVERY_NODE | ({BuiltinCondition.LIFECYCLE} if node.lifecycle else set())
-    for row in built_in_interfaces(DISTROS[-1], node.library, conditions):
-        name = row.name.replace("~", base, 1)
-        yield ExpandedInterface(row.kind, name, row.type, Certainty.EXACT, node.source, built_in=True)

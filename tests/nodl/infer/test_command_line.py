@@ -98,7 +98,7 @@ def test_declared_encodings_marks_and_line_ends_are_read_as_python_reads_them(
     assert [(node["name"], node["line"]) for node in nodes] == [("latin", 4), ("marked", 2), ("windows", 2)]
 
 
-@pytest.mark.parametrize("kind", ["text", "json", "policy", "v1", "v2"])
+@pytest.mark.parametrize("kind", ["text", "json", "v2"])
 def test_file_names_that_are_not_utf8(kind: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     Path(os.fsdecode(os.fsencode(tmp_path) + b"/\xff.py")).write_text(NODE)
     assert infer(tmp_path, "--format", kind, "--with-gaps") == 0

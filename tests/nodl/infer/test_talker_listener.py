@@ -9,15 +9,13 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
-from xml.etree import ElementTree
 
 import pytest
 
 from nodl.infer import InferredSystem, infer_executable
 from nodl.infer.report.expanded import expand
-from nodl.infer.report.nodl_report import to_v1
 from nodl.infer.report.v2_report import to_v2
-from nodl.infer.report.written import to_json, to_policy
+from nodl.infer.report.written import to_json
 
 Infer = Callable[..., InferredSystem]
 
@@ -46,22 +44,6 @@ def main():
 if __name__ == '__main__':
     main()
 """
-SERVICES = (
-    "describe_parameters", "get_parameter_types", "get_parameters", "get_type_description",
-    "list_parameters", "set_parameters", "set_parameters_atomically",
-)  # fmt: skip
-
-
-def test_policy_contains_the_conditional_publisher(infer: Infer) -> None:
-    root = ElementTree.fromstring(to_policy(expand(infer(LISTENER))).encode())
-    profile = root.find("./enclaves/enclave[@path='/listener']/profiles/profile")
-    assert profile is not None
-    groups = {(group.tag, *group.attrib.items()): [child.text for child in group] for group in profile}
-    assert groups == {
-        ("topics", ("publish", "ALLOW")): ["/chatter2", "/parameter_events", "/rosout"],
-        ("topics", ("subscribe", "ALLOW")): ["/chatter"],
-        ("services", ("reply", "ALLOW")): [f"/listener/{service}" for service in SERVICES],
-    }
 
 
 def test_json_is_the_contract(infer: Infer, tmp_path: Path) -> None:
@@ -91,38 +73,23 @@ def test_json_is_the_contract(infer: Infer, tmp_path: Path) -> None:
     }
 
 
-def test_built_in_interfaces_on_request(infer: Infer) -> None:
-    document = json.loads(to_json(expand(infer(LISTENER)), built_in=True))
-    names = {interface["name"] for interface in document["nodes"][0]["interfaces"]}
-    assert {"/rosout", "/parameter_events", "/listener/get_parameters"} <= names
-
-
 def test_unknown_names_are_listed(infer: Infer) -> None:
     system = infer("import rclpy, sys\nn = rclpy.create_node('n')\nn.create_client(object, sys.argv[1])\n")
     document = json.loads(to_json(expand(system)))
     assert document["nodes"][0]["interfaces"][0]["certainty"] == "unknown"
     assert [entry["line"] for entry in document["unresolved"]] == [3]
-    assert "*" not in to_policy(expand(system), accept_patterns=True)
-
-
-def test_patterns_enter_a_policy_only_when_accepted(infer: Infer) -> None:
-    text = "import rclpy, sys\nn = rclpy.create_node('n')\nn.create_client(object, '/a/' + sys.argv[1])\n"
-    expanded = expand(infer(text))
-    assert "/a/*" not in to_policy(expanded)
-    assert "<service>/a/*</service>" in to_policy(expanded, accept_patterns=True)
 
 
 def test_manifests_read_back_as_what_was_inferred(infer: Infer, tmp_path: Path) -> None:
     from nodl.document import read_document
 
     system = infer(LISTENER)
-    for documents in (to_v1(system), to_v2(system.nodes)):
-        for name, text in documents.items():
-            path = tmp_path / name
-            path.write_text(text, encoding="utf-8")
-            (node,) = read_document(path)
-            found = {(e.kind, str(e.name), e.type) for e in node.interface.endpoints}
-            assert found == {(e.kind, str(e.name), e.type) for e in system.nodes[0].endpoints}
+    for name, text in to_v2(system.nodes).items():
+        path = tmp_path / name
+        path.write_text(text, encoding="utf-8")
+        (node,) = read_document(path)
+        found = {(e.kind, str(e.name), e.type) for e in node.interface.endpoints}
+        assert found == {(e.kind, str(e.name), e.type) for e in system.nodes[0].endpoints}
 
 
 # --- what launch starts -------------------------------------------------------------------------------------
