@@ -25,6 +25,7 @@ from nodl.infer.values import (
     Sequence,
     Value,
     contains,
+    sole,
 )
 
 Condition = tuple[Input, str, tuple[str, ...]]
@@ -201,12 +202,23 @@ def compare(run: Run, node: ast.Compare, frame: Frame) -> Value:
     left = run.evaluate(node.left, frame)
     results: set[bool | None] = set()
     for op, comparator in zip(node.ops, node.comparators, strict=True):
+        if isinstance(op, ast.In | ast.NotIn) and _all_variables(run, comparator, frame):
+            results.add(None)  # ``'node' in locals()``
+            continue
         right = run.evaluate(comparator, frame)
         results.add(compare_values(op, left, right))
         left = right
     if results == {True}:
         return (True,)
     return (False,) if False in results else (True, False)
+
+
+def _all_variables(run: Run, node: ast.expr, frame: Frame) -> bool:
+    """Return whether it is a call of Python's own ``locals`` or ``globals``."""
+    if not isinstance(node, ast.Call) or not isinstance(node.func, ast.Name):
+        return False
+    called = sole(run.evaluate(node.func, frame))
+    return isinstance(called, External) and called.path in ("builtins.locals", "builtins.globals")
 
 
 def compare_values(op: ast.cmpop, left: Value, right: Value) -> bool | None:
