@@ -52,8 +52,13 @@ class Observation(NamedTuple):
 
     @property
     def values(self) -> Inputs:
-        """Return everything that the node could read."""
-        return {**self.defaults, **self.inputs}
+        """Return everything that the node could read.
+
+        A program that declares what stands on its command line copied it from there (topic_tools).
+        """
+        words = {value for name, value in self.inputs.items() if name[0] in "<-"}
+        own = {name: value for name, value in self.defaults.items() if value not in words}
+        return {**own, **self.inputs}
 
 
 class Source(NamedTuple):
@@ -131,12 +136,8 @@ def candidates(name: str, inputs: Inputs) -> tuple[Source, ...]:
 
 
 def possible_sources(name: Name, seen: Observation) -> tuple[Source, ...]:
-    """Return what the launch gave and the program declared, and lists whose entries the program appends something to.
-
-    A program that declares what stands on its command line copied it from there (topic_tools).
-    """
-    copied = any(value == name.name for key, value in seen.inputs.items() if key[0] in "<-")
-    found = (*candidates(name.name, seen.inputs if copied else seen.values), *_names_of_entries(name, seen))
+    """Return what the launch gave, what the program declared, and lists whose entries it appends something to."""
+    found = (*candidates(name.name, seen.values), *_names_of_entries(name, seen))
     return found or tuple(_texts_within(name, seen))
 
 
@@ -153,16 +154,18 @@ def _origin(name: Name, observations: Sequence[Observation]) -> NameOrigin:
     per_observation = [set(_all_sources(name, each)) for each in seen_in]
     if not all(per_observation):
         return FIXED  # it was there once without any input of that value
+    common = set.intersection(*per_observation)
+    possible = dict.fromkeys(source for each in seen_in for source in possible_sources(name, each))
     left = [
         source
-        for source in possible_sources(name, seen_in[0])
-        if all(source in sources for sources in per_observation)
+        for source in possible
+        if (source in common or not common)  # one start gave a word, another a parameter
         and not any(_contradicts(name, source, each) for each in observations)
     ]
     followed = [source for source in left if any(_follows(name, source, each) for each in observations)]
     if followed:
         return NameOrigin(followed[0], proven=True, candidates=tuple(followed[1:]))
-    if len(left) == 1 and any(_is_telling(left[0], each) for each in seen_in):
+    if common and len(left) == 1 and any(_is_telling(left[0], each) for each in seen_in):
         return NameOrigin(left[0])
     return NameOrigin(candidates=tuple(left)) if left else FIXED
 

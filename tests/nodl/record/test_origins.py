@@ -82,6 +82,16 @@ def test_a_second_run_decides_between_several() -> None:
     assert origin("odom", first, second) == NameOrigin(Source("odom0"), proven=True)
 
 
+def test_one_start_gives_a_word_another_a_parameter_and_both_are_sources() -> None:
+    """topic_tools: relay in out, or input_topic."""
+    word, parameter = seen({"<1>": "scan"}, "scan"), seen({"input_topic": "scan"}, "scan")
+    assert origin("scan", word, parameter) == NameOrigin(candidates=(Source("<1>"), Source("input_topic")))
+    copied = word._replace(defaults={"input_topic": "scan"})
+    assert origin("scan", copied, parameter) == NameOrigin(candidates=(Source("<1>"), Source("input_topic")))
+    other = seen({"input_topic": "front"}, "scan")
+    assert origin("scan", word, other) == FIXED, "it did not follow the parameter"
+
+
 def test_a_value_in_the_middle_of_a_word_is_a_coincidence() -> None:
     assert origin("front/scan2", seen({"b": "scan", "c": "can2", "d": "fro"}, "front/scan2")) == FIXED
 
