@@ -133,8 +133,9 @@ def _of_node(
             what = endpoint.kind.value.replace("_", " ")
             gaps.append(Gap(endpoint.source, f"the name of this {what} is empty: rcl refuses it"))
     names: list[str | None] = [*_texts(record.names, record)]
-    if not names and record.description == "tf2_ros::TransformListener":
-        names = [f"transform_listener_impl{RANDOM_ENDING}"]
+    if not names and record.description:  # a library names it by an address
+        names = [f"{_known_beginning(record)}{RANDOM_ENDING}"]
+        rules = (*rules, f"__node:={names[0]}")
     elif not names or len(names) < len(record.names):
         gaps.append(Gap(record.source, "the name of this node is made at run time"))
         names = names or [None]
@@ -152,6 +153,13 @@ def _of_node(
         for name in dict.fromkeys(names)
         for namespace in dict.fromkeys(namespaces or ["/"])
     ]  # fmt: skip
+
+
+def _known_beginning(record: AllocatedNode) -> str:
+    """Return what the name of a node begins with that a library names by an address, without the last ``_``."""
+    (template,) = (each for atom in record.names for each in _templates(atom, record))
+    first = template.parts[0]
+    return first.rstrip("_") if isinstance(first, str) else ""
 
 
 def _texts(value: Value, record: AllocatedNode) -> list[str]:

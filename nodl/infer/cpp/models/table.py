@@ -186,7 +186,7 @@ def _subscribe(run: Machine, call: Call) -> Value:
 
 
 @library_class("tf2_ros::TransformListener")
-def _listener(run: Machine, call: Call) -> None:
+def listener(run: Machine, call: Call) -> None:
     """Model tf2_ros/src/transform_listener.cpp: without a node it makes one, ``transform_listener_impl_<address>``."""
     owner = owner_in(call.values)
     if owner is None and any(_may_be_node(value) for value in call.values[1:2]):
@@ -245,7 +245,7 @@ def _robot_localization(run: Machine, call: Call) -> None:
         Makes(SUB, "acceleration/filtered", "geometry_msgs/msg/AccelWithCovarianceStamped"),
     )
     _make(row, run, call)
-    _listener(run, replace(call, values=[]))
+    listener(run, replace(call, values=[]))
 
 
 # --- nav2, where its sources are not in reach: nav2_ros_common (interface_factories.hpp, lifecycle_node.hpp,

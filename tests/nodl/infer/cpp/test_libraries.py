@@ -91,3 +91,36 @@ def test_the_service_of_a_camera_with_a_namespace(tmp_path: Path) -> None:
 )
 def test_transports_of_point_clouds_are_told(body: str, tmp_path: Path) -> None:
     assert gaps(infer(tmp_path, in_class(body, before=CLOUDS)))
+
+
+def moveit(body: str) -> str:
+    head = HEAD + "#include <moveit/move_group_interface/move_group_interface.hpp>\n"
+    return head + f'int main() {{ auto node = std::make_shared<rclcpp::Node>("mover"); {body} }}\n'
+
+
+def test_a_move_group_interface_asks_move_group_and_waits_for_the_robot(tmp_path: Path) -> None:
+    body = 'moveit::planning_interface::MoveGroupInterface arm(node, "arm"); '
+    system = infer(tmp_path, moveit(body))
+    made = endpoints(system)
+    assert {("action_client", "move_action"), ("subscription", "robot_description_semantic")} <= made
+    assert ("subscription", "joint_states") not in made
+    assert {node.name for node in system.nodes} >= {
+        "mover_ssp_robot_description",
+        "transform_listener_impl_*",
+    }
+    system = infer(tmp_path, moveit(body + "auto pose = arm.getCurrentPose();"))
+    assert ("subscription", "joint_states") in endpoints(system)
+
+
+def test_a_move_group_interface_with_options_leaves_its_namespace_open(tmp_path: Path) -> None:
+    body = "moveit::planning_interface::MoveGroupInterface arm(node, options);"
+    assert any("namespace of this MoveGroupInterface" in gap for gap in gaps(infer(tmp_path, moveit(body))))
+
+
+def test_an_interface_to_the_planning_scene_has_a_node_of_its_own(tmp_path: Path) -> None:
+    system = infer(tmp_path, moveit('moveit::planning_interface::PlanningSceneInterface scene("/arm");'))
+    assert ("service_client", "apply_planning_scene") in endpoints(system)
+    assert [(each.name, each.namespace) for each in system.nodes][1:] == [
+        ("planning_scene_interface_*", "/arm")
+    ]
+    assert not gaps(system)
