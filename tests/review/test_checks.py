@@ -131,6 +131,16 @@ def test_missing_ends_are_one_finding_where_not_all_is_known() -> None:
     )
 
 
+def test_a_display_that_shows_nothing_is_no_missing_publisher() -> None:
+    checked = two({"subscribe": ["/x"]}, {"subscribe": ["/y"]})
+    for node in checked["nodes"]:
+        for each in node["interfaces"]:
+            if each["name"] == "/x":
+                each["place"] = "view.rviz:12"
+    found = {each.subject: each.code for each in check_plan(checked)}
+    assert (found["/x"], found["/y"]) == ("display-empty", "no-publisher")
+
+
 def test_a_wildcard_that_planning_told_of_is_not_told_again() -> None:
     checked = document({"/a": {"/n": {"publish": ["/x*", "/y*"]}}})
     checked["diagnostics"] = [told("pattern-accepted", "/n", "node /n may publish /x*: a pattern")]

@@ -35,6 +35,16 @@ def test_shared_enclaves_are_counted_and_listed_when_asked_for() -> None:
     assert findings_text(shared, verbose=True).count("[enclave-shared]") == 2
 
 
+def test_what_the_user_allowed_to_be_missing_is_counted() -> None:
+    missing = [
+        told("package-not-installed", "/missing/a"),
+        told("include-left-out", "/missing/a/b.launch.py"),
+    ]
+    text = findings_text(missing)
+    assert "[include-left-out]" in text
+    assert text.endswith("0 errors, 2 warnings (1 package-not-installed; -v lists them)\n")
+
+
 def test_an_accepted_finding_is_never_summed_up() -> None:
     (finding, _) = told("enclave-shared", "/a")
     text = findings_text([(finding, "one process"), told("enclave-shared", "/b")])

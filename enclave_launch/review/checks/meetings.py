@@ -68,10 +68,18 @@ def _missing_ends(plan: PlanDocument, document: Document) -> Iterator[PlanFindin
         for name in sorted(asked.get(here, ())):
             candidates = others if has_wildcard(name) else patterns
             if name not in others and not any(can_meet(name, other) for other in candidates):
-                who = sorted({user.node for user in users.get((here, name), ())})
+                using = users.get((here, name), ())
+                who = sorted({user.node for user in using})
                 use = f"{' and '.join(who)} use{'' if len(who) > 1 else 's'}"
                 text = f"nothing in this plan {verb} {name}, which {use}"
-                yield finding(code, name, text, _first_place(users.get((here, name), ())))
+                place = _first_place(using)
+                shown = code == "no-publisher" and using and all(map(_is_display, using))
+                yield finding("display-empty" if shown else code, name, text, place)
+
+
+def _is_display(user: _User) -> bool:
+    """Return True if an rviz file names the topic: rviz2 shows what there is."""
+    return (_place(user.interface["place"])[0] or "").endswith(".rviz")
 
 
 def near_names(plan: PlanDocument, document: Document) -> Iterator[PlanFinding]:
