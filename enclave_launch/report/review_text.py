@@ -60,8 +60,8 @@ _NAMED = 5
 _FOLDED = frozenset({
     "container-elsewhere", "display-empty", "enclave-shared", "executable-not-built", "executable-without-enclave",
     "include-left-out", "interface-unknown", "library-version", "no-manifest", "no-publisher", "no-server",
-    "no-subscriber", "node-name-unknown", "package-not-installed", "parameter-file-missing", "parameter-unknown", "pattern-accepted",
-    "program-not-installed", "remap-dead", "wildcard",
+    "no-subscriber", "node-name-unknown", "package-not-installed", "parameter-file-missing", "parameter-unknown",
+    "pattern-accepted", "program-not-installed", "remap-dead", "wildcard",
 })  # fmt: skip
 """Codes with one cause and often many subjects; what is wrong with a keystore is reported one by one."""
 _SUMMED_UP = frozenset({
