@@ -14,14 +14,11 @@ Condition = tuple[str, int, str]  # file, line of the #if, symbol: what the prep
 @dataclass(frozen=True)
 class Follows:
     """A name that a library makes of the final name of another topic, as remapped: ``how`` is ``remapped`` (``ending``
-    stands behind it) or ``camera_info``. With ``parameter``, of this ``default``, only where it has this ``value``."""
+    stands behind it) or ``camera_info``."""
 
     how: str
     topic: Text
     ending: str = ""
-    parameter: str = ""
-    value: str = ""
-    default: str = ""
 
 
 @dataclass(frozen=True)

@@ -90,7 +90,7 @@ _HARMLESS_FUNCTIONS = re.compile(
     r"signal_handlers_installed|contexts::.*|executors::.*|exceptions::.*|get_message_type_support_handle|extend_name_with_sub_namespace|"
     r"node_interfaces::get_node_(?:base|topics|services|parameters|timers|logging|clock|graph|time_source|waitables|type_descriptions)_interface|create_wall_timer|create_timer|get_typesupport_library|get_typesupport_handle|get_message_typesupport_handle|get_service_typesupport_handle|is_initialized|detail::.*|getLogger)"
     r"|(?:rclcpp|rclcpp_lifecycle|rclcpp_action)::\w*::\w+::(?:get_instance)"
-    r"|rclcpp::(?!Node$|create_|Async|Sync|wait_for|Generic)\w+(?:::\w+)*"
+    r"|rclcpp::(?!Node\b|create_|Async|Sync|wait_for|Generic)\w+(?:::\w+)*"
     r"|rclcpp_lifecycle::(?:State|Transition)\w*(?:::\w+)*"
     r"|rclcpp_action::(?:ServerGoalHandle|ClientGoalHandle|Client|Server|to_string|convert|ClientBase|ServerBase)(?:::.*)?"
     r"|\w+::(?:msg|srv|action)::.*"

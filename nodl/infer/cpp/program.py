@@ -22,7 +22,7 @@ from nodl.infer.cpp.reading.parameter_library import listener_of
 from nodl.infer.cpp.reading.preprocess import Preprocessed, preprocess
 from nodl.infer.cpp.reading.project import SourcePackage, Workspace, sources_of
 from nodl.infer.cpp.reading.type_names import Type
-from nodl.infer.cpp.running import calls, expressions, invocation, loops, operators, statements  # noqa: F401 (how each runs)
+from nodl.infer.cpp.running import calls, expressions, invocation, statements  # noqa: F401 (how each runs)
 from nodl.infer.cpp.running.callbacks import run_callbacks
 from nodl.infer.cpp.running.constructors import construct
 from nodl.infer.cpp.running.invocation import invoke
@@ -288,7 +288,7 @@ def _findings(run: Machine, sources: Sources) -> ProgramFindings:
     for (file, start), (source, what, name) in run.unset.items():
         if start not in run.handled.get(file, ()):
             run.gap_at(source, f"{what} was never seen to be set: what {name}() makes is not known")
-    for cls in run.names.specialisations.doubts.values():
+    for cls in run.names.doubts.values():
         why = f"which specialisation of {cls.qualified} is meant is not known"
         run.gap_at(SourceRef(cls.file.file, cls.line), why)
     for index in run.names.files.values():

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
-from nodl.dependence import Dependence, Test, Variation, When
+from nodl.dependence import Dependence, Variation, When
 from nodl.infer.cpp.entry import FixedMapping
 from nodl.infer.cpp.findings import AllocatedNode, Condition, Follows, PossibleEndpoint
 from nodl.infer.cpp.program import ProgramFindings
@@ -188,9 +188,7 @@ def _dependence(record: AllocatedNode, gaps: list[Gap]) -> Dependence | None:
                 gaps.append(Gap(found.source, f"{template} follows the names of several topics, as remapped"))
     if not variations:
         return None
-    asked = {f.follows.parameter: f.follows.default for f in record.endpoints if f.follows is not None}
-    defaults = FixedMapping((name, default) for name, default in asked.items() if name)
-    return Dependence(variations=FixedMapping(variations), defaults=defaults, options=FixedMapping())
+    return Dependence(variations=FixedMapping(variations), defaults=FixedMapping(), options=FixedMapping())
 
 
 def _variation(follows: Follows, record: AllocatedNode) -> Variation | None:
@@ -199,9 +197,8 @@ def _variation(follows: Follows, record: AllocatedNode) -> Variation | None:
     parts = [_reference(part) for part in template.parts]
     if others or None in parts:
         return None
-    tests = ((Test(follows.parameter, (follows.value,)),),) if follows.parameter else ()
     name = f"$({follows.how} {''.join(part or '' for part in parts)}){follows.ending}"
-    return Variation(name, when=When(tests))
+    return Variation(name, when=When(()))
 
 
 def _reference(part: Part) -> str | None:

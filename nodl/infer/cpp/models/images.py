@@ -2,29 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 
 from nodl.infer.cpp.findings import AllocatedNode, Follows
-from nodl.infer.cpp.libraries import Call, library_class, library_function, library_method
+from nodl.infer.cpp.libraries import LIBRARY_CLASSES, Call, library_class, library_function, library_method
 from nodl.infer.cpp.models.interfaces import PUB, SRV, SUB, node_of, owner_in, texts_in
 from nodl.infer.cpp.reading.type_names import Type
-from nodl.infer.cpp.running.launch_values import given_by_launch
 from nodl.infer.cpp.running.machine import Machine
 from nodl.infer.cpp.running.values import (
-    DerivedName,
     Obj,
-    Param,
     Text,
     Value,
     concatenated,
-    join,
     literal,
     plain,
     unknown,
 )
-from nodl.name_template import ParameterPart
 
 _IMAGE, _INFO = "sensor_msgs/msg/Image", "sensor_msgs/msg/CameraInfo"
 
@@ -98,112 +92,34 @@ def _image_subscription(
     run: Machine, record: AllocatedNode, base: Value, call: Call, transport: object
 ) -> None:
     """Model image_transport/src/subscriber.cpp: one topic, by the transport."""
-    known = plain(transport) if isinstance(transport, Text) else None
+    known = plain(transport) or ""
     if known in _TRANSPORTS:
-        _transported_subscription(run, record, base, call, str(known), "", "")
-    elif isinstance(transport, Param) and transport.item is None and _only_text(transport) is not None:
-        _chosen_by(run, record, base, call, transport)
-    else:
-        run.endpoint(record, SUB, base, _IMAGE, call)
-        if known != "raw":
-            run.gap(
-                call.node, call.frame,
-                "the transport of this image subscription is chosen at run time (not known); "
-                "its topic is BASE for raw, BASE/TRANSPORT else",
-                record,
-            )  # fmt: skip
-
-
-def hinted(call: Call) -> Value:
-    """Return the transport that hints among the arguments name; nothing without hints."""
-    hints = [a for v in call.values for a in v if isinstance(a, Obj) and a.type.last == "TransportHints"]
-    return join(*(each.data.get("transport", unknown("a transport")) for each in hints))
+        for topic in concatenated(base):
+            name = concatenated((topic,), literal(f"/{known}"))
+            run.endpoint(record, SUB, name, _TRANSPORTS[known], call, Follows("remapped", topic, f"/{known}"))
+        return
+    run.endpoint(record, SUB, base, _IMAGE, call)
+    if known != "raw":
+        run.gap(
+            call.node, call.frame,
+            "the transport of this image subscription is chosen at run time (not known); its topic is BASE for raw, "
+            "BASE/TRANSPORT else",
+            record,
+        )  # fmt: skip
 
 
 def _transports_of(record: AllocatedNode, call: Call, place: int) -> Value:
-    """Return the transports as given, else ``raw``; for methods of ``ImageTransport`` hints decide, else a parameter.
+    """Return the transports as given, else ``raw``; for methods of ``ImageTransport`` hints or a parameter decide.
 
     Source: image_transport/src/image_transport.cpp, ``getTransportOrDefault``.
     """
     if call.receiver is None:
         return (call.values[place] or unknown("a transport")) if len(call.values) > place else literal("raw")
-    parameter = (Param(record, "image_transport"),) if "image_transport" in record.parameters else None
-    return hinted(call) or parameter or literal("raw")
+    hints = any(isinstance(a, Obj) and a.type.last == "TransportHints" for v in call.values for a in v)
+    return unknown("a transport") if hints or "image_transport" in record.parameters else literal("raw")
 
 
-def _only_text(atom: Param) -> str | None:
-    texts = [plain(each) for each in atom.default]
-    return texts[0] if len(texts) == 1 else None
-
-
-def _chosen_by(run: Machine, record: AllocatedNode, base: Value, call: Call, chosen: Param) -> None:
-    """Subscribe, of all topics of a parameter that names the transport, the one with its value."""
-    default = _only_text(chosen) or ""
-    for topic in concatenated(base):
-        raw = Follows("remapped", topic, "", chosen.name, "raw", default)
-        name = concatenated((topic,), only_if(chosen.name, default, "raw"))
-        run.endpoint(record, SUB, name, _IMAGE, call, raw)
-    for transport in _TRANSPORTS:
-        _transported_subscription(run, record, base, call, transport, chosen.name, default)
-    if chosen_transport(run, chosen, ("raw", *_TRANSPORTS)) is None:
-        named = run.consulted.get(chosen.name) or default
-        why = f"the image transport {named} (parameter {chosen.name}) is not in the table"
-        run.gap(call.node, call.frame, why, record)
-
-
-def _transported_subscription(
-    run: Machine, record: AllocatedNode, base: Value, call: Call, transport: str, parameter: str, default: str
-) -> None:
-    for topic in concatenated(base):
-        wanted = transport if parameter else ""
-        follows = Follows("remapped", topic, f"/{transport}", parameter, wanted, default)
-        condition = only_if(parameter, default, transport) if parameter else literal("")
-        name = concatenated((topic,), literal(f"/{transport}"), condition)
-        run.endpoint(record, SUB, name, _TRANSPORTS[transport], call, follows)
-
-
-def chosen_transport(run: Machine, chosen: Param, known: Sequence[str]) -> str | None:
-    """Return the default of a parameter that names a transport; ``None`` unless it, and what launch gives, is in the
-    table.
-    """
-    default = _only_text(chosen) or ""
-    given = given_by_launch(run, chosen.record, chosen.name)
-    run.from_default.pop(chosen.name, None)  # its values are all listed
-    return default if (default if given is None else given) in known else None
-
-
-def only_if(parameter: str, default: str, value: str) -> Value:
-    """Return an empty ending for a name, which drops the name unless the parameter has this ``value``."""
-    return (Text((ParameterPart(parameter, default, None, (("only if equal", (value,)),)),)),)
-
-
-@library_class("image_transport::TransportHints")
-def _transport_hints(run: Machine, call: Call) -> None:
-    """Model image_transport/transport_hints.hpp: (node, default, parameter name), read by ``get_parameter_or``."""
-    owner, texts = owner_in(call.values), texts_in(call.values)
-    name = plain(texts[1][0]) if len(texts) > 1 and len(texts[1]) == 1 else "image_transport"
-    fallback = texts[0] if texts else literal("raw")
-    if owner is not None and owner.node is not None and name is not None:
-        call.this.data["transport"] = (Param(owner.node, name, None, owner.node.default(name) or fallback),)
-
-
-@library_method("image_transport::TransportHints", "getTransport")
-def _transport(run: Machine, call: Call) -> Value:
-    found: Value = call.this.data.get("transport", unknown("a transport"))
-    return found
-
-
-@library_function("image_transport::getCameraInfoTopic")
-def _camera_info_topic(run: Machine, call: Call) -> Value:
-    """Model image_transport/camera_common.hpp. Callers give it the name that launch has remapped, which it follows
-    then.
-    """
-    found: list[object] = []
-    for image in call.value(0):
-        for atom in _info_topic((image,)):
-            known = isinstance(atom, Text) and isinstance(image, Text)
-            found.append(Text((*atom.parts[:-1], DerivedName(atom.parts[-1], image))) if known else atom)
-    return tuple(found)
+LIBRARY_CLASSES["image_transport::TransportHints"] = lambda run, call: None
 
 
 @library_class("image_transport::ImageTransport")

@@ -57,27 +57,15 @@ def named_in(values: Sequence[Value]) -> list[Value]:
 
 
 def add(run: Machine, owner: Obj, kind: EndpointKind, name: Value, type_name: str, call: Call) -> Value:
-    """Add the interface of one call, under the sub-namespace of a sub-node; return the object it gives."""
+    """Add the interface of one call; return the object it gives."""
     record = owner.node
     assert record is not None
-    prefix = owner.data.get("prefix")
-    if prefix:
-        name = _below(prefix, name)
     run.endpoint(record, kind, name, type_name, call)
     made = run.obj(call.key("interface"), Type(f"rclcpp::{kind.value}"))
     made.heap = True
     made.data.update(name=name, kind=kind, type=type_name, record=record)
     run.later(call.values, call.frame)
     return (made,)
-
-
-def _below(prefix: Value, name: Value) -> Value:
-    found: list[object] = []
-    for atom in name:
-        written = plain(atom)
-        relative = written is not None and not written.startswith(("/", "~"))
-        found += concatenated(prefix, literal("/"), (atom,)) if relative or written is None else (atom,)
-    return tuple(found)
 
 
 def owner_and_name(call: Call) -> tuple[Obj | None, int]:
@@ -121,51 +109,22 @@ def _adapted(call: Call) -> str:
 
 
 def _statistics(run: Machine, call: Call) -> None:
-    """Add topic statistics, if the options of the subscription request them (rclcpp/subscription_options.hpp)."""
+    """Add a gap if the options of a subscription may request topic statistics (rclcpp/subscription_options.hpp)."""
     for atom in (atom for value in call.values[2:] for atom in value):
-        if not isinstance(atom, Obj) or not atom.type.last.startswith("SubscriptionOptions"):
-            continue
-        inner = [o for o in run.store.get((atom, "topic_stats_options")) or BOTTOM if isinstance(o, Obj)]
-        state = [a for o in inner for a in run.store.get((o, "state")) or BOTTOM]
-        topic = [a for o in inner for a in run.store.get((o, "publish_topic")) or BOTTOM]
-        if any("Disable" not in str(getattr(a, "why", a)) for a in state):
-            name = tuple(topic) or literal("/statistics")
-            run.endpoint(call.record, PUB, name, "statistics_msgs/msg/MetricsMessage", call)
+        if isinstance(atom, Obj) and run.store.get((atom, "topic_stats_options")):
+            run.gap(call.node, call.frame, "topic statistics of a subscription are not followed", call.record)
 
 
 def _generic(word: str, kind: EndpointKind) -> None:
     def method(run: Machine, call: Call) -> Value:
         return add(run, call.this, kind, call.value(0), _text_type(call.value(1)), call)
 
-    def function(run: Machine, call: Call) -> Value:
-        owner, position = owner_and_name(call)
-        if owner is None:
-            return _homeless(run, call, f"create_generic_{word}")
-        return add(run, owner, kind, call.value(position), _text_type(call.value(position + 1)), call)
-
     node_method(f"create_generic_{word}")(method)
-    library_function(f"rclcpp::create_generic_{word}")(function)
 
 
 def _text_type(value: Value) -> str:
     texts = [plain(atom) for atom in value if isinstance(atom, Text)]
     return texts[0] if len(texts) == 1 == len(value) and texts[0] and texts[0].count("/") == 2 else ""
-
-
-def _of_rcl(name: str, kind: EndpointKind, name_at: int) -> None:
-    """Register the model of rcl's C function, in which the node is the second argument.
-
-    Source: rcl/publisher.h, subscription.h, service.h, client.h, rcl_action/action_server.h, action_client.h. The
-    type stands in a structure that is not followed.
-    """
-
-    def function(run: Machine, call: Call) -> Value:
-        owner = owner_in([call.value(1)])
-        if owner is None:
-            return _homeless(run, call, name)
-        return add(run, owner, kind, call.value(name_at), "", call)
-
-    library_function(name)(function)
 
 
 def _action(word: str, kind: EndpointKind) -> None:
@@ -183,10 +142,8 @@ def _action(word: str, kind: EndpointKind) -> None:
 for _word, _kind in KINDS.items():
     _typed(_word, _kind)
     _generic(_word, _kind)
-    _of_rcl(f"rcl_{_word}_init", _kind, 3)
-for _word, _kind, _name_at in (("server", ACT, 4), ("client", CALL, 3)):
-    _action(_word, _kind)
-    _of_rcl(f"rcl_action_{_word}_init", _kind, _name_at)
+_action("server", ACT)
+_action("client", CALL)
 _action("generic_client", CALL)
 
 
@@ -201,11 +158,3 @@ def _introspection(run: Machine, call: Call) -> Value:
         name = concatenated(data["name"], literal("/_service_event"))
         run.endpoint(data["record"], PUB, name, f"{data['type']}_Event" if data["type"] else "", call)
     return BOTTOM
-
-
-@library_function("rclcpp::wait_for_message")
-def _wait_for_message(run: Machine, call: Call) -> Value:
-    owner, names = owner_in(call.values), named_in(call.values)
-    if owner is None:
-        return _homeless(run, call, "wait_for_message")
-    return add(run, owner, SUB, names[0] if names else unknown("a topic"), call.interface, call)

@@ -16,7 +16,6 @@ from nodl.infer.cpp.libraries import (
     node_class,
     node_method,
 )
-from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.launch_values import text_of
 from nodl.infer.cpp.running.machine import Machine
 from nodl.infer.cpp.running.values import (
@@ -30,14 +29,12 @@ from nodl.infer.cpp.running.values import (
     Text,
     Unknown,
     Value,
-    concatenated,
     join,
     literal,
     truth,
     unknown,
 )
 from nodl.infer.cpp.syntax import field_of, text
-from nodl.node_interface import EndpointKind
 
 OPTIONS = "rclcpp::NodeOptions"
 
@@ -115,15 +112,11 @@ def _assigned(atom: object) -> str | None:
 
 
 def _asked_for(run: Machine, record: AllocatedNode, options: Obj, call: Call) -> None:
-    """Add what rclcpp makes if the options request it: topic statistics, logger services (node_logging.cpp)."""
-    statistics = run.store.get((options, "enable_topic_statistics"))
-    if statistics and truth(statistics) is not False:
-        kind = "statistics_msgs/msg/MetricsMessage"
-        run.endpoint(record, EndpointKind.PUBLISHER, literal("/statistics"), kind, call)
-    logger = run.store.get((options, "enable_logger_service"))
-    for name in ("get_logger_levels", "set_logger_levels") if logger and truth(logger) is not False else ():
-        kind = f"rcl_interfaces/srv/{name.title().replace('_', '')}"
-        run.endpoint(record, EndpointKind.SERVICE_SERVER, literal(f"~/{name}"), kind, call)
+    """Add a gap for what rclcpp makes if the options request it: topic statistics, logger services."""
+    for name in ("enable_topic_statistics", "enable_logger_service"):
+        given = run.store.get((options, name))
+        if given and truth(given) is not False:
+            run.gap(call.node, call.frame, f"what {name} of node options makes is not followed", record)
 
 
 def _word(run: Machine, item: Value) -> str | None:
@@ -171,26 +164,9 @@ for _what, _name in (("name", "get_name"), ("ns", "get_namespace"), ("fqn", "get
     node_method(_name)(partial(_says, _what))
 
 
-@node_method("get_sub_namespace")
-def _sub_namespace(run: Machine, call: Call) -> Value:
-    """Return the sub-namespace, empty for the node itself (rclcpp/src/rclcpp/node.cpp)."""
-    return call.this.data.get("prefix") or literal("")
-
-
 @node_method("get_effective_namespace")
 def _effective_namespace(run: Machine, call: Call) -> Value:
-    """Return the namespace of the node, of a sub-node with its own behind it (rclcpp/src/rclcpp/node.cpp)."""
-    return unknown("the namespace of a sub-node") if call.this.data.get("prefix") else _says("ns", run, call)
-
-
-@node_method("create_sub_node")
-def _sub_node(run: Machine, call: Call) -> Value:
-    """Make a sub-node: its relative names stand below its sub-namespace."""
-    made = run.obj(call.key("sub"), Type("rclcpp::Node"), heap=True)
-    made.node, made.is_node = call.record, True
-    outer = call.this.data.get("prefix")
-    made.data["prefix"] = concatenated(outer, literal("/"), call.value(0)) if outer else call.value(0)
-    return (made,)
+    return _says("ns", run, call)
 
 
 @node_method("resolve_topic_name", "resolve_service_name", "resolve_topic_or_service_name")

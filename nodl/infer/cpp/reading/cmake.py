@@ -108,8 +108,6 @@ class BuildReader:
                 self.run(body, Layer(variables, {given[0]: item}))
         elif name == "if":
             self._if(words, body, variables)
-        elif name == "while":
-            self.run(body, variables)
 
     def _if(self, words: list[str], body: Sequence[Command], variables: dict[str, str]) -> None:
         parts: list[tuple[list[str], list[Command]]] = [(words, [])]
@@ -215,11 +213,6 @@ class BuildReader:
                 if near(each, variables)
             ]
             variables[given[1]] = ";".join(file for files in found for file in sorted(files))
-
-    def _do_aux_source_directory(self, given: list[str], variables: dict[str, str]) -> None:
-        folder = absolute(given[0], variables)
-        found = [str(p) for p in sorted(Path(folder).glob("*")) if p.suffix in _SOURCE_SUFFIXES]
-        variables[given[-1]] = ";".join(found)
 
     def _do_target_sources(self, given: list[str], variables: dict[str, str]) -> None:
         if given[0] in self.build.targets:

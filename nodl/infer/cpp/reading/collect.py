@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from nodl.infer.cpp.reading.declarations import (
@@ -115,17 +115,14 @@ class _Collector:
         body = field_of(node, "body")
         prefix = "::".join((*scope, *([name] if name else [])))
         self.index.enums.add(name)
-        number: int | None = -1
-        numbers: dict[str, int] = {}
-        for child in children(body):
-            if child.type == "enumerator":
-                constant = text(field_of(child, "name"))
-                full = f"{prefix}::{constant}" if prefix else constant
-                number = _enumerated(field_of(child, "value"), number, numbers)
-                if number is not None:
-                    numbers[constant] = self.index.enumerator_numbers[full] = number
-                for key in (constant, f"{name}::{constant}", full):
-                    self.index.enumerators.setdefault(key, full)
+        listed = [child for child in children(body) if child.type == "enumerator"]
+        if not _all_differ([text(field_of(each, "value")) for each in listed]):
+            return
+        for child in listed:
+            constant = text(field_of(child, "name"))
+            full = f"{prefix}::{constant}" if prefix else constant
+            for key in (constant, f"{name}::{constant}", full):
+                self.index.enumerators.setdefault(key, full)
 
     # --- functions --------------------------------------------------------------------------------------
 
@@ -295,12 +292,11 @@ def _plain_name(name: str) -> str:
     return re.sub(r"\s+", "", "".join(out))
 
 
-def _enumerated(value: Node | None, before: int | None, numbers: Mapping[str, int]) -> int | None:
-    """Return the number of an enumerator: as written, that of another, else one more than the one before."""
-    if value is None:
-        return None if before is None else before + 1
-    written = text(value).rstrip("uUlL")
-    return numbers.get(written) if not written.isdecimal() or written[0] == "0" != written else int(written)
+def _all_differ(numbers: Sequence[str]) -> bool:
+    """Return whether enumerators with these numbers, as written, are certainly all different."""
+    if not any(numbers[1:]):
+        return not numbers or numbers[0].isdecimal() or not numbers[0]
+    return all(map(str.isdecimal, numbers)) and len({int(each) for each in numbers}) == len(numbers)
 
 
 def _initialiser(item: Node) -> tuple[str, Node]:

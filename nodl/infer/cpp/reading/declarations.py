@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from nodl.infer.cpp.reading.preprocess import Preprocessed
-from nodl.infer.cpp.reading.writes import Writes
 from nodl.infer.cpp.syntax import Node, Tree, children, field_of, line_of, text, walk
 
 if TYPE_CHECKING:
@@ -56,7 +55,7 @@ class Function:
     static: bool = False
     variadic: bool = False
     specialises: tuple[str, ...] | None = None  # arguments as written, its own or those of its class
-    written: Writes | None = None  # variables that it may change, when asked
+    written: frozenset[str] | None = None  # variables that it may change, when asked
     _words: frozenset[str] | None = None
 
     @property
@@ -159,7 +158,6 @@ class FileIndex:
     using: list[str] = field(default_factory=list)  # using namespace
     enums: set[str] = field(default_factory=set)
     enumerators: dict[str, str] = field(default_factory=dict)  # qualified and last name -> qualified
-    enumerator_numbers: dict[str, int] = field(default_factory=dict)  # by qualified name
     errors: list[tuple[int, int, str]] = field(default_factory=list)  # first byte, line, text
     all_functions: list[Function] = field(default_factory=list)
     sites: tuple[Site, ...] | None = None  # where it may make interfaces, when asked

@@ -10,7 +10,6 @@ from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from nodl.infer.cpp.reading.declarations import Class, FileIndex, Function, Global, Scope
 from nodl.infer.cpp.reading.known_headers import KNOWN_HEADERS, is_of_c
-from nodl.infer.cpp.reading.specialisations import Specialisations
 from nodl.infer.cpp.reading.type_names import POINTER_MEMBERS, Type, split_type
 
 _WRAPPERS = frozenset({
@@ -63,7 +62,6 @@ class Names:
         self.globals: dict[str, list[Global]] = {}
         self.aliases: dict[str, list[tuple[FileIndex, str, str, Scope]]] = {}
         self.enumerators: dict[str, str] = {}
-        self.enumerator_numbers: dict[str, int] = {}
         self.enums: set[str] = set()
         self._bases: dict[str, tuple[str, ...]] = {}
         self.hidden: dict[Class, frozenset[str]] = {}  # what ``inheritance.hidden`` found
@@ -71,7 +69,13 @@ class Names:
         self.plugins: dict[str, str] = {}  # lookup name or class -> class that pluginlib makes
         for index in self.files.values():
             self._add(index)
-        self.specialisations = Specialisations(self)
+        self.doubts: dict[str, Class] = {}  # used templates with specialisations, which are not followed
+        self._specialised = {
+            each.qualified
+            for found in self.classes.values()
+            for each in found
+            if each.specialises is not None and (each.fields or each.declared or each.methods)
+        }
         self._attach()
 
     def _add(self, index: FileIndex) -> None:
@@ -83,7 +87,6 @@ class Names:
             last = qualified.rpartition("::")[2]
             self.aliases.setdefault(last, []).append((index, qualified, target, scope))
         self.enumerators.update(index.enumerators)
-        self.enumerator_numbers.update(index.enumerator_numbers)
         self.enums |= index.enums
 
     def _attach(self) -> None:
@@ -94,7 +97,6 @@ class Names:
         for function in (each for found in self.functions.values() for each in found):
             cls, name = self._class_of_method(function), function.name
             if cls is not None:
-                cls = self.specialisations.of_method(cls, function)
                 self.methods[cls].setdefault(name, []).append(function)
                 _complete(function, cls.declared.get(name, ()))
             elif not function.owner:
@@ -240,9 +242,18 @@ class Names:
         return listed[0] if len(listed) == 1 else None
 
     def class_of(self, kind: Type, scope: Scope, file: FileIndex) -> Class | None:
-        """Return the class of a type, of a template the specialisation for its arguments; doubts are noted."""
+        """Return the class of a type; of a template that has specialisations this is noted as a doubt."""
         cls = self.find_class(kind.name, scope, file)
-        return cls if cls is None else self.specialisations.meant(cls, kind)
+        if cls is not None and cls.qualified in self._specialised:
+            self.doubts.setdefault(cls.qualified, cls)
+        return cls
+
+    def bindings(self, cls: Class, kind: Type) -> dict[str, Type]:
+        """Return what the parameters of the template ``cls`` stand for."""
+        bound = dict(zip(cls.templates, kind.arguments, strict=False))
+        for name, default in cls.template_defaults.items():
+            bound.setdefault(name, self.resolve(default, cls.scope, cls.file, bound))
+        return bound
 
     @_once
     def ancestry(self, cls: Class | None) -> list[Class]:
@@ -398,7 +409,7 @@ class Names:
         cls = self.find_class(outer.name, scope, file)
         if cls is not None:
             cls = self.class_of(outer, scope, file) or cls
-            bound = self.specialisations.bindings(cls, outer)
+            bound = self.bindings(cls, outer)
             return self.resolve(rest, cls.scope, cls.file, bound)._replace(pointer=pointer)
         return Type(f"{outer.name}::{rest}", (), pointer)
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
-from typing import NamedTuple
 
 from nodl.infer.cpp.syntax import Node, field_of, text, walk
 
@@ -18,38 +16,12 @@ _READING = frozenset({
 """Methods that leave their object as it is."""
 
 
-class Writes(NamedTuple):
-    """``changed``: assigned, counted up, read from a stream, given to a call or changed by a method of theirs, aliases
-    included; ``replaced``: those that may hold another object afterwards."""
+def writes_of(node: Node) -> frozenset[str]:
+    """Return what the code below ``node`` may change itself, aliases included.
 
-    changed: frozenset[str]
-    replaced: frozenset[str]
-
-    def union(self, others: Iterable[Writes]) -> Writes:
-        listed = list(others)
-        return Writes(
-            self.changed.union(*(each.changed for each in listed)),
-            self.replaced.union(*(each.replaced for each in listed)),
-        )
-
-
-def writes_of(node: Node) -> Writes:
-    """Return what the code below ``node`` may change itself."""
-    changed: set[str] = set()
-    replaced: set[str] = set()
-    for each in walk(node):
-        changed |= _words_of(each)
-        replaced |= _replaced(each)
-    return Writes(frozenset(changed | replaced), frozenset(replaced))
-
-
-def _replaced(node: Node) -> set[str]:
-    if node.type == "assignment_expression":
-        return _in(field_of(node, "left"))
-    callee = field_of(node, "function") if node.type == "call_expression" else None
-    if callee is not None and text(field_of(callee, "field")) in ("reset", "swap"):
-        return _in(field_of(callee, "argument"))
-    return set()
+    That is assigned, counted up, read from a stream, given to a call or changed by a method of theirs.
+    """
+    return frozenset(word for each in walk(node) for word in _words_of(each))
 
 
 def _words_of(node: Node) -> set[str]:

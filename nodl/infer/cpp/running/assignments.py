@@ -150,22 +150,18 @@ def assign(run: Machine, target: Node, value: Value, frame: Frame) -> None:
         if argument is not None:
             _through_pointer(run, argument, value, frame)
             assign(run, argument, value, frame)
-    elif inner.type == "conditional_expression":
-        for side in ("consequence", "alternative"):
-            target_side = field_of(inner, side)
-            if target_side is not None:
-                assign(run, target_side, join(run.evaluate(target_side, frame), value), frame)
     elif inner.type == "call_expression":
         _assign_result(run, inner, value, frame)
+    elif not inner.type.endswith("literal"):
+        through(run, inner, frame)
 
 
 def _assign_result(run: Machine, call: Node, value: Value, frame: Frame) -> None:
     """Run ``f() = x``: an option or element of a known library; else what is written is not known."""
     function = field_of(call, "function")
     if text(function) in ("std::tie", "tie"):
-        for index, each in enumerate(children(field_of(call, "arguments"))):
-            parts = [a.items[index] for a in value if isinstance(a, Group) and index < len(a.items)]
-            assign(run, each, join(*parts) if parts else unknown("what is taken apart"), frame)
+        for each in children(field_of(call, "arguments")):
+            assign(run, each, unknown("what is taken apart"), frame)
         return
     if _TEMPORARY.match(text(call)):
         return
@@ -177,8 +173,6 @@ def _assign_result(run: Machine, call: Node, value: Value, frame: Frame) -> None
         for atom, model in zip(holders, models, strict=True):
             if model is not None:
                 model(run, Call(call, frame, [value], receiver=atom))
-    elif owner is not None and name in ("at", "front", "back") and holders:
-        assign(run, owner, tuple(_one_of(atom, value) for atom in holders), frame)
     elif any(isinstance(atom, Text | Seq | Map | Param) for atom in value) or _gives_reference(run, function):
         run.gap(call, frame, f"what {text(call)[:60]} = ... writes to is not known")
 
@@ -191,13 +185,6 @@ def _gives_reference(run: Machine, callee: Node | None) -> bool:
     listed = run.names.functions_by_name.get(text(callee).partition("<")[0].rpartition("::")[2], ())
     declarators = [field_of(each.node, "declarator") for each in listed]
     return any(each is not None and each.type == "reference_declarator" for each in declarators)
-
-
-def _one_of(atom: object, value: Value) -> object:
-    """Return a container after one of its elements, it is not known which, was written."""
-    if isinstance(atom, Seq):
-        return open_sequence((*atom.items, value))
-    return atom._replace(open=True) if isinstance(atom, Map) else Unknown("a text whose letters are written")
 
 
 def _through_pointer(run: Machine, pointer: Node, value: Value, frame: Frame) -> None:
@@ -253,8 +240,8 @@ def _assign_field(run: Machine, node: Node, value: Value, frame: Frame) -> None:
     objects = [atom for atom in owners if isinstance(atom, Obj)]
     if is_plain(value) and re.search(r"->second\.", text(node)) and not objects:
         through(run, node, frame)
-    if any(isinstance(atom, Group) for atom in owners) and name in ("first", "second"):
-        _assign_half(run, node, owners, name, value, frame)
+    if any(isinstance(atom, Group) for atom in owners) and name in ("first", "second") and is_plain(value):
+        through(run, node, frame)
     if any(not isinstance(atom, Obj) or atom.cls is None for atom in owners) or not owners:
         run.later([value], frame)  # a library keeps it and may call it
     for each in objects:
@@ -262,19 +249,6 @@ def _assign_field(run: Machine, node: Node, value: Value, frame: Frame) -> None:
         cell = (each, name)
         before = run.store.get(cell) or BOTTOM
         run.store.set(cell, value if strong else join(before, value))
-
-
-def _assign_half(run: Machine, node: Node, owners: Value, name: str, value: Value, frame: Frame) -> None:
-    """Run ``pair.first = x``; through an iterator it is not known whose entry is written."""
-    argument = field_of(node, "argument")
-    if not is_plain(value):
-        return
-    if argument is None or text(field_of(node, "operator")) == "->":
-        through(run, node, frame)
-        return
-    pairs = [atom.items for atom in owners if isinstance(atom, Group) and len(atom.items) == 2]
-    halves = [(value, second) if name == "first" else (first, value) for first, second in pairs]
-    assign(run, argument, tuple(Group(each) for each in halves), frame)
 
 
 def _assign_element(run: Machine, node: Node, value: Value, frame: Frame) -> None:

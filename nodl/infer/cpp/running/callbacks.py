@@ -9,10 +9,10 @@ from dataclasses import dataclass, field
 
 from nodl.infer.cpp.ledger import Reach
 from nodl.infer.cpp.reading.declarations import Class, Function
-from nodl.infer.cpp.reading.writes import Writes, writes_of
+from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.invocation import HOOKS, call_lambda, invoke
-from nodl.infer.cpp.running.machine import MAX_STEPS, NEXT, Frame, Machine
-from nodl.infer.cpp.running.memory import Cell, Reads
+from nodl.infer.cpp.running.machine import NEXT, Frame, Machine
+from nodl.infer.cpp.running.memory import Reads
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     Bound,
@@ -34,9 +34,6 @@ from nodl.source_ref import SourceRef
 PATIENCE = 5
 """Rounds after which a variable that callbacks still change counts as not known."""
 MAX_ROUNDS = 32
-SIDE_STEPS = 30_000
-"""For a callback that makes no interface itself; what one that needs more may change is not known."""
-
 Key = tuple[object, object]
 
 
@@ -52,10 +49,8 @@ class _Ran:
 class _Rounds:
     run: Machine
     last: dict[Key, _Ran] = field(default_factory=dict)
-    read: set[Cell] = field(default_factory=set)  # by callbacks
-    names_read: set[str] = field(default_factory=set)
-    writes: dict[object, Writes] = field(default_factory=dict)
-    given_up: set[Key] = field(default_factory=set)  # callbacks that only change variables, in too many steps
+    names_read: set[str] = field(default_factory=set)  # by callbacks
+    writes: dict[object, frozenset[str]] = field(default_factory=dict)
 
 
 def run_callbacks(run: Machine) -> None:
@@ -101,39 +96,10 @@ def _call(rounds: _Rounds, key: Key, atom: object, frame: Frame, certainly: bool
         and run.store.holds(last.reads, in_any_order=True)
     ):
         return False
-    if key in rounds.given_up:
-        return _unsettle(rounds, atom)
-    makes = certainly or _makes(run, atom)
-    done = True
-
-    def go() -> None:
-        nonlocal done
-        done = run.attempt(lambda: _run(run, atom, frame, certainly), MAX_STEPS if makes else SIDE_STEPS)
-
-    reads = run.store.watched(go)
-    if not done:
-        rounds.given_up.add(key)
-        return _unsettle(rounds, atom)
+    reads = run.store.watched(lambda: _run(run, atom, frame, certainly))
     rounds.last[key] = _Ran(reads, len(run.nodes))
-    rounds.read.update(reads.cells)
     rounds.names_read.update(name for _, name in reads.cells)
     return True
-
-
-def _unsettle(rounds: _Rounds, atom: object) -> bool:
-    """Forget what a callback may change that was not followed; return whether that is news."""
-    store, writes, news = rounds.run.store, _writes(rounds, atom), False
-    for cell in rounds.read:
-        if cell[1] not in writes.changed:
-            continue
-        before = store.get(cell) or BOTTOM
-        after = join(*(_settled(each, BOTTOM) for each in before))
-        if cell[1] in writes.replaced:
-            after = join(after, unknown("a value that callbacks change"))
-        if set(after) != set(before):
-            store.set(cell, after)
-            news = True
-    return news
 
 
 def _run(run: Machine, atom: object, frame: Frame, certainly: bool) -> None:
@@ -141,7 +107,7 @@ def _run(run: Machine, atom: object, frame: Frame, certainly: bool) -> None:
         if isinstance(atom, Lambda):
             call_lambda(run, atom, [], atom.node, atom.frame)
         elif isinstance(atom, Bound):
-            given = [unknown(f"the argument {p.name}") for p in atom.function.parameters]
+            given = atom.fixed or [unknown(f"the argument {p.name}") for p in atom.function.parameters]
             invoke(run, atom.function, atom.this, given, atom.function.node, frame, ())
         return NEXT
 
@@ -150,7 +116,7 @@ def _run(run: Machine, atom: object, frame: Frame, certainly: bool) -> None:
 
 def _matters(rounds: _Rounds, atom: object) -> bool:
     """Return whether it may make an interface, or change what a callback that runs has read."""
-    return _makes(rounds.run, atom) or not rounds.names_read.isdisjoint(_writes(rounds, atom).changed)
+    return _makes(rounds.run, atom) or not rounds.names_read.isdisjoint(_writes(rounds, atom))
 
 
 def _makes(run: Machine, atom: object) -> bool:
@@ -159,22 +125,22 @@ def _makes(run: Machine, atom: object) -> bool:
     return isinstance(atom, Bound) and run.makes_interfaces(atom.function)
 
 
-def _writes(rounds: _Rounds, atom: object) -> Writes:
+def _writes(rounds: _Rounds, atom: object) -> frozenset[str]:
     """Return what the callback, and whatever it may call, writes."""
     run = rounds.run
     if not isinstance(atom, Lambda | Bound):
-        return Writes(frozenset(), frozenset())
+        return frozenset()
     key = (atom.node.id if isinstance(atom, Lambda) else atom.function, len(run.used_classes()))
     if key not in rounds.writes:
         if isinstance(atom, Lambda):
             own, words = writes_of(atom.node), words_in(atom.node)
         else:
             own, words = _written(atom.function), atom.function.words
-        rounds.writes[key] = own.union(map(_written, Reach(run).from_words(words)))
+        rounds.writes[key] = own.union(*map(_written, Reach(run).from_words(words)))
     return rounds.writes[key]
 
 
-def _written(function: Function) -> Writes:
+def _written(function: Function) -> frozenset[str]:
     if function.written is None:
         function.written = writes_of(function.node)
     return function.written
@@ -222,7 +188,7 @@ def _find_overrides(run: Machine) -> None:
                     hook = in_force and (name in HOOKS or (method.virtual and not known))
                     if hook or name.startswith("~"):
                         frame = Frame(method.file, method.scope, None, obj)
-                        run.callbacks.setdefault((method, obj), (Bound(method, obj), frame))
+                        run.callbacks.setdefault((method, (obj, ())), (Bound(method, obj), frame))
 
 
 _PLAIN_NODES = frozenset({"rclcpp::Node", "rclcpp_lifecycle::LifecycleNode"})

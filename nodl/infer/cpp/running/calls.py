@@ -8,26 +8,35 @@ from __future__ import annotations
 
 import re
 
-from nodl.infer.cpp.libraries import LIBRARY_CLASSES, LIBRARY_FUNCTIONS, NODE_BASES
+from nodl.infer.cpp.ledger import CREATES
+from nodl.infer.cpp.libraries import (
+    LIBRARY_CLASSES,
+    LIBRARY_FUNCTIONS,
+    LIBRARY_METHODS,
+    NODE_BASES,
+    NODE_METHODS,
+    FunctionModel,
+)
+from nodl.infer.cpp.reading.declarations import Class, Function
 from nodl.infer.cpp.reading.names import STANDARD_TYPES
 from nodl.infer.cpp.reading.type_names import NO_TYPE
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.constructors import cast, construct, is_plain_type, made
-from nodl.infer.cpp.running.invocation import CallSite, call_functions, call_values
+from nodl.infer.cpp.running.containers import CONTAINER_METHODS, container_call, is_standard
+from nodl.infer.cpp.running.contents import handed_over
+from nodl.infer.cpp.running.invocation import CallSite, call_functions, call_values, pointed_to
 from nodl.infer.cpp.running.machine import Frame, Machine, expression
-from nodl.infer.cpp.running.method_calls import (
-    by_model,
-    method_call,
-    model_of,
-    of_this,
-    on_object,
-    only_declared,
-)
 from nodl.infer.cpp.running.references import is_plain, keep_references
 from nodl.infer.cpp.running.standard import CASTS, STANDARD, as_algorithm, may_write, writes_elements
-from nodl.infer.cpp.running.static_types import class_around, current_object
-from nodl.infer.cpp.running.unknown_calls import changed_by_standard, unknown_call
-from nodl.infer.cpp.running.values import BOTTOM, Bound, Lambda, Obj, Value, join, unknown
+from nodl.infer.cpp.running.static_types import (
+    GIVES_INNER,
+    class_around,
+    class_of_member,
+    current_object,
+    declared_type,
+)
+from nodl.infer.cpp.running.unknown_calls import changed_by_standard, unknown_call, without_source
+from nodl.infer.cpp.running.values import BOTTOM, Bound, Lambda, Obj, Unknown, Value, join, unknown
 from nodl.infer.cpp.running.variables import member, variable
 from nodl.infer.cpp.syntax import Node, callee_name, field_of, text, unwrapped
 
@@ -206,5 +215,170 @@ def _static_method(run: Machine, head: str, last: str, site: CallSite) -> Value 
     if cls is None or not methods:
         return only_declared(run, cls, last, site, None)
     inside = this is not None and cls in run.names.ancestry(this.cls)
-    bindings = run.names.specialisations.bindings(cls, kind)
+    bindings = run.names.bindings(cls, kind)
     return site.call_methods(methods, this if inside else None, exactly=True, bindings=bindings)
+
+
+# --- methods ----------------------------------------------------------------------------------------------------
+
+
+def method_call(run: Machine, site: CallSite) -> Value:
+    """Call ``x.f(...)`` for each thing that ``x`` may be; join the results, ``BOTTOM`` if ``x`` holds nothing."""
+    callee, frame, subject = site.callee, site.frame, site.receiver
+    field = unwrapped(field_of(callee, "field"))
+    name = callee_name(field) if field is not None else ""
+    if field is not None and field.type == "qualified_identifier":
+        name = name.rpartition("::")[2]
+    receiver = run.evaluate(subject, frame)
+    if text(field_of(callee, "operator")) == "->":
+        receiver = pointed_to(run, receiver, "operator->", callee, frame)
+    is_inner = name in GIVES_INNER and not site.given and any(isinstance(atom, Obj) for atom in receiver)
+    if is_inner and not any(run.methods_of(atom, name) for atom in receiver):
+        return receiver
+    if name == "reset" and _declared_pointer(run, subject, frame):
+        value = run.evaluate(site.given[0], frame) if site.given else BOTTOM
+        assign(run, subject, value, frame)  # pointer.reset(new Foo(...))
+        return BOTTOM
+    if name == "emplace" and _declared_pointer(run, subject, frame):  # of an optional
+        kind, _ = declared_type(run, subject, frame)
+        made = construct(run, kind._replace(pointer=False), site.values, site.node, frame)
+        assign(run, subject, made, frame)
+        return made
+    if not receiver:
+        run.later(site.values, frame)
+        run.resolve(site.node, frame)
+        if _could_make(run, subject, name, frame):
+            found_at = (frame.file.file, site.node.start_byte)
+            run.unset[found_at] = (run.place(site.node, frame), text(subject)[:40], name)
+        return BOTTOM
+    found: list[Value] = []
+    before = run.store.mark()
+    alternatives = []
+    for atom in receiver:
+        # Runs its arguments anew.
+        found.append(_on_atom(run, atom, name, CallSite(run, site.node, callee, frame)))
+        if len(receiver) > 1:
+            alternatives.append(run.store.changes(before))
+            run.store.undo(before)
+    if alternatives:
+        run.store.merge(alternatives)
+        run.left = None
+    return join(*found)
+
+
+def _could_make(run: Machine, receiver: Node, name: str, frame: Frame) -> bool:
+    """Return whether the method, of an object that was not seen to be made, would make interfaces."""
+    kind, _ = declared_type(run, receiver, frame)
+    cls = run.class_of(kind, frame)
+    if cls is not None:
+        return any(map(run.makes_interfaces, run.names.find_methods(cls, name)))
+    if CREATES.fullmatch(name):
+        return True
+    if kind.name not in ("", "auto"):
+        return False
+    return any(run.makes_interfaces(f) for table in run.names.methods.values() for f in table.get(name, ()))
+
+
+def _declared_pointer(run: Machine, node: Node, frame: Frame) -> bool:
+    if node.parent is not None and "->" in text(node.parent)[len(text(node)) : len(text(node)) + 3]:
+        return False
+    return declared_type(run, node, frame)[1]
+
+
+def _on_atom(run: Machine, atom: object, name: str, site: CallSite) -> Value:
+    if isinstance(atom, Obj):
+        return on_object(run, atom, name, site)
+    if isinstance(atom, Lambda | Bound):
+        values = site.values
+        return call_values(run, (atom,), values, site.node, site.frame) if name == "operator()" else BOTTOM
+    if not isinstance(atom, Unknown) or name in CONTAINER_METHODS:
+        return container_call(run, atom, name, site)
+    return _on_unknown(run, atom, name, site)
+
+
+def on_object(run: Machine, atom: Obj, name: str, site: CallSite) -> Value:
+    """Call a method of one object: its source, else a closure in a member, else the tables, else unknown code."""
+    callee, frame = site.callee, site.frame
+    if atom.cls is not None:
+        argument = field_of(callee, "argument")
+        own = argument is not None and argument.type == "this" and "::" not in text(field_of(callee, "field"))
+        seen = None if own else class_of_member(run, atom, name, callee, frame)
+        methods = run.names.find_methods(seen, name) if seen is not None else of_this(run, atom, name, frame)
+        if methods:
+            return site.call_methods(methods, atom)
+        field = member(run, atom, name, seen)
+        if field is not None and name not in NODE_METHODS:
+            return site.call_value(field)
+    if atom.cls is None and atom.type.name:
+        run.resolve(site.node, frame)
+    found = by_model(run, atom, name, site)
+    if found is None:
+        found = only_declared(run, atom.cls, name, site, atom)
+    if found is not None:
+        return found
+    if atom.node is not None and not atom.is_node and not name.startswith("create"):
+        run.later(site.values, frame)
+        return unknown(f"the result of {name}()")
+    whole = f"{atom.type.name}::{name}"
+    return unknown_call(run, whole, site.values, site.node, site.given, frame, receiver=atom)
+
+
+def only_declared(
+    run: Machine, cls: Class | None, name: str, site: CallSite, receiver: Obj | None
+) -> Value | None:
+    """Return a method that the class or a base declares without a body in reach; ``None`` if none does."""
+    if cls is None or not run.names.declarations(cls, name):
+        return None
+    return without_source(run, f"{cls.name}::{name}", site.values, site.node, site.frame, receiver)
+
+
+def of_this(run: Machine, this: Obj, name: str, frame: Frame) -> list[Function]:
+    """Return what ``name()`` calls inside of a class: its own while it is made as a base, or if it is not virtual."""
+    methods = run.names.find_methods(this.cls, name)
+    cls, ancestry = class_around(run, frame), run.names.ancestry(this.cls)
+    if this.building is not None and this.building is not this.cls:
+        return run.names.find_methods(this.building, name) or methods
+    if cls is None or cls is this.cls or cls not in ancestry or not methods:
+        return methods
+    every = [m for each in ancestry for m in run.names.methods.get(each, {}).get(name, ())]
+    if any(each.virtual for each in (*every, *run.names.declarations(this.cls, name))):
+        return methods
+    return run.names.find_methods(cls, name) or methods
+
+
+def model_of(this: Obj, name: str) -> FunctionModel | None:
+    """Return what the tables have of a method: by the object's class, its library base, or for it as a node."""
+    found = LIBRARY_METHODS.get((this.type.name, name)) or LIBRARY_METHODS.get((this.foreign_base, name))
+    return found or (NODE_METHODS.get(name) if this.is_node else None)
+
+
+def by_model(run: Machine, atom: Obj, name: str, site: CallSite) -> Value | None:
+    """Return what the tables know of a method; ``None`` if they do not know it."""
+    model = model_of(atom, name)
+    if model is None:
+        return None
+    call = site.call(atom)
+    run.handle(site.node, site.frame)
+    return model(run, call)
+
+
+def _on_unknown(run: Machine, atom: Unknown, name: str, site: CallSite) -> Value:
+    values, node, frame, subject = site.values, site.node, site.frame, site.receiver
+    if CREATES.fullmatch(name):
+        run.handle(node, frame)
+        what = f"{text(subject)[:60]}->{name}()"
+        run.gap(node, frame, f"the node that {what} makes an interface on is not known: {atom.why}")
+        return unknown(f"the result of {name}()")
+    kind, _ = declared_type(run, subject, frame)
+    is_own = kind.last in run.names.classes  # in whatever namespace
+    if kind.name not in ("", "auto") or not is_standard(name):
+        run.resolve(node, frame)
+    if (kind.name in ("", "auto") or is_own) and not is_standard(name):
+        every = (f for table in run.names.methods.values() for f in table.get(name, ()))
+        possible = [f for f in every if run.makes_interfaces(f)]
+        possible = [f for f in possible if len(values) <= len(f.parameters) + (9 if f.variadic else 0)]
+        if possible:
+            which = f"which {name}() is called here is not known ({atom.why})"
+            run.gap(node, frame, f"{which}; {possible[0]} makes interfaces")
+    handed_over(run, f"{text(subject)[:40]}->{name}()", values, node, frame)
+    return unknown(f"the result of {name}()")

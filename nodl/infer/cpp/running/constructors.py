@@ -34,7 +34,6 @@ from nodl.infer.cpp.running.values import (
     join,
     literal,
     open_sequence,
-    plain,
     unknown,
 )
 from nodl.infer.cpp.syntax import Node, children, field_of, text
@@ -43,8 +42,7 @@ SEQUENCES = frozenset({
     "std::vector", "std::array", "std::list", "std::deque", "std::set", "std::unordered_set", "std::initializer_list",
     "vector", "std::multiset", "std::queue", "std::stack",
 })  # fmt: skip
-SETS = frozenset({"std::set", "std::unordered_set", "set"})
-ORDERED = frozenset({*SETS, "std::multiset", "std::priority_queue"})
+ORDERED = frozenset({"std::set", "std::unordered_set", "set", "std::multiset", "std::priority_queue"})
 MAPS = frozenset({"std::map", "std::unordered_map", "std::multimap", "map"})
 _TEXTS = frozenset({
     "std::string", "string", "std::string_view", "std::stringstream", "std::ostringstream", "std::filesystem::path",
@@ -176,7 +174,7 @@ def _sequence(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame
         return items[0]
     parent = given[0].parent if given else None
     if parent is None or parent.type != "argument_list":
-        return (as_set(items) if kind.name in SETS else Seq(tuple(items)),)
+        return (open_sequence(items) if kind.name in ORDERED else Seq(tuple(items)),)
     if len(items) > 1 and END in items[1]:
         parts = [items_of(run, atom) for atom in items[0]]
         listed = [item for part, _ in parts for item in part]
@@ -189,45 +187,25 @@ def _repeated(
     run: Machine, node: Node, inner: Type, count: object, frame: Frame, value: Value | None = None
 ) -> Value:
     """Return so many elements of type ``inner``: each its own object, or one for all if that is not known."""
+
+    def element(where: Frame) -> Value:
+        if value is not None:
+            return copied(run, value, node, where, run.held_class(inner, where))
+        return default_value(run, node, inner, where) if inner.name and not inner.pointer else BOTTOM
+
     if isinstance(count, int) and 0 <= count <= MAX_ELEMENTS:
-        made_ones = []
-        for index in range(count):
-            of_one = replace(frame, path=(*frame.path, index))
-            made_ones.append(_element(run, node, inner, of_one, value))
-        return (Seq(tuple(made_ones)),)
+        return (Seq(tuple(element(replace(frame, path=(*frame.path, at))) for at in range(count))),)
     run.repeated += 1
-    one = _element(run, node, inner, frame, value)
+    one = element(frame)
     run.repeated -= 1
     return (open_sequence((one,)),)
 
 
-def _element(run: Machine, node: Node, inner: Type, frame: Frame, value: Value | None) -> Value:
-    if value is not None:
-        return copied(run, value, node, frame, run.held_class(inner, frame))
-    return default_value(run, node, inner, frame) if inner.name and not inner.pointer else BOTTOM
-
-
-def as_set(items: Sequence[Value]) -> Seq:
-    """Return each element once, in order; in any order, any number of times if one is not a known text."""
-    known = [plain(item[0]) if len(item) == 1 and isinstance(item[0], Text) else None for item in items]
-    by_text = {text: item for text, item in zip(known, items, strict=True) if text is not None}
-    return open_sequence(items) if None in known else Seq(tuple(by_text[text] for text in sorted(by_text)))
-
-
 def cast(run: Machine, kind: Type, value: Value) -> Value:
-    """Evaluate ``static_cast<T>(x)``: a number as T holds it, the enumerator of a number, else the object itself."""
+    """Evaluate ``static_cast<T>(x)``: a number as T holds it, an enumerator or the object itself."""
     if kind.last not in run.names.enums:
         return as_type(kind.name, value)
-    numbers = run.names.enumerator_numbers
-    owner = f"::{kind.last}::"
-    found: list[object] = []
-    for atom in value:
-        same = [full for full, each in numbers.items() if each == atom and owner in f"::{full}"]
-        if isinstance(atom, int) and same:
-            found.append(Const(same[0], atom))
-        else:
-            found.append(atom if isinstance(atom, Const) else Unknown("an enumerator"))
-    return tuple(found)
+    return tuple(atom if isinstance(atom, Const) else Unknown("an enumerator") for atom in value)
 
 
 def text_of(run: Machine, values: Sequence[Value]) -> Value:
@@ -286,7 +264,7 @@ def _aggregate(
 ) -> Value:
     """Make an object whose fields braces fill; ``values``: what was given, if that ran already."""
     names = fields_of(cls)
-    bindings = run.names.specialisations.bindings(cls, kind)
+    bindings = run.names.bindings(cls, kind)
     members: dict[str, Value] = {}
     for position, item in enumerate(given):
         name, value = names[position] if position < len(names) else "", item
@@ -391,9 +369,7 @@ def _check_operators(run: Machine, cls: Class, node: Node, frame: Frame) -> None
         (name, f) for each in ancestry for name, found in run.names.methods[each].items() for f in found
     ]
     for name, method in listed:
-        if _NOT_FOLLOWED.fullmatch(name) and (
-            run.makes_interfaces(method) or writes_of(method.node).changed & kept
-        ):
+        if _NOT_FOLLOWED.fullmatch(name) and (run.makes_interfaces(method) or writes_of(method.node) & kept):
             why = f"{name} of {cls.name} changes something: where it runs is not followed"
             run.gap(node, frame, why)
 
@@ -415,7 +391,7 @@ def construct_class(
     if frame.depth > MAX_DEPTH:
         run.gap(node, frame, f"the bases of {cls.name} are deeper than is followed")
         return
-    this.bindings[cls] = run.names.specialisations.bindings(cls, kind)
+    this.bindings[cls] = run.names.bindings(cls, kind)
     constructor = chosen(
         run.names.find_methods(cls, cls.name) if cls.name in run.names.methods[cls] else [], arguments
     )

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import re
+from collections.abc import Sequence
 
-from nodl.infer.cpp.running.arithmetic import CHANGES_TEXT, added, asked_of_text, changed_text
+from nodl.infer.cpp.running.arithmetic import added
 from nodl.infer.cpp.running.assignments import assign, with_entry
-from nodl.infer.cpp.running.constructors import ORDERED, SETS, as_set, construct, made
+from nodl.infer.cpp.running.constructors import ORDERED, construct, made
 from nodl.infer.cpp.running.contents import copied, handed_over, items_of
+from nodl.infer.cpp.running.expressions import element
 from nodl.infer.cpp.running.invocation import CallSite
 from nodl.infer.cpp.running.launch_values import settled_text
 from nodl.infer.cpp.running.machine import Machine
-from nodl.infer.cpp.running.operators import element
 from nodl.infer.cpp.running.standard import called_now
 from nodl.infer.cpp.running.static_types import declared_type
 from nodl.infer.cpp.running.values import (
@@ -25,12 +25,13 @@ from nodl.infer.cpp.running.values import (
     Text,
     Unknown,
     Value,
+    as_one_map,
     literal,
     open_sequence,
     plain,
     unknown,
 )
-from nodl.infer.cpp.syntax import children, text
+from nodl.infer.cpp.syntax import children
 
 
 def is_standard(name: str) -> bool:
@@ -108,21 +109,10 @@ def _added(run: Machine, atom: object, name: str, site: CallSite) -> Value:
     if not isinstance(atom, Seq):
         assign(run, receiver, (open_sequence((value, (atom,))),), frame)
         return value
-    in_front = name.endswith("_front") or _is_begin(site)
-    ordered = kind.name in ORDERED or (name in ("insert", "emplace") and not in_front)
-    longer = (value, *atom.items) if in_front else (*atom.items, value)
-    if kind.name in SETS and not atom.open:
-        assign(run, receiver, (as_set(longer),), frame)
-    else:
-        is_open = atom.open or (ordered and not name.endswith("_front"))
-        assign(run, receiver, (open_sequence(longer) if is_open else Seq(longer),), frame)
+    keeps_order = not atom.open and kind.name not in ORDERED and name in ("push_back", "emplace_back", "push")
+    longer = (*atom.items, value)
+    assign(run, receiver, (Seq(longer) if keeps_order else open_sequence(longer),), frame)
     return value
-
-
-def _is_begin(site: CallSite) -> bool:
-    """Return whether it is ``x.insert(x.begin(), ...)``."""
-    start = re.sub(r"\s", "", text(site.given[0])) if site.given else ""
-    return start in (f"{text(site.receiver)}.begin()", f"{text(site.receiver)}.cbegin()")
 
 
 def _inserted(run: Machine, atom: object, source: Value, site: CallSite) -> Value:
@@ -144,31 +134,24 @@ def _map_call(run: Machine, atom: Map, name: str, site: CallSite) -> Value:
     first = values[0] if values else BOTTOM
     if name in ("emplace", "insert_or_assign", "try_emplace") and len(values) >= 2:
         key, value = _new_entry(run, site)
-        return becomes(_entered(atom, key, value, name == "insert_or_assign"))
+        return becomes(
+            with_entry(atom, key, value) if name == "insert_or_assign" else _entered(atom, key, value)
+        )
     if name == "insert" and values:
         pairs = [each for each in first if isinstance(each, Group | Seq) and len(each.items) == 2]
         pairs += [Group(entry) for each in first if isinstance(each, Map) for entry in each.entries]
         for pair in pairs:
-            atom = _entered(atom, pair.items[0], pair.items[1], False)
+            atom = _entered(atom, pair.items[0], pair.items[1])
         return becomes(atom if pairs else atom._replace(open=True))
-    if name == "erase":
-        return becomes(_without(atom, first))
-    if name == "clear":
-        return becomes(Map(()))
-    if name in ("count", "contains") and values and _is_definite(atom, first):
-        return (not _is_missing(atom, first),)
-    if name == "empty" and not atom.open:
-        return (not atom.entries,)
-    if name == "at" and values:
-        return element(run, atom, first)
-    if name == "find" and values:
-        return (END,) if _is_missing(atom, first) else (Group((first, element(run, atom, first))),)
+    if name in ("erase", "clear"):
+        return becomes(Map(()) if name == "clear" else atom._replace(open=True))
+    if name in ("at", "find") and values:
+        found = element(run, atom, first)
+        return found if name == "at" else (END, Group((first, found)))
     if name in ("end", "cend"):
         return (END,)
     if name in ("begin", "cbegin"):
         return (atom,)
-    if name == "size" and not atom.open:
-        return (len(atom.entries),)
     return unknown(f"the result of {name}()")
 
 
@@ -186,39 +169,15 @@ def _new_entry(run: Machine, site: CallSite) -> tuple[Value, Value]:
     return key, construct(run, inner, rest, site.node, site.frame)
 
 
-def _entered(atom: Map, key: Value, value: Value, replace: bool) -> Map:
-    """Enter a pair: a key that a map already has keeps its value, unless that is to be replaced."""
-    if replace or _is_missing(atom, key):
-        return with_entry(atom, key, value)
-    if _is_definite(atom, key):
-        return atom
-    return atom._replace(entries=(*atom.entries, (key, value)), open=True)
-
-
-def _without(atom: Map, key: Value) -> Map:
-    if _is_definite(atom, key):
-        return atom._replace(entries=tuple(entry for entry in atom.entries if entry[0] != key))
-    return atom._replace(open=True)
-
-
-def _is_definite(atom: Map, key: Value) -> bool:
-    """Return whether it is certain which entry has this key, or that none has."""
-    return (
-        not atom.open
-        and len(key) == 1
-        and plain(key[0]) is not None
-        and all(len(known) == 1 and plain(known[0]) is not None for known, _ in atom.entries)
-    )
-
-
-def _is_missing(atom: Map, key: Value) -> bool:
-    """Return whether a map certainly has no such key."""
-    return _is_definite(atom, key) and all(known != key for known, _ in atom.entries)
+def _entered(atom: Map, key: Value, value: Value) -> Map:
+    """Enter a pair; a key that the map already has may keep its value."""
+    definite = len(key) == 1 and plain(key[0]) is not None
+    return as_one_map((*atom.entries, (key, value)), atom.open or not definite)
 
 
 _REARRANGES = frozenset({
     "erase", "resize", "pop_back", "pop_front", "assign", "swap", "pop", "remove", "unique", "sort", "reverse",
-    "splice", "merge", "remove_if", "extract",
+    "splice", "merge", "remove_if", "extract", "fill",
 })  # fmt: skip
 
 
@@ -243,36 +202,20 @@ def _sequence_call(run: Machine, atom: Seq | Group, name: str, site: CallSite) -
         before = run.evaluate(site.given[0], site.frame)
         assign(run, site.given[0], (atom,), site.frame)
         assign(run, site.receiver, before, site.frame)
-    elif name == "assign" and len(values) == 1:
-        assign(run, site.receiver, first, site.frame)
-    elif (after := _rearranged(atom, name, site)) is not None:
+    elif (after := _rearranged(atom, name, values)) is not None:
         assign(run, site.receiver, (after,), site.frame)
     return unknown(f"the result of {name}()")
 
 
-def _rearranged(atom: Seq | Group, name: str, site: CallSite) -> Seq | None:
+def _rearranged(atom: Seq | Group, name: str, values: Sequence[Value]) -> Seq | None:
     """Return what a method that changes a list leaves of it; ``None`` for one that does not."""
-    exact, items, values = isinstance(atom, Group) or not atom.open, atom.items, site.values
-    first = values[0] if values else BOTTOM
     if name == "clear":
         return Seq(())
-    if name == "resize" and exact and len(first) == 1 and isinstance(first[0], int):
-        count = min(first[0], 256)
-        unset = [unknown("an element that is not set")] * (count - len(items))
-        return Seq((*items[:count], *unset))
-    if isinstance(atom, Group):
+    if isinstance(atom, Group) or name not in _REARRANGES:
         return None
-    if name == "fill" and values:
-        return Seq((first,) * len(items)) if exact else open_sequence((first,))
-    if name in ("pop_back", "pop_front") and exact:
-        return Seq(items[:-1] if name == "pop_back" else items[1:])
-    if name == "erase" and exact and _is_begin(site):
-        return Seq(items[1:]) if len(values) == 1 else open_sequence(items)
-    more = (unknown("an element of a list"),) if name in _ADDS_OTHERS else ()
-    return open_sequence((*items, *more)) if name in _REARRANGES else None
+    return open_sequence((*atom.items, *values[:1], unknown("an element of a list")))
 
 
-_ADDS_OTHERS = frozenset({"resize", "assign", "swap", "splice", "merge"})
 _SAME_TEXT = frozenset({
     "c_str", "str", "string", "data", "value", "get", "as_string", "view", "get_value", "value_or", "generic_string",
     "begin", "end",
@@ -285,14 +228,18 @@ def _text_call(run: Machine, atom: Text | Param, name: str, site: CallSite) -> V
         if name == "str" and values:
             assign(run, site.receiver, values[0], site.frame)
         return (atom,)
-    known = settled_text(run, atom)
-    if name in CHANGES_TEXT:
-        after = changed_text(known, name, values) if known is not None else None
-        if after is None and name in ("append", "push_back") and len(values) == 1:
-            found = added((atom,), values[0])
-        else:
-            found = literal(after) if after is not None else unknown(f"what {name}() makes of a text")
+    if name in _CHANGES_TEXT:
+        adds = name in ("append", "push_back") and len(values) == 1
+        changed = literal("") if name == "clear" else unknown(f"what {name}() makes of a text")
+        found = added((atom,), values[0]) if adds else changed
         assign(run, site.receiver, found, site.frame)
         return found
-    found_value = asked_of_text(known, name, values) if known is not None else None
-    return unknown(f"the result of {name}()") if found_value is None else found_value
+    known = settled_text(run, atom)
+    return (not known,) if name == "empty" and known is not None else unknown(f"the result of {name}()")
+
+
+_CHANGES_TEXT = frozenset({
+    "erase", "replace", "insert", "pop_back", "assign", "resize", "remove_prefix", "remove_suffix", "swap", "clear",
+    "push_back", "append",
+})  # fmt: skip
+"""Methods after which the text is another one."""

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from nodl.infer.cpp.libraries import NODE_METHODS, Call
+from nodl.infer.cpp.libraries import Call
 from nodl.infer.cpp.reading.declarations import Function, FunctionParameter, parameters_of, type_text
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.assignments import assign
@@ -18,7 +18,7 @@ from nodl.infer.cpp.running.memory import MEMORY_DEPTH, CallOutcome, Changes
 from nodl.infer.cpp.running.overloads import candidates, chosen
 from nodl.infer.cpp.running.static_types import declared_type
 from nodl.infer.cpp.running.unknown_calls import unknown_call
-from nodl.infer.cpp.running.values import Bound, Lambda, Obj, Unknown, Value, join, unknown
+from nodl.infer.cpp.running.values import Bound, Lambda, Obj, Value, join, unknown
 from nodl.infer.cpp.syntax import Node, children, field_of, template_arguments, text, unwrapped
 
 
@@ -83,13 +83,10 @@ def call_values(run: Machine, callee: Value, values: Sequence[Value], node: Node
         elif isinstance(atom, Bound):
             found += [
                 invoke(run, atom.function, this, given, node, frame, ())
-                for this, given in _bound(atom, values)
+                for this, given in _bound(atom, atom.fixed or values)
             ]
         elif isinstance(atom, Obj) and (own := run.methods_of(atom, "operator()")):
             found.append(call_methods(run, own, atom, values, node, frame, ()))
-        elif isinstance(atom, Obj) and atom.data.get("partial") is not None:
-            inner, fixed = atom.data["partial"]
-            found.append(call_values(run, inner, _placed(fixed, values), node, frame))
         else:
             name = text(field_of(node, "function"))[:60]
             if "*" in name and ("->*" in name or ".*" in name):
@@ -107,23 +104,6 @@ def _bound(atom: Bound, values: Sequence[Value]) -> list[tuple[Obj | None, Seque
     if atom.this is None and function.owner and objects and len(values) == len(function.parameters) + 1:
         return [(each, values[1:]) for each in objects]
     return [(atom.this, values)]
-
-
-def _placed(fixed: Sequence[Value], values: Sequence[Value]) -> list[Value]:
-    """Return the arguments of ``std::bind`` with its placeholders filled in."""
-    found = []
-    for value in fixed:
-        place = next(
-            (
-                a.why
-                for a in value
-                if isinstance(a, Unknown) and re.search(r"the value of (?:\w+::)*_\d$", a.why)
-            ),
-            "",
-        )
-        index = int(place[-1]) - 1 if place else -1
-        found.append((values[index] if index < len(values) else unknown("an argument")) if place else value)
-    return found
 
 
 def call_lambda(run: Machine, atom: Lambda, values: Sequence[Value], node: Node, frame: Frame) -> Value:
@@ -166,36 +146,17 @@ def call_functions(
     types: Sequence[Type],
 ) -> Value:
     """Return what the overloads that fit best may return; ``unknown_call`` decides if none fits."""
-    fitting = candidates(_meant(run, functions, types, node, frame), values, run.makes_interfaces)
+    _check_special(run, functions, node, frame)
+    fitting = candidates(functions, values, run.makes_interfaces)
     if not fitting:
         return unknown_call(run, functions[0].name, values, node, [], frame)
     return _any_of(run, [partial(invoke, run, each, None, values, node, frame, types) for each in fitting])
 
 
-def _meant(
-    run: Machine, functions: Sequence[Function], arguments: Sequence[Type], node: Node, frame: Frame
-) -> Sequence[Function]:
-    """Return the specialisation for these arguments, else the template; a gap if they are not known."""
-    special = [each for each in functions if each.specialises is not None]
-    if not special:
-        return functions
-    found = [
-        f
-        for f in special
-        if [run.names.resolve(t, f.scope, f.file) for t in f.specialises or ()] == [*arguments]
-    ]
-    general = [each for each in functions if each.specialises is None]
-    if not arguments or not (found or general):
-        run.gap(node, frame, f"which specialisation of {special[0].name} is called is not known")
-    return found or general or functions
-
-
-def _of_class(
-    run: Machine, methods: Sequence[Function], this_object: Obj | None, bindings: dict[str, Type] | None
-) -> list[Type]:
-    """Return the arguments of the class whose methods these are."""
-    bound = bindings or (_class_bindings(methods[0], this_object) if this_object is not None else {})
-    return list(bound.values())
+def _check_special(run: Machine, functions: Sequence[Function], node: Node, frame: Frame) -> None:
+    """Add a gap if a template has explicit specialisations: which is meant is not followed."""
+    if any(each.specialises is not None for each in functions):
+        run.gap(node, frame, f"which specialisation of {functions[0].name} is called is not known")
 
 
 def _any_of(run: Machine, calls: Sequence[Callable[[], Value]]) -> Value:
@@ -224,25 +185,13 @@ def call_methods(
     exactly: bool = False,
     bindings: dict[str, Type] | None = None,
 ) -> Value:
-    """Call as ``call_functions``; if none fits, bases (unless ``exactly``) and methods of nodes are tried."""
-    methods = _meant(run, methods, types or _of_class(run, methods, this_object, bindings), node, frame)
-    function = chosen(methods, values)
-    if function is None and this_object is not None and this_object.cls is not None and not exactly:
-        for base in run.names.ancestry(this_object.cls)[1:]:
-            function = chosen(run.names.methods.get(base, {}).get(methods[0].name, []), values)
-            if function is not None:
-                break
-    if function is None:
-        name = f"{methods[0].owner}::{methods[0].name}"
-        if this_object is not None and this_object.is_node and methods[0].name in NODE_METHODS:
-            run.handle(node, frame)
-            return NODE_METHODS[methods[0].name](
-                run, Call(node, frame, list(values), list(types), [], this_object)
-            )
-        return unknown_call(run, name, values, node, [], frame)
-    if this_object is not None and not exactly and len(values) < len(function.parameters):
-        _check_defaults(run, function, this_object, len(values), node, frame)
-    fitting = candidates(methods, values, run.makes_interfaces) if function in methods else [function]
+    """Call as ``call_functions``; ``exactly``: of this class, whatever the object is."""
+    _check_special(run, methods, node, frame)
+    fitting = candidates(methods, values, run.makes_interfaces)
+    if not fitting:
+        return unknown_call(run, f"{methods[0].owner}::{methods[0].name}", values, node, [], frame)
+    if this_object is not None and not exactly and len(values) < len(fitting[0].parameters):
+        _check_defaults(run, fitting[0], this_object, len(values), node, frame)
     calls = [
         partial(invoke, run, each, this_object, values, node, frame, types, bindings) for each in fitting
     ]

@@ -21,7 +21,6 @@ from nodl.infer.cpp.running.values import (
     BOTTOM,
     Atom,
     Bound,
-    DerivedName,
     Lambda,
     Notes,
     Obj,
@@ -119,7 +118,6 @@ class Machine:
         self.left: object = None  # the last call that certainly threw, or ended the program
         self.steps = 0
         self.repeated = 0  # how many of the elements being made stand for several each
-        self.limit = MAX_STEPS
         self.calls_back = False  # the program has come to its end, callbacks run
         self.consulted: dict[str, object] = {}  # parameters whose value decided what is made
         self.from_default: dict[str, None] = {}  # those of them that no launch was asked for
@@ -135,7 +133,7 @@ class Machine:
         if node is None:
             return BOTTOM
         self.steps += 1
-        if self.steps > self.limit:
+        if self.steps > MAX_STEPS:
             raise StepLimitExceeded
         if node.has_error and node.type != "assignment_expression" and any(c.is_error for c in node.children):
             return self._misread(node, frame)
@@ -160,7 +158,7 @@ class Machine:
     def count(self, steps: int) -> None:
         """Raises ``StepLimitExceeded``."""
         self.steps += steps
-        if self.steps > self.limit:
+        if self.steps > MAX_STEPS:
             raise StepLimitExceeded
 
     def execute(self, node: Node | None, frame: Frame) -> int:
@@ -172,25 +170,6 @@ class Machine:
             self.evaluate(node, frame)
             return NEXT
         return handler(self, node, frame)
-
-    def attempt(self, action: Callable[[], None], steps: int) -> bool:
-        """Run ``action`` if it takes no more than so many steps; else nothing of what it wrote is left.
-
-        Raises ``StepLimitExceeded`` at the end of all steps.
-        """
-        before, mark, active = self.limit, self.store.mark(), len(self.active)
-        self.limit = min(before, self.steps + steps)
-        try:
-            action()
-        except StepLimitExceeded:
-            if self.steps > before:
-                raise
-            self.store.undo(mark)
-            del self.active[active:]
-            return False
-        finally:
-            self.limit = before
-        return True
 
     def branches(self, alternatives: Sequence[Callable[[], int]]) -> int:
         """Run each alternative from the present state; continue with any that goes on."""
@@ -322,11 +301,7 @@ class Machine:
         conditions = self.conditions(call.node, call.frame)
         for atom in concatenated(name or unknown("a name that is never set")):
             parts = atom.parts if isinstance(atom, Text) else (UnknownPart(atom.why),)
-            derived = parts[-1] if parts and isinstance(parts[-1], DerivedName) else None
-            which = (
-                Follows("camera_info", derived.image) if derived is not None and follows is None else follows
-            )
-            found = PossibleEndpoint(kind, Text(parts), type_name, source, follows=which)
+            found = PossibleEndpoint(kind, Text(parts), type_name, source, follows=follows)
             record.endpoints.setdefault(found, []).append(conditions)
 
     def later(self, values: Iterable[Value], frame: Frame) -> None:
@@ -337,7 +312,7 @@ class Machine:
                 self.callbacks.setdefault((atom.node.id, atom.frame.path), (atom, frame))
             elif isinstance(atom, Bound):
                 for each in self._with_objects(atom, atoms):
-                    self.callbacks.setdefault((each.function, each.this), (each, frame))
+                    self.callbacks.setdefault((each.function, each[1:]), (each, frame))
 
     def _with_objects(self, atom: Bound, atoms: Sequence[Atom]) -> list[Bound]:
         """Bind a method that is handed over beside objects that have it to those."""
@@ -345,7 +320,7 @@ class Machine:
             return [atom]
         name = atom.function.name
         owners = [each for each in atoms if atom.function in self.methods_of(each, name)]
-        return [Bound(atom.function, each) for each in owners] or [atom]
+        return [atom._replace(this=each) for each in owners] or [atom]
 
     def made_classes(self) -> set[Class]:
         return {each.cls for each in self.objects.values() if each.cls is not None}

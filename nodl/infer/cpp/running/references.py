@@ -65,7 +65,7 @@ def elements_written(
     held += [inner for atom in held if isinstance(atom, Group) for item in atom.items[1:] for inner in item]
     if not any(isinstance(atom, Text | Param | int | float) for atom in held):
         return False
-    return body is not None and not writes_of(body).changed.isdisjoint(names)
+    return body is not None and not writes_of(body).isdisjoint(names)
 
 
 def keep_references(run: Machine, made: Value, given: Sequence[Node], frame: Frame) -> None:

@@ -8,14 +8,12 @@ from functools import partial
 
 from nodl.infer.cpp.libraries import Call, library_class
 from nodl.infer.cpp.reading.declarations import parameters_of
-from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.constructors import text_of
 from nodl.infer.cpp.running.contents import items_of
 from nodl.infer.cpp.running.machine import NEXT, Frame, Machine, registered
 from nodl.infer.cpp.running.values import (
     BOTTOM,
-    END,
     Bound,
     Group,
     Lambda,
@@ -27,9 +25,7 @@ from nodl.infer.cpp.running.values import (
     concatenated,
     join,
     literal,
-    number_of,
     plain,
-    truth,
     unknown,
 )
 from nodl.infer.cpp.syntax import Node, field_of, text
@@ -75,8 +71,7 @@ def _text(run: Machine, values: Sequence[Value], node: Node, frame: Frame) -> Va
 def _to_string(run: Machine, values: Sequence[Value], node: Node, frame: Frame) -> Value:
     if any(isinstance(atom, Text) and plain(atom) is not None for value in values for atom in value):
         return unknown("the number of a letter")
-    numbers = tuple(map(number_of, values[0])) if values else BOTTOM
-    return concatenated(numbers) if values else unknown("a text")
+    return concatenated(values[0]) if values else unknown("a text")
 
 
 @_standard(
@@ -96,33 +91,29 @@ def _get(run: Machine, values: Sequence[Value], node: Node, frame: Frame) -> Val
 
 @_standard("std::bind", "boost::bind", "std::bind_front")
 def _bind(run: Machine, values: Sequence[Value], node: Node, frame: Frame) -> Value:
-    """Bind a method to its object, or a function to its first arguments."""
+    """Bind a method to its object, or a function; where arguments are bound, too, placeholders are not known."""
     if not values:
         return BOTTOM
-    found: list[object] = []
+    found: list[Bound | Lambda] = []
     for atom in values[0]:
         objects = [each for each in values[1] if isinstance(each, Obj)] if len(values) > 1 else []
         if isinstance(atom, Bound) and atom.this is None and atom.function.owner and objects:
-            rest = values[2:]
-            targets: list[Bound | Lambda] = [Bound(atom.function, each) for each in objects]
-        else:
-            rest = values[1:]
-            targets = [atom] if isinstance(atom, Bound | Lambda) else []
-        for target in targets:
-            if [_placeholder(value) for value in rest] == list(range(1, len(rest) + 1)):
-                found.append(target)
-            else:
-                key = ("bind", frame.file.file, node.start_byte, frame.path, target)
-                made = run.obj(key, Type("std::function"))
-                made.data["partial"] = ((target,), list(rest))
-                found.append(made)
+            fixed = _fixed(values[2:])
+            found += [Bound(atom.function, each, fixed) for each in objects]
+        elif isinstance(atom, Bound):
+            found.append(Bound(atom.function, atom.this, _fixed(values[1:])))
+        elif isinstance(atom, Lambda) and _fixed(values[1:]):
+            run.later([(atom,)], frame)
+        elif isinstance(atom, Lambda):
+            found.append(atom)
     return tuple(found) if found else unknown("a function")
 
 
-def _placeholder(value: Value) -> int:
-    """Return the number of ``_1``, else 0."""
-    found = [re.search(r"the value of (?:\w+::)*_(\d)$", a.why) for a in value if isinstance(a, Unknown)]
-    return next((int(match[1]) for match in found if match), 0)
+def _fixed(given: Sequence[Value]) -> tuple[Value, ...]:
+    """Return bound arguments; none if they are nothing but ``_1``, ``_2`` ... in their order."""
+    whys = [atom.why for value in given for atom in value if isinstance(atom, Unknown)]
+    in_order = [bool(re.search(rf"the value of (?:\w+::)*_{at}$", why)) for at, why in enumerate(whys, 1)]
+    return () if len(whys) == len(given) and all(in_order) else tuple(given)
 
 
 @_standard("std::thread", "std::jthread", "std::async", "std::call_once", "std::for_each", "std::transform",
@@ -144,11 +135,7 @@ def _calls_back(run: Machine, values: Sequence[Value], node: Node, frame: Frame)
     )
     if text(field_of(node, "function")).startswith(_ALGORITHMS):
         return unknown("the result of an algorithm")
-    for atom in _bind(run, list(values[position:]), node, frame):
-        if isinstance(atom, Obj) and atom.data.get("partial"):
-            run.calls.call_values(run, (atom,), [], node, frame)  # with its arguments
-        else:
-            run.later([(atom,)], frame)
+    run.later([_bind(run, values[position:], node, frame)], frame)
     run.later([tuple(a for a in value if not isinstance(a, Bound)) for value in values], frame)
     return unknown(f"the result of {text(node.child_by_field_name('function'))[:40]}()")
 
@@ -170,31 +157,6 @@ def _once(run: Machine, atom: Lambda, elements: Sequence[Value], node: Node, fra
     return NEXT
 
 
-@_standard("std::find_if", "std::find")
-def _find_if(run: Machine, values: Sequence[Value], node: Node, frame: Frame) -> Value:
-    """Find the element of a list that is exactly known, or its end."""
-    items, exact = items_of(run, values[0][0]) if values and len(values[0]) == 1 else ([], False)
-    for item in items if exact and len(values) > 2 else ():
-        called = any(isinstance(atom, Lambda | Bound) for atom in values[2])
-        answer = (
-            truth(run.calls.call_values(run, values[2], [item], node, frame))
-            if called
-            else same(item, values[2])
-        )
-        if answer is None:
-            return unknown("an element that is looked for")
-        if answer:
-            return item
-    return (END,) if exact else unknown("an element that is looked for")
-
-
-def same(left: Value, right: Value) -> bool | None:
-    """Return whether two literals read the same; ``None`` unless each value is exactly one literal."""
-    first = plain(left[0]) if len(left) == 1 else None
-    second = plain(right[0]) if len(right) == 1 else None
-    return None if first is None or second is None else first == second
-
-
 @_standard("std::function", "std::optional", "std::make_optional", "std::shared_ptr", "std::unique_ptr", "std::begin",
            "std::weak_ptr", "std::mem_fn", "std::remove_reference", "std::launder", "std::exchange")  # fmt: skip
 def _itself(run: Machine, values: Sequence[Value], node: Node, frame: Frame) -> Value:
@@ -206,10 +168,12 @@ def _environment(run: Machine, values: Sequence[Value], node: Node, frame: Frame
     return unknown("an environment variable")
 
 
+INTO_FIRST = r"v?sn?printf|strn?(?:cpy|cat)|memcpy"
+"""Functions of C that write to what their first argument points to."""
 _BY_ARGUMENT = re.compile(
     r"for_each(?:_n)?|transform|(?:stable_|partial_)?sort|reverse|rotate|shuffle|fill(?:_n)?|generate(?:_n)?|copy(?:_if|_n)?|"
     r"replace(?:_if)?|remove_if|unique|iota|(?:stable_)?partition|swap(?:_ranges)?|iter_swap|accumulate|getline|"
-    r"(?:all|any|none)_of|(?:count|find)(?:_if)?"
+    r"(?:all|any|none)_of|(?:count|find)(?:_if)?|" + INTO_FIRST
 )
 _KEEPS = re.compile(
     r"std::(?:thread|jthread|async|bind\w*|function|make_\w+|pair|tuple|optional|any|\w+_ptr|forward_as_tuple|tie)"
@@ -228,24 +192,18 @@ def writes_elements(run: Machine, name: str, values: Sequence[Value]) -> bool:
     if not name.startswith("std::") or _KEEPS.fullmatch(name):
         return False
     atoms = [atom for value in values for atom in value]
-    called = [a for a in atoms if isinstance(a, Lambda | Bound) or (isinstance(a, Obj) and _callable(run, a))]
+    called = [a for a in atoms if isinstance(a, Lambda | Bound) or run.methods_of(a, "operator()")]
     return any(_writes(run, atom) for atom in called) or (name in _CALLS and not called)
-
-
-def _callable(run: Machine, atom: Obj) -> bool:
-    return bool(run.methods_of(atom, "operator()") or atom.data.get("partial"))
 
 
 def _writes(run: Machine, atom: object) -> bool:
     if isinstance(atom, Lambda):
         declarator = field_of(atom.node, "declarator")
         given = [p.name for p in parameters_of(declarator) if p.written_back] if declarator else []
-        return bool(given) and not writes_of(atom.node).changed.isdisjoint(given)
+        return bool(given) and not writes_of(atom.node).isdisjoint(given)
     if isinstance(atom, Bound):
         given = [p.name for p in atom.function.parameters if p.written_back]
-        return bool(given) and not writes_of(atom.function.node).changed.isdisjoint(given)
-    if isinstance(atom, Obj) and atom.data.get("partial"):
-        return any(_writes(run, each) for each in atom.data["partial"][0])
+        return bool(given) and not writes_of(atom.function.node).isdisjoint(given)
     return any(_writes(run, Bound(each, None)) for each in run.methods_of(atom, "operator()"))
 
 
@@ -257,5 +215,5 @@ def called_now(run: Machine, values: Sequence[Value], node: Node, frame: Frame) 
         return NEXT
 
     for atom in (atom for value in values for atom in value if isinstance(atom, Lambda)):
-        if writes_of(atom.node).changed:
+        if writes_of(atom.node):
             run.branches([partial(once, atom), lambda: NEXT])

@@ -1,4 +1,4 @@
-"""How statements run: blocks, branches, loops, declarations."""
+"""How statements run: blocks, branches, declarations; loops turn by turn while that is decided, else to a fixpoint."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ from functools import partial
 
 from nodl.infer.cpp.reading.collect import declared_names
 from nodl.infer.cpp.reading.declarations import type_text
+from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.constructors import declared_value, fields_of
+from nodl.infer.cpp.running.contents import copied, iterated
 from nodl.infer.cpp.running.machine import (
     BREAK,
     CONTINUE,
@@ -20,8 +22,9 @@ from nodl.infer.cpp.running.machine import (
     statement,
 )
 from nodl.infer.cpp.running.memory import Changes
-from nodl.infer.cpp.running.references import bind_reference
-from nodl.infer.cpp.running.values import BOTTOM, Const, Group, Obj, Seq, Value, join, truth, unknown
+from nodl.infer.cpp.running.references import bind_reference, elements_written
+from nodl.infer.cpp.running.static_types import element_type, seen_type
+from nodl.infer.cpp.running.values import BOTTOM, Group, Obj, Seq, Value, join, truth, unknown
 from nodl.infer.cpp.running.variables import member
 from nodl.infer.cpp.syntax import Node, children, field_of, parse_expression, text, unwrapped, walk
 
@@ -187,57 +190,21 @@ def preprocessor_branches(run: Machine, node: Node, frame: Frame) -> int:
 @statement("switch_statement")
 @in_a_block
 def switch_statement(run: Machine, node: Node, frame: Frame) -> int:
-    """Run the chosen case and those it falls through to; any of the cases if that is not decided."""
+    """Run any of the cases with those it falls through to, or none without a default."""
     condition = field_of(node, "condition")
-    subject = run.evaluate(field_of(condition, "value") or unwrapped(condition), frame)
+    run.evaluate(field_of(condition, "value") or unwrapped(condition), frame)
     cases = [c for c in children(field_of(node, "body")) if c.type == "case_statement"]
-    chosen, certain = _chosen_cases(run, cases, subject, frame)
-    if certain and _has_inner_labels(node):
-        chosen, certain = range(len(cases)), False
-        run.gap(node, frame, "a switch jumps into another statement: what it makes is not followed")
     loop = _Switch(run.store.mark())
     frame.loops.append(loop)
-    sides: list[Callable[[], int]] = [partial(_falling, run, cases[index:], frame) for index in chosen]
-    if not certain or not sides:
+    sides: list[Callable[[], int]] = [partial(_falling, run, cases[at:], frame) for at in range(len(cases))]
+    if not sides or all(field_of(case, "value") is not None for case in cases):
         sides.append(lambda: NEXT)
     outcome = run.branches(sides)
     frame.loops.pop()
     run.settle(loop.start, loop.breaks, bool(outcome & NEXT))
     if outcome & BREAK:
         outcome = (outcome & ~BREAK) | NEXT
-    for case in cases[: min(chosen, default=0)] if certain else ():
-        run.kill(case, frame, "the switch never takes this case")
     return outcome
-
-
-def _has_inner_labels(switch: Node) -> bool:
-    """Return whether a case of this switch stands inside of another statement of it."""
-    body = field_of(switch, "body")
-    waiting = [inner for case in children(body) for inner in children(case) if case.type == "case_statement"]
-    while waiting:
-        each = waiting.pop()
-        if each.type == "case_statement":
-            return True
-        waiting += [] if each.type in ("switch_statement", "lambda_expression") else children(each)
-    return False
-
-
-def _chosen_cases(
-    run: Machine, cases: list[Node], subject: Value, frame: Frame
-) -> tuple[Sequence[int], bool]:
-    default = [index for index, case in enumerate(cases) if field_of(case, "value") is None]
-    every = range(len(cases)), bool(default)
-    if not _is_number(subject):
-        return every
-    labels = [run.evaluate(field_of(case, "value"), frame) for case in cases]
-    if not all(index in default or _is_number(label) for index, label in enumerate(labels)):
-        return every
-    matching = [index for index, label in enumerate(labels) if label == subject]
-    return (matching or default)[:1], True
-
-
-def _is_number(value: Value) -> bool:
-    return len(value) == 1 and isinstance(value[0], Const | int)
 
 
 def _falling(run: Machine, cases: list[Node], frame: Frame) -> int:
@@ -388,3 +355,174 @@ def _bound_part(run: Machine, atom: object, index: int) -> list[Value]:
         found = member(run, atom, fields[index], atom.cls) if index < len(fields) else None
         return [found] if found is not None else []
     return []
+
+
+# --- loops ------------------------------------------------------------------------------------------------------
+
+
+MAX_UNROLLED = 64
+MAX_ROUNDS = 3
+
+
+@statement("for_range_loop")
+@in_a_block
+def for_range_loop(run: Machine, node: Node, frame: Frame) -> int:
+    """Run one turn for each item; each may also be left out if the items are not exactly known."""
+    right, body = field_of(node, "right"), field_of(node, "body")
+    subject = run.evaluate(right, frame)
+    items, exact = iterated(run, subject)
+    declarator, written = field_of(node, "declarator"), type_text(node)
+    parts = list(walk(declarator)) if declarator is not None else []
+    names = [text(part) for part in parts if part.type == "identifier"]
+    structured = any(part.type == "structured_binding_declarator" for part in parts)
+
+    def bind(item: Value) -> None:
+        if structured:
+            bind_names(run, names, item, frame)
+        elif names:
+            by_value = not set("&*") & set(text(declarator)) and not _hold_pointers(run, right, frame)
+            cls = run.held_class(run.type_of(written, frame), frame)
+            own = copied(run, item, node, frame, cls) if by_value else item
+            run.local(frame, names[0], own, written)
+
+    outcome = _over(run, body, [partial(bind, item) for item in items], exact, frame)
+    is_reference = "&" in text(declarator) and "const" not in text(node).split(":")[0]
+    if (
+        is_reference
+        and right is not None
+        and right.type in _VARIABLES
+        and elements_written(run, body, names, subject, frame)
+    ):
+        assign(run, right, unknown("what a loop writes to the elements"), frame)
+    return outcome
+
+
+_VARIABLES = ("identifier", "field_expression", "subscript_expression", "pointer_expression")
+
+
+def _hold_pointers(run: Machine, right: Node | None, frame: Frame) -> bool:
+    """Return whether the elements are pointers."""
+    if right is not None and right.type == "initializer_list":
+        return any(each.type == "pointer_expression" for each in children(right))
+    return element_type(seen_type(run, right, frame)).pointer
+
+
+def _over(run: Machine, body: Node | None, steps: list[Callable[[], None]], exact: bool, frame: Frame) -> int:
+    """Run the body once for each step; any number of times each unless ``exact``."""
+    if not steps and exact:
+        run.kill(body, frame, "the loop runs over nothing")
+        return NEXT
+    loop = Loop(run.store.mark())
+    returns, outer_path = 0, frame.path
+    for index, step in enumerate(steps):
+        frame.path = (*outer_path, index)
+
+        def once(step: Callable[[], None] = step) -> int:
+            step()
+            return _iteration(run, body, frame, loop)
+
+        outcome = once() if exact else run.branches([once, lambda: NEXT])
+        returns |= outcome & RETURN
+        if not outcome & NEXT:
+            break
+    else:
+        outcome = NEXT
+    frame.path = outer_path
+    return returns | _after(run, loop, outcome)
+
+
+def _after(run: Machine, loop: Loop, outcome: int) -> int:
+    """Join what left the loop early with what came to its end; return whether anything goes on behind it."""
+    run.settle(loop.start, loop.breaks, bool(outcome & NEXT))
+    return NEXT if loop.breaks else outcome & NEXT
+
+
+def _iteration(run: Machine, body: Node | None, frame: Frame, loop: Loop) -> int:
+    loop.mark, loop.continues = run.store.mark(), []
+    frame.loops.append(loop)
+    outcome = run.execute(body, frame)
+    frame.loops.pop()
+    run.settle(loop.mark, loop.continues, bool(outcome & NEXT))
+    if outcome & CONTINUE:
+        outcome |= NEXT
+    return outcome & (NEXT | RETURN)
+
+
+@statement("for_statement")
+@in_a_block
+def for_statement(run: Machine, node: Node, frame: Frame) -> int:
+    """Runs like ``while``, behind its initializer."""
+    run.execute(field_of(node, "initializer"), frame)
+    return _counted(run, node, frame)
+
+
+@statement("while_statement")
+@in_a_block
+def while_statement(run: Machine, node: Node, frame: Frame) -> int:
+    """Turn by turn while its condition is decided; else, as for ``while (true)``, to a fixpoint."""
+    return _counted(run, node, frame)
+
+
+def _counted(run: Machine, node: Node, frame: Frame) -> int:
+    """Run as often as the condition is certainly true; after that any number of times."""
+    condition, body, update = (field_of(node, name) for name in ("condition", "body", "update"))
+    loop = Loop(run.store.mark())
+    returns, outer_path = 0, frame.path
+    for index in range(MAX_UNROLLED):
+        holds = condition_value(run, condition, frame)
+        if holds is False:
+            if index == 0:
+                run.kill(body, frame, "the condition of the loop is never true")
+            break
+        if holds is None or text(condition) in ("true", "1", "(true)", "(1)"):
+            returns |= _repeated(run, body, update, condition, frame, loop)
+            break
+        frame.path = (*outer_path, index)
+        outcome = _iteration(run, body, frame, loop)
+        returns |= outcome & RETURN
+        if not outcome & NEXT:
+            frame.path = outer_path
+            return returns | _after(run, loop, 0)
+        run.evaluate(update, frame)
+    else:
+        returns |= _repeated(run, body, update, condition, frame, loop)
+    frame.path = outer_path
+    return returns | _after(run, loop, NEXT)
+
+
+def _repeated(
+    run: Machine, body: Node | None, update: Node | None, condition: Node | None, frame: Frame, loop: Loop
+) -> int:
+    """Run until nothing changes; what still does after some rounds is not known."""
+    returns = 0
+    for round_ in range(MAX_ROUNDS + 2):
+        mark = run.store.mark()
+
+        def once() -> int:
+            outcome = _iteration(run, body, frame, loop)
+            if outcome & NEXT:
+                run.evaluate(update, frame)
+            condition_value(run, condition, frame)
+            return outcome
+
+        returns |= run.branches([once, lambda: NEXT]) & RETURN
+        before = run.store.before(mark)
+        changes = run.store.changes(mark).items()
+        moved = {cell: value for cell, value in changes if set(before[cell]) != set(value)}
+        if not moved:
+            break
+        if round_ >= MAX_ROUNDS - 1:
+            for cell, value in moved.items():
+                run.store.set(cell, join(before[cell], unknown("a value that changes in a loop")) or value)
+    return returns
+
+
+@statement("do_statement")
+def do_statement(run: Machine, node: Node, frame: Frame) -> int:
+    """Run the body once, then any number of times unless it left or the condition is certainly false."""
+    body, condition = field_of(node, "body"), unwrapped(field_of(node, "condition"))
+    loop = Loop(run.store.mark())
+    outcome = _iteration(run, body, frame, loop)
+    if outcome & NEXT and condition_value(run, condition, frame) is not False:
+        outcome |= _repeated(run, body, None, condition, frame, loop)
+    return (outcome & RETURN) | _after(run, loop, outcome)

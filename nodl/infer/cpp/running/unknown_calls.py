@@ -12,7 +12,7 @@ from nodl.infer.cpp.running.constructors import is_plain_type
 from nodl.infer.cpp.running.contents import handed_over, nodes_in
 from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.references import through
-from nodl.infer.cpp.running.standard import called_now
+from nodl.infer.cpp.running.standard import INTO_FIRST, called_now
 from nodl.infer.cpp.running.static_types import declared_type, element_type, seen_type
 from nodl.infer.cpp.running.values import (
     BOTTOM,
@@ -24,14 +24,11 @@ from nodl.infer.cpp.running.values import (
     Text,
     Value,
     as_one_map,
-    as_parts,
     join,
     open_sequence,
-    plain,
     unknown,
 )
 from nodl.infer.cpp.syntax import Node, field_of, text, unwrapped, walk
-from nodl.name_template import ParameterPart, Part
 
 
 def without_source(
@@ -107,6 +104,8 @@ def changed_by_standard(run: Machine, name: str, given: Sequence[Node], frame: F
 
     Likewise ``std::getline(stream, x)``, and that of ``std::back_inserter(x)``.
     """
+    if _WRITES_FIRST.fullmatch(name):
+        given = given[:1]
     seen: set[str] = set()
     targets = [target for each in given for target in _variables(each)]
     if name == "std::swap":
@@ -114,8 +113,6 @@ def changed_by_standard(run: Machine, name: str, given: Sequence[Node], frame: F
         crossed = values[::-1] if len(values) == len(given) == 2 else [join(*values)] * len(values)
         for target, value in zip(targets, crossed, strict=True):
             assign(run, target, value, frame)
-        return
-    if name == "std::replace" and _replaced(run, given, targets, frame):
         return
     for each in given:
         if not _variables(each) and _RANGE.search(text(each)):
@@ -126,33 +123,7 @@ def changed_by_standard(run: Machine, name: str, given: Sequence[Node], frame: F
                 _changed(run, name, target, frame)
 
 
-def _replaced(run: Machine, given: Sequence[Node], targets: Sequence[Node], frame: Frame) -> bool:
-    """Run ``std::replace(s.begin(), s.end(), 'a', 'b')`` in a text; return whether that could be followed."""
-    if len(given) != 4 or len({text(target) for target in targets}) != 1:
-        return False
-    old, new = (run.evaluate(each, frame) for each in given[2:])
-    letters = [
-        plain(value[0]) if len(value) == 1 and isinstance(value[0], Text) else None for value in (old, new)
-    ]
-    found = [_with_letter(atom, letters[0], letters[1]) for atom in run.evaluate(targets[0], frame)]
-    if not found or None in found:
-        return False
-    assign(run, targets[0], tuple(each for each in found if each is not None), frame)
-    return True
-
-
-def _with_letter(atom: object, old: str | None, new: str | None) -> Text | None:
-    if not isinstance(atom, Text | Param) or old is None or new is None:
-        return None
-    parts: list[Part] = []
-    for part in as_parts(atom):
-        if isinstance(part, ParameterPart):
-            parts.append(part._replace(edits=(*part.edits, ("replace", (old, new)))))
-        elif isinstance(part, str) and type(part) is str:
-            parts.append(part.replace(old, new))
-        else:
-            return None
-    return Text(tuple(parts))
+_WRITES_FIRST = re.compile(f"std::(?:{INTO_FIRST})")
 
 
 def _variables(given: Node) -> list[Node]:

@@ -88,17 +88,6 @@ class Text(NamedTuple):
     parts: tuple[Part | NodeNamePart, ...]
 
 
-class DerivedName(str):
-    """The end of a name that a library made of the final name of an image: that of its ``camera_info``."""
-
-    image: Text
-
-    def __new__(cls, written: str, image: Text) -> DerivedName:
-        made = super().__new__(cls, written)
-        made.image = image
-        return made
-
-
 class Unknown(NamedTuple):
     """Something that is not known; ``why``, such as ``the result of f()``, is what gaps say of it."""
 
@@ -109,11 +98,9 @@ class Const(NamedTuple):
     """An enumerator, by its qualified name."""
 
     name: str
-    number: int | None = None
 
 
 END = Const("the end of a container")
-NPOS = Const("std::string::npos")
 
 
 class Param(NamedTuple):
@@ -154,10 +141,11 @@ class Group(NamedTuple):
 
 
 class Bound(NamedTuple):
-    """A function, on an object if it is a method."""
+    """A function, on an object if it is a method; ``fixed``: the arguments that are bound to it."""
 
     function: Function
     this: Obj | None
+    fixed: tuple[Value, ...] = ()
 
 
 class Lambda(NamedTuple):
@@ -362,8 +350,3 @@ def _truth(atom: Atom) -> bool | None:
 def has_text(value: Value) -> bool:
     """Return whether one of the alternatives is a text or a parameter."""
     return any(isinstance(atom, Text | Param) for atom in value)
-
-
-def number_of(atom: object) -> object:
-    """Return an enumerator as its number."""
-    return atom.number if isinstance(atom, Const) and atom.number is not None else atom

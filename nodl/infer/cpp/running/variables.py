@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import re
-
 from nodl.infer.cpp.reading.declarations import Class
 from nodl.infer.cpp.running.constructors import default_value, made
 from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.static_types import current_object, static_by_name
-from nodl.infer.cpp.running.values import BOTTOM, NPOS, Bound, Const, Obj, Value, unknown
+from nodl.infer.cpp.running.values import BOTTOM, Bound, Const, Obj, Value, unknown
 from nodl.infer.cpp.syntax import Node, children
 
 
@@ -19,7 +17,7 @@ def variable(run: Machine, name: str, frame: Frame) -> Value:
         target = owner.aliases.get(name)
         return run.evaluate(target, owner) if target is not None else run.store.get((owner, name)) or BOTTOM
     if name in frame.bindings:
-        return _argument(run, frame.bindings[name].name, frame)
+        return unknown(f"the argument {name} of a template")
     this_object = current_object(frame)
     if this_object is not None and "::" not in name:
         found = member(run, this_object, name)
@@ -28,19 +26,7 @@ def variable(run: Machine, name: str, frame: Frame) -> Value:
     found = constant(run, name, frame)
     if found is not None:
         return found
-    if name.endswith("string::npos"):
-        return (NPOS,)
     return unknown(f"the value of {name}")
-
-
-def _argument(run: Machine, written: str, frame: Frame) -> Value:
-    """Return a parameter of a template that stands for a value, as the argument is written."""
-    if re.fullmatch(r"-?\d+", written):
-        return (int(written),)
-    if written in ("true", "false"):
-        return (written == "true",)
-    found = constant(run, written, frame) if re.fullmatch(r"[\w:]+", written) else None
-    return found or unknown(f"the value of {written}")
 
 
 def member(run: Machine, owner: Obj, name: str, seen: Class | None = None) -> Value | None:
@@ -117,7 +103,7 @@ def constant(run: Machine, name: str, frame: Frame) -> Value | None:
     for key in (name, f"{head.rpartition('::')[2]}::{last}" if separator else name):
         full = run.names.enumerators.get(key)
         if full is not None:
-            return (Const(full, run.names.enumerator_numbers.get(full)),)
+            return (Const(full),)
     function = run.names.find_functions(name, frame.scope, frame.file)
     if function:
         return tuple(Bound(each, None) for each in function)

@@ -214,11 +214,3 @@ def test_what_callbacks_hand_on_from_one_to_the_next_arrives(tmp_path: Path) -> 
     body = "create_wall_timer(1s, [this]() { create_publisher<std_msgs::msg::String>(v0, 1); });" + hand_on
     members = "".join(f'std::string v{i} = "a{i}";' for i in range(5))
     assert names(infer(tmp_path, in_class(body, members))) == ["a0", "a1", "a2", "a3", "a4"]
-
-
-def test_what_a_callback_writes_that_is_too_long_to_be_followed_is_not_known(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("nodl.infer.cpp.running.callbacks.SIDE_STEPS", 3)
-    heard = 'create_subscription<M>("in", 1, [this](M::SharedPtr) { int i = 1; ++i; topic_ = "late"; });'
-    assert "?" in names(infer(tmp_path, in_class(heard + LATE, 'std::string topic_ = "a";')))

@@ -74,16 +74,15 @@ FOUND = {
     ),
     "names bound to an array": (f'std::string l[2] = {{"x", "y"}}; auto & [a, b] = l; {PUB}(b, 1);', "", ["y"]),
     "letters that are replaced": (
-        f"std::string s = \"a-b-c\"; std::replace(s.begin(), s.end(), '-', '_'); {PUB}(s, 1);",
-        "",
-        ["a_b_c"],
+        f"std::string s = \"a-b\"; std::replace(s.begin(), s.end(), '-', '_'); {PUB}(s, 1);", "", ["?"]
     ),
-    "a text by snprintf": (
-        f'char b[32]; snprintf(b, sizeof(b), "t%02d/%s", 3, "x"); {PUB}(b, 1);', "", ["t03/x"]
+    "a text by snprintf": (f'char b[32] = "old"; snprintf(b, sizeof(b), "t%02d", 3); {PUB}(b, 1);', "", ["?"]),
+    "a text by fmt": (f'{PUB}("a/" + fmt::format("{{}}", 2), 1);', "", ["a/?"]),
+    "a word from a stream": (
+        f'std::string w = "old"; std::istringstream s("a b"); s >> w; {PUB}(w, 1);', "", ["?"]
     ),
-    "a text that may be cut off": (f'char b[4]; snprintf(b, 4, "%s", "long"); {PUB}(b, 1);', "", ["?"]),
-    "a text by fmt": (f'{PUB}(fmt::format("{{}}/{{}}", "x", 2), 1);', "", ["x/2"]),
-    "a format that is not followed": (f'{PUB}(fmt::format("{{:>4}}", "x"), 1);', "", ["?:>4?"]),
+    "a text that is edited": (f'std::string s = "ab"; s.erase(0, 1); {PUB}(s, 1);', "", ["?"]),
+    "a part of a text": (f'{PUB}(std::string("ab").substr(1), 1);', "", ["?"]),
 }  # fmt: skip
 
 
@@ -91,13 +90,6 @@ FOUND = {
 def test_a_name_is_known(body: str, members: str, made: list[str], tmp_path: Path) -> None:
     system = infer(tmp_path, in_class(body, members))
     assert (names(system), gaps(system)) == (made, [])
-
-
-def test_the_letters_of_a_parameter_are_replaced_at_launch(tmp_path: Path) -> None:
-    declared = 'auto s = declare_parameter<std::string>("p", "a-b");'
-    body = f"{declared} std::replace(s.begin(), s.end(), '-', '_'); {PUB}(s, 1);"
-    ((endpoint,),) = (node.endpoints for node in infer(tmp_path, in_class(body)).nodes)
-    assert [endpoint.name.fill(given).text for given in ({}, {"p": "x-y"})] == ["a_b", "x_y"]
 
 
 def test_a_header_may_bring_in_the_names_of_std(tmp_path: Path) -> None:
@@ -275,7 +267,7 @@ def test_an_element_that_stands_for_all_keeps_what_was_written(made: str, tmp_pa
 
 
 PARTS = {
-    "taken apart": ('std::string a = "d"; int b; std::tie(a, b) = std::make_tuple("x", 1);', "a", ["x"]),
+    "taken apart": ('std::string a = "d"; int b; std::tie(a, b) = std::make_tuple("x", 1);', "a", ["?"]),
     "taken apart of what is not known": ('std::string a = "d"; int b; std::tie(a, b) = get();', "a", ["?"]),
     "turned round": (
         'std::vector<std::string> a{"x", "y"}; std::reverse(a.begin(), a.end());',

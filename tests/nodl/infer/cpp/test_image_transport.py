@@ -17,11 +17,7 @@ pytest.importorskip("tree_sitter_cpp", reason="the extra cpp is not installed")
 
 SOURCE = in_class(
     """
-    declare_parameter<std::string>("image_transport", "raw");
-    auto topic = get_node_topics_interface()->resolve_topic_name("image_raw");
-    image_transport::TransportHints hints(this);
-    in_ = image_transport::create_camera_subscription(
-      this, topic, [](const auto &, const auto &) {}, hints.getTransport());
+    in_ = image_transport::create_camera_subscription(this, "image_raw", [](const auto &, const auto &) {}, "raw");
     out_ = image_transport::create_publisher(this, "image_rect");
     """,
     before="#include <image_transport/image_transport.hpp>\n",
@@ -68,21 +64,13 @@ def test_transports_and_settings_follow_the_remapped_image(way, tmp_path: Path) 
     assert not may(planned, "/front/image/compressed")
 
 
-@pytest.mark.parametrize("way", [live, documented])
-def test_a_parameter_chooses_the_transport(way, tmp_path: Path) -> None:  # type: ignore[no-untyped-def]
-    planned = way(tmp_path, COMPRESSED)
-    assert not planned.problems
-    assert may(planned, "/front/image/compressed")
-    assert not may(planned, "/front/image")
-
-
-def test_a_transport_that_is_not_in_the_table_is_a_gap(tmp_path: Path) -> None:
-    planned = live(tmp_path, '<param name="image_transport" value="draco"/>')
-    assert any("draco" in str(problem) for problem in planned.problems)
-
-
 def test_a_transport_that_nothing_tells_is_a_gap(tmp_path: Path) -> None:
-    source = SOURCE.replace("hints.getTransport()", 'std::string(std::getenv("T"))')
+    source = SOURCE.replace('"raw"', 'std::string(std::getenv("T"))')
+    assert any("transport of this image subscription" in why for why in gaps(infer(tmp_path, source)))
+
+
+def test_a_transport_that_a_parameter_chooses_is_a_gap(tmp_path: Path) -> None:
+    source = SOURCE.replace('"raw"', "image_transport::TransportHints(this).getTransport()")
     assert any("transport of this image subscription" in why for why in gaps(infer(tmp_path, source)))
 
 
@@ -113,18 +101,3 @@ def test_nothing_is_made_under_an_empty_name(tmp_path: Path) -> None:
 
 def test_an_empty_name_alone_is_a_gap(tmp_path: Path) -> None:
     assert any("empty" in why for why in gaps(infer(tmp_path, in_class('create_publisher<M>("", 1);'))))
-
-
-def test_settings_asked_for_by_name_follow_the_remapped_image(tmp_path: Path) -> None:
-    source = in_class(
-        'auto image = get_node_base_interface()->resolve_topic_or_service_name("image_raw", false);'
-        "info_.subscribe(this, image_transport::getCameraInfoTopic(image));"
-        'other_.subscribe(this, "left/camera_info");',
-        "message_filters::Subscriber<sensor_msgs::msg::CameraInfo> info_, other_;",
-    )
-    package(tmp_path / "src/demo", {"src/main.cpp": source}, "add_executable(filter_node src/main.cpp)")
-    install(tmp_path)
-    planned = plan(tmp_path, LAUNCH.format(parameter=""))
-    assert may(planned, "/front/camera_info")
-    assert may(planned, "/left/camera_info")
-    assert not may(planned, "/camera_info")

@@ -75,10 +75,6 @@ ROWS = {
         in_class('create_generic_publisher("a", "std_msgs/msg/String", 1);'),
         {("publisher", "a")},
     ),
-    "a message that is waited for": (
-        in_class('std_msgs::msg::String m; rclcpp::wait_for_message(m, shared_from_this(), "a");'),
-        {("subscription", "a")},
-    ),
     "a client of another node's parameters": (
         in_class(
             'c_ = std::make_shared<rclcpp::SyncParametersClient>(this, "other");',
@@ -102,20 +98,6 @@ ROWS = {
             "rclcpp::Service<std_srvs::srv::Empty>::SharedPtr s_;",
         ),
         {("service_server", "s"), ("publisher", "s/_service_event")},
-    ),
-    "topic statistics of a subscription": (
-        in_class(
-            "rclcpp::SubscriptionOptions o; o.topic_stats_options.state = rclcpp::TopicStatisticsState::Enable; "
-            'o.topic_stats_options.publish_topic = "stats"; create_subscription<std_msgs::msg::String>("a", 1, cb, o);'
-        ),
-        {("subscription", "a"), ("publisher", "stats")},
-    ),
-    "a sub-node": (
-        in_class(
-            'auto n = create_sub_node("inner"); n->create_publisher<std_msgs::msg::String>("a", 1); '
-            'n->create_publisher<std_msgs::msg::String>("/b", 1);'
-        ),
-        {("publisher", "inner/a"), ("publisher", "/b")},
     ),
     "its own name": (
         in_class('create_publisher<std_msgs::msg::String>(std::string(get_name()) + "/a", 1);'),
@@ -179,11 +161,6 @@ NAMES = {
     "a conversion": (
         'declare_parameter("p", "a"); create_publisher<M>(get_parameter("p").as_string(), 1);',
         "param:p",
-    ),
-    "what a switch chooses": (
-        'std::string t; switch (K::B) { case K::A: t = "x"; break; case K::B: t = "a"; '
-        "break; } create_publisher<M>(t, 1);",
-        "a",
     ),
 }
 
