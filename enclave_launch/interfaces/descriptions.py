@@ -78,7 +78,8 @@ def meeting(
     interfaces = tuple(_decided(each, judged, start) for each in base.description.interfaces)
     names = base.names
     for other in others:
-        interfaces = _united(interfaces, other.description.interfaces, names.keys(), start)
+        added = tuple(_decided(each, judged, start) for each in other.description.interfaces)
+        interfaces = _united(interfaces, added, names.keys(), start)
         names = {**other.names, **names}
     used = (base, *others)
     return Found(

@@ -373,6 +373,30 @@ def test_a_record_that_leaves_a_name_open_gives_way_to_who_knows_it(
     assert allowed(plan, "publish") == ["/known"] and not plan.problems
 
 
+def test_readings_of_a_record_that_gave_way_are_decided_as_those_of_one_that_did_not(
+    launch: Launch, install: Callable[..., Path], document: Callable[..., Path]
+) -> None:
+    """ekf_node: a record with another sensor than this launch has still says what it knows, by the source's reading."""
+    rows = (
+        "[{in: publishers, name: seen, parameter: out, runs: [a]}, "
+        "{in: publishers, name: status, parameter: label, proof: one run, runs: [a]}]"
+    )
+    section = f"{{library: rclcpp, runs: [{{id: a}}], endpoints: {rows}}}"
+    install("pkg", "prog", source=PYTHON.format(topic="node.declare_parameter('label', 'status').value"))
+    own = document("pkg/prog", "seen", section)
+    file = own / "pkg" / "prog.nodl.yaml"
+    file.write_text(
+        file.read_text().replace(
+            "[{name: seen,", "[{name: status, type: p/T, qos: " + QOS + "}, {name: seen,"
+        )
+    )
+    node = '<node pkg="pkg" exec="prog" name="n"><param name="label" value="warehouse"/></node>'
+    plan = launch(node, library_folders=(own,))
+    assert allowed(plan, "publish") == ["/warehouse"] and not plan.problems
+    alone = launch(node, library_folders=(own,), infer=False)
+    assert alone.problems and allowed(alone, "publish") == ["/status", "/warehouse"]
+
+
 def test_explain_says_of_one_name_which_descriptions_have_it(
     launch: Launch, install: Callable[..., Path], document: Callable[..., Path]
 ) -> None:
