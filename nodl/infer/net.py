@@ -3,9 +3,9 @@
 Takes a finished ``Run``, gives a gap for what was lost. It reads the text alone and knows nothing of values. A *place*
 is a call of something that makes nodes or interfaces (``create_publisher``, ``ActionClient`` ...), or of a function or
 class of the program whose text reaches one, by its name. For every function that live text refers to, and for every
-call that entered it, each place in it must have been evaluated, unless constants in the text say that control does not
-get there: a test of literals (also of an argument or default that the caller writes as one), or a statement behind
-``return`` or ``raise``. A function that something live refers to and that nothing entered is a gap as a whole.
+call that entered it, each place in it must have been evaluated, unless the text says that control does not get there:
+a test of a literal or of ``__name__``, or a statement behind ``return`` or ``raise``. A function that something live
+refers to and that nothing entered is a gap as a whole.
 
 So a mistake of the analysis that skips a branch, ends a path too early, loses a caller, a callback or a module shows up
 here. What it cannot see: a wrong value, and creation behind names that do not stand in the text.
@@ -16,10 +16,9 @@ from __future__ import annotations
 import ast
 import functools
 import itertools
-import operator
 import re
-from collections.abc import Callable, Iterable, Iterator
-from typing import Any, NamedTuple
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
 
 from nodl.infer.interpreter.imports import absolute_name
 from nodl.infer.interpreter.run import Run
@@ -30,7 +29,6 @@ from nodl.node_interface import Gap
 from nodl.source_ref import SourceRef
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda
-Constants = dict[str, object]  # names that stand for a literal
 CREATING_NAMES = frozenset(NODE_ENDPOINTS) | ros.CREATING_NAMES
 _CREATING_TEXT = re.compile("|".join(sorted(map(re.escape, CREATING_NAMES))))
 _ELSEWHERE = re.compile(r"rclpy|\b(?:importlib|__import__|eval|exec|runpy|pickle)\b")
@@ -103,7 +101,6 @@ class _Text(NamedTuple):
     scopes: list[FunctionText]
     classes: dict[str, list[ast.ClassDef]]
     imported: set[str]  # names that come from other modules
-    constants: Constants
 
 
 @functools.lru_cache(maxsize=256)
@@ -112,28 +109,7 @@ def _text_of(module: SourceModule) -> _Text:
     top = FunctionText(None, None, module.path)
     reader.scopes.append(top)
     reader.block(module.tree.body, top, ())
-    return _Text(reader.scopes, reader.classes, reader.imported, _literals(module.tree))
-
-
-def _literals(tree: ast.AST) -> Constants:
-    """Names that are given a value once, and a literal."""
-    values: Constants = {}
-    stores: dict[str, int] = {}
-    for part in ast.walk(tree):
-        names: list[str] = []
-        if isinstance(part, (ast.Name, ast.Attribute)):
-            names = [] if isinstance(part.ctx, ast.Load) else [last_name(part)]
-        elif isinstance(part, ast.arg):
-            names = [part.arg]
-        elif isinstance(part, ast.Global | ast.Nonlocal):
-            names = part.names
-        elif isinstance(part, ast.alias):
-            names = [part.asname or part.name]
-        elif isinstance(part, ast.Assign) and len(part.targets) == 1 and isinstance(part.value, ast.Constant):
-            values[last_name(part.targets[0])] = part.value.value
-        for name in names:
-            stores[name] = stores.get(name, 0) + 1
-    return {name: value for name, value in values.items() if stores.get(name) == 1}
+    return _Text(reader.scopes, reader.classes, reader.imported)
 
 
 class _Reader:
@@ -266,7 +242,6 @@ class _Net:
     ) -> None:
         self.gaps: list[Gap] = []
         self._run = run
-        self._known_constants: dict[tuple[FunctionText, ast.AST | None], Constants] = {}
         self._elsewhere = called
         self._instantiated = instantiated | set(run.instantiated)
         self._modules = {module.path: module for module in modules}
@@ -372,11 +347,8 @@ class _Net:
         """Note what the text refers to, and calls that were not evaluated, or on something that is not known."""
         self._meant.update(("", name) for name in scope.attributes)
         names = set(scope.names)
-        entries = [None] if scope.node is None else list(self._run.entries.get(scope.node, [None]))
         for place in scope.calls:
-            seen = place.node in self._evaluated or all(
-                is_dead(place.around, self._constants(scope, entry)) for entry in entries
-            )
+            seen = place.node in self._evaluated or self._is_dead(place, scope)
             if not seen or place.node in self._run.doubtful:
                 if isinstance(place.node.func, ast.Name):
                     names.add(place.name)
@@ -420,14 +392,13 @@ class _Net:
     # --- one function, entered by one call ------------------------------------------------------------------
 
     def _entered(self, scope: FunctionText, entry: ast.AST | None, places: list[CallPlace]) -> None:
-        constants = self._constants(scope, entry) if places else {}
         for place in places:
             if (place.node, entry) in self._run.evaluated:
                 if place.name in CREATING_NAMES and place.node not in self._run.understood:
                     self._gap(
                         scope, place.node, f"{place.name}() is called on something that is not understood"
                     )
-            elif not is_dead(place.around, constants):
+            elif not self._is_dead(place, scope):
                 self._gap(scope, place.node, self._skipped(scope, place, entry))
 
     def _skipped(self, scope: FunctionText, place: CallPlace, entry: ast.AST | None) -> str:
@@ -436,53 +407,8 @@ class _Net:
         where = f" where {scope.name} is called at {caller.path.rpartition('/')[2]}:{line}" if caller else ""
         return f"{place.name}() was not reached{where}; what it would make there is not listed"
 
-    def _constants(self, scope: FunctionText, entry: ast.AST | None) -> Constants:
-        found = self._known_constants.get((scope, entry))
-        if found is None:
-            found = self._known_constants[scope, entry] = self._constants_of(scope, entry)
-        return found
-
-    def _constants_of(self, scope: FunctionText, entry: ast.AST | None) -> Constants:
-        """Names that are literals in this call of the function: of its module, its arguments and its defaults."""
-        module = self._texts[scope.path].constants
-        constants: Constants = {**module, "__name__": self._names[scope.path], "TYPE_CHECKING": False}
-        function = scope.node
-        if function is None:
-            return constants
-        parameters = [*function.args.posonlyargs, *function.args.args]
-        every = [*parameters, *function.args.kwonlyargs]
-        stored = {
-            n.id for n in ast.walk(function) if isinstance(n, ast.Name) and not isinstance(n.ctx, ast.Load)
-        }
-        for each in every:
-            constants.pop(each.arg, None)
-        for name in stored:
-            constants.pop(name, None)
-        if not isinstance(entry, ast.Call) or not self._is_plain(entry):
-            return constants
-        given: dict[str, ast.expr | None] = {}
-        first = len(parameters) - len(function.args.defaults)
-        for index, default in enumerate(function.args.defaults):
-            given[parameters[first + index].arg] = default
-        for each, none in zip(function.args.kwonlyargs, function.args.kw_defaults, strict=True):
-            given[each.arg] = none
-        shift = 1 if scope.cls is not None and not _is_static(function) else 0
-        for each, argument in zip(parameters[shift:], entry.args, strict=False):
-            given[each.arg] = argument
-        given.update({each.arg: each.value for each in entry.keywords if each.arg is not None})
-        caller = self._callers.get(entry)
-        outer = self._texts[caller.path].constants if caller is not None and caller.node is None else {}
-        for name, value in given.items():
-            known = None if value is None or name in stored else _literal(value, outer)
-            if known is not None:
-                constants[name] = known[0]
-        return constants
-
-    def _is_plain(self, entry: ast.Call) -> bool:
-        """Return True if its arguments are those of the function: no ``*``, no ``partial`` or thread in between."""
-        starred = any(isinstance(each, ast.Starred) for each in entry.args)
-        starred = starred or any(each.arg is None for each in entry.keywords)
-        return not starred and last_name(entry.func) in self._makers
+    def _is_dead(self, place: CallPlace, scope: FunctionText) -> bool:
+        return is_dead(place.around, self._names[scope.path])
 
     def _gap(self, scope: FunctionText, node: ast.AST, why: str) -> None:
         self.gaps.append(Gap(SourceRef(scope.path, getattr(node, "lineno", 0)), why))
@@ -491,19 +417,14 @@ class _Net:
 _CONSTRUCTORS = frozenset({"__init__", "__new__", "__post_init__"})
 
 
-def _is_static(function: Function) -> bool:
-    decorators = [] if isinstance(function, ast.Lambda) else function.decorator_list
-    return any(last_name(each) == "staticmethod" for each in decorators)
+# --- literals in the text -----------------------------------------------------------------------------------
 
 
-# --- constants in the text ----------------------------------------------------------------------------------
-
-
-def is_dead(around: tuple[ast.AST, ...], constants: Constants) -> bool:
-    """Return True if a test of literals keeps control from the last of ``around``."""
+def is_dead(around: tuple[ast.AST, ...], module: str) -> bool:
+    """Return True if a test of literals, or of the ``module``'s name, keeps control from the last of ``around``."""
     for outer, inner in itertools.pairwise(around):
         if isinstance(outer, ast.If | ast.While | ast.IfExp):
-            outcome = _decided(outer.test, constants)
+            outcome = _decided(outer.test, module)
             body = outer.body if isinstance(outer.body, list) else [outer.body]
             orelse = outer.orelse if isinstance(outer.orelse, list) else [outer.orelse]
             if (outcome is False and inner in body) or (
@@ -513,43 +434,22 @@ def is_dead(around: tuple[ast.AST, ...], constants: Constants) -> bool:
         if isinstance(outer, ast.BoolOp) and inner in outer.values:
             stops = isinstance(outer.op, ast.Or)
             before = outer.values[: outer.values.index(inner)]
-            if any(_decided(each, constants) is stops for each in before):
+            if any(_decided(each, module) is stops for each in before):
                 return True
     return False
 
 
-def _decided(test: ast.expr, constants: Constants) -> bool | None:
-    """Return the truth of a test of literals; ``None`` for all others."""
+def _decided(test: ast.expr, module: str) -> bool | None:
+    """Return the truth of a literal, or of a test of ``__name__`` or ``TYPE_CHECKING``; ``None`` for all others."""
+    if isinstance(test, ast.Constant):
+        return bool(test.value)
+    if isinstance(test, ast.Name | ast.Attribute) and last_name(test) == "TYPE_CHECKING":
+        return False
     if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not):
-        outcome = _decided(test.operand, constants)
+        outcome = _decided(test.operand, module)
         return None if outcome is None else not outcome
-    if isinstance(test, ast.BoolOp):
-        outcomes = [_decided(each, constants) for each in test.values]
-        stops = isinstance(test.op, ast.Or)
-        return stops if stops in outcomes else None if None in outcomes else not stops
-    if isinstance(test, ast.Compare) and len(test.ops) == 1:
-        compared = _COMPARED.get(type(test.ops[0]))
-        left, right = _literal(test.left, constants), _literal(test.comparators[0], constants)
-        return bool(compared(left[0], right[0])) if compared and left and right else None
-    known = _literal(test, constants)
-    return None if known is None else bool(known[0])
-
-
-_COMPARED: dict[type, Callable[[Any, Any], object]] = {
-    ast.Eq: operator.eq, ast.NotEq: operator.ne,
-    ast.Is: lambda a, b: a is b, ast.IsNot: lambda a, b: a is not b,
-    ast.In: lambda a, b: a in b if isinstance(b, tuple) else True,
-}  # fmt: skip
-
-
-def _literal(node: ast.expr, constants: Constants) -> tuple[object] | None:
-    if isinstance(node, ast.Constant):
-        return (node.value,)
-    if isinstance(node, ast.Name | ast.Attribute) and last_name(node) in constants:
-        plain = isinstance(node, ast.Name) or node.attr == "TYPE_CHECKING"
-        return (constants[last_name(node)],) if plain else None
-    if isinstance(node, ast.Tuple | ast.List | ast.Set) and all(
-        isinstance(each, ast.Constant) for each in node.elts
-    ):
-        return (tuple(each.value for each in node.elts if isinstance(each, ast.Constant)),)
+    if isinstance(test, ast.Compare) and isinstance(test.left, ast.Name) and test.left.id == "__name__":
+        other, op = test.comparators[0], test.ops[0]
+        if isinstance(other, ast.Constant) and isinstance(op, ast.Eq | ast.NotEq) and len(test.ops) == 1:
+            return (other.value == module) is isinstance(op, ast.Eq)
     return None

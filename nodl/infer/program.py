@@ -168,17 +168,6 @@ class Program:
             return os.path.join(folder, last + ".py")
         return None
 
-    def has_namespace_package(self, name: str, beside: str) -> bool:
-        """Return True if there is such a folder without ``__init__.py`` but with Python files, an implicit package."""
-        key = (name + ".", beside)
-        if key not in self._found:
-            folders = (os.path.join(root, *name.split(".")) for root in (beside, *self.roots))
-            self._found[key] = next((f for f in folders if self._has_python(f)), None)
-        return name not in MODELLED and self._found[key] is not None
-
-    def _has_python(self, folder: str) -> bool:
-        return any(entry.endswith(".py") for entry in self._listing(folder))
-
     def _listing(self, folder: str) -> frozenset[str]:
         listing = self._listings.get(folder)
         if listing is None:

@@ -428,18 +428,9 @@ class SuperProxy(NamedTuple):
 
 
 class PropertyValue(NamedTuple):
-    """``cached``: read once, then an attribute of the object."""
+    """A property, by what reads it."""
 
     getter: Value
-    setter: Value = BOTTOM
-    deleter: Value = BOTTOM
-    cached: bool = False
-
-    def with_accessor(self, name: str, function: Value) -> PropertyValue:
-        """Return the property after ``@x.setter``, ``@x.deleter`` or ``@x.getter``."""
-        if name == "getter":
-            return self._replace(getter=function)
-        return self._replace(setter=function) if name == "setter" else self._replace(deleter=function)
 
 
 class ClassMethod(NamedTuple):

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import ast
 
-from nodl.infer.interpreter.define import is_key, program_classes
+from nodl.infer.interpreter.define import is_key
 from nodl.infer.interpreter.elements import elements
-from nodl.infer.interpreter.frames import Arguments, Frame
+from nodl.infer.interpreter.frames import Frame
 from nodl.infer.interpreter.run import Run
 from nodl.infer.values import (
     ABSENT,
@@ -22,7 +22,6 @@ from nodl.infer.values import (
     Items,
     Key,
     ModuleValue,
-    PropertyValue,
     Sequence,
     Value,
     join,
@@ -49,11 +48,9 @@ def assign(run: Run, target: ast.expr, value: Value, frame: Frame) -> None:
 
 
 def store_attribute(run: Run, owners: Value, name: str, value: Value, node: ast.AST, frame: Frame) -> None:
-    """Run ``owner.name = value``, with what a setter of the owner's class makes of it."""
+    """Run ``owner.name = value``."""
     certain = len(owners) == 1
     for owner in owners:
-        if isinstance(owner, Instance) and _set_by_property(run, owner, name, value, node, frame):
-            continue
         if isinstance(owner, (Instance, ClassValue, ModuleValue)):
             kept = BOTTOM if certain else owner.cells.get(name, BOTTOM)
             run.state.store(owner, name, join(kept, value))
@@ -72,17 +69,6 @@ def _patched(run: Run, owner: External, name: str, node: ast.AST, frame: Frame) 
         return
     if "(" not in owner.path and "[" not in owner.path and ".qos" not in owner.path:
         run.gap(node, frame, f"{owner.path}.{name} is replaced; what its users then do is not analysed")
-
-
-def _set_by_property(run: Run, owner: Instance, name: str, value: Value, node: ast.AST, frame: Frame) -> bool:
-    """Return True if a setter of the program certainly took the value."""
-    classes = program_classes(owner.cls) if isinstance(owner.cls, ClassValue) else []
-    held = next((each.cells[name] for each in classes if each.cells.get(name)), BOTTOM)
-    setters = [atom for atom in held if isinstance(atom, PropertyValue) and not atom.cached]
-    for atom in setters:
-        if atom.setter:
-            run.call(atom.setter, Arguments([(owner,), value]), node, frame)
-    return bool(setters) and len(held) == 1
 
 
 def store_item(run: Run, obj: Dictionary, key: Value, value: Value) -> None:

@@ -72,7 +72,7 @@ def _class_attribute(
         if isinstance(base, ClassValue):
             value = base.cells.get(name)
             if value:
-                return _bound(run, obj, value, node, frame, name)
+                return _bound(run, obj, value, node, frame)
         elif isinstance(base, External):
             found = foreign.inherited(obj, base.path, name)
             if found is not None:
@@ -82,7 +82,7 @@ def _class_attribute(
     return None
 
 
-def _bound(run: Run, obj: Instance, value: Value, node: ast.AST, frame: Frame, name: str = "") -> Value:
+def _bound(run: Run, obj: Instance, value: Value, node: ast.AST, frame: Frame) -> Value:
     if len(value) == 1 and type(value[0]) is FunctionValue:
         return (BoundMethod(value[0], obj),)
     result: Value = BOTTOM
@@ -90,10 +90,7 @@ def _bound(run: Run, obj: Instance, value: Value, node: ast.AST, frame: Frame, n
         if isinstance(atom, FunctionValue):
             result = join(result, (BoundMethod(atom, obj),))
         elif isinstance(atom, PropertyValue):
-            made = run.call(atom.getter, Arguments([(obj,)]), node, frame)
-            if atom.cached and name:
-                run.state.store(obj, name, made)
-            result = join(result, made)
+            result = join(result, run.call(atom.getter, Arguments([(obj,)]), node, frame))
         elif isinstance(atom, ClassMethod):
             result = join(result, _bound_class_method(atom, obj.cls))
         else:
@@ -122,8 +119,8 @@ def _of_class(run: Run, cls: ClassValue, name: str, node: ast.AST, frame: Frame)
             value = base.cells.get(name)
             if value is None:
                 continue
-            if is_enumeration(cls):
-                return _enum_member(run, base, name, value, node)
+            if is_enumeration(cls) and not isinstance(value[0], FunctionValue | ClassMethod):
+                return unknown(f"the member {name} of an enumeration")
             result: Value = BOTTOM
             for atom in value:
                 found: Value = (atom,)
@@ -132,21 +129,8 @@ def _of_class(run: Run, cls: ClassValue, name: str, node: ast.AST, frame: Frame)
                 result = join(result, found)
             return result or ANY
         if isinstance(base, External) and base.path not in ("builtins.object", "abc.ABC", "typing.Generic"):
-            if base.path.startswith("enum.") and name == "__members__":
-                return ANY
             return external(f"{base.path}.{name}")
     return unknown(f"attribute {name} of class {cls.name}")
-
-
-def _enum_member(run: Run, cls: ClassValue, name: str, value: Value, node: ast.AST) -> Value:
-    if isinstance(value[0], FunctionValue | ClassMethod | PropertyValue) or name.startswith("_"):
-        return value
-    key = ("enum", id(cls), name)
-    member = run.enum_members.get(key)
-    if member is None:
-        member = run.enum_members[key] = Instance(cls)
-        member.cells.update({"value": value, "_value_": value, "name": (name,)})
-    return (member,)
 
 
 def _of_module(run: Run, module: ModuleValue, name: str, node: ast.AST, frame: Frame) -> Value:
@@ -166,12 +150,10 @@ def _of_external(run: Run, atom: External, name: str, node: ast.AST, frame: Fram
     if atom.path.count(".") > MAX_DOTS:
         return unknown(f"an attribute of {atom.path}")  # ``x = x.next`` in a loop would go on without end
     path = f"{atom.path}.{name}"
-    module = imports.import_submodule(run, path, frame)
+    module = run.modules.get(path)  # imported from a folder without __init__.py
     if module is not None:
         return (module,)
-    found = foreign.constant(path) or external(path)
-    if not run.program.has_namespace_package(path.partition(".")[0], run.beside):
-        run.foreign_attributes[atom.path, name] = found
+    found = run.foreign_attributes[atom.path, name] = foreign.constant(path) or external(path)
     return found
 
 

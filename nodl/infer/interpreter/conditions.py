@@ -238,8 +238,6 @@ def _compare_atoms(op: ast.cmpop, left: object, right: object) -> bool | None:
     if not isinstance(op, ast.Is | ast.IsNot | ast.Eq | ast.NotEq):
         return None
     same = isinstance(op, ast.Is | ast.Eq)
-    if _is_member(left) and _is_member(right):
-        return (left is right) is same
     if left is None or right is None:
         other = right if left is None else left
         own = isinstance(other, Instance) and isinstance(op, ast.Eq | ast.NotEq)
@@ -248,17 +246,6 @@ def _compare_atoms(op: ast.cmpop, left: object, right: object) -> bool | None:
 
 
 _NEVER_NONE = (Instance, FunctionValue, ClassValue, ModuleValue, Sequence, Dictionary)
-
-
-def _is_member(atom: object) -> bool:
-    """Return True for a member of an enumeration whose members are equal to themselves only."""
-    if not isinstance(atom, Instance) or "_value_" not in atom.cells or not isinstance(atom.cls, ClassValue):
-        return False
-    bases = [base for base in atom.cls.linear or () if isinstance(base, External)]
-    return (
-        all(base.path in ("enum.Enum", "builtins.object") for base in bases)
-        and "__eq__" not in atom.cls.cells
-    )
 
 
 def _membership(element: object, container: object) -> bool | None:

@@ -32,7 +32,7 @@ _TRANSPARENT = frozenset({
     "typing.override", "typing.overload", "typing_extensions.override", "typing.final", "pytest.fixture",
     "asyncio.coroutine",
 })  # fmt: skip
-_PROPERTIES = frozenset({"builtins.property", "functools.cached_property", "abc.abstractproperty"})
+_PROPERTIES = frozenset({"builtins.property", "abc.abstractproperty"})
 _PLAIN_METACLASSES = frozenset({"abc.ABCMeta", "enum.EnumMeta", "enum.EnumType", "builtins.type"})
 _PLAIN_DECORATORS = frozenset(
     {"functools.total_ordering", "typing.final", "typing.runtime_checkable", "enum.unique"}
@@ -85,14 +85,14 @@ def _decorated(run: Run, value: Value, function: FunctionValue, decorator: ast.e
     if isinstance(decorator, ast.Attribute) and decorator.attr in ("setter", "deleter", "getter"):
         found = run.evaluate(decorator.value, frame)
         if found and all(isinstance(atom, PropertyValue) for atom in found):
-            return tuple(
-                a.with_accessor(decorator.attr, value) for a in found if isinstance(a, PropertyValue)
-            )
+            why = f"property {function.name} has a {decorator.attr}, which is not analysed"
+            run.gap(decorator, frame, why)
+            return found
     callee = run.evaluate(decorator.func if isinstance(decorator, ast.Call) else decorator, frame)
     atom = sole(callee)
     path = atom.path if isinstance(atom, External) else ""
     if path in _PROPERTIES:
-        return (PropertyValue(value, cached=path == "functools.cached_property"),)
+        return (PropertyValue(value),)
     if path == "functools.wraps" and isinstance(decorator, ast.Call):
         function.name = ""  # that of the wrapped one
         return value

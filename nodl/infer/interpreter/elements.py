@@ -5,14 +5,13 @@ from __future__ import annotations
 import ast
 
 from nodl.infer.interpreter.conditions import is_plain_parameter, only_if
-from nodl.infer.interpreter.define import is_constant, is_key
+from nodl.infer.interpreter.define import is_constant, is_enumeration, is_key
 from nodl.infer.interpreter.frames import Arguments, Frame
 from nodl.infer.interpreter.run import Run
 from nodl.infer.text import Input, Text, input_of, make_text
 from nodl.infer.values import (
     ANY,
     BOTTOM,
-    NONE,
     OTHER,
     OTHER_KEYS,
     RESULT,
@@ -36,7 +35,7 @@ def subscript(run: Run, node: ast.Subscript, frame: Frame) -> Value:
     """Return what ``owner[key]`` gives for each owner but ``None``; ``ANY`` when nothing comes of it."""
     owner = run.evaluate(node.value, frame)
     key = run.evaluate(node.slice, frame) if not isinstance(node.slice, ast.Slice) else ANY
-    if isinstance(node.slice, ast.Slice) and not all(isinstance(a, str | Sequence) for a in owner):
+    if isinstance(node.slice, ast.Slice):
         for bound in (node.slice.lower, node.slice.upper, node.slice.step):
             if bound is not None:
                 run.evaluate(bound, frame)
@@ -52,10 +51,10 @@ def _element(run: Run, atom: object, key: Value, node: ast.Subscript, frame: Fra
         return dictionary_item(run, atom, key, node, frame)
     if isinstance(atom, Sequence):
         if isinstance(node.slice, ast.Slice):
-            return _sliced(run, atom, node, frame)
+            return _sliced(run, atom, node)
         return _sequence_item(run, atom, key)
     if isinstance(atom, str):
-        return _character(run, atom, key, node, frame)
+        return _character(atom, key)
     if isinstance(atom, Text):
         piece = atom.pieces[0]
         index = key[0] if len(key) == 1 else None
@@ -63,7 +62,7 @@ def _element(run: Run, atom: object, key: Value, node: ast.Subscript, frame: Fra
             return (make_text((Input(piece.name, piece.owner, index, piece.edits),)),)
         return unknown("a part of a text that is not known")
     if isinstance(atom, ClassValue):
-        return _class_item(run, atom, key, node, frame)
+        return ANY if is_enumeration(atom) else (atom,)  # Generic[T]
     if isinstance(atom, External) and atom.path == "os.environ":
         return run.call(external("os.environ.get"), Arguments([key]), node, frame)
     if isinstance(atom, External):
@@ -71,13 +70,6 @@ def _element(run: Run, atom: object, key: Value, node: ast.Subscript, frame: Fra
             return (atom,)
         return external(f"{atom.path}[]")
     return (atom,) if isinstance(atom, Unknown) else ANY
-
-
-def _class_item(run: Run, cls: ClassValue, key: Value, node: ast.AST, frame: Frame) -> Value:
-    names = [atom for atom in key if isinstance(atom, str)]
-    if names and all(name in cls.cells for name in names):  # Enum["MEMBER"]
-        return join_all(run.attribute((cls,), name, node, frame) for name in names)
-    return (cls,)  # Generic[T]
 
 
 def chosen_by_parameter(obj: Dictionary, key: Value, default: Value | None = None) -> Value | None:
@@ -149,31 +141,13 @@ def _sequence_item(run: Run, sequence: Sequence, key: Value) -> Value:
     return items.any_element() or ANY
 
 
-def _sliced(run: Run, sequence: Sequence, node: ast.Subscript, frame: Frame) -> Value:
-    items = sequence.items
-    bounds = slice_of(run, node.slice, frame)
-    if items.exact is not None and bounds is not None and not sequence.escaped:
-        return run.sequence(node, sequence.kind, Items(items.exact[bounds]))
-    found = items.any_element()
+def _sliced(run: Run, sequence: Sequence, node: ast.AST) -> Value:
+    """Return some of the elements; nobody knows which."""
+    found = sequence.items.any_element()
     return run.sequence(node, sequence.kind, Items(None, join(found, ANY) if len(found) > 1 else found))
 
 
-def slice_of(run: Run, node: ast.expr, frame: Frame) -> slice | None:
-    """Return the slice if its bounds are known."""
-    assert isinstance(node, ast.Slice)
-    bounds: list[int | None] = []
-    for bound in (node.lower, node.upper, node.step):
-        value = NONE if bound is None else run.evaluate(bound, frame)
-        if len(value) != 1 or not isinstance(value[0], int | None):
-            return None
-        bounds.append(value[0])
-    return slice(*bounds) if bounds[2] != 0 else None
-
-
-def _character(run: Run, text: str, key: Value, node: ast.Subscript, frame: Frame) -> Value:
-    if isinstance(node.slice, ast.Slice):
-        bounds = slice_of(run, node.slice, frame)
-        return (text[bounds],) if bounds is not None else unknown("a part of a text")
+def _character(text: str, key: Value) -> Value:
     index = key[0] if len(key) == 1 else None
     if type(index) is int and -len(text) <= index < len(text):
         return (text[index],)
@@ -203,8 +177,6 @@ def _elements_of(run: Run, atom: object, node: ast.AST, frame: Frame) -> Items:
         return Items(tuple((character,) for character in atom)) if len(atom) <= 256 else Items(None, ANY)
     if isinstance(atom, Text):
         return Items(None, _input_items(atom))
-    if isinstance(atom, ClassValue):
-        return enum_members(run, atom, node, frame)
     return Items(None, (atom,) if isinstance(atom, Unknown) else ANY)
 
 
@@ -234,17 +206,3 @@ def _in_order(obj: Dictionary, known: tuple[Value, ...], others: Value) -> Items
         return Items(None, join(result, ANY) if obj.escaped else result)
     certain = all(certain for _, _, certain in obj.entries()) and not obj.summary
     return Items(known) if certain else Items(None, join_all(known))
-
-
-def enum_members(run: Run, cls: ClassValue, node: ast.AST, frame: Frame) -> Items:
-    """Return what iterating over an enumeration gives: each name assigned in its body; anything without one."""
-    names = [
-        target.id
-        for statement in cls.node.body
-        if isinstance(statement, ast.Assign)
-        for target in statement.targets
-        if isinstance(target, ast.Name)
-    ]
-    if not names:
-        return Items(None, ANY)
-    return Items(tuple(run.attribute((cls,), name, node, frame) for name in names))

@@ -18,9 +18,7 @@ from nodl.infer.values import (
     ANY,
     BOTTOM,
     RESULT,
-    ClassValue,
     External,
-    Instance,
     Items,
     Sequence,
     Unknown,
@@ -52,13 +50,6 @@ def _text_of_atom(atom: object) -> TextAtom:
         return _hole(atom.why)
     if isinstance(atom, External):
         return _hole(f"a result of {atom.path.removesuffix(RESULT)}")
-    if isinstance(atom, Instance) and isinstance(atom.cls, ClassValue):
-        bases = atom.cls.linear or ()
-        value = sole(atom.cells.get("_value_", ANY))
-        if isinstance(value, str) and any(
-            isinstance(b, External) and b.path == "enum.StrEnum" for b in bases
-        ):
-            return value
     return _hole("the text of an object")
 
 
@@ -130,39 +121,18 @@ def _is_whole_number(text: Text) -> bool:
     return bool(default) and all(type(atom) is int for atom in default)
 
 
+_DIRECTIVE = re.compile(r"%(?:s|(\d*(?:\.\d+)?[dfx]))")
+
+
 def percent(left: Value, right: Value) -> Value:
-    """Run ``'text %s' % values``."""
-    results: list[TextAtom] = []
-    for atom in left:
-        if isinstance(atom, str):
-            results.extend(_percent_one(atom, right))
-        elif isinstance(atom, Text):
-            results.append(_hole("a format that is not known"))
-    return text_value(results) or ANY
-
-
-_DIRECTIVE = re.compile(r"%(?P<flags>[#0\- +]*\d*(?:\.\d+)?)(?P<type>[a-zA-Z%])")
-
-
-def _percent_one(template: str, right: Value) -> list[TextAtom]:
-    atom = sole(right)
-    whole = not (isinstance(atom, Sequence) and atom.kind == "tuple")
-    given = iter((right,) if whole or not isinstance(atom, Sequence) else atom.items.exact or ())
-    operands: list[Sequences[TextAtom]] = []
-    position = 0
-    for match in _DIRECTIVE.finditer(template):
-        operands.append([template[position : match.start()]])
-        position = match.end()
-        operands.append(["%"] if match["type"] == "%" else _percent_text(match, next(given, ANY)))
-    operands.append([template[position:]])
-    return [_hole("a format with names")] if "%(" in template else concatenations(operands)
-
-
-def _percent_text(match: re.Match[str], value: Value) -> list[TextAtom]:
-    if match["type"] == "s" and not match["flags"]:
-        return as_texts(value)
-    spec = "d" if match["type"] in "di" and not match["flags"] else match["flags"]
-    return _each_formatted(value, spec, lambda atom: f"%{match['flags']}{match['type']}" % atom)
+    """Run ``'text %s' % values`` where ``'text {}'.format(*values)`` says the same."""
+    template, given = sole(left), sole(right)
+    if not isinstance(template, str) or "%" in _DIRECTIVE.sub("", template):
+        return unknown("a text made with %")
+    several = given.items.exact if isinstance(given, Sequence) and given.kind == "tuple" else (right,)
+    escaped = template.replace("{", "{{").replace("}", "}}")
+    fields = _DIRECTIVE.sub(lambda found: f"{{:{found[1] or ''}}}", escaped)
+    return text_value(str_format(fields, Arguments(list(several or ()))))
 
 
 def str_format(template: TextAtom, args: Arguments) -> list[TextAtom]:

@@ -122,17 +122,3 @@ def execute_module(run: Run, source: SourceModule, name: str) -> ModuleValue:
     if body.early or body.unsettled:
         run.state.join_seen(0, None)
     return module
-
-
-def import_submodule(run: Run, name: str, frame: Frame) -> ModuleValue | None:
-    """Return an analysed module below a folder without ``__init__.py`` (``import p.q`` where only q.py exists)."""
-    top = name.partition(".")[0]
-    if not run.program.has_namespace_package(top, run.beside):
-        return None
-    place = (name, frame.module)
-    if place in run.no_submodules:
-        return None
-    found = _load(run, name, frame)
-    if found is None:
-        run.no_submodules.add(place)
-    return found

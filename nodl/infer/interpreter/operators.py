@@ -28,15 +28,6 @@ _ARITHMETIC: dict[type, Callable[[object, object], object]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
     ast.Mult: operator.mul,
-    ast.Div: operator.truediv,
-    ast.FloorDiv: operator.floordiv,
-    ast.Mod: operator.mod,
-    ast.Pow: operator.pow,
-    ast.LShift: operator.lshift,
-    ast.RShift: operator.rshift,
-    ast.BitOr: operator.or_,
-    ast.BitAnd: operator.and_,
-    ast.BitXor: operator.xor,
 }
 _COMBINING = (ast.BitOr, ast.BitAnd, ast.BitXor, ast.Sub)
 _NUMBERS = (int, float)
@@ -85,22 +76,12 @@ def _arithmetic(run: Run, node: ast.AST, left: Value, op: ast.operator, right: V
 
 
 def _arithmetic_atoms(run: Run, node: ast.AST, a: object, op: ast.operator, b: object) -> Value:
-    if isinstance(op, ast.Mult) and isinstance(a, Sequence) and isinstance(b, int):
-        exact = a.items.exact
-        if exact is not None and 0 <= len(exact) * b <= 64:
-            return run.sequence(node, a.kind, Items(exact * b))
+    if isinstance(op, ast.Mult) and isinstance(a, Sequence):
         return run.sequence(node, a.kind, Items(None, a.items.any_element()))
-    if not (isinstance(a, _NUMBERS) and isinstance(b, _NUMBERS)):
-        if isinstance(op, ast.Mult) and isinstance(a, str) and isinstance(b, int) and len(a) * b < 300:
-            return (a * b,)
-        return (b,) if isinstance(b, Unknown) else (a,) if isinstance(a, Unknown) else ANY
-    if isinstance(op, ast.Pow | ast.LShift | ast.RShift) and (abs(a) > _LARGE or not 0 <= b <= 64):
-        return ANY  # of any size
-    try:
+    if isinstance(a, _NUMBERS) and isinstance(b, _NUMBERS) and max(abs(a), abs(b)) < _LARGE:
         result = _ARITHMETIC[type(op)](a, b)
-    except (ArithmeticError, ValueError, TypeError):
-        return ANY
-    return (result,) if isinstance(result, _NUMBERS) and abs(result) < _LARGE else ANY
+        return (result,) if isinstance(result, _NUMBERS) else ANY
+    return (b,) if isinstance(b, Unknown) else (a,) if isinstance(a, Unknown) else ANY
 
 
 def _add(run: Run, node: ast.AST, left: Value, right: Value) -> Value:
@@ -136,12 +117,7 @@ def _text_side(value: Value) -> list[TextAtom]:
 
 
 def _added_sequences(run: Run, node: ast.AST, left: Value, right: Value, sequences: list[Sequence]) -> Value:
-    kind = sequences[0].kind
-    if len(left) == len(right) == 1 and len(sequences) == 2:
-        first, second = sequences[0].items, sequences[1].items
-        if first.exact is not None and second.exact is not None and len(first.exact + second.exact) <= 256:
-            return run.sequence(node, kind, Items(first.exact + second.exact))
     element = join_all(sequence.items.any_element() for sequence in sequences)
     if any(not isinstance(atom, Sequence) for atom in (*left, *right)):
         element = join(element, ANY)
-    return run.sequence(node, kind, Items(None, element))
+    return run.sequence(node, sequences[0].kind, Items(None, element))

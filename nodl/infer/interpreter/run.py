@@ -96,7 +96,6 @@ class Run(Allocations):
         super().__init__(ProgramState())
         self.findings = Findings()
         self.modules: dict[str, ModuleValue] = {}
-        self.no_submodules: set[tuple[str, ModuleValue]] = set()  # looked for and not found
         self.foreign_attributes: dict[tuple[str, str], Value] = {}  # of libraries, by path and name
         self.at: tuple[ast.AST, Frame] | None = None  # the latest call of the program
         self.escaped: dict[ClassValue | Instance, None] = {}  # handed to code that is not analysed
@@ -114,7 +113,6 @@ class Run(Allocations):
         self.understood: set[ast.AST] = set()
         self.stack: list[ast.AST] = []
         self.classes: dict[ast.AST, ClassValue] = {}
-        self.enum_members: dict[tuple[str, int, str], Instance] = {}
         self.functions: dict[tuple[object, ...], FunctionValue] = {}
         self.recursions: dict[ast.AST, Any] = {}  # functions that are calling themselves
         self.options = OptionDefaults()

@@ -110,59 +110,30 @@ def _constant_method(run: Run, text: str, name: str, arguments: tuple[object, ..
 EDITED = "an element of a list that is edited while that is undecided"
 
 
-def _stored(
-    run: Run, owner: Sequence, exact: list[Value] | None, others: Value, edited: bool = False
-) -> Value:
-    """Store the new contents: element by element where they are ``exact``, else ``others``.
+def _changed(run: Run, owner: Sequence, added: Value, edited: bool = False) -> Value:
+    """Note that ``added`` came to the elements; in which order they are is not kept.
 
     ``edited``: something was taken away, nobody knows what; a text among the elements may be the one.
     """
-    if exact is not None and not owner.summary and len(exact) < MAX_EXACT:
-        run.state.store(owner, ITEMS, (Items(tuple(exact)),))
-        return NONE
+    others = join(owner.items.any_element(), added)
     if edited and any(isinstance(atom, str | Text) for atom in others):
         others = join(others, unknown(EDITED))
     run.state.store(owner, ITEMS, (Items(None, others),))
     return NONE
 
 
-MAX_EXACT = 512
-
-
-def _exact(owner: Sequence) -> list[Value] | None:
-    exact = owner.items.exact
-    return None if exact is None or owner.escaped else list(exact)
-
-
 def _append(run: Run, owner: Sequence, call: Call) -> Value:
-    value = call.args.at(0) or ANY
-    exact = _exact(owner)
-    if exact is not None:
-        exact.append(value)
-    return _stored(run, owner, exact, join(owner.items.any_element(), value))
+    return _changed(run, owner, call.args.at(0) or ANY)
 
 
 def _extend(run: Run, owner: Sequence, call: Call) -> Value:
-    added = [elements(run, value, call.node, call.frame) for value in call.args.positional] or [
-        Items(None, ANY)
-    ]
-    exact = _exact(owner)
-    for items in added:
-        exact = None if exact is None or items.exact is None else [*exact, *items.exact]
-    return _stored(
-        run, owner, exact, join_all((owner.items.any_element(), *(i.any_element() for i in added)))
-    )
+    added = (elements(run, value, call.node, call.frame).any_element() for value in call.args.positional)
+    return _changed(run, owner, join_all(added) if call.args.positional else ANY)
 
 
-def _pop(run: Run, owner: Sequence, call: Call, first: bool = False) -> Value:
+def _pop(run: Run, owner: Sequence, call: Call) -> Value:
     element = owner.items.any_element()
-    exact = _exact(owner)
-    index = 0 if first else sole(call.args.at(0) or (-1,))
-    if exact and type(index) is int and -len(exact) <= index < len(exact) and owner.kind == "list":
-        taken = exact.pop(index)
-        _stored(run, owner, exact, element)
-        return taken
-    _stored(run, owner, None, element, edited=True)
+    _changed(run, owner, BOTTOM, edited=True)
     return element or ANY
 
 
@@ -173,19 +144,15 @@ def _copy_sequence(run: Run, owner: Sequence, call: Call) -> Value:
 def _edited(run: Run, owner: Sequence, call: Call) -> Value:
     """Handle ``insert``, ``remove``, ``sort`` ...: what is left, in which order, is not known."""
     run.register_callback(call.args.keywords.get("key", BOTTOM), 1)
-    return _stored(
-        run, owner, None, join_all((owner.items.any_element(), *call.args.positional)), edited=True
-    )
+    return _changed(run, owner, join_all(call.args.positional), edited=True)
 
 
 SequenceMethod = Callable[[Run, Sequence, Call], Value]
 _SEQUENCE: dict[str, SequenceMethod] = {
     **dict.fromkeys(("append", "add", "appendleft"), _append),
     **dict.fromkeys(("extend", "update"), _extend),
-    **dict.fromkeys(("insert", "remove", "discard", "sort", "reverse"), _edited),
-    "pop": _pop,
-    "popleft": lambda run, owner, call: _pop(run, owner, call, first=True),
-    "clear": lambda run, owner, call: _stored(run, owner, [], owner.items.any_element(), edited=True),
+    **dict.fromkeys(("insert", "remove", "discard", "sort", "reverse", "clear"), _edited),
+    **dict.fromkeys(("pop", "popleft"), _pop),
     "copy": _copy_sequence,
 }
 

@@ -39,7 +39,6 @@ from nodl.infer.values import (
     BOTTOM,
     NONE,
     External,
-    Instance,
     Unknown,
     Value,
     external,
@@ -85,8 +84,6 @@ def names_of(value: Value) -> list[object]:
     for atom in value:
         if isinstance(atom, str | Text | Unknown):
             names.append(atom)
-        elif isinstance(atom, Instance) and "_value_" in atom.cells:
-            names.extend(as_texts((atom,)))
         elif atom is not None and not isinstance(atom, int | float):
             names.append(unknown("a name that is made by an object")[0])
     return names or [unknown("the name is never set to a text")[0]]

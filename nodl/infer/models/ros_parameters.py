@@ -104,15 +104,6 @@ def _get_parameter(run: Run, record: NodeRecord, call: Call) -> Value:
     return parameter_object(run, call, _inputs(run, record, _names(call)))
 
 
-def _get_parameters(run: Run, record: NodeRecord, call: Call) -> Value:
-    names = _each(run, call.args.at(0, "names") or ANY, call)
-    found = tuple(
-        parameter_object(run, call, _inputs(run, record, constant_strings(name)), f"parameter {index}")
-        for index, name in enumerate(names)
-    )
-    return run.sequence(call.node, "list", Items(found))
-
-
 def _get_parameters_by_prefix(run: Run, record: NodeRecord, call: Call) -> Value:
     """Return a dictionary of the parameters below a prefix, under the rest of their names."""
     found = run.allocate(call.node, "by prefix", Dictionary)
@@ -161,7 +152,6 @@ METHODS: dict[str, Callable[[Run, NodeRecord, Call], Value]] = {
     "declare_parameter": _declare_parameter,
     "declare_parameters": _declare_parameters,
     "get_parameter": _get_parameter,
-    "get_parameters": _get_parameters,
     "get_parameter_or": _get_parameter_or,
     "get_parameters_by_prefix": _get_parameters_by_prefix,
     "set_parameters": _set_parameters,

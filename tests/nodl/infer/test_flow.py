@@ -181,7 +181,7 @@ OUTSIDE: dict[str, tuple[str, str, str, list[str]]] = {
     ),
     "enum": (
         "from enum import Enum\nclass E(Enum):\n    X = 'a'\n    Y = 'b'",
-        "self.P(E.X.value)\nfor e in E:\n    self.P('all/' + e.value)", "", ["a", "all/a", "all/b"],
+        "self.P(E.X.value)\nfor e in E:\n    self.P('all/' + e.value)", "", ["?", "all/?"],
     ),
     "timer": ("", "self.create_timer(1.0, self.tick)", "def tick(self):\n    self.P('a')", ["a"]),
     "field set by another callback": (

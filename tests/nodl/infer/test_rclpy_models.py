@@ -182,7 +182,6 @@ PARAMETERS = {
     "self.declare_parameter('t', 'd'); n = self.get_parameter('t').get_parameter_value().string_value": "param:t",
     "self.declare_parameters('', [('t', 'd')]); n = self.get_parameter('t').value": "param:t",
     "self.declare_parameters('p', [('t', 'd')]); n = self.get_parameter('p.t').value": "param:p.t",
-    "self.declare_parameter('t', 'd'); (p,) = self.get_parameters(['t']); n = p.value": "param:t",
     "n = self.get_parameter_or('t', Parameter('t', Parameter.Type.STRING, 'd')).value": "param:t",
 }
 
