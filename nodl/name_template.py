@@ -70,6 +70,8 @@ class ParameterPart(NamedTuple):
         listed = self.item == "each" or any(
             method in ("split", "range", "unless empty") for method, _ in self.edits
         )
+        if any(method == "only if set" for method, _ in self.edits):
+            return True
         known = self.name in parameters or self.default is not None
         return self.is_condition or self.name.endswith(".**") or (listed and known)
 

@@ -397,6 +397,42 @@ def test_readings_of_a_record_that_gave_way_are_decided_as_those_of_one_that_did
     assert alone.problems and allowed(alone, "publish") == ["/status", "/warehouse"]
 
 
+OPTIONAL = """#!/usr/bin/env python3
+import rclpy
+from rclpy.exceptions import ParameterUninitializedException
+from rclpy.parameter import Parameter
+from std_msgs.msg import String
+rclpy.init()
+node = rclpy.create_node('n')
+node.declare_parameter('lock', Parameter.Type.STRING)
+try:
+    lock = node.get_parameter('lock').value
+except {caught}:
+    lock = None
+if lock:
+    node.create_publisher(String, lock, 1)
+rclpy.spin(node)
+"""
+
+
+@pytest.mark.parametrize("caught", ["ParameterUninitializedException", "(KeyError, Exception)"])
+def test_a_parameter_without_a_value_whose_exception_is_caught_gives_no_name(
+    caught: str, launch: Launch, install: Callable[..., Path]
+) -> None:
+    install("pkg", "prog", source=OPTIONAL.format(caught=caught))
+    unset = launch(NODE)
+    assert allowed(unset, "publish") == [] and not unset.problems
+    assert allowed(launch(f'{NODE[:-2]}><param name="lock" value="l"/></node>'), "publish") == ["/l"]
+
+
+def test_a_parameter_without_a_value_that_ends_the_program_is_a_gap(
+    launch: Launch, install: Callable[..., Path]
+) -> None:
+    install("pkg", "prog", source=OPTIONAL.format(caught="KeyError"))
+    (problem,) = launch(NODE).problems
+    assert "parameter 'lock' has no value" in problem.text
+
+
 def test_explain_says_of_one_name_which_descriptions_have_it(
     launch: Launch, install: Callable[..., Path], document: Callable[..., Path]
 ) -> None:

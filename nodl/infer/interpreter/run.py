@@ -127,6 +127,7 @@ class Run(Allocations):
         self.limit = min(MAX_STEPS, MAX_STEPS_IN_VAIN)
         self.gave_up = False
         self.called_back: dict[tuple[object, int | None], object] = {}  # the state before the latest call
+        self.without_value = 0  # inside bodies whose handlers catch a parameter that has no value
         self.conditional = False  # an undecided test asks for the value of a parameter
 
     # --- syntax -----------------------------------------------------------------------------------------

@@ -179,8 +179,11 @@ def run_try(run: Run, node: Any, frame: Frame) -> bool:
     mark, returned = run.state.mark(), frame.returned
     early, unsettled = frame.early, frame.unsettled
     frame.early = frame.unsettled = False
+    without_value = any(map(_catches_no_value, node.handlers))
     run.state.depth += 1
+    run.without_value += without_value
     passes = run.execute(node.body, frame)
+    run.without_value -= without_value
     run.state.depth -= 1
     if passes and node.orelse:
         passes = run.execute(node.orelse, frame)
@@ -201,6 +204,16 @@ def run_try(run: Run, node: Any, frame: Frame) -> bool:
         frame.returned = join(within, frame.returned)
         frame.jump = frame.jump if passes else jump
     return done and passes
+
+
+def _catches_no_value(handler: ast.ExceptHandler) -> bool:
+    """Return True if a parameter that was declared without a value, and got none, ends in ``handler``."""
+    kinds = handler.type.elts if isinstance(handler.type, ast.Tuple) else [handler.type]
+    return any(kind is None or ast.unparse(kind).rpartition(".")[2] in _NO_VALUE for kind in kinds)
+
+
+_NO_VALUE = frozenset({"ParameterUninitializedException", "ParameterException", "Exception", "BaseException"})
+"""What rclpy's ``get_parameter`` raises then, and what it is derived from (rclpy/exceptions.py)."""
 
 
 def _cannot_fail(statement: ast.stmt) -> bool:

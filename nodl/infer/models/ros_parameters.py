@@ -73,7 +73,10 @@ def _inputs(run: Run, record: NodeRecord, names: list[str]) -> Value:
         held = record.cells.get(name, ABSENT)
         result = join(result, present(held))
         if ABSENT[0] in held:
-            result = join(result, (make_text((Input(name, record),)),))
+            text = make_text((Input(name, record),))
+            if run.without_value and record.parameters.get(name) == BOTTOM:
+                text = with_edit(Input(name, record), "only if set", ())
+            result = join(result, (text,))
     return result
 
 
