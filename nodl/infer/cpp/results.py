@@ -11,7 +11,6 @@ from nodl.infer.cpp.findings import AllocatedNode, Condition, Follows, PossibleE
 from nodl.infer.cpp.program import ProgramFindings
 from nodl.infer.cpp.running.values import NodeNamePart, Text, Value, concatenated, plain
 from nodl.infer.results import certainty_of, own_name
-from nodl.infer.start import Start
 from nodl.name_template import NameTemplate, ParameterPart, Part, UnknownPart, melted
 from nodl.node_interface import (
     RANDOM_ENDING,
@@ -30,76 +29,40 @@ def interfaces_of(
     package: str | None,
     executable: str | None,
     plugin: str | None,
-    start: Start | None = None,
 ) -> list[NodeInterface]:
-    """Return one interface for each node and each name that it may have; gaps of the whole program go to the first.
-
-    With ``start`` the names of further nodes, which the parameters of the first do not reach, are filled in.
-    """
+    """Return one interface for each node and each name that it may have; gaps of the whole program go to the first."""
     found: list[NodeInterface] = []
     for record in findings.nodes:
-        made = _of_node(record, package, executable, plugin)
-        if start is not None and _needs_start(record, findings):
-            made = [_filled(each, record, findings, start) for each in made]
-        found += made
+        unreached = _unreached(record, findings)
+        found += [_opened(each, unreached) for each in _of_node(record, package, executable, plugin)]
     if found:
         found[0] = found[0]._replace(gaps=tuple(dict.fromkeys((*found[0].gaps, *program_gaps(findings)))))
     return found
 
 
-def depends_on_start(findings: ProgramFindings) -> bool:
-    """Return whether another launch of the program may get other interfaces from ``interfaces_of``."""
-    return any(_needs_start(record, findings) for record in findings.nodes)
+def _unreached(record: AllocatedNode, findings: ProgramFindings) -> set[str]:
+    """Return the parameters that a plan, which knows one node's parameters at a time, would not find in the launch: all
+    of a further node or of one with arguments of its own, and what only another node declares.
+    """
+    every = {name for each in findings.nodes for name in each.parameters}
+    is_first = record is findings.nodes[0] and not record.arguments
+    return every - set(record.parameters) if is_first else every
 
 
-def _needs_start(record: AllocatedNode, findings: ProgramFindings) -> bool:
-    """Return whether a plan, which knows one node's parameters at a time, could not fill in the names of ``record``."""
-    names = {
-        part.name
-        for found in record.endpoints
-        for template in _templates(found.name, record)
-        for part in template.parts
-        if isinstance(part, ParameterPart)
-    }
-    is_first = record is findings.nodes[0]
-    return bool(names) and (
-        not is_first or bool(record.arguments) or bool(names & _foreign(record, findings).keys())
-    )
-
-
-def _foreign(record: AllocatedNode, findings: ProgramFindings) -> dict[str, str | None]:
-    """Return the parameters that only another node of the program declares, with that node's name in the source."""
-    return {
-        parameter: name
-        for other in findings.nodes
-        if other is not record
-        for name in (_name(other),)
-        for parameter in other.parameters
-        if parameter not in record.parameters
-    }
-
-
-def _name(record: AllocatedNode) -> str | None:
-    names = _texts(record.names, record)
-    return names[0] if len(names) == 1 else None
-
-
-def _filled(
-    interface: NodeInterface, record: AllocatedNode, findings: ProgramFindings, start: Start
-) -> NodeInterface:
-    foreign = _foreign(record, findings)
-    parameters = {
-        name: value for name, value in start.parameters(interface.name).items() if name not in foreign
-    }
-    for parameter, node in foreign.items():
-        given = start.parameters(node)
-        if parameter in given:
-            parameters[parameter] = given[parameter]
-    endpoints = tuple(
-        endpoint._replace(name=template)
-        for endpoint in interface.endpoints
-        for template in endpoint.name.fill_each(parameters)
-    )
+def _opened(interface: NodeInterface, unreached: set[str]) -> NodeInterface:
+    """Return the interface with what launch gives to these parameters not known."""
+    endpoints = []
+    for each in interface.endpoints:
+        parts = tuple(
+            UnknownPart(f"parameter {part.name} of a node beside it")
+            if isinstance(part, ParameterPart) and part.name in unreached
+            else part
+            for part in each.name.parts
+        )
+        name = NameTemplate(parts)
+        endpoints.append(
+            each if parts == each.name.parts else each._replace(name=name, certainty=certainty_of(name))
+        )
     return interface._replace(endpoints=tuple(dict.fromkeys(endpoints)))
 
 

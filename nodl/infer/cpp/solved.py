@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 import gc
-import re
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import TypeAlias
 
-from enclave_common.files import text_or_nothing
 from nodl.infer.cpp.cache.answers import Answers, Made
 from nodl.infer.cpp.cache.folder import digest_of
 from nodl.infer.cpp.entry import CppSupportMissing, Entry, Solved, failure
 from nodl.infer.cpp.program import Sources, run_program
-from nodl.infer.cpp.reading.declarations import FileIndex, FunctionParameter
-from nodl.infer.cpp.results import depends_on_start, interfaces_of, program_gaps
-from nodl.infer.cpp.syntax import text
+from nodl.infer.cpp.results import interfaces_of, program_gaps
 from nodl.infer.start import LaunchKey, Start
 from nodl.node_interface import Gap
 from nodl.source_ref import SourceRef
@@ -50,11 +46,11 @@ def _solved(sources: Sources, key: LaunchKey, entry: Entry, start: Start | None)
     with _garbage_at_the_end():
         findings = run_program(sources, entry, start)
     solved = Solved(
-        nodes=tuple(interfaces_of(findings, key.package, key.executable, key.plugin, start)),
+        nodes=tuple(interfaces_of(findings, key.package, key.executable, key.plugin)),
         gaps=tuple(program_gaps(findings)),
         dead=tuple(Gap(answer.source, answer.reason) for answer in findings.answers if answer.dead),
         classes=tuple(sorted(findings.classes)),
-        consulted=findings.consulted or depends_on_start(findings),
+        consulted=findings.consulted,
     )
     read = (*findings.files, *sources.unreadable)
     return Made(solved, {name: sources.digests[name] for name in read})
@@ -78,91 +74,12 @@ def _garbage_at_the_end() -> Iterator[None]:
 
 
 def solve_all(sources: Sources, answers: Answers, programs: Sequence[Program]) -> list[Made]:
-    """Solve each of ``programs``: from earlier runs if nothing has changed; one that only makes a component as that."""
-    found: dict[Program, Made] = {}
-    components = [each for each in programs if each[1].cls]
-    for each in sorted(programs, key=lambda program: not program[1].cls):
+    """Solve each of ``programs``, from earlier runs if nothing has changed."""
+    found: list[Made] = []
+    for each in programs:
         known = answers.find(("program", *each))
         if known is None:
-            known = _as_component(each, components, found, sources) or solve(sources, *each)
+            known = solve(sources, *each)
             answers.keep(("program", *each), known)
-        found[each] = known
-    return [found[each] for each in programs]
-
-
-def _as_component(
-    program: Program, components: Iterable[Program], found: Mapping[Program, Made], sources: Sources
-) -> Made | None:
-    """Return the answer of the component that ``program`` makes and nothing else; ``None`` if it is not so."""
-    key, entry = program
-    made = next((each for each in components if only_makes(entry, each[1], sources)), None)
-    return _under(key, found[made], sources, entry) if made is not None else None
-
-
-def _under(key: LaunchKey, component: Made, sources: Sources, executable: Entry) -> Made:
-    """Return the component's answer as that of an executable that makes only the component."""
-    solved: Solved = component.answer
-    nodes = tuple(
-        node._replace(package=key.package, executable=key.executable, plugin=key.plugin)
-        for node in solved.nodes
-    )
-    read = {**component.files, **{name: sources.digests[name] for name in executable.files}}
-    return component._replace(answer=solved._replace(nodes=nodes), files=read)
-
-
-_MAIN = re.compile(
-    r"\{rclcpp::init\((?P<arguments>\w+,\w+)\);"
-    r"(?:rclcpp::NodeOptions(?P<options>\w+);)?"
-    r"auto(?P<node>\w+)=std::make_shared<(?P<component>[\w:]+)>\((?P<given>rclcpp::NodeOptions\(\)|(?P=options))?\);"
-    r"rclcpp::spin\((?P=node)(?:->get_node_base_interface\(\))?\);"
-    r"(?:rclcpp::shutdown\(\);)?(?:return(?:0|EXIT_SUCCESS);)?\}"
-)  # without white space
-_DEFAULTS = ("rclcpp::NodeOptions()", "NodeOptions()", "{}")
-
-
-def _main_beside(executable: Entry, component: Entry) -> str | None:
-    """Return the one source that the executable has beside those of the component; ``None`` if that is not all."""
-    own = [file for file in executable.files if file not in component.files]
-    rest = tuple(file for file in executable.files if file in component.files)
-    alike = (executable.symbols, executable.complete) == (component.symbols, component.complete)
-    return own[0] if alike and executable.main and rest == component.files and len(own) == 1 else None
-
-
-def only_makes(executable: Entry, component: Entry, sources: Sources) -> bool:
-    """Return whether ``executable`` makes ``component``, as a container would, and nothing else."""
-    file, symbols = _main_beside(executable, component), dict(component.symbols)
-    if file is None or f"<{component.cls}>" not in text_or_nothing(file):
-        return False
-    index = sources.index(file, symbols, component.complete)
-    made = _made(index) if index is not None else None
-    if index is None or made is None or made["component"] != component.cls:
-        return False
-    reached = sources.closure(component.files, symbols, component.complete)
-    takes = _options_alone(component.cls, reached)
-    default = text(takes.default) if takes is not None else ""
-    called_alike = takes is not None and (made["given"] or "".join(default.split()) in _DEFAULTS)
-    return bool(called_alike) and {each.file for each in reached}.issuperset(index.source.includes)
-
-
-def _made(index: FileIndex) -> re.Match[str] | None:
-    """Return what such a ``main`` makes, if the file has nothing else."""
-    others = (
-        index.classes, index.globals, index.aliases, index.using, index.enums, index.declared, index.errors,
-        index.source.uncertain, index.source.unknown_macros,
-    )  # fmt: skip
-    mains = index.functions.get("main", ())
-    if any(others) or len(index.all_functions) != 1 or len(mains) != 1:
-        return None
-    match = _MAIN.fullmatch("".join(text(mains[0].body).split()))
-    given = ",".join(each.name for each in mains[0].parameters)
-    return match if match is not None and match["arguments"] == given else None
-
-
-def _options_alone(component: str, files: Iterable[FileIndex]) -> FunctionParameter | None:
-    """Return the parameter of the one constructor that takes options and nothing else; ``main`` can call no other."""
-    name = component.rpartition("::")[2]
-    classes = (each for index in files for each in index.classes.get(name, ()) if each.qualified == component)
-    found = [each for cls in classes for each in (*cls.methods.get(name, ()), *cls.declared.get(name, ()))]
-    taking = [each.parameters for each in found if any("NodeOptions" in p.type for p in each.parameters)]
-    alone = len(taking) == 1 == len(taking[0]) and all(each.parameters for each in found)
-    return taking[0][0] if alone else None
+        found.append(known)
+    return found

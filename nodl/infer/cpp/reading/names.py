@@ -9,7 +9,7 @@ from functools import cached_property, update_wrapper
 from typing import Any, Concatenate, ParamSpec, TypeVar
 
 from nodl.infer.cpp.reading.declarations import Class, FileIndex, Function, Global, Scope
-from nodl.infer.cpp.reading.known_headers import KNOWN_HEADERS, is_of_c
+from nodl.infer.cpp.reading.known_headers import KNOWN_HEADERS
 from nodl.infer.cpp.reading.type_names import POINTER_MEMBERS, Type, split_type
 
 _WRAPPERS = frozenset({
@@ -298,11 +298,6 @@ class Names:
         if not found and re.search(r"(?:^|::)\w*Node$", name):
             return "no header in reach defines it"
         return found
-
-    def is_of_c(self, name: str, file: FileIndex) -> bool:
-        """Return whether a type that is not in reach comes from a header of C that ``file`` includes."""
-        seen = (self.files[each].source.foreign for each in self.visible(file.file) if each in self.files)
-        return is_of_c(name, [header for foreign in seen for header in foreign])
 
     # --- types ------------------------------------------------------------------------------------------
 

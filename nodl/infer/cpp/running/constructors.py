@@ -343,8 +343,6 @@ def _unmodelled(run: Machine, kind: Type, node: Node, frame: Frame, deliberate: 
 
     ``deliberate``: it is made with arguments or with new, as structures of C are not.
     """
-    if run.names.is_of_c(kind.name, frame.file):
-        return
     first = kind.name.partition("::")[0]
     if first in KNOWN_HEADERS and not (deliberate and first in ROS_LIBRARIES):
         return

@@ -190,23 +190,16 @@ int main(int argc, char ** argv) {
 }
 """
 )
-TWICE = """
-<launch>
-  <node pkg="demo" exec="filter_node" namespace="a"><param name="channel" value="one"/></node>
-  <node pkg="demo" exec="filter_node" namespace="b"><param name="channel" value="two"/><param from="{file}"/></node>
-</launch>
-"""
 
 
-def test_a_name_from_a_parameter_of_another_node_follows_each_start(tmp_path: Path) -> None:
-    """Two starts of one program have their own values, and a parameter file tells which node has one."""
+def test_a_name_from_a_parameter_of_another_node_is_not_known(tmp_path: Path) -> None:
     package(
         tmp_path / "src/demo", {"src/filter.cpp": TWO_NODES}, "add_executable(filter_node src/filter.cpp)\n"
     )
     install(tmp_path)
-    file = tmp_path / "of_outer.yaml"
-    write(file, "/b/outer:\n  ros__parameters: {back: other, channel: not_mine}\n")
-    found = plan(tmp_path, TWICE.format(file=file))
-    assert not found.problems
-    assert all(may(found, name) for name in ("/cloud/one", "/cloud/two", "/b", "/other"))
-    assert not any(may(found, name) for name in ("/cloud/data", "/cloud/not_mine"))
+    found = plan(
+        tmp_path,
+        '<launch><node pkg="demo" exec="filter_node"><param name="channel" value="one"/></node></launch>',
+    )
+    assert found.problems
+    assert not any(may(found, name) for name in ("/cloud/one", "/cloud/data", "/b"))
