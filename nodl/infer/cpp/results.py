@@ -42,11 +42,11 @@ def interfaces_of(
 
 def _unreached(record: AllocatedNode, findings: ProgramFindings) -> set[str]:
     """Return the parameters that a plan, which knows one node's parameters at a time, would not find in the launch: all
-    of a further node or of one with arguments of its own, and what only another node declares.
+    of a further node or of one that renames itself, and what only another node declares.
     """
     every = {name for each in findings.nodes for name in each.parameters}
-    is_first = record is findings.nodes[0] and not record.arguments
-    return every - set(record.parameters) if is_first else every
+    renamed = any("__n" in (word or "") for words in record.arguments for word in words)
+    return every - set(record.parameters) if record is findings.nodes[0] and not renamed else every
 
 
 def _opened(interface: NodeInterface, unreached: set[str]) -> NodeInterface:
