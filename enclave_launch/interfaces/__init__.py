@@ -31,6 +31,7 @@ from nodl.source_ref import SourceRef
 if TYPE_CHECKING:
     from nodl.infer.cpp.reach import SourcesInReach
     from nodl.infer.executable import InferredExecutable
+    from nodl.infer.start import Start
 
 SOURCE_VARIABLE = "SECURE_LAUNCH_SOURCE"
 """Folders with sources of compiled nodes, separated as in ``PATH``; after those that ``--source`` names."""
@@ -80,7 +81,7 @@ class InterfaceFinder:
         self._prefixes = prefixes
         self._distro = distro
         self._lookup = ManifestLookup(prefixes, self._options.manifests)
-        self._library = LibraryAccess(prefixes, self._options, distro, launch)
+        self._library = LibraryAccess(prefixes, self._options, distro, launch, self._controller)
         self._known: dict[_Subject, _Known] = {}
         self._infers = self._options.infer and installed("nodl.infer")
 
@@ -185,6 +186,13 @@ class InterfaceFinder:
             start_of=started,
             compiled_only=compiled_only,
         )
+
+    def _controller(self, plugin_class: str, start: Start) -> tuple[NodeInterface, ...]:
+        if not self._infers:
+            return ()
+        from nodl.infer.executable import infer_controller  # an add-on: inference
+
+        return infer_controller(plugin_class, self._sources, start)
 
     @cached_property
     def _sources(self) -> SourcesInReach:

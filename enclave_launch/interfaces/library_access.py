@@ -6,12 +6,13 @@ index, documents of the library and the configuration files that launch names.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
+from typing import NamedTuple
 
 from enclave_launch.errors import UsageError
 from enclave_launch.interfaces.launch_contents import launched
-from enclave_launch.interfaces.situation import situation_of
+from enclave_launch.interfaces.situation import StartedController, situation_of
 from enclave_launch.options import ResolveOptions
 from enclave_launch.policy.program_inputs import own_words
 from enclave_launch.process import Evaluation, ResolvedComponent, ResolvedProcess
@@ -19,18 +20,52 @@ from nodl.ament_index import list_resources, package_version
 from nodl.dependence import Launched, Situation
 from nodl.dependence.apply import applied, own_name
 from nodl.library import SHIPPED, Hit, Library, LibraryDocuments
-from nodl.node_interface import NodeInterface
+from nodl.node_interface import Certainty, NodeInterface
 
 _FURTHER = 32
+
+
+def _filled(interface: NodeInterface, parameters: Mapping[str, object]) -> NodeInterface:
+    """Return ``interface`` with its names under these parameters."""
+    endpoints = (
+        endpoint._replace(name=name, certainty=Certainty.EXACT if name.is_literal else Certainty.PATTERN)
+        for endpoint in interface.endpoints
+        for name in endpoint.name.fill_each(parameters)
+    )
+    return interface._replace(endpoints=tuple(dict.fromkeys(endpoints)))
+
+
+class _Documents(NamedTuple):
+    """The documents of a library, and what sources say of plugins that have none."""
+
+    library: LibraryDocuments
+    of_source: Callable[[str, str], NodeInterface | None]
+
+    def of_class(self, plugin_class: str, instance: str = "") -> NodeInterface | None:
+        return self.library.of_class(plugin_class) or self.of_source(plugin_class, instance)
+
+    def named(self, name: str) -> NodeInterface | None:
+        return self.library.named(name)
+
+    def transports(self) -> tuple[tuple[str, str, NodeInterface], ...]:
+        return self.library.transports()
 
 
 class LibraryAccess:
     """Opens nothing until a node has no manifest, or one that depends on its start."""
 
     def __init__(
-        self, prefixes: Sequence[str], options: ResolveOptions, distro: str, launch: Evaluation | None = None
+        self,
+        prefixes: Sequence[str],
+        options: ResolveOptions,
+        distro: str,
+        launch: Evaluation | None = None,
+        of_source: Callable[
+            [str, StartedController], tuple[NodeInterface, ...]
+        ] = lambda plugin_class, start: (),
     ):
-        """Open nothing yet; ``launch`` is all that starts, for nodes that must know others.
+        """Open nothing yet; ``launch`` is all that starts, for nodes that must know others. ``of_source`` describes
+        plugins that no document describes, with the nodes that they make.
 
         Raises ``UsageError`` for a folder of documents that is not there.
         """
@@ -38,6 +73,7 @@ class LibraryAccess:
         self._distro = distro
         self._enabled = options.library
         self._launch = launch
+        self._of_source = of_source
         self._folders = options.library_folders
         for folder in self._folders:
             if not folder.is_dir():
@@ -94,9 +130,21 @@ class LibraryAccess:
         depth: int = 0,
     ) -> Iterator[NodeInterface]:
         named = self._named(interface, started)
-        documents = LibraryDocuments(self._library, self._distro)
-        done = applied(named, self._situation(named, started, container), documents)
+        situation = self._situation(named, started, container)
+        process = started if isinstance(started, ResolvedProcess) else container
+
+        made: list[NodeInterface] = []
+
+        def of_source(plugin_class: str, instance: str) -> NodeInterface | None:
+            start = StartedController(process, situation, instance)
+            found = self._of_source(plugin_class, start)
+            made.extend(found[1:])
+            return _filled(found[0], start.parameters(instance)) if found else None
+
+        documents = _Documents(LibraryDocuments(self._library, self._distro), of_source)
+        done = applied(named, situation, documents)
         yield done.interface
+        yield from made
         for further in done.further if depth < _FURTHER else ():
             yield from self._complete(further, started, container, depth + 1)
 

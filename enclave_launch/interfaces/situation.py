@@ -101,3 +101,21 @@ class StartedProgram:
             source=SourceRef(str(started.location)),
         )
         return situation_of(started, self._container, interface, self._distro)
+
+
+class StartedController:
+    """A controller that the controller manager in ``situation`` loads under a name."""
+
+    def __init__(self, process: ResolvedProcess | None, situation: Situation, name: str) -> None:
+        self._process, self._situation, self._name = process, situation, name
+
+    def parameters(self, node: str | None) -> Mapping[str, object]:
+        """Return what the manager's command line and the spawners set."""
+        namespace = self._situation.namespace
+        given = parameters_of_node(self._process, namespace, self._name) if self._process else {}
+        spawned = (each for each in self._situation.launched.spawned if each.controller == self._name)
+        return {**given, **next((each.parameters for each in spawned), {})}
+
+    def final_name(self, node: str | None) -> tuple[str | None, str | None]:
+        """Return the name under which it is loaded, in the namespace of its manager."""
+        return self._name, self._situation.namespace

@@ -37,7 +37,7 @@ _DEPTH = 8
 class Documents(Protocol):
     """Where the descriptions of plugins and further nodes are found; ``None``: nobody describes it."""
 
-    def of_class(self, plugin_class: str) -> NodeInterface | None: ...
+    def of_class(self, plugin_class: str, instance: str = "") -> NodeInterface | None: ...
 
     def named(self, name: str) -> NodeInterface | None: ...
 
@@ -149,7 +149,7 @@ class _Application:
         if plugin_class is None:
             self._gap(by, f"the class of plugin '{instance}' is not known: {class_parameter} is not set")
             return
-        described = self._documents.of_class(plugin_class)
+        described = self._documents.of_class(plugin_class, instance)
         if described is None:
             self._gap(by, f"plugin '{instance}' is of class {plugin_class}, which no document describes")
             return

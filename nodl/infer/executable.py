@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from enclave_common.files import check_regular
 from nodl.ament_index import ExecutableNotInstalledError, PackageNotFoundError, executable_path
+from nodl.dependence import Dependence
 from nodl.node_interface import NodeInterface
 
 if TYPE_CHECKING:
@@ -58,6 +59,20 @@ def infer_executable(
     from nodl.infer.python_executable import infer_python
 
     return InferredExecutable(*infer_python(path, package, executable, prefixes))
+
+
+def infer_controller(name: str, sources: SourcesInReach, start_of: Start) -> tuple[NodeInterface, ...]:
+    """Return a controller of ros2_control whose sources are in reach, a plugin that is a node of its own, and the nodes
+    that it makes; nothing if there is none."""
+    from nodl.infer.cpp.entry import CONTROLLER, CppSupportMissing
+
+    try:
+        interfaces = sources.infer_controller(name, start_of).interfaces
+    except CppSupportMissing:
+        return ()
+    if not interfaces or interfaces[0].name != CONTROLLER:
+        return ()
+    return (interfaces[0]._replace(depends=Dependence(own_node=True)), *interfaces[1:])
 
 
 def _compiled(

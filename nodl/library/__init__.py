@@ -122,8 +122,8 @@ class LibraryDocuments(NamedTuple):
     library: Library
     distro: str = ""
 
-    def of_class(self, plugin_class: str) -> NodeInterface | None:
-        """Return the description of a plugin by its class."""
+    def of_class(self, plugin_class: str, instance: str = "") -> NodeInterface | None:
+        """Return the description of a plugin by its class, the same for each ``instance``."""
         hit = self.library.of_class(plugin_class, distro=self.distro)
         return hit.document.interface if hit else None
 

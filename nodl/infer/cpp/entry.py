@@ -8,6 +8,9 @@ from typing import Any, NamedTuple
 
 from nodl.node_interface import Gap, NodeInterface
 
+CONTROLLER = "controller"
+"""The name of a controller of ros2_control until somebody loads it."""
+
 
 class Entry(NamedTuple):
     """Where a program starts: ``main`` of its files, or the constructor of a class."""

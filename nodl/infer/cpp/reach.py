@@ -44,6 +44,12 @@ class SourcesInReach:
             return Answer((), f"the sources of package '{package}' are not in reach ({self._searched()})")
         return self._answering.of_program(found, executable, plugin, start)
 
+    def infer_controller(self, name: str, start: Start | None = None) -> Answer:
+        """Infer a controller of ros2_control by the name of its plugin; raises ``CppSupportMissing``."""
+        if not (self._folders or self._workspaces):
+            return Answer((), self._searched())
+        return self._answering.of_controller(name, start)
+
     @cached_property
     def _answering(self) -> Answering:
         from nodl.infer.cpp.system import Answering  # the whole analysis of C++ comes with it

@@ -4,14 +4,17 @@ workspace. Answers are kept by content between runs. Reads files."""
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
+from enclave_common.files import text_or_nothing
 from nodl.infer.cpp.cache.answers import Answers, Made, WatchedStart
 from nodl.infer.cpp.entry import Answer, CppSupportMissing, Entry, Solved, failure
 from nodl.infer.cpp.libraries import NODE_BASES
+from nodl.infer.cpp.models.controllers import CONTROLLERS
 from nodl.infer.cpp.program import Sources, registered_components, target_entry
 from nodl.infer.cpp.reading.names import Names
 from nodl.infer.cpp.reading.project import SourcePackage, Workspace, find_packages
@@ -279,6 +282,14 @@ class Answering:
         what = f"executable '{executable}'" if executable else f"component {plugin}"
         return Answer((), f"the CMakeLists.txt of {package.folder} builds no {what}")
 
+    def of_controller(self, name: str, start: Start | None) -> Answer:
+        """Infer the controller of ros2_control that plugin descriptions call ``name``; raises ``CppSupportMissing``."""
+        for plugin, package in self._workspace.plugin_classes.get(name, ()):
+            if plugin.base in CONTROLLERS:
+                key = LaunchKey(package.name, None, plugin.type)
+                return _answer(self._solved(key, _plugin_entry(plugin.type, package, self._workspace), start))
+        return Answer((), f"no plugin description in reach has a controller '{name}'")
+
     @cached_property
     def _sources(self) -> Sources:
         return Sources(self._workspace)
@@ -308,6 +319,21 @@ class Answering:
     def _answers(self) -> Answers:
         check_support()
         return Answers(self._workspace)
+
+
+def _plugin_entry(name: str, package: SourcePackage, workspace: Workspace) -> Entry:
+    """Return the class of a plugin with the sources of the library that exports it."""
+    last = name.rpartition("::")[2]
+    libraries = [each for each in package.build.targets.values() if not each.executable]
+    target = next((each for each in libraries if any(_exports(file, last) for file in each.sources)), None)
+    if target is None:
+        return Entry((), cls=name, main=False, place=package.folder)
+    return target_entry(target, package, workspace)._replace(cls=name, main=False)
+
+
+def _exports(file: str, name: str) -> bool:
+    text = text_or_nothing(file)
+    return "PLUGINLIB_EXPORT_CLASS" in text and re.search(rf"\b{re.escape(name)}\b", text) is not None
 
 
 def _answer(solved: Solved) -> Answer:

@@ -46,7 +46,7 @@ def _names(node: NodeInterface, parameters: dict[str, object]) -> set[str]:
 
 
 class _NoDocuments:
-    def of_class(self, plugin_class: str) -> None:
+    def of_class(self, plugin_class: str, instance: str = "") -> None:
         return None
 
     def named(self, name: str) -> None:

@@ -27,7 +27,7 @@ class Documents:
     def __init__(self, folder: Path):
         self._library = Library([folder], None)
 
-    def of_class(self, plugin_class: str) -> NodeInterface | None:
+    def of_class(self, plugin_class: str, instance: str = "") -> NodeInterface | None:
         hit = self._library.of_class(plugin_class)
         return hit.document.interface if hit else None
 

@@ -51,7 +51,7 @@ def read(run: Machine, record: AllocatedNode, name: Value, default: Value = BOTT
     return tuple(dict.fromkeys(found))
 
 
-@node_method("declare_parameter", "declare_or_get_parameter")
+@node_method("declare_parameter", "declare_or_get_parameter", "auto_declare")
 def _declare(run: Machine, call: Call) -> Value:
     default = _default(call.value(1))
     if len(call.values) < 2:

@@ -21,6 +21,7 @@ KNOWN_HEADERS = frozenset({
     "gflags", "google", "mavconn", "mavlink", "async_web_server_cpp", "dynamixel_sdk", "serial", "serial_driver",
     "io_context", "udp_driver", "libcamera", "nlohmann_json", "spdlog", "casadi", "pinocchio", "osqp", "gps", "libgps",
     "mcap", "zstd", "rosbag2_storage", "geometric_shapes", "eigen_stl_containers", "random_numbers", "srdfdom",
+    "controller_interface", "hardware_interface", "semantic_components",
     "rviz_rendering", "rviz_ogre_vendor", "polyclipping", "backward_ros", "range", "magic_enum", "tl_expected",
 })  # fmt: skip
 

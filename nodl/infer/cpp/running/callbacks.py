@@ -54,10 +54,12 @@ class _Rounds:
 
 
 def run_callbacks(run: Machine) -> None:
-    """Configure a lifecycle node, then activate it, before anything else that its transitions have prepared."""
+    """Initialise a controller, configure a lifecycle node and activate it, before anything else that its transitions
+    have prepared.
+    """
     rounds = _Rounds(run)
     run.calls_back = True
-    for name in HOOKS[:2]:
+    for name in ("on_init", *HOOKS[:2]):
         _find_overrides(run)
         for key, (atom, frame) in list(run.callbacks.items()):
             if getattr(key[0], "name", "") == name:
