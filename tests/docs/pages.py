@@ -2,22 +2,27 @@
 
 A fenced block whose first line ends in ``file=PATH`` is a file. A block of language ``console`` has commands after
 ``$`` and below each what it prints; a line ``...`` stands for any lines, ``...`` within a line for any text. A command
-that ends in ``# exit status N`` ends with that status, others with 0. Blocks of other languages are not run.
+that ends in ``# exit status N`` ends with that status, others with 0. A comment ``<!-- meanwhile: COMMAND -->`` starts
+what the reader has running from there on, and ends what such a comment before it started. Blocks of other languages are
+not run.
 """
 
 from __future__ import annotations
 
 import os
 import re
+import shlex
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
 from tests.programs import python_program
 
-_BLOCK = re.compile(r"^( *)```(\w+)(?: file=(\S+))?\n(.*?)^ *```$", re.S | re.M)
+_BLOCK = re.compile(r"^( *)```(\w+)(?: file=(\S+))?\n(.*?)^ *```$|^<!-- meanwhile: ([^\n]*) -->$", re.S | re.M)
 _STATUS = re.compile(r"  # exit status (\d+)$")
 _COLCON = """
 # As colcon would place this workspace's packages, from their install rules.
@@ -38,10 +43,19 @@ class Command(NamedTuple):
     status: int
 
 
-def parts(page: Path) -> Iterator[tuple[str, str] | Command]:
+class Meanwhile(NamedTuple):
+    """What runs beside the commands that follow."""
+
+    words: str
+
+
+def parts(page: Path) -> Iterator[tuple[str, str] | Command | Meanwhile]:
     """Yield the files (path and text) and the commands of a page in their order."""
     for found in _BLOCK.finditer(page.read_text(encoding="utf-8")):
-        indent, language, file, text = found.groups()
+        indent, language, file, text, meanwhile = found.groups()
+        if meanwhile:
+            yield Meanwhile(meanwhile)
+            continue
         lines = [line.removeprefix(indent) for line in text.splitlines()]
         if file:
             yield file, "".join(f"{line}\n" for line in lines)
@@ -60,7 +74,7 @@ def _commands(lines: list[str]) -> Iterator[Command]:
 def write_files(page: Path, folder: Path) -> None:
     """Write the files of a page, without running anything."""
     for part in parts(page):
-        if not isinstance(part, Command):
+        if not isinstance(part, Command | Meanwhile):
             _write(folder, *part)
 
 
@@ -68,20 +82,41 @@ def read_aloud(page: Path, folder: Path, environment: dict[str, str]) -> None:
     """Do what the page says, in ``folder``; fail at the first command that does otherwise."""
     script = folder.parent / "variables"
     script.write_text("")
-    for part in parts(page):
-        if not isinstance(part, Command):
-            _write(folder, *part)
-            continue
-        line = f". {script}\n{part.words}\nstatus=$?\nexport -p > {script}\nexit $status\n"
-        done = subprocess.run(
-            ["bash", "-c", line], cwd=folder, env=environment, text=True, timeout=150, check=False,
-            stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-        )  # fmt: skip
-        place = f"{page.name}: $ {part.words}\n{done.stdout}"
-        assert done.returncode == part.status, f"exit status {done.returncode}, not {part.status}: {place}"
-        assert _is_shown(done.stdout, part.shown), "\n".join(
-            ("the page shows:", *part.shown, "printed:", place)
-        )
+    with ExitStack() as running:
+        for part in parts(page):
+            if isinstance(part, Meanwhile):
+                running.close()
+                running.enter_context(_running(part.words, folder, environment))
+            elif isinstance(part, Command):
+                _do(part, page, script, folder, environment)
+            else:
+                _write(folder, *part)
+
+
+@contextmanager
+def _running(words: str, folder: Path, environment: dict[str, str]) -> Iterator[None]:
+    process = subprocess.Popen(shlex.split(words), cwd=folder, env=environment, stdout=subprocess.DEVNULL)
+    try:
+        yield
+        assert process.poll() is None, f"ended while the page was read: {words}"
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.wait(60)
+
+
+def _do(command: Command, page: Path, script: Path, folder: Path, environment: dict[str, str]) -> None:
+    line = f". {script}\n{command.words}\nstatus=$?\nexport -p > {script}\nexit $status\n"
+    done = subprocess.run(
+        ["bash", "-c", line], cwd=folder, env=environment, text=True, timeout=150, check=False,
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+    )  # fmt: skip
+    place = f"{page.name}: $ {command.words}\n{done.stdout}"
+    assert done.returncode == command.status, (
+        f"exit status {done.returncode}, not {command.status}: {place}"
+    )
+    assert _is_shown(done.stdout, command.shown), "\n".join(
+        ("the page shows:", *command.shown, "printed:", place)
+    )
 
 
 def make_colcon(folder: Path) -> None:

@@ -9,7 +9,11 @@ from pathlib import Path
 import pytest
 
 import enclave_launch
+from tests.dds.conftest import domain_id as domain_id
+from tests.docs.my_robot import DEMO_NODES, RCLPY_NODES, make_my_robot
 from tests.docs.pages import Command, make_colcon, parts, read_aloud, reader_environment, write_files
+from tests.graph.nodes import LOOPBACK
+from tests.recording.conftest import rclpy_python
 
 ROOT = Path(__file__).parent.parent.parent
 DOCS = ROOT / "docs"
@@ -18,8 +22,8 @@ HOW_TO = sorted((DOCS / "how-to").glob("*.md"))
 OTHERS = sorted(page for page in DOCS.glob("*.md") if page != TUTORIAL)
 SHOWN = [page for page in (*HOW_TO, *OTHERS) if any(isinstance(part, Command) for part in parts(page))]
 """With commands; the tutorial has a test of its own."""
-WITHOUT_COMMANDS = ("learn-from-a-run.md", "watch-for-drift.md")
-"""They need real nodes: tests/recording and tests/drift do the same."""
+WITH_NODES = ("asyncio.md", "learn-from-a-run.md", "observe-a-running-system.md", "watch-for-drift.md")
+"""Their commands start nodes, or look at nodes that run: each has its test below."""
 DEMO = ROOT / "fixtures" / "demo_ws"
 PROVISION = ["secure-launch", "--secure", "--provision-only", "--keystore", "ks", "--enclave-scope", "node"]
 
@@ -38,7 +42,7 @@ def test_the_tutorial_does_what_it_says(workspace: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "page", [page for page in SHOWN if page.name != "asyncio.md"], ids=lambda page: page.stem
+    "page", [page for page in SHOWN if page.name not in WITH_NODES], ids=lambda page: page.stem
 )
 def test_a_page_does_what_it_says(workspace: Path, page: Path) -> None:
     write_files(TUTORIAL, workspace)
@@ -57,6 +61,37 @@ def test_the_asyncio_launcher_runs_the_demo(workspace: Path) -> None:
     environment = reader_environment(workspace.parent, workspace.parent / "bin")
     environment["AMENT_PREFIX_PATH"] = str(DEMO)
     read_aloud(DOCS / "how-to" / "asyncio.md", workspace, environment)
+
+
+@pytest.mark.dds
+@pytest.mark.parametrize("page", ["observe-a-running-system", "watch-for-drift"])
+def test_a_page_about_running_nodes_does_what_it_says(workspace: Path, domain_id: int, page: str) -> None:
+    make_my_robot(workspace.parent / "my_robot", DEMO_NODES)
+    environment = reader_environment(workspace.parent, workspace.parent / "bin") | {
+        "AMENT_PREFIX_PATH": f"{workspace.parent / 'my_robot'}:{DEMO}",
+        "MY_ROBOT_SECONDS": "0" if page.startswith("observe") else "8",
+        "ROS_DOMAIN_ID": str(domain_id),
+        **LOOPBACK,
+    }
+    provision = ["secure-launch", "--secure", "--provision-only", "--keystore", "ks"]
+    subprocess.run(
+        [*provision, "my_robot", "bringup.launch.xml"],
+        cwd=workspace, env=environment, check=True, capture_output=True,
+    )  # fmt: skip
+    read_aloud(DOCS / "how-to" / f"{page}.md", workspace, environment)
+
+
+@pytest.mark.dds
+def test_the_page_about_learning_does_what_it_says(workspace: Path, domain_id: int) -> None:
+    make_my_robot(workspace.parent / "my_robot", RCLPY_NODES)
+    environment = reader_environment(workspace.parent, workspace.parent / "bin") | {
+        "AMENT_PREFIX_PATH": f"{workspace.parent / 'my_robot'}:{ROOT / 'fixtures' / 'rclpy_ws'}",
+        "RCLPY_PYTHON": str(rclpy_python("jazzy")),
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        "ROS_DISTRO": "jazzy",
+        "ROS_DOMAIN_ID": str(domain_id),
+    }
+    read_aloud(DOCS / "how-to" / "learn-from-a-run.md", workspace, environment)
 
 
 @pytest.mark.parametrize("page", [TUTORIAL, *HOW_TO, *OTHERS], ids=lambda page: page.stem)
@@ -88,4 +123,4 @@ def test_the_page_of_the_library_has_every_public_name() -> None:
 
 def test_there_is_something_to_run() -> None:
     for page in (TUTORIAL, *HOW_TO):
-        assert page in (TUTORIAL, *SHOWN) or page.name in WITHOUT_COMMANDS, page
+        assert page in (TUTORIAL, *SHOWN), page
