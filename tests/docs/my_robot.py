@@ -26,7 +26,10 @@ RCLPY_NODES = """<node pkg="rclpy_nodes" exec="talker">
 
 def make_my_robot(prefix: Path, nodes: str) -> None:
     """Install ``my_robot`` into ``prefix``, with a ``bringup.launch.xml`` of these elements, and a second launch."""
-    index, share = prefix / "share" / "ament_index" / "resource_index" / "packages", prefix / "share" / "my_robot"
+    index, share = (
+        prefix / "share" / "ament_index" / "resource_index" / "packages",
+        prefix / "share" / "my_robot",
+    )
     index.mkdir(parents=True)
     (index / "my_robot").touch()
     (share / "launch").mkdir(parents=True)

@@ -22,7 +22,9 @@ from typing import NamedTuple
 
 from tests.programs import python_program
 
-_BLOCK = re.compile(r"^( *)```(\w+)(?: file=(\S+))?\n(.*?)^ *```$|^<!-- meanwhile: ([^\n]*) -->$", re.S | re.M)
+_BLOCK = re.compile(
+    r"^( *)```(\w+)(?: file=(\S+))?\n(.*?)^ *```$|^<!-- meanwhile: ([^\n]*) -->$", re.S | re.M
+)
 _STATUS = re.compile(r"  # exit status (\d+)$")
 _COLCON = """
 # As colcon would place this workspace's packages, from their install rules.
@@ -111,9 +113,7 @@ def _do(command: Command, page: Path, script: Path, folder: Path, environment: d
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
     )  # fmt: skip
     place = f"{page.name}: $ {command.words}\n{done.stdout}"
-    assert done.returncode == command.status, (
-        f"exit status {done.returncode}, not {command.status}: {place}"
-    )
+    assert done.returncode == command.status, f"exit status {done.returncode}, not {command.status}: {place}"
     assert _is_shown(done.stdout, command.shown), "\n".join(
         ("the page shows:", *command.shown, "printed:", place)
     )
