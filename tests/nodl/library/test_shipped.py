@@ -75,6 +75,16 @@ def test_default_plugins_and_further_nodes_have_documents() -> None:
             assert LIBRARY.named(stem), (file, stem)
 
 
+def test_a_controller_publishes_its_transitions_and_serves_none() -> None:
+    """controller_interface_base.cpp turns its services off; rcl_lifecycle.c makes the publisher all the same."""
+    controllers = [document.interface for document in DOCUMENTS.values() if of(document).own_node]
+    assert controllers
+    for interface in controllers:
+        names = {(endpoint.kind, endpoint.name.text) for endpoint in interface.endpoints}
+        assert (EndpointKind.PUBLISHER, "~/transition_event") in names, interface.source
+        assert (EndpointKind.SERVICE_SERVER, "~/change_state") not in names, interface.source
+
+
 def test_a_condition_asks_for_a_parameter_with_a_known_default() -> None:
     """Else "not set" would silently mean "no"; a test that says what it means (``set``, ``not``) may stand alone."""
     for file, document in DOCUMENTS.items():
