@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import enclave_launch
+from tests.dds import sros2_style
 from tests.dds.conftest import domain_id as domain_id
 from tests.docs.my_robot import DEMO_NODES, RCLPY_NODES, make_my_robot
 from tests.docs.pages import Command, make_colcon, parts, read_aloud, reader_environment, write_files
@@ -22,8 +23,27 @@ HOW_TO = sorted((DOCS / "how-to").glob("*.md"))
 OTHERS = sorted(page for page in DOCS.glob("*.md") if page != TUTORIAL)
 SHOWN = [page for page in (*HOW_TO, *OTHERS) if any(isinstance(part, Command) for part in parts(page))]
 """With commands; the tutorial has a test of its own."""
-WITH_NODES = ("asyncio.md", "learn-from-a-run.md", "observe-a-running-system.md", "watch-for-drift.md")
+WITH_NODES = ("asyncio", "learn-from-a-run", "observe-a-running-system", "sros2-keystore", "watch-for-drift")
 """Their commands start nodes, or look at nodes that run: each has its test below."""
+ELSEWHERE = {
+    "docker compose -f compose/compose.yaml up": "deployment/test_podman.py",
+    "kubectl apply -f k8s/": "deployment/test_podman.py",
+    "echo 'pkcs11:": "keystore/test_pkcs11.py",
+    "ros2 launch ": "ros2/test_ros2_launch.py",
+    "secure-keystore create ks --external-identity-ca ": "deployment/test_recipes.py",
+    "secure-keystore create ks --identity-ca ": "keystore/test_pkcs11.py",
+    "secure-keystore import /etc/ros/keystore ": "deployment/test_booted.py",
+    "secure-keystore request host-ks ": "deployment/test_recipes.py",
+    "secure-keystore sign ks ": "deployment/test_recipes.py",
+    "secure-keystore units ": "deployment/test_booted.py",
+    "secure-launch --learn nodl robot ": "recording/test_learning.py",
+    "secure-launch --secure --keystore ks ": "dds/test_secure_launch.py",
+    "RMW_IMPLEMENTATION=rmw_zenoh_cpp ": "zenoh/test_secure_launch.py",
+    "RUST_LOG=zenoh": "zenoh/test_denials.py",
+    "ZENOH_ROUTER_CONFIG_URI=": "zenoh/test_router_process.py",
+    "ZENOH_SESSION_CONFIG_URI=": "zenoh/test_planned_traffic.py",
+}
+"""How commands begin that need what a page cannot have (ROS 2 itself, root, another CA), and which test does the same."""
 DEMO = ROOT / "fixtures" / "demo_ws"
 PROVISION = ["secure-launch", "--secure", "--provision-only", "--keystore", "ks", "--enclave-scope", "node"]
 
@@ -42,14 +62,15 @@ def test_the_tutorial_does_what_it_says(workspace: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    "page", [page for page in SHOWN if page.name not in WITH_NODES], ids=lambda page: page.stem
+    "page", [page for page in SHOWN if page.stem not in WITH_NODES], ids=lambda page: page.stem
 )
 def test_a_page_does_what_it_says(workspace: Path, page: Path) -> None:
     write_files(TUTORIAL, workspace)
     (workspace / "enclaves.review.yaml").unlink()
     environment = reader_environment(workspace.parent, workspace.parent / "bin")
     subprocess.run(["colcon", "build"], cwd=workspace, env=environment, check=True, capture_output=True)
-    environment["AMENT_PREFIX_PATH"] = str(workspace / "install" / "robot")
+    make_my_robot(workspace.parent / "my_robot", DEMO_NODES)
+    environment["AMENT_PREFIX_PATH"] = f"{workspace / 'install' / 'robot'}:{workspace.parent / 'my_robot'}:{DEMO}"
     if page.name not in ("fix-a-refused-node.md", "second-robot.md"):
         provision = [*PROVISION, "robot", "robot.launch.xml"]
         subprocess.run(provision, cwd=workspace, env=environment, check=True, capture_output=True)
@@ -64,7 +85,7 @@ def test_the_asyncio_launcher_runs_the_demo(workspace: Path) -> None:
 
 
 @pytest.mark.dds
-@pytest.mark.parametrize("page", ["observe-a-running-system", "watch-for-drift"])
+@pytest.mark.parametrize("page", ["observe-a-running-system", "sros2-keystore", "watch-for-drift"])
 def test_a_page_about_running_nodes_does_what_it_says(workspace: Path, domain_id: int, page: str) -> None:
     make_my_robot(workspace.parent / "my_robot", DEMO_NODES)
     environment = reader_environment(workspace.parent, workspace.parent / "bin") | {
@@ -73,6 +94,7 @@ def test_a_page_about_running_nodes_does_what_it_says(workspace: Path, domain_id
         "ROS_DOMAIN_ID": str(domain_id),
         **LOOPBACK,
     }
+    sros2_style.create(workspace / "sros2_keystore", domain_id, {"/r1": sros2_style.Grant()})
     provision = ["secure-launch", "--secure", "--provision-only", "--keystore", "ks"]
     subprocess.run(
         [*provision, "my_robot", "bringup.launch.xml"],
@@ -124,3 +146,15 @@ def test_the_page_of_the_library_has_every_public_name() -> None:
 def test_there_is_something_to_run() -> None:
     for page in (TUTORIAL, *HOW_TO):
         assert page in (TUTORIAL, *SHOWN), page
+
+
+def test_a_command_that_no_page_runs_is_run_by_another_test() -> None:
+    unrun = {
+        command: page.name
+        for page in (TUTORIAL, *HOW_TO, *OTHERS)
+        for block in re.findall(r"^ *```text\n(.*?)^ *```$", page.read_text(encoding="utf-8"), re.S | re.M)
+        for command in re.findall(r"^ *[$#] (.*)$", block, re.M)
+    }
+    assert [each for each in unrun if not each.startswith(tuple(ELSEWHERE))] == []
+    assert [test for test in ELSEWHERE.values() if not (ROOT / "tests" / test).is_file()] == []
+    assert [start for start in ELSEWHERE if not any(each.startswith(start) for each in unrun)] == []
