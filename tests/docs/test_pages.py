@@ -70,7 +70,9 @@ def test_a_page_does_what_it_says(workspace: Path, page: Path) -> None:
     environment = reader_environment(workspace.parent, workspace.parent / "bin")
     subprocess.run(["colcon", "build"], cwd=workspace, env=environment, check=True, capture_output=True)
     make_my_robot(workspace.parent / "my_robot", DEMO_NODES)
-    environment["AMENT_PREFIX_PATH"] = f"{workspace / 'install' / 'robot'}:{workspace.parent / 'my_robot'}:{DEMO}"
+    environment["AMENT_PREFIX_PATH"] = (
+        f"{workspace / 'install' / 'robot'}:{workspace.parent / 'my_robot'}:{DEMO}"
+    )
     if page.name not in ("fix-a-refused-node.md", "second-robot.md"):
         provision = [*PROVISION, "robot", "robot.launch.xml"]
         subprocess.run(provision, cwd=workspace, env=environment, check=True, capture_output=True)
