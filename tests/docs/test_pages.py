@@ -43,7 +43,7 @@ ELSEWHERE = {
     "ZENOH_ROUTER_CONFIG_URI=": "zenoh/test_router_process.py",
     "ZENOH_SESSION_CONFIG_URI=": "zenoh/test_planned_traffic.py",
 }
-"""How commands begin that need what a page cannot have (ROS 2 itself, root, another CA), and which test does the same."""
+"""How commands begin that need what a page cannot have (ROS 2, root, another CA): the test that does the same."""
 DEMO = ROOT / "fixtures" / "demo_ws"
 PROVISION = ["secure-launch", "--secure", "--provision-only", "--keystore", "ks", "--enclave-scope", "node"]
 
