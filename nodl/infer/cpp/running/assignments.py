@@ -11,7 +11,7 @@ from nodl.infer.cpp.running.arithmetic import added, as_type, computed
 from nodl.infer.cpp.running.constructors import in_braces
 from nodl.infer.cpp.running.contents import copied, elements_copied, overwrite
 from nodl.infer.cpp.running.machine import Frame, Machine, expression
-from nodl.infer.cpp.running.references import is_plain, through, told
+from nodl.infer.cpp.running.references import is_plain, through
 from nodl.infer.cpp.running.static_types import (
     current_object,
     declared_type,
@@ -210,7 +210,6 @@ def _assign_name(run: Machine, target: Node, value: Value, frame: Frame) -> None
             assign(run, alias, value, owner)
             return
     if owner is not None:
-        told(run, (owner, name), value, target, frame)
         run.store.set((owner, name), value)
         return
     this_object = current_object(frame)
@@ -218,9 +217,7 @@ def _assign_name(run: Machine, target: Node, value: Value, frame: Frame) -> None
     declaring = next((each for each in run.names.ancestry(around) if name in each.fields), None)
     if this_object is not None and declaring is not None and not declaring.fields[name].static:
         cell = (this_object, name)
-        told(run, cell, value, target, frame)
-        weak = this_object.several or name in run.hidden_names(this_object)
-        run.store.set(cell, join(run.store.get(cell) or BOTTOM, value) if weak else value)
+        run.store.set(cell, join(run.store.get(cell) or BOTTOM, value) if this_object.several else value)
         return
     static = (declaring, name) if declaring is not None else static_by_name(run, name, frame)
     if static is not None:
@@ -245,7 +242,7 @@ def _assign_field(run: Machine, node: Node, value: Value, frame: Frame) -> None:
     if any(not isinstance(atom, Obj) or atom.cls is None for atom in owners) or not owners:
         run.later([value], frame)  # a library keeps it and may call it
     for each in objects:
-        strong = len(owners) == 1 and not each.several and name not in run.hidden_names(each)
+        strong = len(owners) == 1 and not each.several
         cell = (each, name)
         before = run.store.get(cell) or BOTTOM
         run.store.set(cell, value if strong else join(before, value))

@@ -26,7 +26,7 @@ from nodl.infer.cpp.running.containers import CONTAINER_METHODS, container_call,
 from nodl.infer.cpp.running.contents import handed_over
 from nodl.infer.cpp.running.invocation import CallSite, call_functions, call_values, pointed_to
 from nodl.infer.cpp.running.machine import Frame, Machine, expression
-from nodl.infer.cpp.running.references import is_plain, keep_references
+from nodl.infer.cpp.running.references import is_plain
 from nodl.infer.cpp.running.standard import CASTS, STANDARD, as_algorithm, may_write, writes_elements
 from nodl.infer.cpp.running.static_types import (
     GIVES_INNER,
@@ -107,7 +107,7 @@ def _own_method(run: Machine, name: str, site: CallSite) -> Value | None:
     if separator:
         return _of_named_class(run, this, head, last, site)
     if this.cls is not None:
-        methods = of_this(run, this, name, frame) or run.names.find_methods(class_around(run, frame), name)
+        methods = of_this(run, this, name) or run.names.find_methods(class_around(run, frame), name)
         if methods:
             return site.call_methods(methods, this)
         field = member(run, this, name)
@@ -137,9 +137,7 @@ def _free_call(run: Machine, name: str, site: CallSite) -> Value:
     qualified = _qualified(run, name, frame)
     if qualified in _MAKERS:
         kind = site.types[0] if site.types else NO_TYPE
-        new = construct(run, kind._replace(pointer=False), site.values, node, frame, heap=True)
-        keep_references(run, new, site.given, frame)
-        return new
+        return construct(run, kind._replace(pointer=False), site.values, node, frame, heap=True)
     functions = run.names.find_functions(name, frame.scope, frame.file)
     if functions:
         return call_functions(run, functions, site.values, node, frame, site.types)
@@ -302,8 +300,8 @@ def on_object(run: Machine, atom: Obj, name: str, site: CallSite) -> Value:
     if atom.cls is not None:
         argument = field_of(callee, "argument")
         own = argument is not None and argument.type == "this" and "::" not in text(field_of(callee, "field"))
-        seen = None if own else class_of_member(run, atom, name, callee, frame)
-        methods = run.names.find_methods(seen, name) if seen is not None else of_this(run, atom, name, frame)
+        seen = None if own else class_of_member(run, atom, callee, frame)
+        methods = run.names.find_methods(seen, name) if seen is not None else of_this(run, atom, name)
         if methods:
             return site.call_methods(methods, atom)
         field = member(run, atom, name, seen)
@@ -332,18 +330,10 @@ def only_declared(
     return without_source(run, f"{cls.name}::{name}", site.values, site.node, site.frame, receiver)
 
 
-def of_this(run: Machine, this: Obj, name: str, frame: Frame) -> list[Function]:
-    """Return what ``name()`` calls inside of a class: its own while it is made as a base, or if it is not virtual."""
+def of_this(run: Machine, this: Obj, name: str) -> list[Function]:
+    """Return what ``name()`` calls inside of a class: its own while it is made as a base."""
     methods = run.names.find_methods(this.cls, name)
-    cls, ancestry = class_around(run, frame), run.names.ancestry(this.cls)
-    if this.building is not None and this.building is not this.cls:
-        return run.names.find_methods(this.building, name) or methods
-    if cls is None or cls is this.cls or cls not in ancestry or not methods:
-        return methods
-    every = [m for each in ancestry for m in run.names.methods.get(each, {}).get(name, ())]
-    if any(each.virtual for each in (*every, *run.names.declarations(this.cls, name))):
-        return methods
-    return run.names.find_methods(cls, name) or methods
+    return run.names.find_methods(this.building, name) or methods if this.building is not None else methods
 
 
 def model_of(this: Obj, name: str) -> FunctionModel | None:

@@ -18,7 +18,7 @@ from nodl.infer.cpp.running.arithmetic import as_type
 from nodl.infer.cpp.running.contents import copied, elements_copied, handed_over, items_of
 from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
 from nodl.infer.cpp.running.overloads import chosen
-from nodl.infer.cpp.running.references import keep_references
+from nodl.infer.cpp.running.references import as_referred_to
 from nodl.infer.cpp.running.static_types import check_hidden, seen_type
 from nodl.infer.cpp.running.values import (
     BOTTOM,
@@ -141,13 +141,11 @@ def made(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame: Fra
             return copied(run, values[0], node, frame, cls)
     if cls is not None and is_aggregate(run, cls) and given:
         found = _aggregate(run, node, kind, cls, given, frame, values)
-        keep_references(run, found, given, frame)
         return found
     values = values or [run.evaluate(each, frame) for each in given]
     if cls is None and len(values) == 1 and _all_of(kind, values[0]):
         return values[0]  # a copy of a library's object
     found = construct(run, kind, values, node, frame)
-    keep_references(run, found, given, frame)
     return found
 
 
@@ -531,6 +529,8 @@ def _members(run: Machine, this: Obj, cls: Class, given: dict[str, Node], inner:
             found = _member(
                 run, member, kind, where or member.default, inner if where is not None else of_class
             )
+        if member.pointer and "char" not in member.type:
+            found = as_referred_to(found)
         before = run.store.get((this, name)) or BOTTOM  # of a member that this one hides
         run.store.set((this, name), join(before, found))
 

@@ -14,7 +14,6 @@ from nodl.infer.cpp.running.contents import items_of
 from nodl.infer.cpp.running.invocation import by_operator, pointed_to
 from nodl.infer.cpp.running.launch_values import settled_text
 from nodl.infer.cpp.running.machine import NEXT, Frame, Machine, expression
-from nodl.infer.cpp.running.references import keep_references
 from nodl.infer.cpp.running.static_types import class_of_member, current_object, seen_type
 from nodl.infer.cpp.running.values import (
     BOTTOM,
@@ -202,7 +201,6 @@ def new(run: Machine, node: Node, frame: Frame) -> Value:
     run.repeated += several
     found = construct(run, kind._replace(pointer=False), values, node, frame, heap=True)
     run.repeated -= several
-    keep_references(run, found, given, frame)
     return found
 
 
@@ -280,7 +278,7 @@ def field(run: Machine, node: Node, frame: Frame) -> Value:
     found: list[Value] = []
     for atom in owners:
         if isinstance(atom, Obj):
-            value = member(run, atom, name, class_of_member(run, atom, name, node, frame))
+            value = member(run, atom, name, class_of_member(run, atom, node, frame))
             if value is None and atom.cls is None and name.endswith(("options", "callbacks")):
                 value = (run.obj(("field", atom, name), Type("")),)  # options in options
                 run.store.set((atom, name), value)

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Protocol, TypeVar
 from nodl.infer.cpp.findings import AllocatedNode, Condition, Follows, PossibleEndpoint
 from nodl.infer.cpp.ledger import CREATES, leads_to_interfaces
 from nodl.infer.cpp.reading.declarations import Class, FileIndex, Function, Scope
-from nodl.infer.cpp.reading.names import Names, hidden
+from nodl.infer.cpp.reading.names import Names
 from nodl.infer.cpp.reading.type_names import Type
-from nodl.infer.cpp.running.memory import AbstractStore, Cell, Changes, Memory
+from nodl.infer.cpp.running.memory import AbstractStore, Changes, Memory
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     Atom,
@@ -122,7 +122,6 @@ class Machine:
         self.consulted: dict[str, object] = {}  # parameters whose value decided what is made
         self.from_default: dict[str, None] = {}  # those of them that no launch was asked for
         self.unset: dict[tuple[str, int], tuple[SourceRef, str, str]] = {}  # calls on pointers to nothing
-        self.shared: dict[Cell, None] = {}  # plain variables that an object keeps a reference to
         self._used: set[str] = set()
         self._known: set[Class] = set()
         self._leading: dict[tuple[object, int], bool] = {}
@@ -231,10 +230,6 @@ class Machine:
     def methods_of(self, atom: object, name: str) -> Sequence[Function]:
         """Return the methods of that name of an object of a class in reach; none for anything else."""
         return self.names.find_methods(atom.cls, name) if isinstance(atom, Obj) else ()
-
-    def hidden_names(self, owner: Obj) -> frozenset[str]:
-        """Return the names that classes of the object hide from each other."""
-        return hidden(self.names, owner.cls) if owner.cls is not None else frozenset()
 
     def obj(self, key: object, kind: Type, **values: object) -> Obj:
         found = self.objects.get(key)

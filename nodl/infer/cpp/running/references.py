@@ -1,7 +1,8 @@
 """References and pointers to texts, numbers and lists: who reads or writes through one means the variable behind it.
 
 Objects are the same ones wherever they are seen; plain values lie in the cells of their variables. A local reference
-stands for the expression that it was made of; what is written through any other is a gap.
+stands for the expression that it was made of, what is written through any other is a gap. What a member refers
+to is not known.
 """
 
 from __future__ import annotations
@@ -10,14 +11,18 @@ from collections.abc import Sequence
 
 from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.machine import Frame, Machine
-from nodl.infer.cpp.running.memory import Cell
-from nodl.infer.cpp.running.values import BOTTOM, Group, Map, Obj, Param, Seq, Text, Value
+from nodl.infer.cpp.running.values import BOTTOM, Group, Map, Param, Seq, Text, Unknown, Value
 from nodl.infer.cpp.syntax import Node, children, field_of, text, unwrapped
 
 
 def is_plain(value: Value) -> bool:
     """Return whether a text, number or container is among the alternatives."""
     return any(isinstance(atom, Text | Seq | Map | Group | Param | int | float) for atom in value)
+
+
+def as_referred_to(value: Value) -> Value:
+    """Return what a member that is a reference or pointer holds: objects; a plain value may change meanwhile."""
+    return tuple(Unknown("what a member refers to") if is_plain((atom,)) else atom for atom in value)
 
 
 def bind_reference(run: Machine, name: str, kind: str, initial: Node | None, frame: Frame) -> None:
@@ -66,53 +71,6 @@ def elements_written(
     if not any(isinstance(atom, Text | Param | int | float) for atom in held):
         return False
     return body is not None and not writes_of(body).isdisjoint(names)
-
-
-def keep_references(run: Machine, made: Value, given: Sequence[Node], frame: Frame) -> None:
-    """Note that an object made of variables may keep references to them: changes of either are gaps from now on."""
-    held = [cell for obj in made if isinstance(obj, Obj) for cell in _held(run, obj)]
-    for each in given if held else ():
-        target = unwrapped(each)
-        if target is not None and target.type == "pointer_expression":
-            target = unwrapped(field_of(target, "argument"))
-        cell = (
-            cell_of_name(run, text(target), frame)
-            if target is not None and target.type == "identifier"
-            else None
-        )
-        value = run.store.get(cell) or BOTTOM if cell is not None else BOTTOM
-        same = [one for one in held if is_plain(value) and run.store.get(one) == value]
-        if cell is not None and same:
-            run.shared.update(dict.fromkeys((cell, *same)))
-
-
-def _held(run: Machine, obj: Obj) -> list[Cell]:
-    """Return members that are references or pointers to plain values, but for letters."""
-    return [
-        (obj, name)
-        for cls in run.names.ancestry(obj.cls)
-        for name, each in cls.fields.items()
-        if each.pointer and not each.static and "char" not in each.type
-    ]
-
-
-def cell_of_name(run: Machine, name: str, frame: Frame) -> Cell | None:
-    """Return where a local variable or member of that name lies."""
-    owner = frame.owner_of(name)
-    if owner is not None:
-        return owner, name
-    outer: Frame | None = frame
-    while outer is not None and outer.this is None:
-        outer = outer.outer
-    if outer is None or outer.this is None:
-        return None
-    return outer.this, name
-
-
-def told(run: Machine, cell: Cell, value: Value, node: Node, frame: Frame) -> None:
-    """Add a gap if a variable is written that an object keeps a reference to."""
-    if cell in run.shared and set(run.store.get(cell) or BOTTOM) != set(value):
-        run.gap(node, frame, f"{text(node)[:40]} is written while an object keeps a reference to it")
 
 
 def through(run: Machine, what: Node, frame: Frame) -> None:

@@ -10,16 +10,23 @@ import re
 from nodl.infer.cpp.reading.declarations import Class, type_text
 from nodl.infer.cpp.reading.names import hidden
 from nodl.infer.cpp.reading.type_names import NO_TYPE, Type
+from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.values import Obj
 from nodl.infer.cpp.syntax import Node, callee_name, field_of, template_arguments, text, unwrapped
 
 
 def check_hidden(run: Machine, cls: Class, node: Node, frame: Frame) -> None:
-    """Add a gap if ``cls`` has two members of one name that hold plain values: which is meant is not followed."""
+    """Add a gap if ``cls`` has two plain members, or methods that matter, of one name: they are not told apart."""
+    ancestry = run.names.ancestry(cls)
+    kept = {name for each in ancestry for name in each.fields}
     for name in hidden(run.names, cls):
-        fields = [each.fields[name].type for each in run.names.ancestry(cls) if name in each.fields]
-        if any(_PLAIN.search(kind) for kind in fields):
+        plain = any(_PLAIN.search(each.fields[name].type) for each in ancestry if name in each.fields)
+        methods = [method for each in ancestry for method in run.names.methods[each].get(name, ())]
+        if plain or any(
+            run.makes_interfaces(each) or "string" in type_text(each.node) or writes_of(each.node) & kept
+            for each in methods
+        ):
             run.gap(node, frame, f"{cls.name} hides {name} of a base: which of them is meant is not followed")
 
 
@@ -29,26 +36,13 @@ def class_around(run: Machine, frame: Frame) -> Class | None:
     return run.names.find_class(owner, frame.scope, frame.file) if owner else None
 
 
-def class_of_member(run: Machine, atom: Obj, name: str, access: Node, frame: Frame) -> Class | None:
-    """Return the class in which ``x.name``, ``x->name`` or ``x.Base::name`` is looked up where ``x`` is ``atom``.
-
-    A method that is not virtual is that of the class which ``x`` has at compile time; a gap if that is not known.
-    """
+def class_of_member(run: Machine, atom: Obj, access: Node, frame: Frame) -> Class | None:
+    """Return the class in which ``x.name``, ``x->name`` or ``x.Base::name`` is looked up where ``x`` is ``atom``."""
     head = text(field_of(access, "field")).rpartition("::")[0]
-    ancestry = run.names.ancestry(atom.cls)
-    if head:
-        named = run.class_of(run.type_of(head, frame), frame)
-        return next((c for c in ancestry if c is named or c.name == head), atom.cls)
-    hidden_ones = [m for each in ancestry for m in run.names.methods[each].get(name, ())]
-    if name not in run.hidden_names(atom) or not hidden_ones:
-        return atom.cls
-    seen = seen_class(run, field_of(access, "argument"), frame)
-    matters = any("string" in type_text(m.node) for m in hidden_ones) or any(
-        map(run.makes_interfaces, hidden_ones)
+    named = run.class_of(run.type_of(head, frame), frame) if head else None
+    return next(
+        (c for c in run.names.ancestry(atom.cls) if head and (c is named or c.name == head)), atom.cls
     )
-    if seen is None and matters:
-        run.gap(access, frame, f"which {name}() is called here is not known: a derived class hides it")
-    return seen if seen in ancestry else atom.cls
 
 
 def current_object(frame: Frame | None) -> Obj | None:

@@ -619,6 +619,11 @@ def test_a_text_that_a_derived_class_hides_is_told_and_a_pointer_that_it_hides_i
 
     assert hiding("std::string name;") == ["D hides name of a base: which of them is meant is not followed"]
     assert hiding("rclcpp::Node * node;") == []
+    assert hiding("void count() {}") == []
+    assert hiding('std::string text() { return "a"; }') == [
+        "D hides text of a base: which of them is meant is not followed"
+    ]
+    assert hiding('virtual std::string text() { return "a"; }') == []
 
 
 COPIED = {

@@ -102,13 +102,6 @@ PROGRAMS: dict[str, tuple[str, str, str, set[str], set[str]]] = {
         'struct Derived : Base { using Base::Base; void go() override { make("derived"); } };\n',
         {"base"}, {"derived"},
     ),
-    "a method that is not virtual is not overridden": (
-        "Derived d; d.go(this);", "",
-        "struct Base { void go(rclcpp::Node * n) { n->create_publisher<std_msgs::msg::String>(name(), 1); }\n"
-        'std::string name() { return "base"; } };\n'
-        'struct Derived : Base { std::string name() { return "derived"; } };\n',
-        {"base"}, {"derived"},
-    ),
     "overloads that look alike may both be meant": (
         'pub(f("x"));', "",
         'std::string f(const char *) { return "of_letters"; } std::string f(std::string) { return "of_text"; }\n',
