@@ -1,4 +1,9 @@
-"""Drives runs: a module from its start, its entry functions, then every callback until nothing changes."""
+"""Drives runs: a module from its start, its entry functions, then every callback until nothing changes.
+
+Callbacks are what the world outside may call: subscriptions, timers, threads and hooks of foreign classes run in any
+order and any number of times. The state after each call is joined with the one before, to a fixpoint. One is not called
+again while nothing has changed since.
+"""
 
 from __future__ import annotations
 
@@ -14,17 +19,174 @@ from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 
-from nodl.infer.callbacks import call_from_outside, settle, settle_meanwhile
+from nodl.infer.interpreter.attributes import ATTRIBUTES
+from nodl.infer.interpreter.calls import call_bound, call_function, instantiate
 from nodl.infer.interpreter.define import expect_methods, linearized
-from nodl.infer.interpreter.frames import Arguments, Frame
+from nodl.infer.interpreter.expressions import EXPRESSIONS
 from nodl.infer.interpreter.imports import execute_module
-from nodl.infer.interpreter.run import BudgetExceeded, Run
-from nodl.infer.interpreter.tables import new_run
+from nodl.infer.interpreter.run import Arguments, BudgetExceeded, Call, Caller, Frame, Run, Tables
+from nodl.infer.interpreter.statements import STATEMENTS
+from nodl.infer.models import foreign
 from nodl.infer.models.foreign import is_node_class
+from nodl.infer.net import unsettled_places
 from nodl.infer.paths import Decisions, refine
-from nodl.infer.program import Program, SourceModule
-from nodl.infer.values import ANY, ClassValue, External, FunctionValue, unknown
+from nodl.infer.program import Program, ProgramTarget, SourceModule
+from nodl.infer.results import interfaces_of
+from nodl.infer.start import LaunchKey
+from nodl.infer.values import (
+    ANY,
+    COMMAND_LINE,
+    OF_A_NODE,
+    TOO_MANY,
+    BoundMethod,
+    ClassMethod,
+    ClassValue,
+    External,
+    ForeignMethod,
+    FunctionValue,
+    Instance,
+    ModuleValue,
+    NativeMethod,
+    Partial,
+    Unknown,
+    Value,
+    unknown,
+)
+from nodl.node_interface import Gap, NodeInterface
 from nodl.source_ref import SourceRef
+
+_OF_EXECUTORS = frozenset({"add_node", "remove_node", "wake"})  # of rclpy, whichever object it is
+_CHANGES = frozenset({"append", "extend", "insert", "remove", "pop", "clear"})
+
+
+def _call_partial(run: Run, partial: Partial, call: Call) -> Value:
+    args = call.args.preceded(*partial.positional)
+    args.keywords = {**dict(partial.keywords), **args.keywords}
+    return run.call(partial.function, args, call.node, call.frame)
+
+
+def _call_instance(run: Run, instance: Instance, call: Call) -> Value:
+    if isinstance(instance.cls, External):
+        run.escape(call.args)
+        return ANY
+    method = run.attribute((instance,), "__call__", call.node, call.frame)
+    return run.call(method, call.args, call.node, call.frame)
+
+
+def _call_unknown(run: Run, atom: Unknown, call: Call) -> Value:
+    if atom.why == TOO_MANY:
+        run.gap(call.node, call.frame, "one of too many functions is called here")
+    function = call.node.func if isinstance(call.node, ast.Call) else None
+    if atom.why == COMMAND_LINE and isinstance(function, ast.Attribute) and function.attr in _CHANGES:
+        run.gap(call.node, call.frame, "the command line is changed in code")
+    if isinstance(function, ast.Attribute) and function.attr in _OF_EXECUTORS:
+        return (atom,)
+    if atom.why == OF_A_NODE:
+        run.gap(call.node, call.frame, "a method of the node whose name is made at run time is called here")
+    run.escape(call.args)
+    return (atom,)
+
+
+CALLABLES: dict[type, Caller] = {
+    FunctionValue: call_function,
+    BoundMethod: call_bound,
+    Partial: _call_partial,
+    Instance: _call_instance,
+    ClassMethod: lambda run, method, call: run.call(method.function, call.args, call.node, call.frame),
+    ClassValue: instantiate,
+    Unknown: _call_unknown,
+    External: foreign.call_external,
+    ForeignMethod: foreign.call_foreign_method,
+    NativeMethod: foreign.call_native,
+}
+
+TABLES = Tables(
+    EXPRESSIONS, STATEMENTS, CALLABLES, ATTRIBUTES, foreign.keeps_off, foreign.lets_through, foreign.creates
+)
+
+
+def new_run(program: Program, main: SourceModule) -> Run:
+    """Return a run of ``main`` with the handlers of all concerns; nothing is executed yet."""
+    return Run(program, TABLES, main)
+
+
+MAX_ROUNDS = 12
+WIDEN_TEXTS_FROM = 4
+
+
+def settle(run: Run, at_end: bool = True) -> None:
+    """Call all callbacks until neither state nor findings change; ``at_end``: the program itself has ended."""
+    run.repeated += 1
+    outermost = run.settle is not _no_settling
+    run.settle = _no_settling
+    expected: set[object] = set()
+    for turn in range(MAX_ROUNDS):
+        _expect_escaped(run, expected)
+        before = run.state.version(), dict(run.callbacks)
+        for callback, arity in before[1].items():
+            if run.called_back.get((callback, arity)) != run.state.version():
+                if at_end:
+                    run.state.forget()
+                _call_back(run, callback, arity, turn >= WIDEN_TEXTS_FROM)
+        if before == (run.state.version(), run.callbacks) and expected.issuperset(run.escaped):
+            break
+    else:
+        run.findings.gap(SourceRef(run.main.path), "the callbacks do not settle; names may be missing")
+    run.repeated -= 1
+    run.settle = settle_meanwhile if outermost else _no_settling
+
+
+def settle_meanwhile(run: Run) -> None:
+    """Call all callbacks where the program waits for them."""
+    settle(run, at_end=False)
+
+
+def _no_settling(run: Run) -> None:
+    """Do nothing: callbacks are running already."""
+
+
+def _call_back(run: Run, callback: object, arity: int | None, widen_texts: bool) -> None:
+    """Call it once. What it made stands for what each of its calls makes."""
+    run.born = []
+    run.called_back[callback, arity] = run.state.version()
+    run.state.repeatedly(_called_from_outside(run, callback, arity), widen_texts)
+    for made in run.born:
+        made.summary = True
+
+
+def _expect_escaped(run: Run, expected: set[object]) -> None:
+    """Expect that code which was handed a class or an object makes objects of it and calls its methods, in
+    any order.
+    """
+    for atom in list(run.escaped):
+        if atom in expected:
+            continue
+        expected.add(atom)
+        if isinstance(atom, ClassValue):
+            run.callbacks.setdefault(atom, None)
+        else:
+            expect_methods(run, (atom,))
+
+
+def _called_from_outside(run: Run, callback: object, arity: int | None) -> Callable[[], bool]:
+    made = unknown("an argument given by code that is not analysed")
+    args = Arguments(more=made) if arity is None else Arguments([made] * arity)
+    module = next(iter(run.modules.values()))
+
+    def call() -> bool:
+        made = call_from_outside(run, module, callback, args)
+        if isinstance(callback, ClassValue):
+            run.escape_value(made)
+        return True
+
+    return call
+
+
+def call_from_outside(run: Run, module: ModuleValue, atom: object, args: Arguments) -> tuple[object, ...]:
+    """Call ``atom`` as nobody in the program does; returns what it gives."""
+    frame = Frame(module, {}, None, run.state.depth)
+    return run.call_atom(atom, Call(args, module.source.tree, frame))
+
 
 _ANALYSES_A_COLLECTION = 100
 _analyses = itertools.count(1)
@@ -192,3 +354,38 @@ def failure(error: Exception) -> str:
         f"the analysis failed ({type(error).__name__} at {place}); any interface is possible: "
         "give the node a manifest, and please report this line with the program"
     )
+
+
+def infer_program(
+    program: Program, target: ProgramTarget, path: str, origin: LaunchKey
+) -> tuple[tuple[NodeInterface, ...], str]:
+    """Return the nodes that the program behind ``path`` creates, with its gaps; without any, why none was found."""
+    try:
+        with without_collector():
+            run = _run(program, target, path)
+            interfaces = interfaces_of(run.findings, origin)
+            for gap in unsettled_places(run):
+                run.findings.gap(gap.source, gap.why)
+    except Exception as error:  # a mistake of ours in one program must not end the plan of all
+        return (), f"{path}: {failure(error)}"
+    if interfaces:
+        return _with_gaps(interfaces, run), ""
+    reasons = "; ".join(f"{source}: {why}" for source, why in run.findings.gaps)
+    return (), f"no node was found in {path}" + (f" ({reasons})" if reasons else "")
+
+
+def _run(program: Program, target: ProgramTarget, path: str) -> Run:
+    source = program.load(target.file, target.module)
+    if target.function:
+        return start_function(program, source, list(target.function))
+    run = start(program, source)
+    if target.missing:
+        run.findings.gap(SourceRef(path), target.missing)
+    return run
+
+
+def _with_gaps(interfaces: list[NodeInterface], run: Run) -> tuple[NodeInterface, ...]:
+    """Give gaps that belong to the whole program to its first node, so that nobody overlooks them."""
+    gaps = tuple(Gap(source, why) for source, why in run.findings.gaps)
+    first = interfaces[0]
+    return (first._replace(gaps=(*first.gaps, *gaps)), *interfaces[1:])

@@ -44,7 +44,7 @@ def infer_python(
     if known is not None:
         interfaces, why = known
         return interfaces, why
-    from nodl.infer.python_program import infer_program  # the whole analysis of Python comes with it
+    from nodl.infer.analysis import infer_program  # the whole analysis of Python comes with it
 
     answer = infer_program(finder.program, target, path, LaunchKey(package, executable))
     cached.store(answer)

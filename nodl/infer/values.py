@@ -16,7 +16,7 @@ from nodl.infer.text import Text, common_text
 
 if TYPE_CHECKING:
     from nodl.infer.findings import NodeRecord
-    from nodl.infer.interpreter.frames import Frame
+    from nodl.infer.interpreter.run import Frame
     from nodl.infer.program import SourceModule
 
 Value: TypeAlias = tuple[object, ...]

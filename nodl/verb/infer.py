@@ -15,8 +15,8 @@ from nodl.ament_index import PackageNotFoundError, executables, package_prefix, 
 from nodl.infer.executable import infer_executable
 from nodl.infer.report import written
 from nodl.infer.report.comparison import lacking, to_text
-from nodl.infer.report.expanded import ExpandedSystem, expand
 from nodl.infer.report.v2_report import open_questions, to_v2
+from nodl.infer.report.written import ExpandedSystem, expand
 from nodl.infer.system import InferredSystem, infer_paths
 from nodl.lookup import ManifestLookup
 from nodl.node_interface import Gap, NodeInterface

@@ -6,8 +6,7 @@ import ast
 
 from nodl.infer.interpreter import imports
 from nodl.infer.interpreter.define import is_enumeration, linearized, program_classes
-from nodl.infer.interpreter.frames import Arguments, Frame
-from nodl.infer.interpreter.run import AttributeReader, Run
+from nodl.infer.interpreter.run import Arguments, AttributeReader, Frame, Run
 from nodl.infer.models import foreign
 from nodl.infer.text import Text
 from nodl.infer.values import (

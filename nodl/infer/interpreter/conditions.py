@@ -10,8 +10,7 @@ import operator
 from collections.abc import Callable
 from typing import Any
 
-from nodl.infer.interpreter.frames import Frame
-from nodl.infer.interpreter.run import Run
+from nodl.infer.interpreter.run import Frame, Run
 from nodl.infer.text import Input, Piece, Text, TextAtom, input_of, make_text, pieces_of
 from nodl.infer.values import (
     CONSTANTS,
@@ -24,7 +23,6 @@ from nodl.infer.values import (
     ModuleValue,
     Sequence,
     Value,
-    contains,
     sole,
 )
 
@@ -231,8 +229,7 @@ def compare_values(op: ast.cmpop, left: Value, right: Value) -> bool | None:
 
 def _compare_atoms(op: ast.cmpop, left: object, right: object) -> bool | None:
     if isinstance(op, ast.In | ast.NotIn):
-        found = _membership(left, right)
-        return found if found is None or isinstance(op, ast.In) else not found
+        return None
     if isinstance(left, CONSTANTS) and isinstance(right, CONSTANTS):
         return _compare_constants(op, left, right)
     if not isinstance(op, ast.Is | ast.IsNot | ast.Eq | ast.NotEq):
@@ -246,23 +243,6 @@ def _compare_atoms(op: ast.cmpop, left: object, right: object) -> bool | None:
 
 
 _NEVER_NONE = (Instance, FunctionValue, ClassValue, ModuleValue, Sequence, Dictionary)
-
-
-def _membership(element: object, container: object) -> bool | None:
-    if isinstance(container, str) and isinstance(element, str):
-        return element in container
-    if isinstance(container, Dictionary) and isinstance(element, CONSTANTS):
-        held, certain = container.held(element)
-        return True if certain else None if held or container.is_open else False
-    if isinstance(container, Sequence) and isinstance(element, CONSTANTS):
-        exact = container.items.exact
-        if exact is None or container.escaped:
-            return None
-        if any(len(item) == 1 and contains(item, element) for item in exact):
-            return True
-        certain = all(isinstance(atom, CONSTANTS) for item in exact for atom in item)
-        return False if certain and not any(contains(item, element) for item in exact) else None
-    return None
 
 
 def _compare_constants(op: ast.cmpop, left: object, right: object) -> bool | None:

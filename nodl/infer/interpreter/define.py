@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import ast
 
-from nodl.infer.interpreter.frames import Arguments, Call, Frame
-from nodl.infer.interpreter.run import Run
+from nodl.infer.interpreter.run import Arguments, Call, Frame, Run
 from nodl.infer.values import (
     BoundMethod,
     ClassMethod,
@@ -14,7 +13,6 @@ from nodl.infer.values import (
     FunctionValue,
     Instance,
     PropertyValue,
-    Sequence,
     Unknown,
     Value,
     external,
@@ -289,29 +287,3 @@ def new_instance(run: Run, cls: ClassValue, call: Call) -> Instance:
 def is_constant(atom: object) -> bool:
     """Return True if ``atom`` is a constant that a dictionary can have as a key."""
     return isinstance(atom, str | int | float | bool | type(None))
-
-
-def is_key(atom: object) -> bool:
-    """Return True if a dictionary finds ``atom`` by what it is: a constant, tuples of such, what equals itself only."""
-    if isinstance(atom, External):
-        return "(" not in atom.path  # else it stands for whatever a library gives
-    if isinstance(atom, Sequence):
-        exact = atom.items.exact if atom.kind == "tuple" else None
-        return exact is not None and all(len(part) == 1 and type(part[0]) in (str, int) for part in exact)
-    if isinstance(atom, Instance):
-        return isinstance(atom.cls, ClassValue) and not atom.summary and _equals_itself_only(atom.cls)
-    if isinstance(atom, FunctionValue):
-        return not atom.shared
-    return is_constant(atom) or (isinstance(atom, ClassValue) and not atom.summary)
-
-
-_COMPARED_BY_IDENTITY = frozenset({"builtins.object", "enum.Enum", "enum.Flag", "abc.ABC", "rclpy.node.Node"})
-
-
-def _equals_itself_only(cls: ClassValue) -> bool:
-    return all(
-        base.path in _COMPARED_BY_IDENTITY
-        if isinstance(base, External)
-        else isinstance(base, ClassValue) and base.fields is None and "__eq__" not in base.cells
-        for base in linearized(cls)
-    )

@@ -1,21 +1,20 @@
-"""Expressions: names, literals, calls, subscripts, functions made in passing."""
+"""Expressions: names, literals, calls, operators, subscripts, functions made in passing."""
 
 from __future__ import annotations
 
 import ast
 import builtins
+import operator
+from collections.abc import Callable
 from functools import partial
 
-from nodl.infer.interpreter.assign import assign, copy_dictionary, store_item
 from nodl.infer.interpreter.conditions import compare, decide, forked, narrowed, only_if, truth, truth_of
 from nodl.infer.interpreter.define import make_function
-from nodl.infer.interpreter.elements import elements, subscript
-from nodl.infer.interpreter.formatting import f_string
-from nodl.infer.interpreter.frames import Arguments, Frame
+from nodl.infer.interpreter.elements import assign, copy_dictionary, elements, store_item, subscript
+from nodl.infer.interpreter.formatting import as_texts, f_string, percent
 from nodl.infer.interpreter.loops import comprehension, dict_comprehension
-from nodl.infer.interpreter.operators import binary
-from nodl.infer.interpreter.run import Evaluator, Run
-from nodl.infer.text import Text, input_of, with_edit
+from nodl.infer.interpreter.run import Arguments, Evaluator, Frame, Run
+from nodl.infer.text import Hole, Text, TextAtom, concatenate, concatenations, input_of, make_text, with_edit
 from nodl.infer.values import (
     ANY,
     BOTTOM,
@@ -25,6 +24,7 @@ from nodl.infer.values import (
     Dictionary,
     Instance,
     Items,
+    Sequence,
     SuperProxy,
     Unknown,
     Value,
@@ -35,6 +35,105 @@ from nodl.infer.values import (
     present,
     unknown,
 )
+
+_ARITHMETIC: dict[type, Callable[[object, object], object]] = {
+    ast.Add: operator.add,
+    ast.Sub: operator.sub,
+    ast.Mult: operator.mul,
+}
+_COMBINING = (ast.BitOr, ast.BitAnd, ast.BitXor, ast.Sub)
+_NUMBERS = (int, float)
+_LARGE = 1 << 40
+
+
+def binary(run: Run, node: ast.BinOp, frame: Frame) -> Value:
+    """Evaluate both sides, the left one first, and apply the operator."""
+    left = run.evaluate(node.left, frame)
+    right = run.evaluate(node.right, frame)
+    return binary_operation(run, node, left, node.op, right, frame)
+
+
+def binary_operation(
+    run: Run, node: ast.AST, left: Value, op: ast.operator, right: Value, frame: Frame
+) -> Value:
+    """Evaluate ``left op right``; ``ANY`` if nothing is known."""
+    if _has_own(left) or _has_own(right):
+        return ANY  # by a special method, which is called from outside
+    if isinstance(op, ast.Add):
+        return _add(run, node, left, right)
+    if isinstance(op, ast.Mod) and any(isinstance(atom, str | Text) for atom in left):
+        return percent(left, right)
+    if type(op) in _COMBINING and any(isinstance(atom, Sequence | Dictionary) for atom in (*left, *right)):
+        run.escape_value((*left, *right))  # dictionaries or sets: what is in them may be called
+        return ANY
+    if type(op) in _ARITHMETIC and len(left) * len(right) <= 16:
+        return _arithmetic(run, node, left, op, right)
+    return ANY
+
+
+def _has_own(value: Value) -> bool:
+    """Return True if ``value`` may be an object of one of the program's classes."""
+    for atom in value:  # noqa: SIM110 - asked at every operator; a generator takes three times as long
+        if type(atom) is Instance and type(atom.cls) is ClassValue:
+            return True
+    return False
+
+
+def _arithmetic(run: Run, node: ast.AST, left: Value, op: ast.operator, right: Value) -> Value:
+    result: Value = BOTTOM
+    for a in left:
+        for b in right:
+            result = join(result, _arithmetic_atoms(run, node, a, op, b))
+    return result or ANY
+
+
+def _arithmetic_atoms(run: Run, node: ast.AST, a: object, op: ast.operator, b: object) -> Value:
+    if isinstance(op, ast.Mult) and isinstance(a, Sequence):
+        return run.sequence(node, a.kind, Items(None, a.items.any_element()))
+    if isinstance(a, _NUMBERS) and isinstance(b, _NUMBERS) and max(abs(a), abs(b)) < _LARGE:
+        result = _ARITHMETIC[type(op)](a, b)
+        return (result,) if isinstance(result, _NUMBERS) else ANY
+    return (b,) if isinstance(b, Unknown) else (a,) if isinstance(a, Unknown) else ANY
+
+
+def _add(run: Run, node: ast.AST, left: Value, right: Value) -> Value:
+    if len(left) == 1 and len(right) == 1 and type(left[0]) is str and type(right[0]) is str:
+        return (concatenate(left[0], right[0]),)
+    texts_left = [atom for atom in left if isinstance(atom, str | Text)]
+    texts_right = [atom for atom in right if isinstance(atom, str | Text)]
+    sequences = [atom for atom in (*left, *right) if isinstance(atom, Sequence)]
+    if sequences:
+        return _added_sequences(run, node, left, right, sequences)
+    if not texts_left and not texts_right:
+        return _arithmetic(run, node, left, ast.Add(), right) if len(left) * len(right) <= 16 else ANY
+    # One side is a text, so the sum is only defined where the other one is too.
+    return tuple(
+        concatenations([texts_left or as_texts(left), texts_right or as_texts(right)])
+        if _pure(left) and _pure(right)
+        else concatenations([_text_side(left), _text_side(right)])
+    )
+
+
+def _pure(value: Value) -> bool:
+    return not any(isinstance(atom, Unknown) for atom in value)
+
+
+def _text_side(value: Value) -> list[TextAtom]:
+    found: list[TextAtom] = []
+    for atom in value:
+        if isinstance(atom, str | Text):
+            found.append(atom)
+        elif isinstance(atom, Unknown):
+            found.append(make_text((Hole(atom.why),)))
+    return found or as_texts(value)
+
+
+def _added_sequences(run: Run, node: ast.AST, left: Value, right: Value, sequences: list[Sequence]) -> Value:
+    element = join_all(sequence.items.any_element() for sequence in sequences)
+    if any(not isinstance(atom, Sequence) for atom in (*left, *right)):
+        element = join(element, ANY)
+    return run.sequence(node, sequences[0].kind, Items(None, element))
+
 
 _BUILTINS = frozenset(dir(builtins))
 

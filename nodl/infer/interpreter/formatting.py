@@ -5,15 +5,12 @@ from __future__ import annotations
 import ast
 import re
 import string
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from collections.abc import Sequence as Sequences
 from contextlib import suppress
-from typing import Any
 
-from nodl.infer.findings import NodeRecord, OptionDefaults
-from nodl.infer.interpreter.frames import Arguments, Frame
-from nodl.infer.interpreter.run import Run
-from nodl.infer.text import Hole, Input, Text, TextAtom, common_text, concatenations, make_text
+from nodl.infer.interpreter.run import Arguments, Frame, Run
+from nodl.infer.text import Hole, Text, TextAtom, common_text, concatenations, make_text
 from nodl.infer.values import (
     ANY,
     BOTTOM,
@@ -91,34 +88,14 @@ def formatted(value: Value, spec: str | None) -> list[TextAtom]:
     """Run ``format(value, spec)`` for constants; what depends on the rest is a hole."""
     if spec == "":
         return as_texts(value)
-    return _each_formatted(value, spec, lambda atom: format(atom, spec or ""))
-
-
-def _each_formatted(value: Value, spec: str | None, write: Callable[[Any], str]) -> list[TextAtom]:
     texts: list[TextAtom] = []
     for atom in value:
-        if spec == "d" and isinstance(atom, Text) and _is_whole_number(atom):
-            texts.append(atom)
-            continue
         if spec is None or not isinstance(atom, str | int | float) or _WIDE.search(spec):
             texts.append(_hole("formatted text"))
             continue
         with suppress(ValueError, TypeError, OverflowError):  # an error at run time, no text
-            texts.append(write(atom))
+            texts.append(format(atom, spec))
     return texts or [_hole("formatted text")]
-
-
-def _is_whole_number(text: Text) -> bool:
-    """Return True for an input that the program declares as a whole number: written plainly, it is its own text."""
-    piece = text.pieces[0]
-    if (
-        len(text.pieces) > 1
-        or not isinstance(piece, Input)
-        or not isinstance(piece.owner, NodeRecord | OptionDefaults)
-    ):
-        return False
-    default = piece.owner.default(piece.name)
-    return bool(default) and all(type(atom) is int for atom in default)
 
 
 _DIRECTIVE = re.compile(r"%(?:s|(\d*(?:\.\d+)?[dfx]))")

@@ -5,8 +5,7 @@ from __future__ import annotations
 import ast
 import os
 
-from nodl.infer.interpreter.frames import Frame
-from nodl.infer.interpreter.run import Run
+from nodl.infer.interpreter.run import Frame, Run
 from nodl.infer.program import SourceModule
 from nodl.infer.values import ModuleValue, Value, external
 from nodl.source_ref import SourceRef

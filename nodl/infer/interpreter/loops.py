@@ -7,11 +7,9 @@ from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
 
-from nodl.infer.interpreter.assign import assign, store_item
 from nodl.infer.interpreter.conditions import decide, narrowed
-from nodl.infer.interpreter.elements import elements
-from nodl.infer.interpreter.frames import Frame
-from nodl.infer.interpreter.run import Run
+from nodl.infer.interpreter.elements import assign, elements, store_item
+from nodl.infer.interpreter.run import Frame, Run
 from nodl.infer.values import Dictionary, Items, LocalCells, Value, join_all
 
 MAX_UNROLLED = 64  # turns, those of the loops around multiplied

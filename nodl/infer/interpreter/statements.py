@@ -8,12 +8,11 @@ from functools import partial
 from typing import Any
 
 from nodl.infer.interpreter import imports, loops
-from nodl.infer.interpreter.assign import assign, delete
 from nodl.infer.interpreter.conditions import decide, forked, narrowed
 from nodl.infer.interpreter.define import define_class, define_function, program_classes
-from nodl.infer.interpreter.frames import Arguments, Frame
-from nodl.infer.interpreter.operators import binary_operation
-from nodl.infer.interpreter.run import Executor, Run
+from nodl.infer.interpreter.elements import assign, delete
+from nodl.infer.interpreter.expressions import binary_operation
+from nodl.infer.interpreter.run import Arguments, Executor, Frame, Run
 from nodl.infer.values import (
     ANY,
     NONE,

@@ -10,19 +10,20 @@ import builtins
 import functools
 import sys
 
-from nodl.infer.interpreter.frames import Call
-from nodl.infer.interpreter.run import Run
+from nodl.infer.interpreter.run import Call, Run
 from nodl.infer.models import (
-    builtin,
-    endpoints,
     native,
     ros,
-    ros_nodes,
     ros_parameters,
     stdlib,
 )
-from nodl.infer.models.library_nodes import library_node, may_make_nodes
-from nodl.infer.models.signatures import COMMON_CALLBACKS, LIFECYCLE_HOOKS, NODE_ENDPOINTS
+from nodl.infer.models.signatures import (
+    COMMON_CALLBACKS,
+    LIFECYCLE_HOOKS,
+    NODE_ENDPOINTS,
+    library_node,
+    may_make_nodes,
+)
 from nodl.infer.values import (
     ANY,
     RESULT,
@@ -37,7 +38,6 @@ from nodl.infer.values import (
     unknown,
 )
 
-_MODELS = {**stdlib.FUNCTIONS, **builtin.FUNCTIONS}
 NODE_METHODS = frozenset(NODE_ENDPOINTS) | frozenset(COMMON_CALLBACKS)
 
 # Libraries that create no endpoints on a node they are given, keep their hands off names and off the program's
@@ -86,7 +86,7 @@ def call_external(run: Run, atom: External, call: Call) -> Value:
         run.escape(call.args, opened=False, objects=False)
         return (atom,)
     owner, _, name = path.rpartition(".")
-    model = _MODELS.get(path)
+    model = stdlib.FUNCTIONS.get(path)
     if model is not None:
         return model(run, call)
     found = ros.call_library(run, path, call)
@@ -202,8 +202,8 @@ def call_foreign_method(run: Run, method: ForeignMethod, call: Call) -> Value:
     model = stdlib.METHODS.get((path, name))
     if model is not None:
         return model(run, receiver, call)
-    if path in endpoints.CLASSES:
-        return endpoints.method(run, receiver, name, call)
+    if path in ros.ENDPOINT_CLASSES:
+        return ros.call_endpoint(run, receiver, name, call)
     if path == ros_parameters.PARAMETER_CLASS:
         return (receiver,) if name == "get_parameter_value" else ANY
     if name == "__init__":
@@ -213,7 +213,7 @@ def call_foreign_method(run: Run, method: ForeignMethod, call: Call) -> Value:
         run.gap(call.node, call.frame, f"{name} is called by the program, which is not analysed")
         return unknown(f"the result of object.{name}()")
     if name in NODE_ENDPOINTS and len(call.args.positional) + len(call.args.keywords) >= 2:
-        record = ros_nodes.record_of_instance(run, receiver, call)
+        record = ros.record_of_instance(run, receiver, call)
         if not record.created:
             why = f"the class derives from {path or 'a class that is not known'}, which is not analysed"
             record.gaps.setdefault((call.source, why))
@@ -232,11 +232,11 @@ def _escape_to(run: Run, path: str, call: Call) -> None:
 
 def _call_node_method(run: Run, receiver: Instance, path: str, name: str, call: Call) -> Value:
     if name == "__init__":
-        ros_nodes.initialise_node(run, receiver, path, call)
+        ros.initialise_node(run, receiver, path, call)
         return ANY
     model = ros.NODE_METHODS.get(name)
     if model is not None:
-        return model(run, ros_nodes.record_of_instance(run, receiver, call), call)
+        return model(run, ros.record_of_instance(run, receiver, call), call)
     run.escape(call.args, opened=False, objects=name in ("add_waitable", "add_rate"))
     return result_of(path)
 
@@ -249,7 +249,7 @@ def _initialise_other_bases(run: Run, receiver: Instance, path: str, call: Call)
     after = paths[paths.index(path) + 1 :] if path in paths else []
     node_class = next(filter(is_node_class, after), None)
     if node_class is not None:
-        ros_nodes.initialise_node(run, receiver, node_class, call)
+        ros.initialise_node(run, receiver, node_class, call)
 
 
 def _foreign_bases(obj: Instance) -> list[str]:
@@ -265,7 +265,7 @@ def call_native(run: Run, method: NativeMethod, call: Call) -> Value:
             ros.register(run, COMMON_CALLBACKS[name], call)
             return ANY
         if len(call.args.positional) + len(call.args.keywords) >= 2:
-            record = ros_nodes.records_of(run, (receiver,), call)[0]
+            record = ros.records_of(run, (receiver,), call)[0]
             return ros.NODE_METHODS[name](run, record, call)
         return ANY
     return native.call_method(run, receiver, name, call)
@@ -283,7 +283,7 @@ def instance_attribute(run: Run, obj: Instance, path: str, name: str) -> Value:
     """Return an attribute of an object whose class is foreign."""
     if path == ros_parameters.PARAMETER_CLASS and name in _PARAMETER_VALUES:
         return obj.cells.get("value", ANY)
-    if path in endpoints.CLASSES and name in endpoints.NAMES:
+    if path in ros.ENDPOINT_CLASSES and name in ros.ENDPOINT_NAMES:
         return obj.cells.get("name", ANY)
     if path in stdlib.OPEN_ATTRIBUTES:
         return stdlib.OPEN_ATTRIBUTES[path](run, obj, name)
@@ -304,7 +304,7 @@ def hooks_of(base: object) -> frozenset[str] | None:
     if not isinstance(base, External):
         return None
     if is_node_class(base.path):
-        return LIFECYCLE_HOOKS if ros_nodes.is_lifecycle(base.path) else frozenset()
+        return LIFECYCLE_HOOKS if ros.is_lifecycle(base.path) else frozenset()
     return stdlib.HOOKS.get(base.path)
 
 

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from nodl.infer.interpreter.assign import copy_dictionary, store_item
-from nodl.infer.interpreter.define import is_constant, is_key
-from nodl.infer.interpreter.elements import chosen_by_parameter, elements, keys_of, values_of
+from nodl.infer.interpreter.define import is_constant
+from nodl.infer.interpreter.elements import (
+    chosen_by_parameter,
+    copy_dictionary,
+    elements,
+    keys_of,
+    store_item,
+    values_of,
+)
 from nodl.infer.interpreter.formatting import joined, str_format, text_value
-from nodl.infer.interpreter.frames import Call
-from nodl.infer.interpreter.run import Run
-from nodl.infer.models.builtin import store_pairs
+from nodl.infer.interpreter.run import Call, Run
+from nodl.infer.models.stdlib import store_pairs
 from nodl.infer.text import MAX_LENGTH, Text, TextAtom, edited, input_of, with_edit
 from nodl.infer.values import (
     ABSENT,
@@ -168,7 +173,7 @@ def _get(run: Run, owner: Dictionary, call: Call) -> Value:
     found = present(owner.cells.get(OTHER, BOTTOM))
     missing = False
     for atom in key:
-        held, certain = owner.held(atom) if is_key(atom) else (BOTTOM, False)
+        held, certain = owner.held(atom) if is_constant(atom) else (BOTTOM, False)
         missing = missing or not certain
         found = join(found, held)
         if not held and not is_constant(atom):

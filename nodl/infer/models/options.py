@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from nodl.infer.interpreter.frames import Call
-from nodl.infer.interpreter.run import Run
+from nodl.infer.interpreter.run import Call, Run
 from nodl.infer.text import Input, Text, input_of, make_text
 from nodl.infer.values import (
     ANY,

@@ -1,28 +1,21 @@
-"""rclpy and its companions at work: calls of the tables in ``signatures`` become findings."""
+"""rclpy and its companions at work: objects become nodes, calls of the tables in ``signatures`` become findings."""
 
 from __future__ import annotations
 
 import functools
 from collections.abc import Callable
 
-from nodl.builtin_interfaces import PARAMETER_SERVICES
+from nodl.builtin_interfaces import LOGGER_SERVICES, PARAMETER_SERVICES
 from nodl.infer.findings import NodeRecord
 from nodl.infer.interpreter.conditions import truth
+from nodl.infer.interpreter.elements import elements
 from nodl.infer.interpreter.formatting import as_texts, text_value
-from nodl.infer.interpreter.frames import Call
-from nodl.infer.interpreter.run import Run
+from nodl.infer.interpreter.run import Call, Run
 from nodl.infer.models import ros_parameters
-from nodl.infer.models.endpoints import endpoint_object, known_quality
-from nodl.infer.models.ros_nodes import (
-    LIFECYCLE_CLASS,
-    NODE_CLASS,
-    create_node,
-    is_lifecycle,
-    records_of,
-    strings_in,
-)
+from nodl.infer.models.ros_parameters import assign_parameters
 from nodl.infer.models.signatures import (
     CLIENT,
+    COMMON_CALLBACKS,
     ENDPOINT_CALLS,
     HELPERS,
     NODE_CALLBACKS,
@@ -32,19 +25,169 @@ from nodl.infer.models.signatures import (
     EndpointCall,
     FixedEndpoint,
     Helper,
+    library_node,
 )
 from nodl.infer.text import NodePart, Text, concatenate, make_text
 from nodl.infer.values import (
     ANY,
     BOTTOM,
     NONE,
+    RESULT,
     External,
+    Instance,
     Unknown,
     Value,
+    constant_strings,
     external,
     join,
+    result_of,
     unknown,
 )
+from nodl.node_interface import EndpointKind, QosPolicies
+
+NODE_CLASS = "rclpy.node.Node"
+
+
+LIFECYCLE_CLASS = "rclpy.lifecycle.Node"
+
+
+def is_lifecycle(path: str) -> bool:
+    """Return True if the path of a node class says that its nodes are lifecycle nodes."""
+    return ".lifecycle" in path or path.endswith("LifecycleNode")
+
+
+def initialise_node(run: Run, instance: Instance, path: str, call: Call) -> None:
+    """Model ``Node.__init__``: the instance becomes a node."""
+    record = record_of_instance(run, instance, call)
+    run.understood.add(call.node)
+    record.created = True
+    record.source = call.source
+    library = library_node(path)
+    default: Value = (library.name,) if library else unknown("a node without a name")
+    record.names = join(record.names, call.args.at(0, "node_name") or default)
+    for fixed in library.endpoints if library else ():
+        record.add_endpoint(fixed.kind, fixed.name, fixed.type, call.source)
+    record.namespaces = join(record.namespaces, call.args.at(1 if library else -1, "namespace") or NONE)
+    record.lifecycle = record.lifecycle or is_lifecycle(path)
+    local = call.args.at(-1, "cli_args")
+    record.arguments = join(record.arguments, strings_in(run, local, call) if local else BOTTOM)
+    use_global = call.args.at(-1, "use_global_arguments")
+    if use_global is not None:
+        record.use_global_arguments = use_global
+    if record.lifecycle:
+        enabled = call.args.at(-1, "enable_communication_interface")
+        record.communication_interface = enabled is None or truth(enabled) is not False
+    overrides = call.args.at(-1, "parameter_overrides")
+    if overrides:
+        assign_parameters(run, record, overrides, call)
+    if truth(call.args.at(-1, "enable_logger_service") or (False,)) is not False:
+        for service, service_type in LOGGER_SERVICES.items():
+            record.add_endpoint(EndpointKind.SERVICE_SERVER, f"~/{service}", service_type, call.source)
+
+
+def strings_in(run: Run, value: Value, call: Call) -> Value:
+    """Return a list of command line arguments as one atom per known list (a tuple of texts), else unknown."""
+    items = elements(run, tuple(atom for atom in value if atom is not None), call.node, call.frame)
+    if all(atom is None for atom in value):
+        return BOTTOM
+    if items.exact is None:
+        return unknown("arguments made at run time")
+    words = [constant_strings(element) for element in items.exact]
+    if any(len(word) != 1 for word in words):
+        return unknown("arguments made at run time")
+    return (tuple(word[0] for word in words),)
+
+
+def record_of_instance(run: Run, instance: Instance, call: Call) -> NodeRecord:
+    """Return the node record of ``instance``; if it has none, a new one, not yet marked as created."""
+    if instance.node is None:
+        instance.node = run.findings.add_node(NodeRecord(call.source))
+    return instance.node
+
+
+def create_node(run: Run, path: str, call: Call) -> Value:
+    """Model ``rclpy.create_node(...)`` or ``Node(...)`` used as it is."""
+    instance = run.library_object(call, path, "node")
+    initialise_node(run, instance, path, call)
+    return (instance,)
+
+
+def records_of(run: Run, value: Value | None, call: Call) -> list[NodeRecord]:
+    """Return the nodes that ``value`` may be; what is not a known node becomes a gap."""
+    records: list[NodeRecord] = []
+    for atom in value or ANY:
+        if isinstance(atom, Instance):
+            records.append(record_of_instance(run, atom, call))
+        elif isinstance(atom, Unknown | External):
+            why = atom.why if isinstance(atom, Unknown) else f"a result of {atom.path.removesuffix(RESULT)}"
+            run.findings.gap(call.source, f"the node of this endpoint is not known: {why}")
+            records.append(run.findings.unknown_node(call.source))
+    return records
+
+
+_CLASS_OF = {
+    EndpointKind.PUBLISHER: "rclpy.publisher.Publisher",
+    EndpointKind.SUBSCRIPTION: "rclpy.subscription.Subscription",
+    EndpointKind.SERVICE_SERVER: "rclpy.service.Service",
+    EndpointKind.SERVICE_CLIENT: "rclpy.client.Client",
+}
+ENDPOINT_CLASSES = frozenset(_CLASS_OF.values())
+ENDPOINT_NAMES = frozenset({"topic", "srv_name"})  # the name as the program gave it
+
+
+def endpoint_object(run: Run, kind: EndpointKind, record: NodeRecord, names: Value, call: Call) -> Value:
+    """Return the object of a publisher, subscription, service or client that ``record`` made."""
+    path = _CLASS_OF[kind]
+    made = run.library_object(call, path, f"{path} {id(record)}")
+    run.state.store(made, "name", names)
+    return (made,)
+
+
+def call_endpoint(run: Run, receiver: Instance, name: str, call: Call) -> Value:
+    """Model a method of such an object."""
+    if name == "configure_introspection":
+        run.findings.gap(
+            call.source, "service introspection publishes events below the service, which is not followed"
+        )
+    if name in COMMON_CALLBACKS:
+        where = COMMON_CALLBACKS[name].argument
+        run.register_callback(call.args.at(where.position, where.keyword) or ANY, None)
+        return ANY
+    run.escape(call.args, opened=False, objects=False)
+    return result_of("rclpy")
+
+
+def _keep_last(depth: int, reliability: str = "RELIABLE") -> QosPolicies:
+    return (
+        ("depth", depth),
+        ("durability", "VOLATILE"),
+        ("history", "KEEP_LAST"),
+        ("reliability", reliability),
+    )
+
+
+_PROFILES = {
+    "sensor_data": _keep_last(5, "BEST_EFFORT"),
+    "services_default": _keep_last(10),
+    "parameters": _keep_last(1000),
+}
+_BY_PATH = {
+    path: quality
+    for name, quality in _PROFILES.items()
+    for path in (f"rclpy.qos.qos_profile_{name}", f"rclpy.qos.QoSPresetProfiles.{name.upper()}.value")
+}
+
+
+def known_quality(call: Call, position: int) -> QosPolicies:
+    """Return policies by NoDL v2's names, sorted; empty if they are not certain."""
+    value = call.args.at(position, "qos_profile")
+    if value is None or len(value) != 1 or call.args.at(-1, "qos_overriding_options") is not None:
+        return ()
+    (given,) = value
+    if isinstance(given, External):
+        return _BY_PATH.get(given.path, ())
+    return _keep_last(given) if type(given) is int and given > 0 else ()
+
 
 _INTERFACE_FOLDERS = ("msg", "srv", "action")
 

@@ -7,8 +7,7 @@ from collections.abc import Callable
 from nodl.infer.findings import NodeRecord
 from nodl.infer.interpreter.conditions import truth
 from nodl.infer.interpreter.elements import elements
-from nodl.infer.interpreter.frames import Call
-from nodl.infer.interpreter.run import Run
+from nodl.infer.interpreter.run import Call, Run
 from nodl.infer.text import Input, make_text, with_edit
 from nodl.infer.values import (
     ABSENT,

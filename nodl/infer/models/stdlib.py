@@ -1,36 +1,313 @@
-"""Python's standard library where it makes names, keeps callables or changes control flow."""
+"""Python's own library, built-in functions included, where it makes names, keeps callables or changes control flow."""
 
 from __future__ import annotations
 
 import os.path
 from collections.abc import Callable
 
-from nodl.infer.interpreter.elements import elements
+from nodl.infer.interpreter.conditions import truth
+from nodl.infer.interpreter.define import expect_methods, is_constant, new_instance, program_classes
+from nodl.infer.interpreter.elements import copy_dictionary, elements, keys_of, store_attribute
 from nodl.infer.interpreter.formatting import as_texts, text_value
-from nodl.infer.interpreter.frames import Call
-from nodl.infer.interpreter.run import Model, Run
-from nodl.infer.models import builtin, options
-from nodl.infer.text import Input, concatenations, make_text
+from nodl.infer.interpreter.imports import import_module
+from nodl.infer.interpreter.run import Arguments, Call, Model, Run
+from nodl.infer.models import options
+from nodl.infer.text import Input, concatenations, input_of, make_text, with_edit
 from nodl.infer.values import (
     ABSENT,
     ANY,
+    BOOLEAN,
     BOTTOM,
     COMMAND_LINE,
     NONE,
+    OF_A_NODE,
+    OTHER,
     ClassValue,
     Dictionary,
     External,
+    HeapObject,
     Instance,
     Items,
+    Key,
+    ModuleValue,
     Partial,
+    Sequence,
     Value,
+    boolean,
     constant_strings,
     join,
+    join_all,
     present,
     result_of,
     sole,
     unknown,
 )
+
+MAX_RANGE = 64
+
+
+# --- texts and numbers --------------------------------------------------------------------------------------
+
+
+def _str(run: Run, call: Call) -> Value:
+    value = call.args.at(0)
+    return ("",) if value is None else text_value(as_texts(value))
+
+
+def _bool(run: Run, call: Call) -> Value:
+    return boolean(truth(call.args.at(0) or (False,)))
+
+
+def _len(run: Run, call: Call) -> Value:
+    atom = sole(call.args.at(0))
+    if isinstance(atom, str):
+        return (len(atom),)
+    if isinstance(atom, Sequence) and atom.items.exact is not None and not atom.escaped:
+        return (len(atom.items.exact),)
+    keys = keys_of(atom).exact if isinstance(atom, Dictionary) else None
+    return ANY if keys is None else (len(keys),)
+
+
+# --- containers ---------------------------------------------------------------------------------------------
+
+
+def _items(run: Run, call: Call, index: int = 0) -> Items:
+    """Return the elements of the argument at ``index``; an empty sequence when it is not given."""
+    value = call.args.at(index)
+    return Items(()) if value is None else elements(run, value, call.node, call.frame)
+
+
+def _range(run: Run, call: Call) -> Value:
+    """Return the numbers if they are known and few; else any number, tied to an input that bounds it."""
+    bounds = [sole(value) for value in call.args.positional]
+    items = Items(None, unknown("a number of a loop"))
+    if not bounds or call.args.more:  # range(*bounds)
+        return run.sequence(call.node, "tuple", items)
+    counted = input_of(bounds[-1]) if len(bounds) < 3 else None
+    if counted is not None and counted.item is None and (len(bounds) == 1 or isinstance(bounds[0], int)):
+        items = Items(None, (with_edit(counted, "range", tuple(map(str, bounds[:-1]))),))
+    integers = [bound for bound in bounds if isinstance(bound, int)]
+    if len(integers) == len(bounds) and (len(bounds) in (1, 2) or (len(bounds) == 3 and integers[2])):
+        numbers = range(*integers)
+        if len(numbers) <= MAX_RANGE:
+            items = Items(tuple((number,) for number in numbers))
+    return run.sequence(call.node, "tuple", items)
+
+
+def _made(kind: str) -> Model:
+    return lambda run, call: run.sequence(call.node, kind, _items(run, call))
+
+
+def _enumerate(run: Run, call: Call) -> Value:
+    """Return a list of pairs; one pair stands for all if the length or the start is not known."""
+    items = _items(run, call)
+    start = sole(call.args.at(1, "start") or (0,))
+    if items.exact is not None and type(start) is int:
+        pairs = tuple(run.tuple_of(((start + index,), element)) for index, element in enumerate(items.exact))
+        return run.sequence(call.node, "list", Items(pairs))
+    pair = run.tuple_of((unknown("a number of a loop"), items.any_element() or ANY))
+    return run.sequence(call.node, "list", Items(None, pair))
+
+
+def _some(run: Run, call: Call) -> Value:
+    """Model ``sorted``, ``reversed``, ``set``: a list of any of the elements, in any order."""
+    element = _items(run, call).any_element()
+    run.register_callback(call.args.keywords.get("key", BOTTOM), 1)
+    return run.sequence(call.node, "list", Items(None, element))
+
+
+def _set(run: Run, call: Call) -> Value:
+    return run.sequence(call.node, "set", Items(None, _items(run, call).any_element()))
+
+
+def _map(run: Run, call: Call) -> Value:
+    """Call the function for any of the elements."""
+    given = [_items(run, call, index).any_element() or ANY for index in range(1, len(call.args.positional))]
+    arguments = Arguments(given, more=call.args.more)
+    element = run.call(call.args.at(0) or ANY, arguments, call.node, call.frame)
+    return run.sequence(call.node, "list", Items(None, element))
+
+
+def _filter(run: Run, call: Call) -> Value:
+    """Return any of the elements; the function is called for each."""
+    element = _items(run, call, 1).any_element()
+    run.register_callback(call.args.at(0) or NONE, 1)
+    return run.sequence(call.node, "list", Items(None, element))
+
+
+def _extreme(run: Run, call: Call) -> Value:
+    """Model ``min``, ``max``: one of the elements, nobody knows which."""
+    run.register_callback(call.args.keywords.get("key", BOTTOM), 1)
+    return join(chosen(run, call), ANY)
+
+
+def _dict(run: Run, call: Call) -> Value:
+    """Make a dictionary of dictionaries, pairs and keywords; keys that are not constant go under ``OTHER``."""
+    obj = run.allocate(call.node, "dict", Dictionary)
+    for atom in call.args.at(0) or BOTTOM:
+        if isinstance(atom, Dictionary):
+            copy_dictionary(run, obj, (atom,))
+        else:
+            store_pairs(run, obj, elements(run, (atom,), call.node, call.frame), call)
+    for name, value in call.args.keywords.items():
+        run.state.store(obj, Key(name), value)
+    if call.args.more_keywords:
+        run.state.store(obj, OTHER, join(obj.cells.get(OTHER, BOTTOM), call.args.more_keywords))
+    return (obj,)
+
+
+def store_pairs(run: Run, obj: Dictionary, items: Items, call: Call) -> None:
+    """Store what ``dict`` and ``dict.update`` make of pairs."""
+    for pair in items.exact if items.exact is not None else (items.any_element(),):
+        parts = elements(run, pair, call.node, call.frame).exact
+        key = sole(parts[0]) if parts and len(parts) == 2 else None
+        if parts and len(parts) == 2 and is_constant(key) and items.exact is not None:
+            run.state.store(obj, Key(key), parts[1])
+        else:
+            value = parts[1] if parts and len(parts) == 2 else ANY
+            run.state.store(obj, OTHER, join(obj.cells.get(OTHER, BOTTOM), value))
+
+
+def chosen(run: Run, call: Call) -> Value:
+    """Model ``next``, ``random.choice``: one of the elements."""
+    if len(call.args.positional) > 1 and not call.args.more:
+        return join_all((*call.args.positional, _items(run, call).any_element())) or ANY
+    return _items(run, call).any_element() or ANY
+
+
+# --- attributes and classes ---------------------------------------------------------------------------------
+
+
+def _getattr(run: Run, call: Call) -> Value:
+    """Return the attribute, the default or either."""
+    owner, names = call.args.at(0) or ANY, call.args.at(1) or ANY
+    there = _has(run, sole(owner), sole(names))
+    known = constant_strings(names)
+    found = join_all(run.attribute(owner, name, call.node, call.frame) for name in known)
+    if len(known) < len(names):
+        expect_methods(run, owner)
+        for atom in owner:
+            if isinstance(atom, Instance):
+                for held in list(atom.cells.values()):
+                    run.escape_value(held, opened=False, objects=False)
+        if any(isinstance(atom, ModuleValue | ClassValue) for atom in owner):
+            run.gap(
+                call.node,
+                call.frame,
+                "something of a module or class is looked up by a name made at run time",
+            )
+        is_node = any(isinstance(atom, Instance) and atom.node is not None for atom in owner)
+        found = join(found, unknown(OF_A_NODE if is_node else "an attribute whose name is made at run time"))
+    default = call.args.at(2)
+    return found if default is None or there else join(found, default)
+
+
+def _setattr(run: Run, call: Call) -> Value:
+    """Set one of the named attributes; one whose name is not known is a gap, unless a library holds the object."""
+    owner, names = call.args.at(0) or ANY, call.args.at(1) or ANY
+    value = call.args.at(2) or ANY
+    known = constant_strings(names)
+    for name in known:
+        if len(names) > 1:
+            value = join(value, run.attribute(owner, name, call.node, call.frame))
+        store_attribute(run, owner, name, value, call.node, call.frame)
+    if len(known) < len(names):
+        run.escape_value(value)
+        if any(isinstance(atom, HeapObject) for atom in owner):
+            run.gap(call.node, call.frame, "an attribute whose name is made at run time is set")
+    return NONE
+
+
+def _hasattr(run: Run, call: Call) -> Value:
+    return (True,) if _has(run, sole(call.args.at(0)), sole(call.args.at(1))) else BOOLEAN
+
+
+def _has(run: Run, owner: object, name: object) -> bool:
+    """Return True if the attribute is certainly there."""
+    if not isinstance(name, str) or not isinstance(owner, Instance | ClassValue | ModuleValue):
+        return False
+    held = owner.cells.get(name)
+    if held:
+        return present(held) is held and not owner.summary
+    cls = owner.cls if isinstance(owner, Instance) else owner
+    return isinstance(cls, ClassValue) and any(base.cells.get(name) for base in program_classes(cls))
+
+
+def _type(run: Run, call: Call) -> Value:
+    """Return the class of an object, else unknown; with three arguments, a class that is not followed."""
+    if len(call.args.positional) == 3:
+        run.gap(call.node, call.frame, "a class is made at run time (type)")
+        run.escape(call.args)
+        return unknown("a class made at run time")
+    atom = sole(call.args.at(0))
+    return (atom.cls,) if isinstance(atom, Instance) else ANY
+
+
+def _dynamic_code(run: Run, call: Call) -> Value:
+    run.gap(call.node, call.frame, "code made at run time (eval, exec) is not analysed")
+    return unknown("the result of code made at run time")
+
+
+def import_dynamic(run: Run, call: Call) -> Value:
+    """Model ``import_module(name)`` and ``__import__``: the module; a gap if its name is not known."""
+    name = sole(call.args.at(0))
+    if isinstance(name, str) and not name.startswith("."):
+        return import_module(run, name, call.frame)
+    run.gap(call.node, call.frame, "a module whose name is made at run time is not analysed")
+    return unknown("a module whose name is made at run time")
+
+
+def _variables(run: Run, call: Call) -> Value:
+    """Model ``vars``, ``globals``, ``locals``."""
+    return run.variables_of(call.node, call.frame)
+
+
+def _object_new(run: Run, call: Call) -> Value:
+    """Model ``object.__new__(cls)``: an object whose constructor has not run."""
+    made: list[object] = []
+    for atom in call.args.at(0) or ANY:
+        if isinstance(atom, ClassValue):
+            for base in program_classes(atom):
+                run.instantiated.setdefault(base.node)
+            made.append(new_instance(run, atom, call))
+        else:
+            made.append(unknown("an object of a class that is not known")[0])
+    return tuple(made)
+
+
+_BUILT_IN: dict[str, Callable[[Run, Call], Value]] = {
+    f"builtins.{name}": model
+    for name, model in {
+        "str": _str,
+        "bool": _bool,
+        "len": _len,
+        "range": _range,
+        "list": _made("list"),
+        "tuple": _made("tuple"),
+        **dict.fromkeys(("set", "frozenset"), _set),
+        "iter": lambda run, call: call.args.at(0) or ANY,  # walking along it gives the same
+        **dict.fromkeys(("sorted", "reversed"), _some),
+        "enumerate": _enumerate,
+        "map": _map,
+        "filter": _filter,
+        "dict": _dict,
+        "next": chosen,
+        **dict.fromkeys(("min", "max"), _extreme),
+        "getattr": _getattr,
+        "setattr": _setattr,
+        "hasattr": _hasattr,
+        "type": _type,
+        **dict.fromkeys(("any", "all", "callable", "isinstance"), lambda run, call: BOOLEAN),
+        **dict.fromkeys(("eval", "exec", "compile"), _dynamic_code),
+        "__import__": import_dynamic,
+        **dict.fromkeys(("vars", "globals", "locals"), _variables),
+        "input": lambda run, call: unknown("text that the user types"),
+        "object": lambda run, call: ANY,
+        "object.__new__": _object_new,
+        "object.__init_subclass__": lambda run, call: NONE,
+    }.items()
+}
+
 
 Method = Callable[[Run, Instance, Call], Value]
 CONTENTS = "the contents of a file, read when the program runs"
@@ -141,6 +418,7 @@ def _patched(run: Run, call: Call) -> Value:
 
 
 FUNCTIONS: dict[str, Model] = {
+    **_BUILT_IN,
     **{f"unittest.mock.patch{method}": _patched for method in ("", ".object", ".dict", ".multiple")},
     "argparse.ArgumentParser": options.made_parser,
     "os.getenv": _environment,
@@ -154,11 +432,11 @@ FUNCTIONS: dict[str, Model] = {
     "threading.Timer": _timer,
     "multiprocessing.Process": _thread,
     "collections.defaultdict": _default_dict,
-    "collections.OrderedDict": builtin.FUNCTIONS["builtins.dict"],
-    "collections.deque": builtin.FUNCTIONS["builtins.list"],
+    "collections.OrderedDict": _BUILT_IN["builtins.dict"],
+    "collections.deque": _BUILT_IN["builtins.list"],
     **dict.fromkeys(("copy.copy", "copy.deepcopy"), _copy),
-    "random.choice": builtin.FUNCTIONS["builtins.next"],
-    "importlib.import_module": builtin.import_dynamic,
+    "random.choice": _BUILT_IN["builtins.next"],
+    "importlib.import_module": import_dynamic,
     **dict.fromkeys(
         ("yaml.safe_load", "yaml.load", "json.load", "json.loads"), lambda run, call: unknown(CONTENTS)
     ),

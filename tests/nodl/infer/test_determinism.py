@@ -12,8 +12,7 @@ from pathlib import Path
 import pytest
 
 from nodl.infer import InferredSystem, infer_paths
-from nodl.infer.report.expanded import expand
-from nodl.infer.report.written import to_json
+from nodl.infer.report.written import expand, to_json
 
 # Each level of calls doubles the work: without a budget this would take minutes.
 _ENDLESS = "\n".join(

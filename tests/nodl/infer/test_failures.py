@@ -8,8 +8,7 @@ from typing import Any
 
 import pytest
 
-from nodl.infer import infer_executable, infer_paths, python_program, system
-from nodl.infer.interpreter import tables
+from nodl.infer import analysis, infer_executable, infer_paths, system
 from nodl.infer.models import ros
 
 PROGRAM = """\
@@ -37,7 +36,7 @@ main()
 """
 ERRORS = [RecursionError, MemoryError, ValueError, KeyError, AssertionError]
 TABLES = ["expressions", "statements", "callables", "attributes"]
-PLACES = [(name, kind) for name in TABLES for kind in getattr(tables.TABLES, name)]
+PLACES = [(name, kind) for name in TABLES for kind in getattr(analysis.TABLES, name)]
 
 
 def _failing(error: type[Exception]) -> Callable[..., Any]:
@@ -66,7 +65,7 @@ def test_a_failing_handler_is_a_gap_and_a_sound_one_is_not(
     whole = infer_executable("demo", "talker", prefixes=[str(tmp_path)])
     assert [str(e.name) for n in whole.interfaces for e in n.endpoints][:2] == ["a/out", "b/out"]
     assert not any(node.gaps for node in whole.interfaces)
-    handlers = getattr(tables.TABLES, place[0])
+    handlers = getattr(analysis.TABLES, place[0])
     for error in ERRORS:
         called: list[object] = []
 
@@ -91,7 +90,7 @@ def test_what_comes_after_the_run_may_fail_too(
 ) -> None:
     file = _installed(tmp_path)
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
-    monkeypatch.setattr(python_program, name, _failing(error))
+    monkeypatch.setattr(analysis, name, _failing(error))
     monkeypatch.setattr(system, name, _failing(error))
     found = infer_executable("demo", "talker", prefixes=[str(tmp_path)])
     assert "the analysis failed" in found.why

@@ -6,8 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from nodl.infer import InferredSystem
-from nodl.infer.interpreter import tables
+from nodl.infer import InferredSystem, analysis
 
 Infer = Callable[..., InferredSystem]
 PROGRAM = """
@@ -81,12 +80,12 @@ def test_a_function_that_is_referred_to_and_never_entered_is_a_gap(infer: Infer)
 
 def test_it_does_not_believe_the_interpreter(infer: Infer, monkeypatch: pytest.MonkeyPatch) -> None:
     """An interpreter that skips every second statement is found out."""
-    kind = next(each for each in tables.TABLES.statements if each.__name__ == "Expr")
-    really = tables.TABLES.statements[kind]
+    kind = next(each for each in analysis.TABLES.statements if each.__name__ == "Expr")
+    really = analysis.TABLES.statements[kind]
 
     def skip(run: object, node: object, frame: object) -> bool:
         return getattr(node, "lineno", 0) % 2 == 0 or bool(really(run, node, frame))  # type: ignore[arg-type]
 
-    monkeypatch.setitem(tables.TABLES.statements, kind, skip)
+    monkeypatch.setitem(analysis.TABLES.statements, kind, skip)
     body = "self.make('a')\n            self.make('b')\n            self.make('c')"
     assert sum("was not reached" in why for why in _gaps(infer, body)) >= 1

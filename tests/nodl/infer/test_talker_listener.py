@@ -13,9 +13,8 @@ from pathlib import Path
 import pytest
 
 from nodl.infer import InferredSystem, infer_executable
-from nodl.infer.report.expanded import expand
 from nodl.infer.report.v2_report import to_v2
-from nodl.infer.report.written import to_json
+from nodl.infer.report.written import expand, to_json
 
 Infer = Callable[..., InferredSystem]
 
