@@ -131,14 +131,21 @@ def test_missing_ends_are_one_finding_where_not_all_is_known() -> None:
     )
 
 
-def test_a_display_that_shows_nothing_is_no_missing_publisher() -> None:
-    checked = two({"subscribe": ["/x"]}, {"subscribe": ["/y"]})
-    for node in checked["nodes"]:
-        for each in node["interfaces"]:
-            if each["name"] == "/x":
-                each["place"] = "view.rviz:12"
-    found = {each.subject: each.code for each in check_plan(checked)}
-    assert (found["/x"], found["/y"]) == ("display-empty", "no-publisher")
+def test_the_other_end_of_rviz_and_of_a_default_of_the_library_is_optional() -> None:
+    def code(program: str, place: str, **more: object) -> str:
+        checked = two({"subscribe": ["/x"]}, {})
+        for node in checked["nodes"]:
+            node["program"] = program
+            for each in node["interfaces"]:
+                each.update({"place": place, "remapped_by": [], "note": "", **more})
+        (found,) = [each.code for each in check_plan(checked) if each.subject == "/x"]
+        return found
+
+    document = "/opt/nodl/library/documents/slam_toolbox/sync.nodl.yaml:12"
+    assert code("rviz2/rviz2", "view.rviz:12") == code("slam_toolbox/sync", document) == "other-end-optional"
+    assert code("slam_toolbox/sync", document, remapped_by=["scan:=x"]) == "no-publisher"
+    assert code("slam_toolbox/sync", document, note="parameter scan_topic") == "no-publisher"
+    assert code("demo/node", "node.cpp:12") == "no-publisher"
 
 
 def test_a_wildcard_that_planning_told_of_is_not_told_again() -> None:

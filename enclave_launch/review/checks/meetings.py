@@ -32,6 +32,7 @@ class _User(NamedTuple):
     """A node that uses a name, and where its description says so."""
 
     node: str
+    program: str
     interface: Mapping[str, Any]
 
 
@@ -73,13 +74,19 @@ def _missing_ends(plan: PlanDocument, document: Document) -> Iterator[PlanFindin
                 use = f"{' and '.join(who)} use{'' if len(who) > 1 else 's'}"
                 text = f"nothing in this plan {verb} {name}, which {use}"
                 place = _first_place(using)
-                shown = code == "no-publisher" and using and all(map(_is_display, using))
-                yield finding("display-empty" if shown else code, name, text, place)
+                optional = code != "no-subscriber" and using and all(map(_is_optional, using))
+                yield finding("other-end-optional" if optional else code, name, text, place)
 
 
-def _is_display(user: _User) -> bool:
-    """Return True if an rviz file names the topic: rviz2 shows what there is."""
-    return (_place(user.interface["place"])[0] or "").endswith(".rviz")
+def _is_optional(user: _User) -> bool:
+    """Return True for rviz2, which shows what there is, and for a name that a node of the library has by default: it
+    has inputs for every robot."""
+    interface = user.interface
+    by_default = _LIBRARY in interface["place"] and not interface["remapped_by"] and not interface["note"]
+    return user.program == "rviz2/rviz2" or by_default
+
+
+_LIBRARY = "/nodl/library/documents/"
 
 
 def near_names(plan: PlanDocument, document: Document) -> Iterator[PlanFinding]:
@@ -198,7 +205,7 @@ def _users(document: Document) -> _Users:
     for node in document.get("nodes", ()):
         for interface in node["interfaces"]:
             found.setdefault((interface["operation"], interface["name"]), []).append(
-                _User(node["fqn"], interface)
+                _User(node["fqn"], node["program"], interface)
             )
     return found
 
