@@ -108,9 +108,13 @@ def _bound(atom: Bound, values: Sequence[Value]) -> list[tuple[Obj | None, Seque
 
 def call_lambda(run: Machine, atom: Lambda, values: Sequence[Value], node: Node, frame: Frame) -> Value:
     """Runs the body where the lambda was made and gives what it returns; unknown when calls nest too deep."""
-    if frame.depth > MAX_DEPTH:
+    if frame.depth > MAX_DEPTH or atom.node.id in run.closures:
         if run.subtree_matters(atom.node):
-            run.gap(node, frame, "a closure is called deeper than is followed; it may make interfaces")
+            run.gap(
+                node,
+                frame,
+                "a closure calls itself, or is called deeper than is followed; it may make interfaces",
+            )
         return unknown("a recursion")
     outer = atom.frame
     inner = Frame(
@@ -127,7 +131,9 @@ def call_lambda(run: Machine, atom: Lambda, values: Sequence[Value], node: Node,
             inner, parameter.name, as_parameter(run, parameter, value, atom.node, inner), parameter.type
         )
     body = field_of(atom.node, "body")
+    run.closures.append(atom.node.id)
     outcome = run.execute(body, inner) if body is not None else NEXT
+    run.closures.pop()
     run.settle(inner.mark, inner.exits, bool(outcome & NEXT))
     inner.active = False
     given = parameters_of(declarator) if declarator is not None else []

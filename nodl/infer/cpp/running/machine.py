@@ -115,6 +115,7 @@ class Machine:
         self.dead: dict[tuple[str, int, int], str] = {}
         self.global_arguments: list[tuple[str | None, ...]] = []  # that the program gives to rclcpp::init
         self.active: list[Function] = []
+        self.closures: list[int] = []  # that run now, by their nodes
         self.left: object = None  # the last call that certainly threw, or ended the program
         self.steps = 0
         self.repeated = 0  # how many of the elements being made stand for several each
