@@ -3,7 +3,7 @@
     DIR/records/RUN.record            what was recorded, one file for each run
     DIR/PACKAGE__PROGRAM.nodl.yaml    one manifest for each node of a program, made of all records of the folder
 
-Manifests are made anew from all records each time and united with what stands in them: nothing goes away because it
+Manifests are made again from all records each time and united with what stands in them: nothing goes away because it
 was not seen this time.
 """
 

@@ -1,5 +1,5 @@
 """A new keystore, or the missing parts of one: CAs, governance, settings. The same call completes what an
-interrupted run left; what is there is never made anew.
+interrupted run left; what is there is never replaced.
 
 A new CA's certificate and key are published together (``steps.incoming_ca``).
 """
@@ -262,7 +262,7 @@ def _external_ca(role: Role, options: CreateOptions) -> CertificateFacts:
     """Raises InvalidInputError for one that cannot serve, and for the permissions CA, which signs here."""
     place = options.imported[role].certificate
     if role is not Role.IDENTITY:
-        raise InvalidInputError("only the identity CA can be somebody else's: permissions are signed here")
+        raise InvalidInputError("only the identity CA can be external: permissions are signed here")
     facts = _given(place)
     check_can_serve(facts, role, options.now or utc_now(), printable(place))
     return facts

@@ -97,7 +97,7 @@ def install(folder: Path, options: UnitOptions | None = None) -> Installed:
     Units that go are stopped; nothing is started. The target is enabled.
 
     Raises:
-        InvalidInputError: ``folder`` is not such a folder, or a unit of that name is somebody else's.
+        InvalidInputError: ``folder`` is not such a folder, or a unit of that name is not ours.
         StorageError: A file cannot be written; systemd is then not told of any.
     """
     chosen = options or UnitOptions()

@@ -1,6 +1,6 @@
 """Where the CA is: certificates for keys that were made on their hosts.
 
-``sign_requests`` issues them; ``accept_certificates`` takes those that somebody else's identity CA issued for them.
+``sign_requests`` issues them; ``accept_certificates`` takes those that another identity CA issued for them.
 """
 
 from __future__ import annotations

@@ -45,7 +45,7 @@ def create_tool_enclave(
     name: str | None = None,
     options: ProvisionOptions | None = None,
 ) -> ToolEnclave:
-    """Make it, or make it anew with a full life. ``name`` must be below ``/tools``. The keystore must exist.
+    """Create it, or renew it with its full validity. ``name`` must be below ``/tools``. The keystore must exist.
 
     Raises InvalidInputError for a tool or target that cannot be, and what provisioning raises.
     """

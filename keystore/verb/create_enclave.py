@@ -1,6 +1,6 @@
 """Create enclaves: key, certificate and permissions that grant nothing, unless --allow-all.
 
-Existing enclaves keep keys and permissions; what is missing or expired is made anew.
+Existing enclaves keep keys and permissions; what is missing or expired is created again.
 """
 
 from __future__ import annotations

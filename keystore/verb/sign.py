@@ -19,7 +19,7 @@ OPTIONS: common.Table = (
     ("requests FILE", PATH, "what secure-keystore request wrote"),
     common.REVOKE_OLD,
     ("--issued FILE", PATH,
-     "PEM certificates that somebody else's identity CA issued for the requests: take these, issue none"),
+     "PEM certificates that another identity CA issued for the requests: install these, issue none"),
     *common.PROVISIONING,
 )  # fmt: skip
 

@@ -4,7 +4,7 @@
     follow          whoever changed the keystore    the same files for what it is now
 
 The router has an identity of its own: a certificate for its host's name, which no enclave's has, and for nothing but
-serving. It is issued anew whenever its configuration changes. So whoever connects sees whether the router that runs
+serving. It is issued again whenever its configuration changes. So whoever connects sees whether the router that runs
 knows the present rules, and one that does not is restarted.
 """
 
@@ -44,7 +44,7 @@ from keystore.zenoh.files import (
 
 class ZenohReport(NamedTuple):
     """``written``: files that were not as they are now. ``gaps``: what Zenoh cannot grant, and who is shut out.
-    ``restart``: a router that runs has to be started anew to know of it."""
+    ``restart``: a router that runs has to be restarted to know of it."""
 
     keystore: Path
     router: RouterAddress
@@ -96,7 +96,7 @@ def matching_enclaves(keystore: Path | str, patterns: Sequence[str] | None) -> l
 
 
 def follow(root: Path, options: ProvisionOptions) -> list[str]:
-    """Write the files anew after a change of the keystore; return what to report of it."""
+    """Write the files again after a change of the keystore; return what to report of it."""
     report = write_zenoh(root, (), options=options)
     said = [f"the Zenoh router's configuration follows: {RESTART}"] if report.restart else []
     return [*said, *report.gaps]

@@ -79,7 +79,7 @@ def _address(digits: str, size: int) -> str:
 
 
 def _sockets_of(process: str) -> Iterator[str]:
-    with suppress(OSError):  # it has ended, or is somebody else's
+    with suppress(OSError):  # it has ended, or belongs to another user
         for each in os.scandir(f"{process}/fd"):
             with suppress(OSError):  # closed meanwhile
                 if match := _SOCKET.match(os.readlink(each.path)):
