@@ -211,7 +211,7 @@ class FunctionValue:
     """A function with what it closes over. ``owner`` is the class whose body defines it."""
 
     __slots__ = (
-        "cached", "closure", "defaults", "kw_defaults", "module", "name", "node", "owner", "shared",
+        "cached", "closure", "defaults", "kw_defaults", "module", "name", "node", "owner",
     )  # fmt: skip
 
     def __init__(
@@ -230,7 +230,6 @@ class FunctionValue:
         self.defaults: tuple[Value, ...] = ()
         self.kw_defaults: tuple[Value | None, ...] = ()
         self.cached = False  # by functools.cache
-        self.shared = False  # it stands for several, made at the same place
 
 
 class ClassValue(HeapObject):

@@ -41,7 +41,7 @@ _DATACLASSES = frozenset(
 
 
 def make_function(run: Run, node: FunctionNode, name: str, frame: Frame) -> FunctionValue:
-    """Return a ``def`` or ``lambda`` with its defaults; made again in one context it is one ``shared`` value."""
+    """Return a ``def`` or ``lambda`` with its defaults; made again in one context it is one value."""
     closure = frame.closure if frame.is_class else frame
     if not frame.is_class:
         frame.capture()
@@ -56,7 +56,6 @@ def make_function(run: Run, node: FunctionNode, name: str, frame: Frame) -> Func
     kw_defaults = tuple(
         None if default is None else run.evaluate(default, frame) for default in arguments.kw_defaults
     )
-    function.shared = known is not None
     if known is not None and known.closure is closure:  # made again in a loop: one function for all
         defaults = tuple(join(a, b) for a, b in zip(known.defaults, defaults, strict=True))
         kw_defaults = tuple(

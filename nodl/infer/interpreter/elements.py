@@ -115,7 +115,7 @@ def dictionary_item(run: Run, obj: Dictionary, key: Value, node: ast.AST, frame:
         run.spend(len(obj.cells))
         result = join(result, values_of(obj).any_element())
         everywhere = False
-    result = join(result, present(obj.cells.get(OTHER, BOTTOM)))
+    result = with_other_entries(obj, result)
     if obj.default and not everywhere:
         made = run.call(obj.default, Arguments(), node, frame)
         for atom in key:
@@ -126,6 +126,14 @@ def dictionary_item(run: Run, obj: Dictionary, key: Value, node: ast.AST, frame:
     if obj.escaped or not result:
         result = join(result, unknown("an element of a dictionary that is filled elsewhere"))
     return result
+
+
+def with_other_entries(obj: Dictionary, found: Value) -> Value:
+    """Return ``found`` or what is under keys that are not constants; of several texts nobody knows which is meant."""
+    others = present(obj.cells.get(OTHER, BOTTOM))
+    found = join(found, others)
+    several = sum(isinstance(atom, str | Text) for atom in found) > 1
+    return join(found, unknown("which entry of a dictionary is meant")) if others and several else found
 
 
 def _sequence_item(run: Run, sequence: Sequence, key: Value) -> Value:

@@ -20,6 +20,7 @@ from nodl.infer.values import (
     External,
     Instance,
     Sequence,
+    Unknown,
     Value,
     join,
     sole,
@@ -128,8 +129,10 @@ def _jump(run: Run, node: ast.Break | ast.Continue, frame: Frame) -> bool:
 
 
 def _match(run: Run, node: ast.Match, frame: Frame) -> bool:
-    """Run any of the cases, and none of them unless the last one takes everything."""
+    """Run any of the cases, or none unless the last one takes everything; a gap if the subject decides which."""
     subject = run.evaluate(node.subject, frame)
+    if not any(isinstance(atom, Unknown | External) for atom in subject):
+        run.gap(node, frame, "which case of this match statement is taken is not followed")
     last = node.cases[-1]
     everything = isinstance(last.pattern, ast.MatchAs) and last.pattern.pattern is None and last.guard is None
     sides = [partial(_case, run, case, subject, frame) for case in node.cases]
@@ -140,8 +143,7 @@ def _case(run: Run, case: ast.match_case, subject: Value, frame: Frame) -> bool:
     for part in ast.walk(case.pattern):
         name = getattr(part, "name", None) or getattr(part, "rest", None)
         if isinstance(name, str):
-            whole = part is case.pattern and isinstance(part, ast.MatchAs)
-            run.assign_name(name, subject if whole else ANY, frame)
+            run.assign_name(name, join(subject, ANY), frame)
     if case.guard is not None:
         run.evaluate(case.guard, frame)
     return run.execute(case.body, frame)

@@ -12,6 +12,7 @@ from nodl.infer.interpreter.elements import (
     keys_of,
     store_item,
     values_of,
+    with_other_entries,
 )
 from nodl.infer.interpreter.formatting import joined, str_format, text_value
 from nodl.infer.interpreter.run import Call, Run
@@ -33,7 +34,6 @@ from nodl.infer.values import (
     Value,
     join,
     join_all,
-    present,
     sole,
     unknown,
 )
@@ -170,7 +170,7 @@ def _get(run: Run, owner: Dictionary, call: Call) -> Value:
     picked = chosen_by_parameter(owner, key, call.args.at(1, "default"))
     if picked is not None:
         return picked
-    found = present(owner.cells.get(OTHER, BOTTOM))
+    found: Value = BOTTOM
     missing = False
     for atom in key:
         held, certain = owner.held(atom) if is_constant(atom) else (BOTTOM, False)
@@ -178,6 +178,7 @@ def _get(run: Run, owner: Dictionary, call: Call) -> Value:
         found = join(found, held)
         if not held and not is_constant(atom):
             found = join(found, values_of(owner).any_element())
+    found = with_other_entries(owner, found)
     if missing or owner.is_open:
         found = join(found, call.args.at(1, "default") or NONE)
     return join(found, ANY) if owner.escaped else found

@@ -181,6 +181,11 @@ OUTSIDE: dict[str, tuple[str, str, str, list[str]]] = {
         "from enum import Enum\nclass E(Enum):\n    X = 'a'\n    Y = 'b'",
         "self.P(E.X.value)\nfor e in E:\n    self.P('all/' + e.value)", "", ["?", "all/?"],
     ),
+    "a dictionary by members of an enumeration": (
+        "from enum import Enum\nclass E(Enum):\n    X = 1\n    Y = 2",
+        "self.P({E.X: 'a', E.Y: 'b'}[E.X])\nself.P({E.X: 'c', E.Y: 'd'}.get(E.X))", "", ["?", "a", "b", "c", "d"],
+    ),
+    "a dictionary by pairs": ("", "self.P({(1, 2): 'a', (1, 3): 'b', 'x': 'c'}[1, 2])", "", ["?", "a", "b", "c"]),
     "timer": ("", "self.create_timer(1.0, self.tick)", "def tick(self):\n    self.P('a')", ["a"]),
     "field set by another callback": (
         "", "self.x = 'a'\nself.create_timer(1.0, self.t1)\nself.create_timer(1.0, self.t2)",
