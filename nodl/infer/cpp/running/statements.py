@@ -24,7 +24,7 @@ from nodl.infer.cpp.running.machine import (
 from nodl.infer.cpp.running.memory import Changes
 from nodl.infer.cpp.running.references import bind_reference, elements_written
 from nodl.infer.cpp.running.static_types import element_type, seen_type
-from nodl.infer.cpp.running.values import BOTTOM, Group, Obj, Seq, Value, join, truth, unknown
+from nodl.infer.cpp.running.values import BOTTOM, Const, Group, Obj, Seq, Value, join, truth, unknown
 from nodl.infer.cpp.running.variables import member
 from nodl.infer.cpp.syntax import Node, children, field_of, parse_expression, text, unwrapped, walk
 
@@ -190,21 +190,40 @@ def preprocessor_branches(run: Machine, node: Node, frame: Frame) -> int:
 @statement("switch_statement")
 @in_a_block
 def switch_statement(run: Machine, node: Node, frame: Frame) -> int:
-    """Run any of the cases with those it falls through to, or none without a default."""
+    """Run the case that is chosen and those it falls through to; any of the cases if that is not decided."""
     condition = field_of(node, "condition")
-    run.evaluate(field_of(condition, "value") or unwrapped(condition), frame)
+    subject = run.evaluate(field_of(condition, "value") or unwrapped(condition), frame)
     cases = [c for c in children(field_of(node, "body")) if c.type == "case_statement"]
+    chosen = _chosen_case(run, node, cases, subject, frame)
     loop = _Switch(run.store.mark())
     frame.loops.append(loop)
-    sides: list[Callable[[], int]] = [partial(_falling, run, cases[at:], frame) for at in range(len(cases))]
-    if not sides or all(field_of(case, "value") is not None for case in cases):
+    starts = range(len(cases)) if chosen is None else chosen
+    sides: list[Callable[[], int]] = [partial(_falling, run, cases[at:], frame) for at in starts]
+    if not sides or (chosen is None and all(field_of(case, "value") is not None for case in cases)):
         sides.append(lambda: NEXT)
     outcome = run.branches(sides)
     frame.loops.pop()
     run.settle(loop.start, loop.breaks, bool(outcome & NEXT))
     if outcome & BREAK:
         outcome = (outcome & ~BREAK) | NEXT
+    for case in cases[: min(chosen, default=0)] if chosen is not None else ():
+        run.kill(case, frame, "the switch never takes this case")
     return outcome
+
+
+def _chosen_case(
+    run: Machine, switch: Node, cases: list[Node], subject: Value, frame: Frame
+) -> list[int] | None:
+    """Return the case of this enumerator or number, none if there is none; ``None`` if that is not decided."""
+    listed = [each for each in walk(switch) if each.type == "case_statement"]
+    default = [index for index, case in enumerate(cases) if field_of(case, "value") is None]
+    labels = [run.evaluate(field_of(case, "value"), frame) for case in cases]
+    known = [subject, *(label for index, label in enumerate(labels) if index not in default)]
+    if len(listed) != len(cases) or not all(len(v) == 1 and isinstance(v[0], Const | int) for v in known):
+        return None
+    if len({type(value[0]) for value in known}) > 1:
+        return None
+    return ([index for index, label in enumerate(labels) if label == subject] or default)[:1]
 
 
 def _falling(run: Machine, cases: list[Node], frame: Frame) -> int:
