@@ -31,7 +31,7 @@ from nodl.record.lines import EndpointMade, Line, NodeMade, RecordedRun, StateEn
 from nodl.record.manifest import manifest_file_name, manifest_text
 
 RECORDS = "records"
-_LONGEST_START = 15.0
+_LONGEST_START = 60.0
 """Seconds that a process may take from its start to its first word to rcl before nobody waits for it any more."""
 
 
