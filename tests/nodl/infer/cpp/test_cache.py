@@ -149,3 +149,18 @@ def test_a_record_that_is_not_on_the_list_is_not_kept_as_a_plain_tuple() -> None
 def test_what_is_not_an_answer_of_ours_is_refused(written: object) -> None:
     with pytest.raises(ValueError):
         decoded(written)
+
+
+def test_many_programs_in_parallel_give_what_they_give_one_after_the_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    files = {f"src/n{i}.cpp": NODE.replace("TOPIC", f'"t{i}"') for i in range(5)}
+    cmake = "".join(f"add_executable(n{i} src/n{i}.cpp)\n" for i in range(5))
+    folder = package(tmp_path / "demo", {**files, "include/names.hpp": ""}, cmake)
+    monkeypatch.setenv("XDG_CACHE_HOME", "/dev/null")
+    monkeypatch.setattr("nodl.infer.cpp.parallel._processors", lambda: 1)
+    alone = infer_paths([folder])
+    monkeypatch.setattr("nodl.infer.cpp.parallel._processors", lambda: 2)
+    monkeypatch.setattr("nodl.infer.cpp.parallel._may_fork", lambda: True)
+    assert infer_paths([folder]).nodes == alone.nodes
+    assert names(alone) == ["t0", "t1", "t2", "t3", "t4"]
