@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import random
 import shutil
 import signal
 import subprocess
@@ -42,11 +41,10 @@ class Learnt(NamedTuple):
 
 
 def environment(release: str, folder: Path, **more: str) -> dict[str, str]:
-    """A domain that nobody else uses, on loopback."""
+    """Real rclpy on loopback."""
     return {
         **os.environ,
         "RCLPY_PYTHON": str(rclpy_python(release)),
-        "ROS_DOMAIN_ID": str(random.SystemRandom().randint(100, 200)),
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
         "ROS_LOG_DIR": str(folder / "log"),
         "ROS_DISTRO": release,
@@ -186,9 +184,9 @@ def graph_of(plan: LaunchPlan) -> Graph:
 
 
 @pytest.fixture
-def live_graph(learnt: Learnt, tmp_path: Path) -> Iterator[Graph]:
+def live_graph(learnt: Learnt, tmp_path: Path, domain_id: int) -> Iterator[Graph]:
     """Of another launch file than the one that was learnt, while it runs."""
-    variables = environment(learnt.release, tmp_path)
+    variables = environment(learnt.release, tmp_path, ROS_DOMAIN_ID=str(domain_id))
     command = [sys.executable, "-m", "enclave_launch", "--prefix", str(WORKSPACE)]
     launch = subprocess.Popen(
         [*command, "rclpy_nodes", "other.launch.xml"],
@@ -199,7 +197,7 @@ def live_graph(learnt: Learnt, tmp_path: Path) -> Iterator[Graph]:
     )
     try:
         look = [str(rclpy_python(learnt.release)), str(Path(__file__).parent / "live_graph.py"), "12"]
-        seen = subprocess.run(look, env=variables, capture_output=True, text=True, check=True, timeout=90)
+        seen = subprocess.run(look, env=variables, capture_output=True, text=True, check=True, timeout=180)
         yield {
             node: {kind: {row[0] for row in rows} for kind, rows in kinds.items() if rows}
             for node, kinds in json.loads(seen.stdout.splitlines()[-1]).items()

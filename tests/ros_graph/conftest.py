@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import pytest
 
+from tests.dds.conftest import domain_id as domain_id
 from tests.recording.conftest import rclpy_python
 
 HERE = Path(__file__).parent
@@ -42,7 +43,7 @@ def prefix(tmp_path: Path) -> Path:
 
 
 @pytest.fixture
-def environment(tmp_path: Path) -> dict[str, str]:
+def environment(tmp_path: Path, domain_id: int) -> dict[str, str]:
     """Real rclpy first on the path; nothing leaves this machine, and no other test's nodes are met."""
     python = rclpy_python("jazzy")
     return {
@@ -51,7 +52,7 @@ def environment(tmp_path: Path) -> dict[str, str]:
         "PYTHONPATH": str(ROOT),
         "ROS_DISTRO": "jazzy",
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-        "ROS_DOMAIN_ID": str(30 + os.getpid() % 70),
+        "ROS_DOMAIN_ID": str(domain_id),
         "ROS_LOG_DIR": str(tmp_path / "log"),
         "PYTHONDONTWRITEBYTECODE": "1",
     }
