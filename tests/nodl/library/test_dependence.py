@@ -10,13 +10,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nodl.dependence import Situation
+from nodl.dependence import Dependence, PluginList, Situation
 from nodl.dependence.apply import applied
 from nodl.dependence.scope import Scope
 from nodl.errors import InvalidNoDLError
-from nodl.library import Library
+from nodl.library import Library, LibraryDocuments
 from nodl.library.document import read_library_document
-from nodl.node_interface import NodeInterface
+from nodl.node_interface import EndpointKind, NodeInterface
 
 WriteDocument = Callable[..., Path]
 
@@ -215,3 +215,58 @@ def test_a_value_is_never_read_as_a_reference(value: str) -> None:
 def test_not_even_one_that_looks_like_it() -> None:
     situation = Situation("jazzy", "n", "/", {"a": "$(param b)", "b": "secret"})
     assert Scope(situation, {}, {}).fill("x/$(param a)").text == "x/$(param b)"
+
+
+def names_of(package: str, program: str, parameters: dict[str, object]) -> dict[EndpointKind, list[str]]:
+    """Return what the shipped document of a program gives under parameters."""
+    hit = Library().find(package, program)
+    assert hit
+    situation = Situation("jazzy", "node", "/", parameters)
+    endpoints = applied(
+        hit.document.interface, situation, LibraryDocuments(Library(), "jazzy")
+    ).interface.endpoints
+    return {kind: [str(e.name) for e in endpoints if e.kind is kind] for kind in {e.kind for e in endpoints}}
+
+
+def test_a_command_of_joy_teleop_is_of_the_kind_that_its_type_says() -> None:
+    found = names_of(
+        "joy_teleop",
+        "joy_teleop",
+        {
+            "walk.type": "topic",
+            "walk.topic_name": "cmd_vel",
+            "torso.type": "action",
+            "torso.action_name": "up",
+            "torso.topic_name": "not_used",
+        },
+    )
+    assert found == {
+        EndpointKind.PUBLISHER: ["cmd_vel"],
+        EndpointKind.ACTION_CLIENT: ["up"],
+        EndpointKind.SUBSCRIPTION: ["joy"],
+    }
+
+
+def test_a_merger_of_scans_subscribes_to_each_word_of_its_parameter() -> None:
+    found = names_of("ira_laser_tools", "laserscan_multi_merger", {"laserscan_topics": "/front /rear"})
+    assert found[EndpointKind.SUBSCRIPTION] == ["/front", "/rear"]
+    assert EndpointKind.SUBSCRIPTION not in names_of("ira_laser_tools", "laserscan_multi_merger", {})
+
+
+def test_a_voxel_layer_has_a_switch_for_each_of_its_sources() -> None:
+    layer = LibraryDocuments(Library(), "jazzy").of_class(
+        "spatio_temporal_voxel_layer/SpatioTemporalVoxelLayer"
+    )
+    assert layer and layer.depends
+    given = {"stvl.observation_sources": "near far", "stvl.near.topic": "/points", "stvl.far.topic": ""}
+    costmap = layer._replace(depends=Dependence(plugins=(PluginList("plugins"),)))
+    situation = Situation(
+        "jazzy",
+        "local_costmap",
+        "/local_costmap",
+        {**given, "plugins": ["stvl"], "stvl.plugin": "spatio_temporal_voxel_layer/SpatioTemporalVoxelLayer"},
+    )
+    found = applied(costmap._replace(endpoints=()), situation, LibraryDocuments(Library(), "jazzy")).interface
+    assert [str(e.name) for e in found.endpoints if e.kind is EndpointKind.SUBSCRIPTION] == ["/points"]
+    services = {str(e.name) for e in found.endpoints if e.kind is EndpointKind.SERVICE_SERVER}
+    assert services == {"near/toggle_enabled", "far/toggle_enabled", "save_grid"}
