@@ -120,6 +120,9 @@ def settle(run: Run, at_end: bool = True) -> None:
     outermost = run.settle is not _no_settling
     run.settle = _no_settling
     expected: set[object] = set()
+    if at_end:
+        _expect_escaped(run, expected)
+        _call_at_any_time(run)
     for turn in range(MAX_ROUNDS):
         _expect_escaped(run, expected)
         before = run.state.version(), dict(run.callbacks)
@@ -154,18 +157,26 @@ def _call_back(run: Run, callback: object, arity: int | None, widen_texts: bool)
         made.summary = True
 
 
+def _call_at_any_time(run: Run) -> None:
+    """Call what other code may have called while the program ran: variables hold any of their values since then."""
+    for callback, since in list(run.at_any_time.items()):
+        if run.state.changed_since(since):
+            mix = functools.partial(run.state.join_seen, since, mixed=True)
+            run.state.aside(mix, _called_from_outside(run, callback, run.callbacks[callback]))
+
+
 def _expect_escaped(run: Run, expected: set[object]) -> None:
     """Expect that code which was handed a class or an object makes objects of it and calls its methods, in
     any order.
     """
-    for atom in list(run.escaped):
+    for atom, since in list(run.escaped.items()):
         if atom in expected:
             continue
         expected.add(atom)
         if isinstance(atom, ClassValue):
             run.callbacks.setdefault(atom, None)
         else:
-            expect_methods(run, (atom,))
+            expect_methods(run, (atom,), since)
 
 
 def _called_from_outside(run: Run, callback: object, arity: int | None) -> Callable[[], bool]:

@@ -25,6 +25,7 @@ from nodl.infer.values import (
     Value,
     contains,
     join,
+    mixed_with_unknown,
     widen,
 )
 
@@ -134,8 +135,29 @@ class ProgramState:
         self.forks -= 1
         return outcomes
 
-    def join_seen(self, mark: int, own: Cells | None = None) -> None:
-        """Give each cell written since ``mark`` (except in ``own``) every value it held since then."""
+    def aside(self, prepare: Callable[[], object], action: Alternative) -> None:
+        """Run ``action`` in the state that ``prepare`` makes of the present one.
+
+        Afterwards each cell holds what it held before, or what ``action`` wrote there.
+        """
+        stamp, start = self.stamp, self.mark()
+        prepare()
+        inner = self.mark()
+        self.depth += 1
+        self.forks += 1
+        action()
+        self.depth -= 1
+        self.forks -= 1
+        outcome = self.written(inner)
+        self._undo(start)
+        self.stamp = stamp
+        self._merge([outcome, {}])
+
+    def join_seen(self, mark: int, own: Cells | None = None, mixed: bool = False) -> None:
+        """Give each cell written since ``mark`` (except in ``own``) every value it held since then.
+
+        ``mixed``: which of them is meant depends on when other code runs, see ``mixed_with_unknown``.
+        """
         seen: Written = {}
         self.work += len(self._trail) - mark
         for cells, key, old in self._trail[mark:]:
@@ -148,8 +170,20 @@ class ProgramState:
             entry = (cells, key, join(entry[2], _absent(cells) if old is None else old))
             seen[place] = entry
         for cells, key, value in seen.values():
+            if mixed:
+                value = mixed_with_unknown(value)
             if value:
                 self.write(cells, key, value)
+
+    def changed_since(self, mark: int) -> bool:
+        """Return True if a cell held something since ``mark`` that it does not hold now; None does not count."""
+        return any(
+            not contains(cells.get(key, BOTTOM), atom)
+            for cells, key, old in self._trail[mark:]
+            if type(cells) is not LocalCells or not cells.dead
+            for atom in old or ()
+            if atom is not None and atom is not ABSENT[0]
+        )
 
     def settle(self, mark: int, outcomes: list[Written]) -> None:
         """Continue from ``mark`` with any of ``outcomes``."""

@@ -350,6 +350,16 @@ def sole(value: Value | None) -> object:
     return value[0] if value is not None and len(value) == 1 else ANY[0]
 
 
+def mixed_with_unknown(value: Value) -> Value:
+    """Return ``value``, with unknown beside it if there are several: nobody knows which is meant."""
+    items = value[0] if value else None
+    if isinstance(items, Items):
+        mixed = mixed_with_unknown(items.any_element())
+        return value if mixed == items.any_element() else (Items(None, mixed),)
+    several = sum(atom is not None and type(atom) not in (bool, Absent, Unknown) for atom in value) > 1
+    return join(value, unknown("a variable that changes while other code runs")) if several else value
+
+
 def widen(old: Value, new: Value, texts_too: bool) -> Value:
     """Join for the head of a loop: counting numbers become unknown at once, growing texts a pattern."""
     if any(type(atom) is Unknown for atom in old):  # it may be any number or text already

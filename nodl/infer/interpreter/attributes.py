@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 
 from nodl.infer.interpreter import imports
-from nodl.infer.interpreter.define import is_enumeration, linearized, program_classes
+from nodl.infer.interpreter.define import enumeration_member, is_enumeration, linearized, program_classes
 from nodl.infer.interpreter.run import Arguments, AttributeReader, Frame, Run
 from nodl.infer.models import foreign
 from nodl.infer.text import Text
@@ -118,8 +118,8 @@ def _of_class(run: Run, cls: ClassValue, name: str, node: ast.AST, frame: Frame)
             value = base.cells.get(name)
             if value is None:
                 continue
-            if is_enumeration(cls) and not isinstance(value[0], FunctionValue | ClassMethod):
-                return unknown(f"the member {name} of an enumeration")
+            if is_enumeration(cls) and not isinstance(value[0], FunctionValue | ClassMethod | PropertyValue):
+                return (enumeration_member(run, base, name),)
             result: Value = BOTTOM
             for atom in value:
                 found: Value = (atom,)

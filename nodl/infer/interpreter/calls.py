@@ -56,10 +56,12 @@ def call_function(run: Run, function: FunctionValue, call: Call) -> Value:
     run.understood.add(call.node)
     if node in run.stack:
         return _recursive(run, function, cells, call)
+    mark = run.state.mark()
     result = _remembered(run, function, cells, call)
-    if is_generator(function):  # its body may run again when somebody asks for the next value
+    if is_generator(function):  # its body may go on at any time, when somebody asks for the next value
         later = Partial((function,), tuple(call.args.positional), tuple(call.args.keywords.items()))
-        run.register_callback((later,), 0)
+        run.register_callback((later,), 0, mark)
+        run.state.join_seen(mark, mixed=True)
         result = run.sequence(call.node, "generator", Items(None, join(result, LATER)))
     return join(result, EARLIER) if function.cached else result
 
@@ -160,7 +162,7 @@ def _run_body(run: Run, function: FunctionValue, cells: LocalCells, call: Call) 
     else:
         passes = run.execute(node.body, frame)
         if frame.early:
-            _settle(run, node, frame, passes)
+            _settle(run, frame, passes)
         if passes:
             frame.returned = join(frame.returned, NONE)
     if cells.shared:
@@ -174,16 +176,13 @@ def _run_body(run: Run, function: FunctionValue, cells: LocalCells, call: Call) 
     return frame.returned  # nothing, if no path comes back
 
 
-def _settle(run: Run, node: ast.AST, frame: Frame, passes: bool) -> None:
-    """Some path left early: go on with what each return and the end leave, where no handler can run in between."""
+def _settle(run: Run, frame: Frame, passes: bool) -> None:
+    """Some path left early: go on with what each return and the end leave."""
     ends = [*frame.exits, run.state.written(frame.mark)] if passes else frame.exits
-    if ends and not any(isinstance(inner, _RUNS_MORE) for inner in ast.walk(node)):
+    if ends and not frame.runs_more:
         run.state.settle(frame.mark, ends)
     else:
         run.state.join_seen(frame.mark, None if frame.captured else frame.cells)
-
-
-_RUNS_MORE = (ast.Try, ast.With, ast.AsyncWith, ast.Yield, ast.YieldFrom)
 
 
 def call_bound(run: Run, method: BoundMethod, call: Call) -> Value:
@@ -314,10 +313,10 @@ def _expect_operators(run: Run, cls: ClassValue, instance: Instance) -> None:
                 and name.endswith("__")
                 and name not in _FOLLOWED
             ):
-                run.register_callback(methods_in(value, instance, cls), None)
+                run.register_callback(methods_in(value, instance, cls), None, run.state.mark())
 
 
-def _expect_callbacks(run: Run, cls: ClassValue, instance: object) -> None:
+def _expect_callbacks(run: Run, cls: ClassValue, instance: Instance) -> None:
     """Expect a foreign base class to call the methods that override its own; which ones, only its model knows."""
     seen: set[object] = set()
     hooks = [foreign.hooks_of(base) for base in foreign_bases(cls)]
@@ -334,4 +333,5 @@ def _expect_callbacks(run: Run, cls: ClassValue, instance: object) -> None:
                 and (every or name in wanted)
             ):
                 seen.add(name)
-                run.register_callback(methods_in(value, instance, cls), None)
+                since = None if instance.node else run.state.mark()
+                run.register_callback(methods_in(value, instance, cls), None, since)

@@ -10,6 +10,7 @@ import operator
 from collections.abc import Callable
 from typing import Any
 
+from nodl.infer.interpreter.define import is_enumeration
 from nodl.infer.interpreter.run import Frame, Run
 from nodl.infer.text import Input, Piece, Text, TextAtom, input_of, make_text, pieces_of
 from nodl.infer.values import (
@@ -168,7 +169,7 @@ def _only_reads(node: ast.expr) -> bool:
 
 
 def narrowed(run: Run, test: ast.expr, outcome: bool, frame: Frame) -> None:
-    """Drop from a variable or field of ``self`` that is tested by itself what the outcome excludes."""
+    """Drop from a variable or field of ``self`` that is tested, or compared, what the outcome excludes."""
     if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not):
         narrowed(run, test.operand, not outcome, frame)
     elif isinstance(test, ast.BoolOp) and isinstance(test.op, ast.And) == outcome:
@@ -176,6 +177,13 @@ def narrowed(run: Run, test: ast.expr, outcome: bool, frame: Frame) -> None:
             narrowed(run, part, outcome, frame)
     cells: dict[object, Value] = {}
     key: object = None
+    holds: Callable[[object], bool | None] = truth_of
+    if isinstance(test, ast.Compare) and isinstance(
+        test.comparators[0], ast.Constant | ast.Name | ast.Attribute
+    ):
+        op, other = test.ops[0], run.evaluate(test.comparators[0], frame)
+        if len(test.ops) == 1:
+            test, holds = test.left, lambda atom: compare_values(op, (atom,), other)
     if isinstance(test, ast.Name):
         cells, key = frame.cells, test.id
     elif isinstance(test, ast.Attribute) and isinstance(test.value, ast.Name):
@@ -183,7 +191,7 @@ def narrowed(run: Run, test: ast.expr, outcome: bool, frame: Frame) -> None:
         if len(owner) == 1 and isinstance(owner[0], Instance) and not owner[0].summary:
             cells, key = owner[0].cells, test.attr
     value = cells.get(key, ())
-    kept = tuple(atom for atom in value if truth_of(atom) in (outcome, None))
+    kept = tuple(atom for atom in value if holds(atom) in (outcome, None))
     if kept and len(kept) < len(value):
         run.state.write(cells, key, kept)
 
@@ -229,16 +237,38 @@ def compare_values(op: ast.cmpop, left: Value, right: Value) -> bool | None:
 
 def _compare_atoms(op: ast.cmpop, left: object, right: object) -> bool | None:
     if isinstance(op, ast.In | ast.NotIn):
-        return None
+        found = _is_among(left, right)
+        return None if found is None else found is isinstance(op, ast.In)
     if isinstance(left, CONSTANTS) and isinstance(right, CONSTANTS):
         return _compare_constants(op, left, right)
     if not isinstance(op, ast.Is | ast.IsNot | ast.Eq | ast.NotEq):
         return None
     same = isinstance(op, ast.Is | ast.Eq)
+    if isinstance(left, Instance) and isinstance(right, Instance) and left.cls is right.cls:
+        members = (
+            isinstance(left.cls, ClassValue) and is_enumeration(left.cls) and "__eq__" not in left.cls.cells
+        )
+        return (left is right) is same if members else None
     if left is None or right is None:
         other = right if left is None else left
         own = isinstance(other, Instance) and isinstance(op, ast.Eq | ast.NotEq)
         return not same if isinstance(other, _NEVER_NONE) and not own else None
+    return None
+
+
+def _is_among(constant: object, container: object) -> bool | None:
+    """Return whether a constant is in a text, or in a sequence or dictionary of constants."""
+    if not isinstance(constant, CONSTANTS):
+        return None
+    if isinstance(constant, str) and isinstance(container, str):
+        return constant in container
+    if isinstance(container, Sequence) and container.items.exact is not None and not container.escaped:
+        known = [item[0] for item in container.items.exact if len(item) == 1]
+        certain = len(known) == len(container.items.exact) and all(isinstance(k, CONSTANTS) for k in known)
+        return constant in known if certain else None
+    if isinstance(container, Dictionary) and not container.is_open and not container.default:
+        held, certain = container.held(constant)
+        return True if certain else None if held or container.summary else False
     return None
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 
 from nodl.infer.interpreter.conditions import is_plain_parameter, only_if
-from nodl.infer.interpreter.define import is_constant, is_enumeration
+from nodl.infer.interpreter.define import enumeration_members, is_constant, is_enumeration
 from nodl.infer.interpreter.run import Arguments, Frame, Run
 from nodl.infer.text import Input, Text, input_of, make_text
 from nodl.infer.values import (
@@ -119,7 +119,7 @@ def dictionary_item(run: Run, obj: Dictionary, key: Value, node: ast.AST, frame:
     if obj.default and not everywhere:
         made = run.call(obj.default, Arguments(), node, frame)
         for atom in key:
-            if isinstance(atom, str | int):
+            if is_constant(atom):
                 old = obj.held(atom)[0]
                 run.state.write(obj.cells, Key(atom), join(old, made))
         result = join(result, made)
@@ -188,6 +188,8 @@ def _elements_of(run: Run, atom: object, node: ast.AST, frame: Frame) -> Items:
         return Items(tuple((character,) for character in atom)) if len(atom) <= 256 else Items(None, ANY)
     if isinstance(atom, Text):
         return Items(None, _input_items(atom))
+    if isinstance(atom, ClassValue) and is_enumeration(atom):
+        return Items(tuple((member,) for member in enumeration_members(run, atom)))
     return Items(None, (atom,) if isinstance(atom, Unknown) else ANY)
 
 
@@ -239,6 +241,8 @@ def assign(run: Run, target: ast.expr, value: Value, frame: Frame) -> None:
 def store_attribute(run: Run, owners: Value, name: str, value: Value, node: ast.AST, frame: Frame) -> None:
     """Run ``owner.name = value``."""
     certain = len(owners) == 1
+    if name.startswith("__") and name.endswith("__") and name not in _DESCRIBING:
+        run.gap(node, frame, f"{name} is set; what Python then does otherwise is not followed")
     for owner in owners:
         if isinstance(owner, (Instance, ClassValue, ModuleValue)):
             kept = BOTTOM if certain else owner.cells.get(name, BOTTOM)
@@ -249,6 +253,7 @@ def store_attribute(run: Run, owners: Value, name: str, value: Value, node: ast.
                 _patched(run, owner, name, node, frame)
 
 
+_DESCRIBING = frozenset({"__name__", "__qualname__", "__doc__", "__module__", "__version__", "__wrapped__"})
 _UNMODELLED = frozenset({"unittest", "pytest", "tkinter"})  # whose objects hold attributes of the program
 
 
@@ -268,7 +273,7 @@ def store_item(run: Run, obj: Dictionary, key: Value, value: Value) -> None:
             del obj.cells[cell]  # it comes last again; undone, it is as absent as before
         run.state.store(obj, cell, value)
         return
-    known = [atom for atom in key if isinstance(atom, str | int)]
+    known = [atom for atom in key if is_constant(atom)]
     for atom in known:
         cell = Key(atom)
         run.state.write(obj.cells, cell, join(obj.cells.get(cell, ABSENT), value))
@@ -394,7 +399,7 @@ def _delete_item(run: Run, owner: object, key: Value, certain: bool) -> None:
         _edited(run, owner, BOTTOM)
     elif isinstance(owner, Dictionary):
         strong = certain and len(key) == 1 and not owner.summary
-        if strong and isinstance(key[0], str | int | float | bool | type(None)):
+        if strong and is_constant(key[0]):
             run.state.write(owner.cells, Key(key[0]), ABSENT)
 
 

@@ -125,12 +125,15 @@ def _while(run: Run, node: ast.While, frame: Frame) -> _Turns:
 
     def turn() -> bool:
         nonlocal broken
+        narrowed(run, node.test, True, frame)
         passes = run.execute(node.body, frame)
         broken = broken or frame.unsettled
         run.evaluate(node.test, frame)
         return passes
 
     fixpoint(run, frame, turn)
+    if not _breaks(node):
+        narrowed(run, node.test, False, frame)
     endless = isinstance(node.test, ast.Constant)  # only break, return or an exception leaves ``while True``
     return _Turns(broken or not endless, not endless, _breaks(node))
 

@@ -51,7 +51,8 @@ class Frame:
 
     __slots__ = (
         "again", "cells", "closure", "depth", "early", "entry", "exits", "forks", "function", "globals", "is_class",
-        "is_comprehension", "jump", "loop_forks", "mark", "module", "nonlocals", "returned", "unsettled", "yielded",
+        "is_comprehension", "jump", "loop_forks", "mark", "module", "nonlocals", "returned", "runs_more", "trying",
+        "unsettled", "yielded",
     )  # fmt: skip
 
     def __init__(self, module: ModuleValue, cells: dict[object, Value], closure: Frame | None, depth: int):
@@ -66,6 +67,10 @@ class Frame:
         self.early = False  # some path left before the end
         self.mark = 0  # of the state, when the frame was entered
         self.exits: list[Written] = []  # what was written since, at each return that leaves early
+        self.trying = 0  # statements around that may go on after a return: ``try``
+        self.runs_more = (
+            False  # something unknown may run after a return, or between two values of a generator
+        )
         self.unsettled = False  # a break or continue that may have happened, since the loop asked last
         self.jump = ""  # the break or continue that certainly ended the latest statement
         self.forks = 0  # undecided branches when the frame was entered, and when its innermost loop was
@@ -192,9 +197,13 @@ class Run(Allocations):
         self.modules: dict[str, ModuleValue] = {}
         self.foreign_attributes: dict[tuple[str, str], Value] = {}  # of libraries, by path and name
         self.at: tuple[ast.AST, Frame] | None = None  # the latest call of the program
-        self.escaped: dict[ClassValue | Instance, None] = {}  # handed to code that is not analysed
+        # Handed to code that is not analysed, with the mark of the state then.
+        self.escaped: dict[ClassValue | Instance, int] = {}
         self.handed: dict[Instance, SourceRef] = {}  # objects that code which is not analysed got, and where
         self.callbacks: dict[object, int | None] = {}  # callable -> number of arguments, if known
+        self.at_any_time: dict[
+            object, int
+        ] = {}  # those that do not wait for a spin, with the mark of the state then
         self.called: dict[ast.AST, None] = {}  # functions analysed so far
         self.instantiated: dict[ast.AST, None] = {}  # classes of which an object was made
         self.with_metaclass: set[ast.AST] = set()
@@ -208,6 +217,7 @@ class Run(Allocations):
         self.stack: list[ast.AST] = []
         self.classes: dict[ast.AST, ClassValue] = {}
         self.functions: dict[tuple[object, ...], FunctionValue] = {}
+        self.members: dict[tuple[ClassValue, str], Instance] = {}  # of enumerations
         self.recursions: dict[ast.AST, Any] = {}  # functions that are calling themselves
         self.options = OptionDefaults()
         self.settle: Callable[[Run], None] = lambda run: None  # runs the callbacks; set by who drives the run
@@ -313,10 +323,15 @@ class Run(Allocations):
 
     # --- the world outside ------------------------------------------------------------------------------
 
-    def register_callback(self, value: Value, arity: int | None) -> None:
-        """Register ``value``: code that is not analysed may call it, with ``arity`` arguments (``None``: any)."""
+    def register_callback(self, value: Value, arity: int | None, since: int | None = None) -> None:
+        """Register ``value``: code that is not analysed may call it, with ``arity`` arguments (``None``: any).
+
+        ``since``: it does so at any time since this mark of the state, and not only where the program waits.
+        """
         for atom in value:
             if isinstance(atom, FunctionValue | BoundMethod | Partial | ClassMethod):
+                if since is not None:
+                    self.at_any_time.setdefault(atom, since)
                 if atom not in self.callbacks:
                     self.callbacks[atom] = arity
                 elif self.callbacks[atom] != arity:
@@ -341,7 +356,7 @@ class Run(Allocations):
             if isinstance(atom, (Sequence, Dictionary)):
                 self._escape_container(atom, opened, objects, depth)
             elif kind in _FUNCTIONS:
-                self.register_callback((atom,), None)
+                self.register_callback((atom,), None, self.state.mark())
             elif isinstance(atom, (ClassValue, Instance)):
                 if objects:
                     self.escape_object(atom, trusted=not opened)
@@ -365,7 +380,7 @@ class Run(Allocations):
         if isinstance(atom, Instance) and not (of_program and (atom.node is None or trusted)):
             return
         if atom not in self.escaped:
-            self.escaped[atom] = None
+            self.escaped[atom] = self.state.mark()
             self.state.learned += 1
 
     def _escape_container(self, obj: Sequence | Dictionary, opened: bool, objects: bool, depth: int) -> None:

@@ -98,7 +98,7 @@ def _return(run: Run, node: ast.Return, frame: Frame) -> bool:
     value = NONE if node.value is None else run.evaluate(node.value, frame)
     frame.returned = join(frame.returned, value)
     _leave(run, frame)
-    if frame.early:
+    if frame.early or frame.trying:
         frame.exits.append(run.state.written(frame.mark))
     return False
 
@@ -177,11 +177,12 @@ def _delete(run: Run, node: ast.Delete, frame: Frame) -> bool:
 
 def run_try(run: Run, node: Any, frame: Frame) -> bool:
     """Run each handler after any part of the body; it sees every value written on the way."""
-    mark, returned = run.state.mark(), frame.returned
+    mark, returned, exits = run.state.mark(), frame.returned, len(frame.exits)
     early, unsettled = frame.early, frame.unsettled
     frame.early = frame.unsettled = False
     without_value = any(map(_catches_no_value, node.handlers))
     run.state.depth += 1
+    frame.trying += 1
     run.without_value += without_value
     passes = run.execute(node.body, frame)
     run.without_value -= without_value
@@ -190,6 +191,7 @@ def run_try(run: Run, node: Any, frame: Frame) -> bool:
         passes = run.execute(node.orelse, frame)
     if node.handlers and not all(_cannot_fail(statement) for statement in node.body):
         passes = _perhaps_handled(run, node.handlers, passes, mark, frame)
+    frame.trying -= 1
     left = frame.early or frame.unsettled or not passes
     frame.early, frame.unsettled = frame.early or early, frame.unsettled or unsettled
     if not node.finalbody:
@@ -198,13 +200,41 @@ def run_try(run: Run, node: Any, frame: Frame) -> bool:
     frame.returned = (
         returned  # where ``finally`` returns itself, what the statement returned is replaced by that
     )
+    done = True
     if left:
-        run.state.join_seen(mark)
-    done = run.execute(node.finalbody, frame)
+        done = _finally_left(run, node.finalbody, mark, exits, passes, frame)
+    if passes and done:
+        done = run.execute(node.finalbody, frame)
     if done:
         frame.returned = join(within, frame.returned)
         frame.jump = frame.jump if passes else jump
     return done and passes
+
+
+def _finally_left(run: Run, body: list[ast.stmt], mark: int, exits: int, passes: bool, frame: Frame) -> bool:
+    """Run ``finally`` for the paths that left the statement; return False if control cannot reach its end.
+
+    ``passes``: others did not leave it, and go on from the present state.
+    """
+    done = True
+
+    def left() -> bool:
+        nonlocal done
+        before = len(frame.exits)
+        run.state.join_seen(mark)
+        start = run.state.mark()
+        done = run.execute(body, frame)
+        written = run.state.written(start)
+        frame.exits[exits:before] = (
+            [{**each, **written} for each in frame.exits[exits:before]] if done else []
+        )
+        return False
+
+    if passes:
+        run.state.branches((left,))
+    else:
+        left()
+    return done
 
 
 def _catches_no_value(handler: ast.ExceptHandler) -> bool:
@@ -264,7 +294,7 @@ def run_with(run: Run, node: ast.With | ast.AsyncWith, frame: Frame) -> bool:
     run.state.depth -= 1
     if not all(isinstance(atom, External) and run.tables.lets_through(atom.path) for atom in managers):
         run.state.join_seen(mark)  # after any part of the body
-        passes = True
+        passes = frame.runs_more = True
     for atom in reversed(managers):
         if isinstance(atom, Instance) and isinstance(atom.cls, ClassValue):
             leave = run.attribute((atom,), "__exit__", node, frame)

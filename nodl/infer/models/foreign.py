@@ -219,7 +219,7 @@ def call_foreign_method(run: Run, method: ForeignMethod, call: Call) -> Value:
             record.gaps.setdefault((call.source, why))
         return ros.NODE_METHODS[name](run, record, call)
     if name in COMMON_CALLBACKS:
-        ros.register(run, COMMON_CALLBACKS[name], call)
+        ros.register(run, COMMON_CALLBACKS[name], call, at_any_time=True)
         return ANY
     _escape_to(run, path, call)
     return unknown(f"the result of {path.rpartition('.')[2] or 'an unknown class'}.{name}()")
@@ -262,7 +262,7 @@ def call_native(run: Run, method: NativeMethod, call: Call) -> Value:
     receiver, name = method.receiver, method.name
     if isinstance(receiver, Unknown):
         if name in COMMON_CALLBACKS:
-            ros.register(run, COMMON_CALLBACKS[name], call)
+            ros.register(run, COMMON_CALLBACKS[name], call, at_any_time=True)
             return ANY
         if len(call.args.positional) + len(call.args.keywords) >= 2:
             record = ros.records_of(run, (receiver,), call)[0]

@@ -16,7 +16,7 @@ from nodl.infer.interpreter.elements import (
 )
 from nodl.infer.interpreter.formatting import joined, str_format, text_value
 from nodl.infer.interpreter.run import Call, Run
-from nodl.infer.models.stdlib import store_pairs
+from nodl.infer.models.stdlib import call_each, store_pairs
 from nodl.infer.text import MAX_LENGTH, Text, TextAtom, edited, input_of, with_edit
 from nodl.infer.values import (
     ABSENT,
@@ -148,7 +148,7 @@ def _copy_sequence(run: Run, owner: Sequence, call: Call) -> Value:
 
 def _edited(run: Run, owner: Sequence, call: Call) -> Value:
     """Handle ``insert``, ``remove``, ``sort`` ...: what is left, in which order, is not known."""
-    run.register_callback(call.args.keywords.get("key", BOTTOM), 1)
+    call_each(run, call.args.keywords.get("key", NONE), owner.items.any_element(), call)
     return _changed(run, owner, join_all(call.args.positional), edited=True)
 
 
@@ -218,7 +218,7 @@ def _update(run: Run, owner: Dictionary, call: Call) -> Value:
 def _pop_item(run: Run, owner: Dictionary, call: Call) -> Value:
     found = _get(run, owner, call)
     key = sole(call.args.at(0))
-    if isinstance(key, str | int | float | bool | type(None)) and not owner.summary:
+    if is_constant(key) and not owner.summary:
         run.state.write(owner.cells, Key(key), ABSENT)
     return found
 

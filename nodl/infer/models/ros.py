@@ -216,9 +216,10 @@ def add_endpoints(run: Run, made: EndpointCall, records: list[NodeRecord], call:
         register(run, callback, call)
 
 
-def register(run: Run, callback: CallbackArgument, call: Call) -> None:
+def register(run: Run, callback: CallbackArgument, call: Call, at_any_time: bool = False) -> None:
     """Register the callback that is given to the call, if one is."""
-    run.register_callback(argument(call, callback.argument) or BOTTOM, callback.arity)
+    since = run.state.mark() if at_any_time else None
+    run.register_callback(argument(call, callback.argument) or BOTTOM, callback.arity, since)
 
 
 def names_of(value: Value) -> list[object]:

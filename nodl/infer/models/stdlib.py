@@ -112,8 +112,13 @@ def _enumerate(run: Run, call: Call) -> Value:
 def _some(run: Run, call: Call) -> Value:
     """Model ``sorted``, ``reversed``, ``set``: a list of any of the elements, in any order."""
     element = _items(run, call).any_element()
-    run.register_callback(call.args.keywords.get("key", BOTTOM), 1)
+    call_each(run, call.args.keywords.get("key", NONE), element, call)
     return run.sequence(call.node, "list", Items(None, element))
+
+
+def call_each(run: Run, function: Value, element: Value, call: Call) -> None:
+    """Call ``function`` for any of the elements, of which there may be none."""
+    run.state.perhaps(lambda: run.call(function, Arguments([element or ANY]), call.node, call.frame))
 
 
 def _set(run: Run, call: Call) -> Value:
@@ -131,14 +136,15 @@ def _map(run: Run, call: Call) -> Value:
 def _filter(run: Run, call: Call) -> Value:
     """Return any of the elements; the function is called for each."""
     element = _items(run, call, 1).any_element()
-    run.register_callback(call.args.at(0) or NONE, 1)
+    call_each(run, call.args.at(0) or NONE, element, call)
     return run.sequence(call.node, "list", Items(None, element))
 
 
 def _extreme(run: Run, call: Call) -> Value:
     """Model ``min``, ``max``: one of the elements, nobody knows which."""
-    run.register_callback(call.args.keywords.get("key", BOTTOM), 1)
-    return join(chosen(run, call), ANY)
+    found = chosen(run, call)
+    call_each(run, call.args.keywords.get("key", NONE), found, call)
+    return join(found, ANY)
 
 
 def _dict(run: Run, call: Call) -> Value:
@@ -375,9 +381,9 @@ def _register_with(run: Run, target: Value, args: Value | None, kwargs: Value | 
                     keywords.append((cell.constant, value))
     items = Items(()) if args is None else elements(run, args, call.node, call.frame)
     if items.exact is None:
-        run.register_callback(target, None)
+        run.register_callback(target, None, run.state.mark())
     elif target != NONE:
-        run.register_callback((Partial(target, items.exact, tuple(keywords)),), 0)
+        run.register_callback((Partial(target, items.exact, tuple(keywords)),), 0, run.state.mark())
 
 
 def _lock(run: Run, call: Call) -> Value:

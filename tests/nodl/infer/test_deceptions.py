@@ -148,6 +148,7 @@ UNDECIDED = {
     "control_flow: any and all decide": {"/every"},
     "data_model: __bool__ decides": {"/on"},
     "data_model: __eq__ decides": {"/different"},
+    "data_model: members of an Enum that equal what they like": {"/other"},
     "language: a truth that counts": {"/empty2", "/full"},
     "records: a namedtuple is a tuple": {"/is_not"},
     "records: a text that is equal to nothing": {"/equal"},
