@@ -270,3 +270,16 @@ def test_a_voxel_layer_has_a_switch_for_each_of_its_sources() -> None:
     assert [str(e.name) for e in found.endpoints if e.kind is EndpointKind.SUBSCRIPTION] == ["/points"]
     services = {str(e.name) for e in found.endpoints if e.kind is EndpointKind.SERVICE_SERVER}
     assert services == {"near/toggle_enabled", "far/toggle_enabled", "save_grid"}
+
+
+def test_a_camera_of_orbbec_publishes_the_streams_that_are_enabled() -> None:
+    def published(**parameters: object) -> set[str]:
+        return set(names_of("orbbec_camera", "orbbec_camera_node", dict(parameters))[EndpointKind.PUBLISHER])
+
+    assert {"depth/image_raw", "/tf_static"} <= published()
+    assert "color/image_raw" not in published()
+    given = published(
+        enable_color=True, enable_depth=False, enable_sync_output_accel_gyro=True, enable_gyro=True
+    )
+    assert {"color/image_raw", "gyro_accel/sample", "accel/imu_info"} <= given
+    assert not {"depth/image_raw", "gyro/sample", "depth_to_color"} & given
