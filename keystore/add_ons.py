@@ -1,8 +1,4 @@
-"""Zenoh, an add-on: everything that the rest of the keystore calls of it.
-
-DDS enforces permissions in each process; on Zenoh a router does, whose files stand in the keystore and follow from what
-is signed. A keystore without these files never needs ``keystore.zenoh``.
-"""
+"""Zenoh, an add-on: everything that the rest of the keystore calls of it."""
 
 from __future__ import annotations
 

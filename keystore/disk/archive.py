@@ -51,11 +51,7 @@ def read_bundle(bundle: Path) -> dict[str, bytes]:
 
 
 def read_archive(content: bytes, place: str) -> dict[str, bytes]:
-    """Return name -> bytes of each regular file.
-
-    All names and sizes are checked before the content of any file is taken. Raises DamagedKeystoreError for what is cut
-    off, names a file twice, or holds anything but plain files and directories.
-    """
+    """Return name -> bytes of each regular file; names and sizes are checked first. Raises DamagedKeystoreError."""
     try:
         with tarfile.open(fileobj=io.BytesIO(content), mode="r:") as archive:
             entries = _plain_files(archive, len(content), place)

@@ -14,10 +14,7 @@ from keystore.signing.public_key import fingerprint
 
 
 def deployed_manifest(view: KeystoreView) -> Manifest | None:
-    """Return the manifest of an imported keystore, signed by its permissions CA; None where nothing was imported.
-
-    Raises DamagedKeystoreError.
-    """
+    """Return the signed manifest of an imported keystore, None without an import. Raises DamagedKeystoreError."""
     signed = safe_files.read_if_there(view.root, layout.BUNDLE)
     if signed is None:
         return None
@@ -30,10 +27,7 @@ def deployed_manifest(view: KeystoreView) -> Manifest | None:
 def differing_files(
     view: KeystoreView, manifest: Manifest, enclaves: Iterable[str] | None = None
 ) -> Iterator[tuple[str, str]]:
-    """Yield each file that is not as the manifest has it, and what is wrong with it.
-
-    ``enclaves``: look only at what these read; None for all.
-    """
+    """Yield each file that is not as the manifest has it, and why; of those that ``enclaves`` read, if given."""
     chosen = manifest.names if enclaves is None else [name for name in enclaves if name in manifest.names]
     has_key = {one.enclave: one.has_key for one in manifest.enclaves}
     wanted = layout.bundle_files(((name, has_key[name]) for name in chosen), crl=True, handover=True)

@@ -27,10 +27,7 @@ _POLL = 0.02
 
 @contextmanager
 def exclusive(root: Path, timeout: float = DEFAULT_TIMEOUT) -> Iterator[None]:
-    """Hold the keystore's lock; raises KeystoreBusyError with the holder after ``timeout`` seconds.
-
-    ``root`` must exist. Raises StorageError when the lock cannot be opened (read-only, no permission).
-    """
+    """Hold the lock of ``root``; raises KeystoreBusyError after ``timeout`` seconds, StorageError where none can be."""
     deadline = time.monotonic() + timeout
     while (descriptor := _locked(root, timeout, deadline)) is None:
         continue
@@ -99,10 +96,7 @@ def _busy(descriptor: int, root: Path, timeout: float) -> KeystoreBusyError:
 
 
 def _sign_in(descriptor: int) -> None:
-    """Write the program's name, never its arguments.
-
-    Best effort: a full disk must not keep anyone from reading.
-    """
+    """Write the program's name, never its arguments; best effort: a full disk must not keep anyone from reading."""
     program = os.path.basename(sys.argv[0] if sys.argv else "python")
     text = f"{program} (pid {os.getpid()} on {socket.gethostname()}) since {iso(utc_now())}\n"
     try:

@@ -17,12 +17,7 @@ _parsed = lru_cache(maxsize=2)(parse_register)
 
 
 def read_register(root: Path) -> Register | None:
-    """Read the register; None if there is none: a bundle without ``private/``, a keystore of SROS2 or of an earlier
-    version.
-
-    Raises DamagedKeystoreError for what is not a register, UnsafeKeystoreError for one that others could have
-    written.
-    """
+    """Read the register, None without one. Raises DamagedKeystoreError, UnsafeKeystoreError if others can write it."""
     if not os.path.lexists(f"{root}/{layout.REGISTER}"):
         return None
     text = safe_files.read_private(root, layout.REGISTER)

@@ -1,8 +1,4 @@
-"""Reading a keystore without being led out of it, and refusing one that others could have changed.
-
-Used by everything that reads; ``keystore.disk.store`` is the only module that writes. Errors say what is wrong and
-which command repairs it.
-"""
+"""Reading a keystore without being led out of it, and refusing one that others could have changed."""
 
 from __future__ import annotations
 
@@ -35,10 +31,7 @@ def resolve_root(keystore: Path | str) -> Path:
 
 
 def read(root: Path, relative: str) -> bytes:
-    """Read a keystore file.
-
-    Raises DamagedKeystoreError if it is missing, UnsafeKeystoreError for a strange link, StorageError otherwise.
-    """
+    """Read a file. Raises DamagedKeystoreError if it is missing, UnsafeKeystoreError for a link, StorageError."""
     try:
         return _read(root, relative)
     except FileNotFoundError:
@@ -137,9 +130,7 @@ def refuse_unsafe_private(root: Path, relative: str) -> None:
 
 
 def refuse_unsafe_private_directories(root: Path) -> None:
-    """Refuse ``private/`` if somebody else may add to it: what waits there becomes a CA, what is retired there is
-    trusted.
-    """
+    """Refuse ``private/`` if somebody else may add to it: what waits there becomes a CA."""
     for relative in (layout.PRIVATE, *layout.PRIVATE_FOLDERS):
         path = root / relative
         if not os.path.lexists(path):

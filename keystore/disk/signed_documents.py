@@ -30,10 +30,7 @@ def signed_governance(view: KeystoreView) -> smime.SignedDocument:
 
 
 def governance_domains(view: KeystoreView) -> Domains:
-    """Returns the domains that the governance lists; raises DamagedKeystoreError when there are none.
-
-    Of a governance that has to be signed again, too.
-    """
+    """Return the domains that the governance lists; raises DamagedKeystoreError if there are none."""
     place = printable(view.root / layout.GOVERNANCE)
     return _listed_domains(
         smime.read_any(safe_files.read(view.root, layout.GOVERNANCE), place).document, view
@@ -63,10 +60,7 @@ def governance_stands(view: KeystoreView, domains: Domains | None, register: Reg
 
 
 def trusted_document(view: KeystoreView, relative: str) -> bytes:
-    """Returns the XML inside a ``.p7s``; raises DamagedKeystoreError when none of this keystore's CAs signed it.
-
-    It is to be signed again, or compared with the register: the file may have another form than ours.
-    """
+    """Return the XML inside a ``.p7s`` of any form; raises DamagedKeystoreError if none of our CAs signed it."""
     place = printable(view.root / relative)
     signed = smime.read_any(safe_files.read(view.root, relative), place)
     smime.check(signed, list(own_permissions_cas(view)), place)

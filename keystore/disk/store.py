@@ -197,7 +197,7 @@ class Batch:
         self._moves.append((place, target))
 
     def _place(self) -> str:
-        """Return a name in the staging area; text, not ``Path``, because there are thousands."""
+        # Text, not ``Path``: there are thousands.
         if not self._moves:
             os.mkdir(self._staging, 0o700)
         return f"{self._staging}/{len(self._moves)}"

@@ -39,9 +39,7 @@ _OWN_ENTRIES = frozenset({
 
 
 def keystore_at(keystore: Path | str) -> KeystoreView:
-    """Open the keystore at that path, links resolved; raises NotAKeystoreError for what is none, or not a complete
-    one.
-    """
+    """Open the keystore at that path, links resolved; raises NotAKeystoreError unless it is a complete one."""
     view = KeystoreView(safe_files.resolve_root(keystore))
     view.require_complete()
     return view
@@ -171,9 +169,7 @@ class KeystoreView:
             )
 
     def matching(self, patterns: Iterable[str]) -> list[str]:
-        """Return the enclaves that match patterns (``/robot1/*``); raises InvalidInputError for a pattern that none
-        matches.
-        """
+        """Return the enclaves that match patterns (``/robot1/*``); raises InvalidInputError for one without match."""
         names, fitting = self.enclaves(), set[str]()
         for pattern in patterns:
             found = [name for name in names if fnmatchcase(name, pattern)]

@@ -144,10 +144,7 @@ read_pem = read_certificate
 
 
 def read_certificates(pem: bytes, place: str) -> list[CertificateFacts]:
-    """Reads a file of certificates and nothing else, such as a trust file during a CA roll-over.
-
-    Raises DamagedKeystoreError for no certificate, and for anything that is not the PEM of these certificates.
-    """
+    """Read a file of certificates; raises DamagedKeystoreError for anything that is not exactly their PEM."""
     found = _read_all(pem)
     if not found:
         raise DamagedKeystoreError(f"{place} is not a usable certificate, or is damaged")

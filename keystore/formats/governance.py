@@ -107,9 +107,7 @@ class Governance:
         return Domains(tuple(part for rule in self.domain_rules for part in rule.domains.ranges))
 
     def extended_to(self, domains: Domains) -> Governance:
-        """Return the same rules for more domains; only unambiguous with a single rule, else raises
-        NoGovernanceRuleError.
-        """
+        """Return the same rules for more domains; raises NoGovernanceRuleError if there are several rules."""
         if len(self.domain_rules) != 1:
             raise NoGovernanceRuleError(
                 domains,

@@ -123,9 +123,7 @@ class Permitted(NamedTuple):
 
 
 def grant_for(document: bytes, subject: str, place: str) -> Grant | None:
-    """Return the grant that DDS uses for ``subject``: the first. Raises InvalidInputError for another kind of
-    document.
-    """
+    """Return the grant that DDS uses for ``subject``: the first. Raises InvalidInputError for another document."""
     grants = parse_permissions(document, place)
     return next((grant for grant in grants if grant.subject_name.strip() == subject), None)
 

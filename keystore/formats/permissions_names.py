@@ -50,10 +50,7 @@ _FORMS: dict[Operation, tuple[Forms, Forms]] = {
 
 
 def full_name(expression: str, profile: Profile) -> str:
-    """Make ``expression`` absolute: ``x`` below ``ns``, ``~/x`` below ``ns`` and ``node``.
-
-    Raises ``PolicyError`` for names that no ROS node can have, which would be dead or broader rules.
-    """
+    """Make ``expression`` absolute; raises ``PolicyError`` for names that no ROS node can have."""
     if _FULL_NAME.match(expression) and len(expression) <= MAX_NAME_LENGTH:
         return expression
     _check_profile(profile)

@@ -56,10 +56,7 @@ def size_concern(size: int, policy: EnclavePolicy) -> SizeConcern | None:
 
 
 def expected_concern(policy: EnclavePolicy) -> SizeConcern | None:
-    """Estimate the same before anything is signed, from the names alone (wildcards and denials count as names).
-
-    Raises ``PolicyError`` for a name that no permission can be written for.
-    """
+    """Estimate the same before anything is signed, from the names alone. Raises ``PolicyError``."""
     names = {
         (rule.operation, full_name(rule.expression, profile))
         for profile in policy.profiles

@@ -110,9 +110,7 @@ class Register:
         return self._latest_documents.get(enclave)
 
     def trusts_authority(self, role: Role, ca: bytes) -> bool:
-        """Return whether the CA with this certificate may stand in the trust file: made here or given, and not
-        retired.
-        """
+        """Return whether the CA with this certificate may stand in the trust file: known, and not retired."""
         return self.authorities.get((role, ca), AuthorityState.RETIRED) is not AuthorityState.RETIRED
 
     def revoked(self, issuer: str) -> dict[int, datetime]:

@@ -20,10 +20,7 @@ MAX_BYTES = 4_000_000
 
 
 def parse_xml(document: bytes, where: str, max_bytes: int = MAX_BYTES) -> etree._Element:
-    """Parse XML to its root element.
-
-    ``where`` names the document in errors; raises ``InvalidInputError`` with file:line.
-    """
+    """Parse XML to its root element; raises ``InvalidInputError`` with ``where`` and the line."""
     from lxml import etree
 
     if len(document) > max_bytes:

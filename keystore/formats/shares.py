@@ -57,9 +57,7 @@ def is_part_of(profiles: Iterable[Profile], whole: Iterable[Profile]) -> bool:
 
 
 def united_domains(shares: Iterable[Share]) -> Domains:
-    """Unite the domains of all shares: a document is for one set of domains, so each share gets those of the others
-    too.
-    """
+    """Unite the domains of all shares: a document is for one set, so each share gets those of the others too."""
     return Domains(span for share in shares for span in share.domains.ranges)
 
 

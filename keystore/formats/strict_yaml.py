@@ -1,7 +1,4 @@
-"""YAML that a person wrote for us, read strictly: no aliases, no key twice, no unknown key; errors with file and place.
-
-What the governance and the hosts file have in common.
-"""
+"""YAML that a person wrote for us, read strictly: no aliases, no key twice, no unknown key; errors with the place."""
 
 from __future__ import annotations
 

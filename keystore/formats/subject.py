@@ -51,9 +51,7 @@ def generation_of(cn: str) -> int:
 
 
 def names_enclave(cn: str | None, enclave: str) -> bool:
-    """Return whether ``cn`` is a common name that ``enclave`` can have, in any scheme and generation; SROS2's may be
-    long.
-    """
+    """Return whether ``cn`` is a common name that ``enclave`` can have, in any scheme and generation."""
     if cn is None:
         return False
     generation = generation_of(cn)
@@ -82,10 +80,7 @@ def pieces(cn: str) -> frozenset[tuple[str, str]]:
 
 
 def borrowable(names: Mapping[str, str]) -> list[tuple[str, str]]:
-    """Return pairs (borrower, lender) of enclaves whose CNs let Cyclone accept the lender's grant for the borrower.
-
-    ``names`` maps enclave to common name. Sorted; empty for any set of names of the exact scheme.
-    """
+    """Return sorted pairs (borrower, lender) of enclaves whose CNs let Cyclone accept the lender's grant."""
     bags = {enclave: pieces(cn) for enclave, cn in names.items()}
     open_ones = {enclave: bag for enclave, bag in bags.items() if re.search(_SEPARATORS, names[enclave])}
     by_bag: dict[frozenset[tuple[str, str]], list[str]] = {}

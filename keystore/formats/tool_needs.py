@@ -151,10 +151,7 @@ def tool_enclave_name(tool: Tool, targets: tuple[str, ...]) -> str:
 
 
 def tool_targets(tool: Tool, words: tuple[str, ...]) -> tuple[str, ...]:
-    """Return absolute names of what the tool works on, as its command line would take them.
-
-    Raises ``InvalidInputError`` for too few or too many, and ``PolicyError`` for what is not a name.
-    """
+    """Return absolute names of what the tool works on. Raises ``InvalidInputError`` or ``PolicyError``."""
     if tool.target is ToolTarget.NOTHING and words:
         raise InvalidInputError(f"--for {tool.name} works on the whole graph: it takes no target")
     if tool.target is not ToolTarget.NOTHING and not words and not tool.optional_target:

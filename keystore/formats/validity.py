@@ -98,9 +98,7 @@ def parse_duration(text: str) -> timedelta:
 
 
 def parse_moment(text: str) -> datetime:
-    """Parse an ISO date or date-time; without a zone it is UTC, a bare date is its first second; raises
-    InvalidInputError.
-    """
+    """Parse an ISO date or date-time, in UTC unless it says otherwise; raises InvalidInputError."""
     try:
         moment = datetime.fromisoformat(text.strip().replace("Z", "+00:00"))
     except ValueError:

@@ -90,7 +90,6 @@ def refuse_ca_name(name: str) -> None:
 
 
 def _key_usage(role: Role | None) -> x509.KeyUsage:
-    """Return the key usage of the CA for ``role``; with None, of an enclave."""
     is_leaf = role is None
     return x509.KeyUsage(
         digital_signature=is_leaf or role is Role.PERMISSIONS, key_cert_sign=not is_leaf,

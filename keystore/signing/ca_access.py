@@ -66,7 +66,7 @@ class Secret:
 
 
 def _read_all(descriptor: int) -> bytes:
-    """Read to the end: a pipe may give the secret in pieces."""
+    # A pipe may give the secret in pieces.
     content = b""
     while len(content) <= _MAX_SECRET + 2 and (piece := os.read(descriptor, _MAX_SECRET + 3)):
         content += piece

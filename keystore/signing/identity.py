@@ -1,7 +1,4 @@
-"""An enclave's key, its certificate from an identity CA, and the request (PKCS#10, RFC 2986) of a key made elsewhere.
-
-Bytes in, bytes out; nothing is written here.
-"""
+"""An enclave's key, its certificate from an identity CA, and the request (PKCS#10) of a key made elsewhere."""
 
 from __future__ import annotations
 
@@ -50,10 +47,7 @@ def new_identity(
 
 
 def public_half(pem: bytes, place: str) -> PublicKey:
-    """Return the public key of an enclave's ``key.pem``, or of the request in its place.
-
-    Raises SigningUnavailableError without showing any of it.
-    """
+    """Return the public key of ``key.pem``, or of the request in its place. Raises SigningUnavailableError."""
     if b"CERTIFICATE REQUEST" in pem:
         return request_key(pem, place).key
     return FileSigner(load_private_key(pem, None, place)).public_key()

@@ -90,10 +90,7 @@ class Pkcs11Signer:
 
 
 def _sign_ecdsa(pkcs11: Any, key: Any, data: bytes) -> bytes:
-    """Sign with a hash made here, which suits every token.
-
-    Tokens return r and s side by side; X.509 and CMS want DER.
-    """
+    """Sign with a hash made here, which suits every token; X.509 and CMS want r and s in DER."""
     raw = bytes(key.sign(hashlib.sha256(data).digest(), mechanism=pkcs11.Mechanism.ECDSA))
     half = len(raw) // 2
     return encode_dss_signature(int.from_bytes(raw[:half], "big"), int.from_bytes(raw[half:], "big"))

@@ -134,10 +134,7 @@ def key_pem(signer: FileSigner, passphrase: Secret | None = None) -> bytes:
 
 
 def load_private_key(pem: bytes, passphrase: Secret | None, place: str) -> PrivateKey:
-    """Loads the EC or RSA key of a PEM file (PKCS#8 or SEC1), encrypted or not.
-
-    Raises SigningUnavailableError with ``place`` and without any of the content.
-    """
+    """Load the EC or RSA key of a PEM file, encrypted or not. Raises SigningUnavailableError without its content."""
     encrypted = b"ENCRYPTED" in pem
     if encrypted and passphrase is None:
         raise SigningUnavailableError(

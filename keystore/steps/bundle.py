@@ -97,14 +97,12 @@ _KEYSTORE = "the keystore"
 
 
 def _concerned(place: str, owners: Mapping[str, str]) -> str | None:
-    """Return what a finding is about: the keystore as a whole, an exported enclave, or (None) another one."""
     if not place.startswith(layout.ENCLAVES + "/") or place in (layout.GOVERNANCE, layout.GOVERNANCE_XML):
         return _KEYSTORE
     return owners.get(place) or owners.get(place.rpartition("/")[0])
 
 
 def _refuse(what: str, finding: Finding, accept_exposures: bool) -> None:
-    """Raises DamagedKeystoreError."""
     found = f"{finding.place}: {finding.message} [{finding.code}]; repair: {finding.repair}"
     # Fast DDS alone cannot carry large permissions: the user's choice of DDS.
     if finding.severity is Severity.ERROR and finding.code != "too-large":
@@ -134,7 +132,6 @@ def _public_files(
 
 
 def _write(target: Path, files: Mapping[str, Content | Link]) -> None:
-    """Write beside the target and rename: a bundle is complete or absent."""
     target.parent.mkdir(parents=True, exist_ok=True)
     aside = target.with_name(f".{target.name}.{os.getpid()}.partial")
     try:

@@ -53,10 +53,7 @@ class WantedEnclave(NamedTuple):
 def compare(
     root: Path, wanted: Mapping[str, WantedEnclave], options: ProvisionOptions, now: datetime
 ) -> ProvisionReport | None:
-    """Return the report of a run in which nothing is to be done; None if something is.
-
-    Raises NotAKeystoreError if the keystore is not complete and must not, or cannot, be made.
-    """
+    """Return the report of a run in which nothing is to be done; None if something is. Raises NotAKeystoreError."""
     view = KeystoreView(root)
     if not view.is_complete:
         if not options.create:
@@ -97,11 +94,7 @@ def _first_end(view: KeystoreView, enclaves: Iterable[Validity | None]) -> datet
 def differences(
     keystore: Path | str, policy: EnclavePolicy, *, options: ProvisionOptions | None = None
 ) -> tuple[str, ...]:
-    """Return why an enclave is not (or no longer) what ``provision`` with the same options left; empty if it is.
-
-    Reads only: bytes, dates, modes, links and signatures. Raises a KeystoreError for a keystore that cannot be read
-    at all.
-    """
+    """Return why an enclave is not what ``provision`` with the same options left; empty if it is. Reads only."""
     root = resolve_root(keystore)
     # What ends soon is renewed by a start, and good until then.
     chosen = with_domains(root, options or ProvisionOptions())._replace(renew_within=timedelta(0))
@@ -172,10 +165,7 @@ def _with_shares_of_others(view: KeystoreView, state: EnclaveState, wanted: Want
 
 
 def _outlives(state: EnclaveState, wanted: WantedEnclave) -> bool:
-    """Return whether a certificate that is good otherwise lasts longer.
-
-    Seconds pass between two runs, so an hour more does not count.
-    """
+    """Return whether a good certificate lasts longer than requested, by an hour: seconds pass between two runs."""
     if wanted.ends_by is None or state.reissue is not Reissue.NOTHING or state.facts is None:
         return False
     return state.facts.validity.not_after > later(wanted.ends_by, timedelta(hours=1))

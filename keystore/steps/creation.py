@@ -178,9 +178,7 @@ def _add_ca(opened: Store, role: Role, options: CreateOptions) -> tuple[str, lis
 
 
 def _record_present_ca(opened: Store, role: Role, options: CreateOptions) -> None:
-    """Record the CA that is there if the register knows none of this role: an earlier version, or SROS2, left the
-    keystore incomplete.
-    """
+    """Record the CA that SROS2 left, if the register knows none of this role."""
     view = KeystoreView(opened.root)
     if role in options.imported:
         place = options.imported[role].certificate
@@ -227,9 +225,6 @@ def _self_signed(role: Role, options: CreateOptions, signer: Signer) -> Authorit
 
 
 def _passphrase(options: CreateOptions) -> Secret | None:
-    """Return what new CA keys are encrypted with; None if they are not. Raises ``InvalidInputError`` without a
-    passphrase.
-    """
     if options.encrypt_ca_keys and options.access.passphrase is None:
         raise InvalidInputError("encrypting CA keys needs a passphrase: --passphrase-file, -fd or -env")
     return options.access.passphrase if options.encrypt_ca_keys else None
@@ -244,7 +239,6 @@ def _import_ca(role: Role, options: CreateOptions, key: Path) -> tuple[Authority
 
 
 def _given(place: Path) -> CertificateFacts:
-    """Return the first certificate of a file that somebody gave."""
     return given_certificates(read_given(place), printable(place))[0]
 
 
@@ -269,7 +263,6 @@ def _external_ca(role: Role, options: CreateOptions) -> CertificateFacts:
 
 
 def _complete_governance(opened: Store, options: CreateOptions) -> bool:
-    """Returns whether there was none."""
     if os.path.isfile(opened.root / layout.GOVERNANCE):
         return False
     document = _unsigned_default(opened.root) or governance_document(

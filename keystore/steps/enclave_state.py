@@ -65,8 +65,6 @@ class EnclaveState(NamedTuple):
 
 
 class _Enclave(NamedTuple):
-    """The enclave that is looked at, and what it is held against."""
-
     view: KeystoreView
     register: Register | None
     name: str
@@ -141,8 +139,6 @@ def _is_there(view: KeystoreView, directory: str) -> bool:
 
 
 class _Found(NamedTuple):
-    """The key pair as it stands, and what is wrong with it."""
-
     reissue: Reissue
     facts: CertificateFacts | None
     problem: str | None = None
@@ -179,7 +175,6 @@ def _identity(enclave: _Enclave) -> _Found:
 
 
 def _key_mode(enclave: _Enclave) -> int:
-    """Return the permission bits of the private key, 0 without one."""
     path = f"{enclave.view.root}/{enclave.directory}/{layout.KEY}"
     try:
         info = os.lstat(path)
@@ -216,7 +211,6 @@ def _certificate_problem(enclave: _Enclave, facts: CertificateFacts | None, matc
 
 
 def _record_problem(register: Register | None, enclave: str, serial: int) -> str | None:
-    """Return what the register says against a certificate that looks good by itself."""
     if register is None:
         return None
     record = register.certificates.get(serial)

@@ -72,7 +72,6 @@ class EnclaveWriter:
         return self._options.revoke and can_revoke(self._view)
 
     def _lifetime(self, enclave: str) -> timedelta:
-        """Return the requested lifetime, else what the enclave was granted, else the keystore's."""
         options = self._options
         if options.valid_until is not None:
             return options.valid_until - self._now
@@ -81,7 +80,6 @@ class EnclaveWriter:
         return granted_lifetime(self._view, self._register, enclave) or self._view.settings.lifetime
 
     def _validity(self, enclave: str) -> Validity:
-        """Return the validity of a new certificate; permissions take over what their certificate got."""
         self._view.refuse_ended(self._now, *Role)
         cas = [self._view.ca(role).validity for role in Role]
         asked = Validity.starting(self._now, self._lifetime(enclave), backdate=self._options.backdate)
@@ -186,7 +184,6 @@ class EnclaveWriter:
         entries: dict[str, Content | Link],
         actions: list[str],
     ) -> CertificateFacts:
-        """Return the present certificate, or issue one and add its files to ``entries``."""
         if state.reissue is Reissue.NOTHING and state.facts is not None:
             return state.facts
         made = self._issue(state, self._subject(state.enclave, new_generation), actions)

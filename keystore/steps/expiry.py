@@ -117,7 +117,6 @@ def _expiry(what: str, enclave: str | None, validity: Validity) -> Expiry:
 
 
 def _permissions_validity(signed: bytes, place: str) -> Validity:
-    """Return the validity of the first grant, the only one that implementations use."""
     found = dict(reversed(re.findall(_DATE, smime.read_any(signed, place).document)))
     try:
         return Validity(parse_moment(found[b"before"].decode()), parse_moment(found[b"after"].decode()))

@@ -110,7 +110,6 @@ def _reference(root: Path) -> Reference:
 
 
 def _sources(places: Iterable[Path | str]) -> Iterator[Path]:
-    """Yield bundles and imported keystores; each directory is searched one level deep."""
     for place in map(Path, places):
         if place.is_file() or (place / layout.BUNDLE).is_file():
             yield place
@@ -163,7 +162,6 @@ def _ends(manifest: Manifest, now: datetime, limit: datetime) -> Iterator[str]:
 
 
 def _changed(place: Path) -> Iterator[str]:
-    """Yield what in an imported keystore or a bundle file is not as its manifest has it."""
     if place.is_file():
         content = read_bundle(place)
         manifest = smime.read(content[layout.BUNDLE], printable(place)).document

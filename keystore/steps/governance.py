@@ -1,7 +1,4 @@
-"""The governance document of a keystore: signed, mirrored in plain text, replaced by another.
-
-It is signed again where its domains or signer changed; copies in enclaves are kept in step. Writes the keystore.
-"""
+"""The governance document of a keystore: signed, mirrored in plain text, replaced by another. Writes the keystore."""
 
 from __future__ import annotations
 
@@ -46,12 +43,7 @@ def write_governance(opened: Store, document: bytes, permissions_ca: Authority, 
 
 
 def renew_governance(opened: Store, domains: Domains, access: CaAccess, now: datetime) -> bool:
-    """Sign the governance again if it is not the one signed last, or its domains or signer no longer fit.
-
-    Returns whether it did.
-
-    Raises InvalidInputError when it has several rules and none for a domain: then a person must decide.
-    """
+    """Sign the governance again unless it fits; return whether it did. Raises InvalidInputError without a rule."""
     view = KeystoreView(opened.root)
     if governance_stands(view, domains, opened.register):
         return False
@@ -89,7 +81,6 @@ def set_governance(
 
 
 def _stands(view: KeystoreView, document: bytes) -> bool:
-    """Return whether exactly ``document`` is in force; what cannot be read is not."""
     try:
         signed = signed_governance(view)
     except DamagedKeystoreError:

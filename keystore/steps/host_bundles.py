@@ -194,7 +194,7 @@ def _manifest(view: KeystoreView, host: str, names: list[str], files: Mapping[st
 
 
 def _bundled(enclave: str, files: Mapping[str, Content]) -> BundledEnclave:
-    """Return the manifest's row for ``enclave``, from the very bytes that are exported."""
+    # From the very bytes that are exported.
     directory = layout.enclave_directory(enclave)
     cert = read_certificate(files[f"{directory}/{layout.CERT}"].data, f"{directory}/{layout.CERT}")
     signed = smime.read(files[f"{directory}/{layout.PERMISSIONS}"].data, f"{directory}/{layout.PERMISSIONS}")
@@ -211,7 +211,6 @@ def _bundled(enclave: str, files: Mapping[str, Content]) -> BundledEnclave:
 
 
 def _write(output: Path, host: str, content: bytes, root: Path) -> Path:
-    """Replace the previous bundle atomically."""
     target = output / f"{host}{SUFFIX}"
     if Path(os.path.realpath(output)).is_relative_to(root):
         raise InvalidInputError(f"{printable(output)} lies in the keystore; choose another place")

@@ -168,7 +168,6 @@ def find_key(versions: Versions, wanted: BundledEnclave) -> HostKey:
 
 
 def _candidates(versions: Versions, enclave: str) -> Iterator[tuple[Path, Path]]:
-    """Yield where a key may be, and the file beside it with its public key."""
     waiting = versions.pending / layout.flat_name(enclave)
     yield waiting, waiting / layout.REQUEST
     if versions.current is not None:

@@ -69,11 +69,7 @@ def installed_units(options: UnitOptions | None = None) -> list[Unit]:
 
 
 def chosen_units(units: Sequence[Unit], names: Iterable[str]) -> list[Unit]:
-    """Return the services that ``names`` call, by unit, target, node or enclave, in restart order; all without names.
-
-    Raises:
-        InvalidInputError: A name calls none.
-    """
+    """Return the services of these units, targets, nodes or enclaves, in restart order; all without names."""
     processes = in_restart_order(units)
     wanted = list(names)
     for name in wanted:
@@ -129,11 +125,7 @@ def install(folder: Path, options: UnitOptions | None = None) -> Installed:
 
 
 def uninstall(name: str, options: UnitOptions | None = None) -> Installed:
-    """Stop and remove all units of the target ``name``.
-
-    Raises:
-        InvalidInputError: There is no such target.
-    """
+    """Stop and remove all units of the target ``name``; raises InvalidInputError if there is none."""
     chosen = options or UnitOptions()
     target = f"{name.removesuffix('.target')}.target"
     names = [unit.name for unit in installed_units(chosen) if unit.target == target]
@@ -233,7 +225,6 @@ def _generated(folder: Path) -> Iterator[tuple[Unit, str]]:
 
 
 def _install_parameters(source: Path, target: Path) -> list[Path]:
-    """Write the parameter files; return those that were there and are no longer wanted."""
     brought = {path.name: path.read_text(encoding="utf-8") for path in source.glob("*.yaml")}
     if brought:
         target.mkdir(parents=True, exist_ok=True)
@@ -265,7 +256,6 @@ def _restart(names: list[str], options: UnitOptions) -> str | None:
 
 
 def _watch(name: str, settle: float) -> str | None:
-    """Return what is wrong with a unit that was just restarted, None if it is up."""
     end = time.monotonic() + settle
     while True:
         state = _state(name)
@@ -303,7 +293,6 @@ def _described(name: str, state: dict[str, str]) -> str:
 def _systemctl(
     *words: str, may_fail: bool = False, timeout: float | None = None
 ) -> subprocess.CompletedProcess[str]:
-    """Run systemctl. Raises StorageError if it is missing or refuses."""
     try:
         done = subprocess.run(["systemctl", *words], capture_output=True, text=True, timeout=timeout)
     except OSError as error:

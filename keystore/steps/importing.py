@@ -169,7 +169,6 @@ def _checked(
 
 
 def _pins(present: Manifest | None, options: ImportOptions) -> dict[Role, frozenset[str]]:
-    """Return the CAs named by hand, else those in force. Raises UnsafeKeystoreError if there are neither."""
     if options.authorities:
         return pins_of(options.authorities)
     if present is None:
@@ -254,7 +253,6 @@ def _check_files(found: _Bundle) -> None:
 
 
 def _check_authorities(found: _Bundle, options: ImportOptions) -> None:
-    """Raise unless the trust files hold the CAs of the manifest; with pins by hand, each only those of its role."""
     pins = pins_of(options.authorities) if options.authorities else None
     for role in Role:
         name = layout.ca_cert(role)
@@ -327,7 +325,6 @@ def _put_in_force(
 
 
 def _without(present: Manifest | None, differing: Collection[str]) -> Manifest | None:
-    """Return what was really in force: without the differing files and the enclaves that they belong to."""
     if present is None:
         return None
     files = {name: digest for name, digest in present.files.items() if name not in differing}
@@ -337,7 +334,6 @@ def _without(present: Manifest | None, differing: Collection[str]) -> Manifest |
 
 
 def _entries(found: _Bundle, keys: Mapping[str, HostKey]) -> dict[str, Content | Link]:
-    """Return the files of the version: those of the bundle, the keys that were made here, and the usual links."""
     entries: dict[str, Content | Link] = {
         name: Content(data, store.PRIVATE_MODE if name.endswith(f"/{layout.KEY}") else store.PUBLIC_MODE)
         for name, data in found.files.items()
@@ -352,7 +348,6 @@ def _entries(found: _Bundle, keys: Mapping[str, HostKey]) -> dict[str, Content |
 
 
 def _refuse_unfit(staged: Path, place: str, now: datetime) -> list[str]:
-    """Raise for what ``verify`` calls an error of the version; return its other findings."""
     notes = []
     for finding in verify(staged, now=now).findings:
         text = f"{finding.place}: {finding.message} [{finding.code}]"

@@ -44,10 +44,7 @@ class KeyEntry(NamedTuple):
 
 
 def inventory(keystore: Path | str) -> tuple[KeyEntry, ...]:
-    """List CAs first, those that are only still trusted after the one in use; then enclaves by name.
-
-    Raises NotAKeystoreError and DamagedKeystoreError.
-    """
+    """List CAs first, those that are only still trusted after the one in use; then enclaves by name."""
     view = keystore_at(keystore)
     return (*_authorities(view), *_enclaves(view))
 
@@ -141,10 +138,7 @@ class Granted(NamedTuple):
 
 
 def granted(keystore: Path | str) -> dict[str, Granted]:
-    """Map enclaves to what their permissions say; an enclave without permissions is left out.
-
-    Raises NotAKeystoreError, DamagedKeystoreError and InvalidInputError for what cannot be read.
-    """
+    """Map enclaves to what their permissions say; an enclave without permissions is left out."""
     view = keystore_at(keystore)
     found = {}
     for enclave in view.enclaves():

@@ -73,10 +73,7 @@ def kept_permissions(
 
 
 def _document(view: KeystoreView, enclave: str, last: SignedPermissions | None) -> bytes:
-    """Returns the document signed last, from ``permissions.xml`` where the signed file was damaged.
-
-    Raises DamagedKeystoreError where neither holds what the register has.
-    """
+    """Return the document signed last, from ``permissions.xml`` if the signed file was damaged."""
     twin = view.enclave_file(enclave, layout.PERMISSIONS_XML)
     if last is not None and twin is not None and fingerprint(twin) == last.document:
         return twin
@@ -84,7 +81,6 @@ def _document(view: KeystoreView, enclave: str, last: SignedPermissions | None) 
 
 
 def _granted_last(view: KeystoreView, last: SignedPermissions) -> Grant | None:
-    """Return the grant on disk, if it is the one recorded."""
     try:
         grant = _grant(_document(view, last.enclave, last), last.enclave)
     except KeystoreError:

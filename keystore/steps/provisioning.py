@@ -118,11 +118,7 @@ def create_enclaves(
     allow_all: bool = False,
     options: ProvisionOptions | None = None,
 ) -> ProvisionReport:
-    """Create enclaves with a valid identity in a keystore that exists.
-
-    New ones may do nothing, existing ones keep their permissions, unless ``allow_all`` requests every topic, service
-    and action.
-    """
+    """Create enclaves in a keystore that exists: without ``allow_all`` new ones may do nothing, others what they may."""
     root = resolve_root(keystore)
     chosen = with_domains(root, _as_long_as_asked(options or ProvisionOptions()))
     ordered = sorted({validate_enclave_name(name) for name in names})

@@ -91,7 +91,6 @@ def _locked(root: Path, options: ProvisionOptions, now: datetime) -> Iterator[St
 def _complete_keystore(
     opened: Store, options: ProvisionOptions, now: datetime
 ) -> tuple[list[str], list[str]]:
-    """Write missing parts of the keystore itself, and a governance that covers the domains."""
     domains = options.domains or governance_domains(KeystoreView(opened.root))
     creation = replace(
         options.creation or CreateOptions(),

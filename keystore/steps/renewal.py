@@ -181,7 +181,6 @@ def _repair_keystore(opened: Store, options: RenewOptions, now: datetime) -> lis
 
 
 def _restore_trust_files(opened: Store) -> list[str]:
-    """Writes each trust file again that is not exactly the CAs which the register knows, the one in use first."""
     if not opened.has_register:
         return []
     done: list[str] = []
@@ -212,14 +211,12 @@ def _restore_trust_files(opened: Store) -> list[str]:
 
 
 def _trusted(opened: Store, role: Role) -> list[bytes]:
-    """Return the CAs that may stand in the trust file (DER), the one in use first."""
     known = {ca: state for (its, ca), state in opened.register.authorities.items() if its is role}
     in_use = [ca for ca, state in known.items() if state is AuthorityState.IN_USE]
     return in_use + [ca for ca in known if opened.register.trusts_authority(role, ca) and ca not in in_use]
 
 
 def _close_modes(opened: Store) -> list[str]:
-    """Set 0700 for ``private/`` and 0600 for what is in it; enclave keys are closed with their enclave."""
     candidates = {layout.PRIVATE: 0o700, layout.SHARED_CA_KEY: 0o600}
     candidates |= {layout.ca_key(role): 0o600 for role in Role}
     closed = []

@@ -97,7 +97,6 @@ def roll_over(
 
 
 def _creation(options: ProvisionOptions, now: datetime, encrypt: bool) -> CreateOptions:
-    """Return how the new CAs are made."""
     given = options.creation or CreateOptions()
     return replace(given, backdate=options.backdate, access=options.access, encrypt_ca_keys=encrypt, now=now)
 
@@ -203,7 +202,6 @@ def _finish(opened: Store, role: Role, creation: CreateOptions) -> str:
 
 
 def _refuse_without_start(opened: Store, roles: Collection[Role]) -> None:
-    """Raises InvalidInputError where no CA of these roles was ever replaced."""
     states = {state for (role, _), state in opened.register.authorities.items() if role in roles}
     if states <= {AuthorityState.IN_USE}:
         raise InvalidInputError(
@@ -221,7 +219,6 @@ def _retire_for_good(opened: Store, role: Role) -> None:
 
 
 def _refuse_to_strand(opened: Store, roles: Collection[Role]) -> None:
-    """Raises InvalidInputError while anything in force hangs on an old CA: nobody would trust it any more."""
     view = KeystoreView(opened.root)
     stranded = [
         name for name in view.enclaves() if not is_tool_enclave(name) and _hangs_on_old_ca(view, name, roles)
@@ -242,10 +239,6 @@ def _refuse_to_strand(opened: Store, roles: Collection[Role]) -> None:
 
 
 def _hangs_on_old_ca(view: KeystoreView, enclave: str, roles: Collection[Role]) -> bool:
-    """Return whether another CA than the one in use issued it.
-
-    What cannot be read belongs to no CA; renew or verify report it.
-    """
     pem = view.enclave_file(enclave, layout.CERT)
     signed = view.enclave_file(enclave, layout.PERMISSIONS)
     with suppress(DamagedKeystoreError):

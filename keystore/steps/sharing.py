@@ -106,7 +106,6 @@ def kept_shares(shares: Iterable[EnclaveShare]) -> list[str]:
 
 
 def _words(profiles: Iterable[Profile]) -> set[str]:
-    """Say what is allowed, by full names: ``publish /chatter``."""
     return {
         f"{operation.verb} {full_name(expression, profile)}"
         for profile in profiles

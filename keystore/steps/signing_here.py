@@ -23,8 +23,7 @@ _SHOWN = 10
 def refuse_without_keys(
     view: KeystoreView, states: list[EnclaveState], wanted: Mapping[str, WantedEnclave]
 ) -> None:
-    """Raises SigningUnavailableError with every enclave that differs, and how, when the key that would be needed is not
-    here."""
+    """Raise SigningUnavailableError with every enclave that differs, and how, if the key it needs is not here."""
     lines = []
     for state in states:
         needs = {Role.IDENTITY: state.reissue is not Reissue.NOTHING, Role.PERMISSIONS: state.permissions}
@@ -58,10 +57,7 @@ def _permission_differences(view: KeystoreView, state: EnclaveState, wanted: Wan
 def beyond_and_missing(
     view: KeystoreView, state: EnclaveState, wanted: WantedEnclave
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Return what the signed permissions grant beyond what is wanted, and what they lack.
-
-    Both are empty for what cannot be read.
-    """
+    """Return what the signed permissions grant beyond what is wanted, and what they lack; nothing if unreadable."""
     if state.facts is None or state.facts.common_name is None:
         return (), ()
     subject, place = subject_name(state.facts.common_name), layout.PERMISSIONS

@@ -109,7 +109,6 @@ def _decided(options: ProvisionOptions) -> dict[str, Any]:
 
 
 def _serve(channel: socket.socket, root: Path, base: ProvisionOptions) -> None:
-    """Answer until the launcher ends; never return."""
     try:
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # the launcher ends first, and then we do
         ctypes.CDLL(None).prctl(_PR_SET_DUMPABLE, 0, 0, 0, 0)  # nobody of the same user reads our memory
@@ -218,7 +217,6 @@ def _error(name: str, message: str, domains: str) -> KeystoreError:
 
 
 def _send(channel: socket.socket, content: Any, descriptor: int | None) -> None:
-    """Send a message; ``descriptor`` is duplicated into the other process."""
     data = json.dumps(content).encode()
     channel.sendmsg([_HEAD.pack(len(data))], _rights(descriptor))
     channel.sendall(data)

@@ -86,10 +86,7 @@ WATCHER = f"{FOLDER}/watch"
 
 
 def provide_watcher(keystore: Path | str, options: ProvisionOptions, *, as_ros_node: bool = False) -> str:
-    """Make the enclave of ``secure-launch --watch``, once for a keystore; it is renewed like the others.
-
-    It reads discovery and nothing else; ``as_ros_node``: for an observer that is a node of rclpy.
-    """
+    """Make the enclave of ``secure-launch --watch``, once for a keystore: it reads discovery and nothing else."""
     policy = tool_policy(TOOLS["list" if as_ros_node else "observe"], (), WATCHER)
     chosen = options._replace(launch=None, enclave_domains={}, guid_halves={WATCHER: Half.LOW}, create=False)
     provision(keystore, [policy], options=chosen)
@@ -97,10 +94,7 @@ def provide_watcher(keystore: Path | str, options: ProvisionOptions, *, as_ros_n
 
 
 def tool_environment(root: Path | str, enclave: str) -> dict[str, str]:
-    """Return the variables that put a tool into its enclave.
-
-    Source: rcl ``security.c``; the override takes precedence over a command line.
-    """
+    """Return the variables that put a tool into its enclave (rcl ``security.c``)."""
     return {
         "ROS_SECURITY_ENABLE": "true",
         "ROS_SECURITY_STRATEGY": "Enforce",
@@ -115,10 +109,7 @@ def _end(root: Path, enclave: str) -> datetime:
 
 
 def enclaves_by_guid(keystore: Path | str) -> dict[int, str]:
-    """Map the first 48 bits of the GUIDs of its participants to each enclave of the keystore; no key is read.
-
-    Source: DDS-Security 9.3.3.
-    """
+    """Map the first 48 bits of the GUIDs of its participants (DDS-Security 9.3.3) to each enclave of the keystore."""
     view = keystore_at(keystore)
     names = {enclave: view.common_name(enclave) for enclave in view.enclaves()}
     return {guid_prefix(name): enclave for enclave, name in names.items() if name}

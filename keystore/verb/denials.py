@@ -40,7 +40,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _lines(logs: Iterable[Path]) -> Iterator[str]:
-    """Raises ``InvalidInputError`` for a file that cannot be read."""
     files = list(logs)
     if not files:
         yield from (line.decode(errors="replace") for line in sys.stdin.buffer)

@@ -102,7 +102,6 @@ def _report_hosts_that_left(arguments: argparse.Namespace, hosts: Iterable[str])
 
 
 def _assigned(arguments: argparse.Namespace) -> dict[str, list[str]]:
-    """Map each host to names or patterns of its enclaves; raises InvalidInputError."""
     if arguments.hosts is None:
         if len(arguments.host) != 1 or not arguments.enclave:
             raise InvalidInputError("without --hosts FILE give one --host NAME and its --enclave PATTERN")

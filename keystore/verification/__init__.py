@@ -1,7 +1,4 @@
-"""The whole keystore checked: files, CAs, governance, every enclave. Reads only, follows no strange link.
-
-verify(keystore) -> VerifyReport          each finding with its place and what repairs it
-"""
+"""The whole keystore checked: files, CAs, governance, every enclave. Reads only, follows no strange link."""
 
 from __future__ import annotations
 
@@ -101,7 +98,6 @@ def _check_zenoh(view: KeystoreView, now: datetime) -> Iterator[Finding]:
 
 
 def _check_deployment(view: KeystoreView) -> Iterator[Finding]:
-    """Check that an imported keystore is what its signed manifest says, and was not changed since."""
     fix = repair.run(
         view.root, "import", "HOST.bundle", note="the bundle in force, or a newer one: restores it"
     )

@@ -99,7 +99,6 @@ def _check_key(view: KeystoreView, role: Role, access: CaAccess) -> Iterator[Fin
 def _check_governance(
     view: KeystoreView, register: Register | None, required: Governance | None
 ) -> Iterator[Finding]:
-    """Check the governance: signature, strength, whether it was signed last, and the XML beside it."""
     place = layout.GOVERNANCE
     again = repair.sign_governance(view.root)
     try:

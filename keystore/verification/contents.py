@@ -68,7 +68,6 @@ def check_content(root: Path, relative: str) -> Iterator[Finding]:
 
 
 def _is_our_form(name: str, data: bytes) -> bool:
-    """Returns whether a file that DDS implementations read is byte for byte as it is written here."""
     try:
         if name == layout.KEY:
             return is_our_form(data)

@@ -204,10 +204,7 @@ class _EnclaveCheck:
             )  # fmt: skip
 
     def _profile(self, facts: CertificateFacts) -> Iterator[Finding]:
-        """Report what the certificate allows beyond identifying one enclave.
-
-        Basic constraints, key usage and signature: RFC 5280 sections 4.2.1.3, 4.2.1.9.
-        """
+        # RFC 5280 sections 4.2.1.3, 4.2.1.9.
         algorithm = facts.certificate.signature_hash_algorithm
         if algorithm is None or algorithm.name in _BROKEN_HASHES:
             text = f"signed with {'no hash' if algorithm is None else algorithm.name}, which can be forged"

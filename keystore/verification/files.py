@@ -129,7 +129,6 @@ def _incomplete(root: Path, relative: str) -> Iterator[Finding]:
 
 
 def _not_a_file(root: Path, relative: str, remove: str) -> Finding | None:
-    """Report something else in the place of a file that is read."""
     name = relative.rpartition("/")[2]
     if relative not in _KNOWN and not (relative.startswith(layout.ENCLAVES) and name in layout.ENCLAVE_FILES):
         return None
@@ -209,7 +208,6 @@ def _stray(root: Path, relative: str, why: str) -> Finding:
 
 
 def _holds_key(path: Path) -> bool:
-    """Return whether a stray file holds a key; one that cannot be read, or is huge, is not taken for a key."""
     try:
         return holds_private_key(read_bytes(path, _MAX_STRAY))
     except OSError:

@@ -29,9 +29,7 @@ _PERMISSIVE = "allow_unauthenticated_participants"  # the one flag whose ``true`
 
 
 def weaknesses(governance: Governance) -> Iterator[str]:
-    """Return each attribute of each rule that is weaker than the default, as ``rtps_protection_kind NONE (default
-    SIGN)``.
-    """
+    """Return each attribute of each rule that is weaker than the default."""
     for rule in governance.domain_rules:
         yield from _weaker(rule, DomainRule(), DOMAIN_SETTINGS, f"domains {rule.domains}")
         for topic in rule.topic_rules:
@@ -58,10 +56,7 @@ def _shown(value: bool | Protection) -> str:
 
 
 def check_strength(root: Path, governance: Governance, required: Governance | None) -> Iterator[Finding]:
-    """Check the strength.
-
-    ``required``: what somebody decided it should be; it may then be weaker, and must be nothing else.
-    """
+    """Check the strength, or against ``required``, which may be weaker: what somebody decided it should be."""
     again = repair.run(root, "governance", "FILE.yaml", note="must reach all participants together")
     if required is not None:
         if governance != required:

@@ -102,7 +102,6 @@ def _rights(
 
 
 def _grouped(permissions: Iterable[MessagePermission]) -> dict[str, set[MessagePermission]]:
-    """Group by what they are about, in words."""
     found: dict[str, set[MessagePermission]] = defaultdict(set)
     for one in permissions:
         about = meaning(one.flow, one.message, one.key)
@@ -112,7 +111,6 @@ def _grouped(permissions: Iterable[MessagePermission]) -> dict[str, set[MessageP
 
 
 def _words(about: Meaning) -> str:
-    """Name what it is about; tokens by what they belong to."""
     return str(about._replace(node="", enclave="") if about.use else about)
 
 
@@ -122,7 +120,6 @@ def _messages(permissions: Iterable[MessagePermission]) -> str:
 
 
 def _named(control: Mapping[str, Any]) -> dict[str, tuple[str, ...]]:
-    """Map each subject to common names."""
     return {
         str(subject["id"]): tuple(map(str, subject.get("cert_common_names") or (EVERYBODY,)))
         for subject in control.get("subjects") or ()
@@ -143,7 +140,6 @@ def _admitted(
 
 
 def _permissions(rule: Mapping[str, Any]) -> Iterator[MessagePermission]:
-    """Return permissions; a rule without flows is for both."""
     allowed = rule["permission"] == "allow"
     for flow in rule.get("flows") or ("ingress", "egress"):
         for message in rule["messages"]:
