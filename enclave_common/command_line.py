@@ -25,18 +25,14 @@ for."""
 
 
 def given_path(text: str) -> Path:
-    """Return ``text`` as a path.
-
-    :raises argparse.ArgumentTypeError: it is empty, as a shell variable that is not set."""
+    """Return ``text`` as a path; raises argparse.ArgumentTypeError if it is empty, as an unset variable."""
     if not text:
         raise argparse.ArgumentTypeError("an empty path; is a variable of the shell not set?")
     return Path(text)
 
 
 def time_span(text: str) -> float:
-    """Return ``20s``, ``5m``, ``1h``, ``2d``, or a number of seconds, in seconds.
-
-    :raises argparse.ArgumentTypeError: it is something else."""
+    """Return ``20s``, ``5m``, ``1h``, ``2d`` or a number in seconds; raises argparse.ArgumentTypeError."""
     found = _SPAN.fullmatch(text)
     if found is None:
         raise argparse.ArgumentTypeError(f"{text!r} is not a time such as 20s, 5m, 1h or 2d")
@@ -211,12 +207,9 @@ def complete_with(
 def complete(
     parser: argparse.ArgumentParser, offer: Callable[[argparse.ArgumentParser], None] | None = None
 ) -> None:
-    """Answer a shell that asks for completions, and end; otherwise do nothing. ``offer`` tells the arguments of
-    ``parser`` what can be offered for them.
+    """Answer a shell that asks for completions through argcomplete, if it is installed; then end.
 
-    The shell asks through argcomplete (``register-python-argcomplete``, as for ``ros2``), an optional dependency:
-    without it the shell gets no answer.
-    """
+    ``offer`` says what can be offered for the arguments of ``parser``."""
     if "_ARGCOMPLETE" not in os.environ:
         return
     try:
@@ -250,10 +243,7 @@ def add_absent_verb(
     error: ImportError,
     handler: str = "run",
 ) -> None:
-    """Add a verb of an add-on that is not installed: it says so, whatever follows it.
-
-    Raises ``error`` again if it is about something else.
-    """
+    """Add a verb of an add-on that is not installed; raises ``error`` again if it is about something else."""
     if missing_dependency(error) is None:
         raise error
     missing = error

@@ -19,10 +19,7 @@ _FLAGS = os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK | os.O_NOCTTY
 
 
 def read_bytes(path: str | bytes | os.PathLike[str], limit: int = DEFAULT_LIMIT) -> bytes:
-    """Read all bytes of the regular file ``path``; links are followed.
-
-    Raises ``OSError``: as ``open`` does, and for what is not a regular file or has more than ``limit`` bytes.
-    """
+    """Read the regular file ``path``; raises ``OSError`` also for anything else and for more than ``limit`` bytes."""
     descriptor = os.open(path, _FLAGS)
     try:
         status = os.fstat(descriptor)
@@ -38,10 +35,7 @@ def read_bytes(path: str | bytes | os.PathLike[str], limit: int = DEFAULT_LIMIT)
 def read_text(
     path: str | bytes | os.PathLike[str], limit: int = DEFAULT_LIMIT, *, errors: str = "strict"
 ) -> str:
-    """Read the text of a UTF-8 file, with line ends as ``open`` gives them.
-
-    Raises as ``read_bytes``, and ``UnicodeDecodeError``.
-    """
+    """Read a UTF-8 file, with line ends as ``open`` gives them; raises as ``read_bytes``, and UnicodeDecodeError."""
     text = read_bytes(path, limit).decode("utf-8", errors)
     return text.replace("\r\n", "\n").replace("\r", "\n") if "\r" in text else text
 

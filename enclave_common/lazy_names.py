@@ -11,9 +11,7 @@ from typing import Any
 def lazy_names(
     package: str, modules: Mapping[str, Sequence[str]]
 ) -> tuple[list[str], Callable[[str], Any], Callable[[], list[str]]]:
-    """Return ``__all__``, ``__getattr__`` and ``__dir__`` for a package.
-
-    :param modules: the public names of each module"""
+    """Return ``__all__``, ``__getattr__`` and ``__dir__`` for a package, from the public names of each module."""
     module_of = {name: module for module, names in modules.items() for name in names}
     public = sorted(module_of)
 

@@ -9,9 +9,7 @@ from pathlib import Path
 
 
 def write_text(path: Path, text: str) -> None:
-    """Replace ``path`` by ``text`` as UTF-8; an existing file keeps its mode.
-
-    :raises OSError: it cannot be written."""
+    """Replace ``path`` by ``text`` as UTF-8; an existing file keeps its mode. Raises OSError."""
     write_bytes(path, text.encode("utf-8", "backslashreplace"))
 
 

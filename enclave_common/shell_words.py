@@ -9,17 +9,13 @@ MAX_WORD = 2**17
 
 
 def split_words(text: str) -> list[str]:
-    """Split ``text`` as a POSIX shell does.
-
-    Raises ``ValueError`` for an open quotation or escape, and for a word of more than ``MAX_WORD`` characters.
-    """
+    """Split ``text`` as a POSIX shell does; raises ``ValueError``, also for a word longer than ``MAX_WORD``."""
     if _longest_word(text) > MAX_WORD:
         raise ValueError(f"a word of a command line has more than {MAX_WORD} characters")
     return shlex.split(text)
 
 
 def _longest_word(text: str) -> int:
-    """Return how long a word of ``text`` may be; a quotation or an escape may join all of it."""
     if any(mark in text for mark in "'\"\\"):
         return len(text)
     return max(map(len, text.split()), default=0)

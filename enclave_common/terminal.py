@@ -33,8 +33,7 @@ def printable_lines(text: str) -> str:
 
 
 def message(text: object) -> str:
-    """Escape a message and indent its later lines, so that no name in it can begin a line that looks like one of
-    ours."""
+    """Escape a message and indent its later lines, so that no name in it can begin a line that looks like ours."""
     return printable_lines(str(text)).replace("\n", "\n    ")
 
 
@@ -83,8 +82,6 @@ def stdout_is_for_the_plan() -> AbstractContextManager[Any]:
 
 
 class _SafeText:
-    """A text stream that escapes what it is given; otherwise the stream itself."""
-
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
 
@@ -140,10 +137,7 @@ _REST = r"/([^\s:,;'\"()<>]+)"
 
 
 def short_paths(text: str, folder: str) -> str:
-    """Strip ``folder`` from the paths of existing files in ``text``.
-
-    Only of files: a ROS name can begin like a folder (``/robot/cmd_vel`` seen from ``/robot``) and must stay
-    whole."""
+    """Strip ``folder`` from the paths of existing files: ROS names (``/robot/cmd_vel``) must stay whole."""
     root = folder.rstrip("/")
     if not root or root not in text:
         return text

@@ -90,5 +90,4 @@ def collect_elements(
 
 
 def _clark(name: str) -> str:
-    """Write ``uri}name`` as ElementTree does: ``{uri}name``."""
     return "{" + name if "}" in name else name

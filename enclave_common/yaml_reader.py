@@ -47,11 +47,7 @@ class YamlDocument(NamedTuple):
 
 
 def load_yaml(text: str, limit: int = MAX_CHARACTERS) -> Any:
-    """Return the value of the one document in ``text``, as ``yaml.safe_load`` does; None if there is none.
-
-    Raises ``yaml.YAMLError``, ``RefusedYaml``, and ``ValueError`` or ``OverflowError`` for numbers and dates that
-    Python refuses.
-    """
+    """Return what ``yaml.safe_load`` gives; raises YAMLError, ``RefusedYaml``, ValueError and OverflowError."""
     return load_yaml_with_lines(text, limit).root
 
 
@@ -67,10 +63,7 @@ def load_yaml_with_lines(text: str, limit: int = MAX_CHARACTERS) -> YamlDocument
 
 
 def compose_yaml(text: str, limit: int = MAX_CHARACTERS) -> yaml.Node | None:
-    """Return the root node of the one document in ``text``; None if there is none.
-
-    Raises ``yaml.YAMLError`` and ``RefusedYaml``.
-    """
+    """Return the root node of the one document in ``text``, None without one; raises YAMLError and ``RefusedYaml``."""
     return _read(text, limit, lambda node: node)
 
 
@@ -135,8 +128,6 @@ def _may_differ(text: str) -> bool:
 
 
 class _Constructor(SafeConstructor):
-    """Constructs what ``yaml.safe_load`` does and notes where mappings and lists begin."""
-
     def __init__(self) -> None:
         super().__init__()
         self.lines: dict[int, int] = {}
@@ -172,10 +163,7 @@ def _may_be_deep(text: str) -> bool:
 
 
 def _refuse_many_aliases(root: yaml.Node) -> None:
-    """Raise ``RefusedYaml`` when the values below ``root``, with every alias written out, are too many.
-
-    Each distinct node is visited once.
-    """
+    """Raise ``RefusedYaml`` when the values below ``root``, with every alias written out, are too many."""
     sizes: dict[int, int] = {}
     pending = [root]
     while pending:

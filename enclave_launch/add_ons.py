@@ -1,8 +1,4 @@
-"""Zenoh, an add-on: everything that the rest of the package calls of it.
-
-The middleware ``rmw_zenoh_cpp`` reads no enclaves; a router of the keystore secures it. Without the add-on a process on
-it is refused as one on any other middleware that reads no enclaves (``admission.middleware``).
-"""
+"""Zenoh, an add-on: everything that the rest of the package calls of it."""
 
 from __future__ import annotations
 
@@ -33,9 +29,7 @@ class LaunchRouter(Protocol):
     def serve(
         self, environment: Mapping[str, str], say: Callable[[str], None]
     ) -> AbstractContextManager[object]:
-        """Return a context within which a router with the present rules answers; one is started where none does.
-
-        :raises RuntimeFailure: on entering, if none answers and none can be started."""
+        """Return a context within which a router with the present rules answers; raises RuntimeFailure."""
 
     def wait(self) -> None:
         """Wait until the router that serves has the present rules. Raises ``RuntimeFailure``."""

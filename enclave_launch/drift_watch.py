@@ -68,9 +68,7 @@ class DriftWatch(LaunchCompanion):
         return of_launch or (1 if self.alarms else _CANNOT_TELL if self.blind else 0)
 
     def opened(self, launch: LaunchControl) -> None:
-        """Start observing.
-
-        :raises RuntimeFailure: the domain cannot be observed, so nothing is started."""
+        """Start observing; raises RuntimeFailure if the domain cannot be observed."""
         self._launch = launch
         try:
             for domain in self._domains:

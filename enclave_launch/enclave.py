@@ -76,11 +76,9 @@ def join_enclave(scope: str, relative: str) -> str:
 def assign_enclave(
     process: ResolvedProcess, scope: EnclaveScope, default_name: str | None = None
 ) -> EnclaveAssignment | None:
-    """Decide the enclave of ``process``; ``None`` for an executable to which the launch file gives none.
+    """Decide the enclave of ``process``; None for an executable to which the launch file gives none.
 
-    ``default_name`` is the node's own name (from its manifest), used where launch knows none.
-    Raises ``LaunchFileError`` naming the element when the path is not one that rcl accepts.
-    """
+    ``default_name``: the node's own name, used where launch knows none. Raises ``LaunchFileError``."""
     assignment = _unchecked(process, scope, default_name)
     if assignment is None:
         return None
@@ -128,9 +126,7 @@ def _default(process: ResolvedProcess, scope: EnclaveScope, default_name: str | 
 
 
 def final_fqn(process: ResolvedProcess, default_name: str | None) -> str:
-    """Return the node's fully qualified name with launch's placeholders replaced.
-
-    An unknown name becomes ``default_name``, an unknown namespace ``/``, as in rcl if nothing remaps it."""
+    """Return the node's fully qualified name; an unknown name becomes ``default_name``, a namespace ``/``."""
     fqn = process.fqn or UNSPECIFIED_NODE_NAME
     fqn = fqn.replace(UNSPECIFIED_NODE_NAMESPACE, "")
     if default_name is not None:

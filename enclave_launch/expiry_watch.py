@@ -35,8 +35,7 @@ class Notice(NamedTuple):
 
 
 def notices(ends: Iterable[Expiry], keystore: str, after: datetime) -> list[Notice]:
-    """Return the notices in their order: for everything that expires together one at each of ``MARGINS`` still
-    ahead."""
+    """Return the notices in order: one at each of ``MARGINS`` still ahead for what expires together."""
     together: dict[datetime, list[str]] = {}
     for one in ends:
         together.setdefault(one.not_after, []).append(one.subject)
@@ -99,8 +98,7 @@ def _watch(
 
 
 def renewal_deadline(launch: ProvisionedLaunch, now: datetime) -> Deadline | None:
-    """Return when to end ``launch`` so that it is provisioned and started again before anything of its enclaves
-    expires."""
+    """Return when to end ``launch`` so that it is provisioned again before anything of its enclaves expires."""
     return deadline_before(_ends(launch), now)
 
 

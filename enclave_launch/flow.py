@@ -47,8 +47,7 @@ if TYPE_CHECKING:
 def find_launch_file(package: str, file_name: str, *, prefixes: Sequence[str | os.PathLike[str]] = ()) -> str:
     """Return the path of a launch file of an installed package, as ``ros2 launch PACKAGE FILE`` finds it.
 
-    :param prefixes: searched before ``AMENT_PREFIX_PATH``
-    :raises LaunchFileError: the package is not installed, or does not have exactly one file of this name."""
+    ``prefixes`` are searched before ``AMENT_PREFIX_PATH``. Raises LaunchFileError."""
     try:
         return launch_file_path(
             package, file_name, search_prefixes([os.fspath(prefix) for prefix in prefixes])
@@ -63,11 +62,9 @@ def resolve(
     *,
     options: ResolveOptions | None = None,
 ) -> LaunchPlan:
-    """Evaluate ``launch_file`` as launch would and plan it. Starts nothing, writes nothing.
+    """Evaluate ``launch_file`` as launch would and plan it; ``plan.problems``: what a secured start refuses.
 
-    Raises ``LaunchFileError`` (file, line, element, include chain) and ``ManifestError``. What a secure start must
-    refuse is in ``plan.problems``.
-    """
+    Raises ``LaunchFileError`` and ``ManifestError``. Starts nothing, writes nothing."""
     chosen = options or ResolveOptions()
     evaluated = evaluate_launch(launch_file, arguments, options=chosen)
     source, evaluation = evaluated.source, evaluated.evaluation
@@ -101,9 +98,7 @@ def evaluate_launch(
     *,
     options: ResolveOptions | None = None,
 ) -> EvaluatedLaunch:
-    """Evaluate a launch file: what would start, without enclaves; all that an unsecured ``run`` needs.
-
-    :raises LaunchFileError: as ``resolve``."""
+    """Evaluate a launch file: what would start, without enclaves; raises LaunchFileError."""
     source = launch_source(launch_file, arguments, options=options)._replace(
         user_code_results=RecordedResults()
     )
@@ -136,8 +131,7 @@ def launch_source(
 
 
 def _missing_programs(evaluation: Evaluation) -> list[Diagnostic]:
-    """Report programs that ``run`` would refuse; placeholders of packages that are not installed have their own
-    warning."""
+    """Report programs that ``run`` would refuse."""
     placeholders = f"{MISSING_PREFIX}/"
     real = [item for item in evaluation.processes if not "".join(item.cmd[:1]).startswith(placeholders)]
     return [
@@ -197,9 +191,7 @@ def start(launch: Launch, *, options: RunSettings | None = None) -> RunningLaunc
 
 
 async def run_async(launch: Launch, *, options: RunSettings | None = None) -> int:
-    """Run inside a running event loop.
-
-    Signals remain the caller's; cancelling ends every process first."""
+    """Run inside a running event loop; signals stay the caller's, cancelling ends every process first."""
     from enclave_launch.running import run_launched_async  # asyncio
 
     return await run_launched_async(launch, options or RunSettings())

@@ -1,8 +1,4 @@
-"""The plan of a launch: everything decided, nothing done.
-
-The values: ``planner`` makes a ``LaunchPlan``, which the dry run prints, ``provision`` turns into a keystore and
-``run`` carries out. Performs no I/O.
-"""
+"""The plan of a launch: everything decided, nothing done. Performs no I/O."""
 
 from __future__ import annotations
 
@@ -37,10 +33,7 @@ if TYPE_CHECKING:
 
 
 class InterfaceOrigin(str, Enum):
-    """A source of knowledge about a node, in the order in which ``interfaces.descriptions`` prefers them.
-
-    Manifests that were learnt from runs are ``RECORDED`` wherever they lie.
-    """
+    """A source of knowledge about a node; manifests that were learnt are ``RECORDED`` wherever they lie."""
 
     __str__ = str.__str__
 

@@ -133,14 +133,12 @@ def _places(names: Mapping[Named, str]) -> list[str]:
 
 
 def _incomplete(nodes: Iterable[RunningNode]) -> Iterator[Diagnostic]:
-    """Report nodes whose records cannot have shown all of their interfaces."""
     for node in nodes:
         for why in node.interface.incomplete:
             yield recording_incomplete(node.fqn, why, str(node.interface.source), node.location)
 
 
 def _alike(container: str, processes: Iterable[PlannedProcess]) -> tuple[str, ...]:
-    """Return nodes of this launch whose last name is that of ``container``."""
     last = "/" + container.rpartition("/")[2]
     return tuple(
         dict.fromkeys(node.fqn for planned in processes for node in planned.nodes if node.fqn.endswith(last))

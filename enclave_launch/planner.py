@@ -78,7 +78,6 @@ class Planner(NamedTuple):
         )
 
     def _admitted(self, planned: PlannedProcess, distro: str) -> PlannedProcess:
-        """Add what decides whether its enclave is used. An executable without one starts where none is found."""
         process = planned.process
         middleware = middleware_of(process.final_environment, distro)
         if planned.enclave is None and process.kind == "executable":

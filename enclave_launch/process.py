@@ -1,8 +1,4 @@
-"""Processes and composable nodes as launch would start them: the result of evaluation.
-
-Comes out of ``evaluation``; goes into enclave assignment, policy derivation, reports and the runtime.
-Plain frozen values: nothing here touches the world.
-"""
+"""Processes and composable nodes as launch would start them: the result of evaluation. Performs no I/O."""
 
 from __future__ import annotations
 

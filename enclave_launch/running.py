@@ -32,8 +32,7 @@ _UNSECURED = (LaunchSource, EvaluatedLaunch, LaunchPlan)
 
 
 def run_launched(launch: Launch, settings: RunSettings) -> int:
-    """Block until all is over. Before anything was started raises ``RuntimeFailure``, and, for a provisioned launch,
-    ``LaunchFileError`` for a program that is not there."""
+    """Block until all is over. Raises ``RuntimeFailure`` and, provisioned, ``LaunchFileError`` before the start."""
     live = _live(launch, settings)
     with _expiry_watch(launch):
         _check_programs(launch)
@@ -51,9 +50,7 @@ async def run_launched_async(launch: Launch, settings: RunSettings) -> int:
 
 
 def start_launched(launch: Launch, settings: RunSettings) -> RunningLaunch:
-    """Start in a thread of its own.
-
-    :raises EnclaveLaunchError: as ``run_launched``, before anything was started."""
+    """Start in a thread of its own; raises EnclaveLaunchError before anything was started."""
     live = _live(launch, settings)
     _check_programs(launch)
 
@@ -67,7 +64,6 @@ def start_launched(launch: Launch, settings: RunSettings) -> RunningLaunch:
 
 
 def _live(launch: Launch, settings: RunSettings) -> partial[LiveLaunch]:
-    """Prepare the launch, except for its observer and its warden."""
     own = frozenset[str]() if isinstance(launch, _UNSECURED) else launch.secret_variables
     needed = None if isinstance(launch, LaunchSource) else bool(_evaluated(launch).evaluation.launcher_calls)
     return partial(
@@ -92,8 +88,7 @@ def _zenoh_router(launch: Launch) -> AbstractContextManager[object]:
 
 
 def _check_programs(launch: Launch) -> None:
-    """Check that all programs of a secured launch can be executed; unsecured, those that can are started, as
-    launch does."""
+    # Unsecured, those that can be executed are started, as launch does.
     if not isinstance(launch, _UNSECURED):
         check_programs(launch.plan.evaluation.processes)
 
@@ -109,7 +104,6 @@ def _evaluated(launch: EvaluatedLaunch | LaunchPlan | ProvisionedLaunch) -> Eval
 
 
 def _gate(launch: Launch, settings: RunSettings) -> EnclaveGate | None:
-    """Return the gate before each process, None for a launch that is to run unsecured."""
     if isinstance(launch, _UNSECURED):
         return None
 
@@ -131,8 +125,7 @@ def _companion(launch: Launch, settings: RunSettings) -> LaunchCompanion | None:
 
 
 def _recording(launch: Launch, settings: RunSettings) -> LaunchCompanion | None:
-    """Return what records the launch: refusals of a secured one are explained. If recording was not requested, the
-    launch goes on without it where it is not possible or not installed."""
+    """Return what records the launch; without a request only where that is possible and installed."""
     secured = not isinstance(launch, _UNSECURED)
     if settings.record is False or (settings.record is None and not secured):
         return None

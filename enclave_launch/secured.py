@@ -53,8 +53,7 @@ class ProvisionedLaunch(NamedTuple):
 
     @property
     def handshakes(self) -> tuple[Diagnostic, ...]:
-        """Report processes on two DDS implementations that cannot authenticate each other with their present
-        certificates."""
+        """Report processes on two DDS whose present certificates cannot authenticate each other."""
         pairs = mixed_enclaves(self.plan.processes)
         view = KeystoreView(Path(self.settings.keystore))
         subjects = {path: view.common_name(path) for pair in pairs for path in pair}
@@ -68,9 +67,7 @@ class ProvisionedLaunch(NamedTuple):
         return frozenset(secret.variable for secret in given if secret is not None and secret.variable)
 
     def serve_router(self, say: Callable[[str], None]) -> AbstractContextManager[object]:
-        """Return a context within which the router of processes on Zenoh answers; without any it does nothing.
-
-        :raises RuntimeFailure: on entering, if no router answers and none can be started."""
+        """Return a context within which the router of processes on Zenoh answers; raises RuntimeFailure."""
         if self.zenoh is None:
             return nullcontext()
         secret = self.secret_variables
@@ -80,10 +77,7 @@ class ProvisionedLaunch(NamedTuple):
 def provision_policies(
     settings: SecuritySettings, plan: LaunchPlan, options: ProvisionOptions, only: EnclavePolicy | None = None
 ) -> ProvisionReport:
-    """Provision all enclaves of ``plan``, or one.
-
-    :raises ProvisionError: the keystore refuses (the message is its own), or the plan requests what it cannot
-        give."""
+    """Provision all enclaves of ``plan``, or one; raises ProvisionError with the keystore's message."""
     policies = plan.derived.policy.enclaves if only is None else (only,)
     with keystore_errors():
         try:
@@ -95,9 +89,7 @@ def provision_policies(
 def provision_plan(
     settings: SecuritySettings, plan: LaunchPlan, options: ProvisionOptions
 ) -> tuple[ProvisionOptions, ProvisionReport, LaunchRouter | None]:
-    """Provision all enclaves of ``plan``, and the router of those on Zenoh; return the options used, too.
-
-    :raises ProvisionError: as ``provision_policies``."""
+    """Provision all enclaves of ``plan``, and the router of those on Zenoh; return the options used, too."""
     enclaves = on_zenoh(plan, os.environ)
     if not enclaves:
         return options, provision_policies(settings, plan, options), None
@@ -109,15 +101,12 @@ def provision_plan(
 
 
 def launch_owner(plan: LaunchPlan) -> str:
-    """Return the owner of this launch's share of an enclave: the launch file, whatever its arguments, or the
-    program that made the launch description."""
+    """Return the owner of this launch's share of an enclave: the launch file, or the program that launches."""
     return os.path.realpath(sys.argv[0] if plan.launch_file.startswith("<") else plan.launch_file)
 
 
 def with_shares_reported(plan: LaunchPlan, keystore: str) -> LaunchPlan:
-    """Return the plan with a warning for each enclave that other launches on ``keystore`` share; only reads.
-
-    :raises ProvisionError: shares cannot be read."""
+    """Return the plan with a warning for each enclave that other launches on ``keystore`` share."""
     with keystore_errors():
         found = list(shared_enclaves(keystore, launch_owner(plan), plan.derived.policy.enclaves))
     return plan._replace(warnings=(*plan.warnings, *(enclave_of_several_launches(*one) for one in found)))
@@ -162,17 +151,12 @@ class PlanProvider:
         return self._grant(planned, process.environment)
 
     def _find(self, process: ResolvedProcess) -> PlannedProcess | None:
-        """Find the process. Equal ones may have enclaves of their own; names tell them apart unless events reordered
-        them.
-        """
+        # Equal ones may have enclaves of their own; names tell them apart unless events reordered them.
         key = identity(process)
         return self._by_name.get((process.process_name, key)) or self._by_identity.get(key)
 
     def ensure_late(self, process: ResolvedProcess) -> StartAdditions:
-        """Extend the plan by ``process`` and provision that; what the plan has already is only held against it.
-
-        Raises ``ProvisionError`` when its interfaces are not known, or its enclave is no longer what was provisioned.
-        """
+        """Extend the plan by ``process`` and provision that; raises ``ProvisionError``."""
         if (process.process_name, identity(process)) in self._by_name:
             return self.ensure(process)
         evaluation = self._plan.evaluation
@@ -196,7 +180,6 @@ class PlanProvider:
         return self.ensure(process)
 
     def _extend_zenoh(self, process: ResolvedProcess) -> None:
-        """Configure the router for the process, which must happen before it starts."""
         if self._launch.zenoh is None:
             raise ProvisionError(
                 f"{process.process_name} is the first process on Zenoh, and no router was started: the plan had none"
@@ -215,8 +198,7 @@ class PlanProvider:
         return StartAdditions(("--enclave", launcher.enclave), variables)
 
     def _check(self, policy: EnclavePolicy) -> None:
-        """Refuse an enclave that changed since it was signed; nothing is repaired here, since somebody else
-        changed it."""
+        """Refuse an enclave that changed since it was signed; somebody else changed it, nothing is repaired."""
         enclave, keystore = policy.path, self._launch.settings.keystore
         try:
             wrong = differences(keystore, policy, options=self._options)

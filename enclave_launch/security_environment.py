@@ -49,10 +49,7 @@ def secured_command(planned: PlannedProcess, settings: SecuritySettings | None) 
 
 
 def secured_environment(planned: PlannedProcess, settings: SecuritySettings | None) -> Mapping[str, str]:
-    """Return the security variables of one process.
-
-    Every process gets them. Those of an executable without an enclave point nowhere, so that a ROS program in it
-    exits with rcl's message instead of joining as ``/`` or unsecured."""
+    """Return the security variables of one process; without an enclave they point nowhere, so that ROS refuses."""
     if settings is None:
         return {}
     if planned.enclave is None:
@@ -64,8 +61,7 @@ def secured_environment(planned: PlannedProcess, settings: SecuritySettings | No
 
 
 def enclave_environment(enclave: str, middleware: str, settings: SecuritySettings) -> Mapping[str, str]:
-    """Return the security variables of a process in ``enclave``; on Zenoh they select the configuration of that
-    enclave only."""
+    """Return the security variables of a process in ``enclave``; on Zenoh they select its configuration."""
     if middleware != ZENOH:
         return launcher_environment(settings)
     file = f"{settings.keystore}/{layout.zenoh_session(enclave)}"

@@ -1,7 +1,4 @@
-"""Choose the DDS domains of each enclave's permissions: those of its own processes.
-
-Takes a plan, gives the keystore's options; what cannot be served is refused with both places named. Performs no I/O.
-"""
+"""Choose the DDS domains of each enclave's permissions: those of its own processes. Performs no I/O."""
 
 from __future__ import annotations
 
@@ -19,10 +16,7 @@ from keystore.steps.options import ProvisionOptions
 def with_domains(
     plan: LaunchPlan, options: ProvisionOptions, environment: Mapping[str, str]
 ) -> ProvisionOptions:
-    """Return ``options`` with the domains of ``plan``, unless the user chose them.
-
-    :param environment: the launcher's own
-    :raises ManifestError: a process is in a domain that was not chosen."""
+    """Return ``options`` with the domains of ``plan``; raises ManifestError for one that was not chosen."""
     if options.domains is not None:
         refused = list(not_served(plan, options.domains))
         if refused:

@@ -18,7 +18,6 @@ __all__ = ["errors", "get_node_by_executable", "parse", "types"]
 
 
 def __getattr__(name: str) -> Any:
-    """Load the v1 functions when first used: who asks for another module of this package reads no manifests."""
     if name in ("get_node_by_executable", "parse"):
         return getattr(import_module("nodl.v1_api"), name)
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -110,19 +110,14 @@ def executables(folder: str) -> list[str]:
 
 
 def launch_files(package: str, prefixes: Sequence[str]) -> list[str]:
-    """Return the base names of the launch files below the package's share directory, sorted; raises as
-    ``package_prefix``.
-    """
+    """Return the base names of the launch files below the package's share directory; raises as ``package_prefix``."""
     share = package_share_directory(package, prefixes)
     files = {file for _, _, files in os.walk(share) for file in files}
     return sorted(file for file in files if _LAUNCH_FILE.search(file))
 
 
 def package_prefix(package: str, prefixes: Sequence[str]) -> str:
-    """Return the first prefix in which ``package`` is installed.
-
-    Raises ``ValueError`` for what cannot be a package name, else ``PackageNotFoundError``.
-    """
+    """Return the first prefix with ``package``; raises ``PackageNotFoundError``, ``ValueError`` for no such name."""
     if _PACKAGE_NAME.fullmatch(package) is None:
         raise ValueError(f"'{package}' is not a valid package name")
     prefix = find_resource("packages", package, prefixes)
@@ -155,11 +150,9 @@ def package_file_version(path: str) -> str | None:
 
 
 def executable_path(package: str, executable: str, prefixes: Sequence[str]) -> str:
-    """Return the file ``<prefix>/lib/<package>/<executable>``.
+    """Return the file ``<prefix>/lib/<package>/<executable>``; with a slash ``executable`` is a path, as upstream.
 
-    ``executable`` with a slash is taken as a path, as upstream's ``which`` does. Raises as ``package_prefix``, and
-    ``ExecutableNotInstalledError`` in the words of ``exec-in-pkg``.
-    """
+    Raises as ``package_prefix``, and ``ExecutableNotInstalledError``."""
     prefix = package_prefix(package, prefixes)
     folder = os.path.join(prefix, "lib", package)
     if not os.path.exists(folder):
@@ -177,10 +170,7 @@ def executable_path(package: str, executable: str, prefixes: Sequence[str]) -> s
 
 
 def launch_file_path(package: str, file_name: str, prefixes: Sequence[str]) -> str:
-    """Return the one file with exactly this base name anywhere below the package's share directory.
-
-    Raises as ``package_prefix``; ``LaunchFileNotFoundError``; ``MultipleLaunchFilesError``.
-    """
+    """Return the one file with this base name below the package's share directory; raises if there is not one."""
     share = package_share_directory(package, prefixes)
     hits = sorted(
         os.path.join(folder, file_name) for folder, _, files in os.walk(share) if file_name in files

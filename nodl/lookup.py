@@ -49,10 +49,7 @@ class ManifestLookup:
         self._packages: dict[str, _Package] = {}
 
     def find(self, package: str, *, executable: str | None = None, plugin: str | None = None) -> Lookup:
-        """Return the nodes that ``executable`` runs, or the one that ``plugin`` is.
-
-        Raises ``InvalidNoDLError`` for a broken document of the package, ``ConflictingNoDLError``.
-        """
+        """Return the nodes that ``executable`` runs, or the one that ``plugin`` is; raises ``InvalidNoDLError``."""
         fits = partial(_describes, executable=executable, plugin=plugin)
         subject = f"{package}/{executable or plugin}"
         chosen = [node for node in self._chosen_nodes() if fits(node) and _same_package(node, package)]
@@ -84,7 +81,6 @@ class ManifestLookup:
         return read_document(file, package=package, prefixes=self._prefixes)
 
     def _owner(self, file: str) -> str | None:
-        """Return the package whose share directory or index entry ``file`` is; None for a file elsewhere."""
         absolute = os.path.abspath(file)
         for prefix in self._prefixes:
             relative = os.path.relpath(absolute, prefix).split(os.sep)
@@ -135,7 +131,6 @@ def _v1_files(share: str) -> list[str]:
 
 
 def _files(path: str) -> list[str]:
-    """Return ``path``, or the manifests of a folder and of those below it, in the order of their names."""
     if not os.path.isdir(path):
         return [path]
     suffixes = (V1_SUFFIX, *(suffix for suffix in V2_SUFFIXES if suffix.startswith(".nodl.")))
@@ -143,7 +138,6 @@ def _files(path: str) -> list[str]:
 
 
 def _program(node: ManifestNode) -> str:
-    """Return package and program as far as the document says them."""
     interface = node.interface
     program = interface.executable or interface.plugin or "a node of no program"
     return f"{interface.package}/{program}" if interface.package else program
@@ -183,6 +177,5 @@ def _agreed(subject: str, nodes: Sequence[ManifestNode]) -> tuple[NodeInterface,
 
 
 def _meaning(interface: NodeInterface) -> object:
-    """Return what two definitions must have in common to be the same one; the place does not count."""
     endpoints = frozenset((e.kind, e.name, e.type) for e in interface.endpoints)
     return interface.name, interface.namespace or "/", endpoints, interface.lifecycle

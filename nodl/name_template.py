@@ -169,10 +169,7 @@ class NameTemplate(NamedTuple):
         return self if len(kept) == len(self.parts) else NameTemplate(kept)
 
     def fill(self, parameters: Mapping[str, object]) -> NameTemplate:
-        """Replace parameter parts by the given values (else by their defaults, else unknown).
-
-        A part that stands for each element of a list of several has no single value: see ``fill_each``.
-        """
+        """Replace parameter parts by the given values, else by their defaults; elements of a list: ``fill_each``."""
         filled = self.fill_each(parameters)
         if len(filled) == 1:
             return filled[0]

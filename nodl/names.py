@@ -81,11 +81,7 @@ def is_name(name: str) -> bool:
 
 
 def validate_name(name: str, what: str = "name") -> None:
-    """Accept a name as code writes it: absolute, relative or private, with ``{node}``, ``{ns}``, ``{namespace}``.
-
-    Follows rcl's ``rcl_validate_topic_name`` (which lets the two-character ``~a`` and ``a//b`` pass; the latter is
-    refused after expansion). Raises ``InvalidNameError``.
-    """
+    """Accept a name as rcl's ``rcl_validate_topic_name`` does (``~a`` passes); raises ``InvalidNameError``."""
     if not name:
         raise InvalidNameError(what, name, "must not be empty")
     if name[0].isascii() and name[0].isdigit():
@@ -99,10 +95,7 @@ def validate_name(name: str, what: str = "name") -> None:
 
 
 def validate_written_name(name: str, what: str = "name") -> None:
-    """Accept a name that a person writes into a manifest: ``validate_name`` without rcl's leniences.
-
-    ``~a``, ``a//b`` and wildcards are refused: they would never match, or match too much.
-    """
+    """Accept a name in a manifest; ``~a``, ``a//b`` and wildcards would never match, or match too much."""
     wildcard = next((i for i, c in enumerate(name) if c in _WILDCARDS), None)
     if wildcard is not None:
         raise InvalidNameError(
@@ -120,11 +113,7 @@ def validate_written_name(name: str, what: str = "name") -> None:
 
 
 def expand_name(name: str, *, namespace: str, node: str, what: str = "name") -> str:
-    """Return the fully qualified form of ``name`` for node ``node`` in ``namespace`` (both final and valid).
-
-    ``x`` -> ``/ns/x``; ``/x`` -> ``/x``; ``~/x`` -> ``/ns/node/x``. Raises ``InvalidNameError`` for a name that is
-    invalid before or after expansion.
-    """
+    """Return ``/ns/x`` for ``x``, ``/ns/node/x`` for ``~/x``, ``/x`` for itself; raises ``InvalidNameError``."""
     plain = _PLAIN.match(name)
     if plain:
         start = plain[1]

@@ -105,11 +105,7 @@ class RemapRules(NamedTuple):
 
 
 class NodeNames:
-    """Resolves names for one node under its final name and namespace.
-
-    The rules are expanded once, so that a node with many names costs one look-up per name.
-    Raises ``InvalidNameError`` from its methods for names that rcl would refuse.
-    """
+    """Resolves names for one node; raises ``InvalidNameError`` from its methods for names that rcl would refuse."""
 
     def __init__(self, node: str, namespace: str, rules: RemapRules | None = None):
         self.node = node

@@ -21,11 +21,7 @@ from nodl.types import Action, Node, Parameter, PubSubRole, ServerClientRole, Se
 
 
 def get_node_by_executable(*, package_name: str, executable_name: str) -> Node:
-    """Return the node that an installed package's NoDL files describe for ``executable_name``.
-
-    Raises ``nodl.ament_index.PackageNotFoundError`` (a ``KeyError``, as ``ament_index_python``'s),
-    ``NoNoDLFilesError``, ``ExecutableNotFoundError``, ``DuplicateNodeError``, ``InvalidNoDLError``.
-    """
+    """Return the node that an installed package's NoDL files describe for ``executable_name``; raises NoDL errors."""
     for node in _nodes_of_package(package_name):
         if node.executable == executable_name:
             return node

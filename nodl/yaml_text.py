@@ -49,10 +49,7 @@ YamlValue = YamlScalar | YamlList | YamlMap
 
 
 def parse_yaml(text: bytes, file: str, *, last_counts: bool = False) -> YamlValue:
-    """Parse the one document of ``text``; a key given twice is refused unless the ``last_counts``.
-
-    Raises ``InvalidYAMLError`` with file:line.
-    """
+    """Parse one document; a key given twice is refused unless the ``last_counts``. Raises ``InvalidYAMLError``."""
     if len(text) > MAX_BYTES:
         raise InvalidYAMLError.at(SourceRef(file), f"larger than the allowed {MAX_BYTES} bytes")
     try:

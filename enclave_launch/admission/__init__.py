@@ -26,9 +26,7 @@ class AdmissionOptions(NamedTuple):
 
 
 def prefix_refusals(process: ResolvedProcess, options: AdmissionOptions) -> Iterator[Diagnostic]:
-    """Report what may change the environment of a process.
-
-    It matters as much without an enclave: then the environment keeps ROS programs from starting unsecured."""
+    """Report what may change the environment of a process; it keeps programs without enclave out, too."""
     for obstacle in obstacles(process, options.prefixes):
         yield diagnostics.prefix_refused(
             process.process_name, obstacle.wrapper, obstacle.why, process.location

@@ -49,8 +49,7 @@ _NO_ENCLAVES = {
 
 
 def middleware_of(environment: Mapping[str, str], distro: str) -> str:
-    """Return the middleware that a process with this environment loads (rmw_implementation functions.cpp: an empty
-    variable counts as unset)."""
+    """Return the middleware that a process loads (rmw_implementation functions.cpp: an empty variable is unset)."""
     return environment.get(VARIABLE) or _DEFAULT_OF.get(distro, DEFAULT)
 
 

@@ -51,9 +51,7 @@ class Setting(NamedTuple):
 
 
 def overridden(environment: Mapping[str, str], *, on_zenoh: bool = False) -> Iterator[Setting]:
-    """Yield the variables that a launch file sets and a secured start overrides.
-
-    :param environment: the launch file's own changes"""
+    """Yield the variables that a launch file sets and a secured start overrides."""
     for name in (*OURS, *((ZENOH_SESSION, *ZENOH_CLEARED) if on_zenoh else ())):
         if name in environment:
             yield Setting(name, environment[name])
@@ -77,9 +75,7 @@ def own_security(environment: Mapping[str, str]) -> Iterator[Setting]:
 
 
 def domain_of(environment: Mapping[str, str]) -> int:
-    """Return the DDS domain of a process.
-
-    :raises UsageError: rcl, or Cyclone DDS in a governance, would refuse it."""
+    """Return the DDS domain of a process; raises UsageError for one that rcl, or Cyclone DDS, would refuse."""
     text = environment.get(DOMAIN, "")
     domain = domain_id(text)
     if domain is None or domain > HIGHEST_ID:

@@ -125,13 +125,11 @@ def _is_wrapper(words: Sequence[str]) -> bool:
 
 
 def _name(word: str) -> str:
-    """Return ``python3`` for ``/usr/bin/python3.11``."""
     name = word.rpartition("/")[2]
     return re.sub(r"^(python3?)\.[0-9.]+$", r"\1", name)
 
 
 def _of_prefix(words: Sequence[str], *, program_follows: bool) -> Iterator[Obstacle]:
-    """Yield the obstacle of each program of a prefix; the last one is the program itself unless ``program_follows``."""
     rest = list(words)
     while rest:
         name, keeper = _name(rest[0]), KEEPERS.get(_name(rest[0]))

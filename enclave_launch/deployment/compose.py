@@ -21,14 +21,7 @@ _PARAMETERS = "/parameters"
 def compose_files(
     deployment: Deployment, *, image: str, user: str, keystore: str, host_network: bool = False
 ) -> dict[str, File]:
-    """Return file name -> file.
-
-    Args:
-        image: Of every service; its entrypoint sets up ROS.
-        user: uid:gid in the containers.
-        keystore: Where bundles are imported on the host.
-        host_network: Share the host's network, for processes that talk to other hosts.
-    """
+    """Return file name -> file; ``user`` is uid:gid, ``keystore`` where bundles are imported on the host."""
     services = {}
     for process in deployment.processes:
         network: dict[str, Any] = {"network_mode": "host"} if host_network else {"networks": ["dds"]}

@@ -176,7 +176,6 @@ def _volumes(process: DeployedProcess) -> Iterator[dict[str, Any]]:
 
 
 def _service(deployment: Deployment, process: DeployedProcess) -> dict[str, Any]:
-    """Return a Service, the name by which peers find the Pod, in whatever order they start."""
     port = _SPDP_PORT + _DOMAIN_GAIN * process.domain
     spec = {
         "clusterIP": "None",

@@ -17,12 +17,7 @@ PUBLIC_FILES = tuple(name for name in layout.RUNTIME_FILES if name != layout.KEY
 
 
 class EnclaveMaterial(NamedTuple):
-    """The files of an enclave.
-
-    Attributes:
-        public: File name -> content, including the CRL if there is one.
-        key: None if it never left its host.
-    """
+    """Public files by name, with the CRL if there is one, and the key, unless it never left its host."""
 
     enclave: str
     public: Mapping[str, bytes]
@@ -33,11 +28,7 @@ class EnclaveMaterial(NamedTuple):
 
 
 def read_material(keystore: str, enclaves: Iterable[str]) -> dict[str, EnclaveMaterial]:
-    """Return enclave -> its files.
-
-    Raises:
-        ProvisionError: An enclave is not there, is not complete, or is not valid now.
-    """
+    """Return enclave -> its files; raises ProvisionError for one that is not there, complete and valid."""
     wanted = sorted(set(enclaves))
     root = resolve_root(keystore)
     view = KeystoreView(root)

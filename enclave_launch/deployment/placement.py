@@ -16,12 +16,7 @@ ONLY_HOST = "host"
 
 
 class Placement(NamedTuple):
-    """The processes of each host.
-
-    Attributes:
-        hosts: Host -> its processes, in launch order.
-        nowhere: Processes that nothing places, although others are placed.
-    """
+    """The processes of each host in launch order, and those that nothing places although others are placed."""
 
     hosts: Mapping[str, tuple[DeployedProcess, ...]]
     nowhere: tuple[DeployedProcess, ...] = ()
@@ -42,13 +37,9 @@ class Placement(NamedTuple):
 
 
 def place(processes: Iterable[DeployedProcess], hosts: Hosts) -> Placement:
-    """Place each process by the hosts file (its node before its enclave), else by ``machine`` of the launch file.
+    """Place each process by the hosts file (node before enclave), else by its ``machine``, else on ``ONLY_HOST``.
 
-    If neither names a host, all are on ``ONLY_HOST``.
-
-    Raises:
-        UsageError: A process belongs to several hosts, or its host has no valid name.
-    """
+    Raises UsageError for a process on several hosts, and a host without a valid name."""
     listed = list(processes)
     found: dict[str, list[DeployedProcess]] = {name: [] for name in hosts.names}
     nowhere = []

@@ -1,8 +1,4 @@
-"""The processes of a plan as an engine runs them.
-
-They are read from the dry run's JSON document, so a saved plan and a launch file give the same. The writer for an
-engine adds its syntax and the place of the enclave's files.
-"""
+"""The processes of a plan as an engine runs them, from the dry run's JSON: a saved plan gives the same."""
 
 from __future__ import annotations
 
@@ -93,7 +89,6 @@ def deployed_processes(document: Mapping[str, Any]) -> tuple[DeployedProcess, ..
 
 
 def _nodes_of(document: Mapping[str, Any]) -> Mapping[str, tuple[str, ...]]:
-    """Return container -> names of its components."""
     found: dict[str, tuple[str, ...]] = {}
     for entry in document["components"]:
         container = "/" + entry["container"].lstrip("/")
@@ -124,10 +119,7 @@ def _process(entry: Mapping[str, Any], name: str, nodes: Mapping[str, tuple[str,
 
 
 def _final_name(entry: Mapping[str, Any]) -> str | None:
-    """Return the name as rcl resolves it, None for executables.
-
-    Without a namespace it is in the root; without a name it has the program's own, assumed to be the executable's.
-    """
+    # As rcl resolves it: without a name it has the program's own, assumed to be the executable's.
     fqn: str | None = entry["fqn"]
     if fqn is None:
         return None
@@ -147,7 +139,6 @@ def _secured(entry: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _stem(entry: Mapping[str, Any]) -> str:
-    """Return ``rviz2`` for ``rviz2-3``."""
     return str(entry.get("process") or entry["executable"]).rpartition("/")[2].rpartition("-")[0] or "process"
 
 

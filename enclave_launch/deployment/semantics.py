@@ -45,10 +45,7 @@ def unexpressed(document: Mapping[str, Any], engine: Engine) -> tuple[Unexpresse
 
 
 def unexpressed_needs(processes: Iterable[DeployedProcess], engine: Engine) -> tuple[Unexpressed, ...]:
-    """Return the needs of processes that ``engine`` cannot express.
-
-    On Kubernetes devices come from a device plugin, and real-time scheduling from the node's configuration.
-    """
+    """Return the needs of processes that ``engine`` cannot express."""
     if engine is not Engine.KUBERNETES:
         return ()
     wanted = [

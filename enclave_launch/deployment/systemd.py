@@ -56,13 +56,7 @@ LimitCORE=0
 def systemd_files(
     deployment: Deployment, *, keystore: str, parameters: str, setup: tuple[str, ...] = ()
 ) -> dict[str, File]:
-    """Return file name -> file.
-
-    Args:
-        keystore: Where bundles are imported on the host.
-        parameters: Where the generated parameter files are installed.
-        setup: Shell files that set up ROS, sourced before each process.
-    """
+    """Return file name -> file; ``setup``: shell files that set up ROS, sourced before each process."""
     files = {f"{deployment.name}.target": File(_target(deployment))}
     for process in deployment.processes:
         unit = _service(deployment, process, keystore, parameters, setup)
@@ -133,7 +127,6 @@ def _unit_section(deployment: Deployment, process: DeployedProcess, keystore: st
 
 
 def _environment(deployment: Deployment, process: DeployedProcess) -> Iterator[str]:
-    """Return all variables but the keystore's, which is known only when the unit starts."""
     folder = unit_name(deployment, process).removesuffix(".service")
     variables: Mapping[str, str] = process.variables("")
     if process.enclave is not None:
@@ -224,15 +217,11 @@ def _script(process: DeployedProcess, setup: tuple[str, ...]) -> str:
 
 
 def _retries(respawn: Respawn | None) -> int | None:
-    """Return how often launch starts the process again, None without a limit."""
     return respawn.retries if respawn is not None and respawn.retries >= 0 else None
 
 
 def _restart(respawn: Respawn | None) -> Iterator[str]:
-    """Restart as the launch file says.
-
-    ``StartLimitBurst=`` would count manual starts as well, so the process counts by ``NRestarts``, which does not.
-    """
+    # ``StartLimitBurst=`` would count manual starts as well, so the process counts by ``NRestarts``.
     if respawn is None:
         yield "Restart=no"
         return
@@ -263,7 +252,6 @@ def home_paths(process: DeployedProcess, setup: tuple[str, ...]) -> tuple[str, .
 
 
 def _hardening_of(needs: Needs) -> Iterator[str]:
-    """Leave open what the hosts file says that the process needs, nothing else."""
     if needs.devices:
         yield "PrivateDevices=no"
         yield "DevicePolicy=closed"

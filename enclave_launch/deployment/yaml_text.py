@@ -9,8 +9,6 @@ import yaml
 
 
 class _Dumper(yaml.SafeDumper):
-    """A dumper without aliases."""
-
     def ignore_aliases(self, data: Any) -> bool:
         return True
 

@@ -28,9 +28,7 @@ def get_search_paths() -> list[str]:
 
 
 def get_resource(resource_type: str, resource_name: str) -> tuple[str, str]:
-    """Return the text and the prefix of a resource.
-
-    :raises LookupError: no prefix has it."""
+    """Return the text and the prefix of a resource; raises LookupError."""
     resource = ament_index.read_resource(resource_type, resource_name, get_search_paths())
     return resource.text, resource.prefix
 

@@ -28,10 +28,7 @@ class Declared(NamedTuple):
 
 
 class DeclaredArguments(NamedTuple):
-    """The arguments that a description declares, and the argument names of all includes in it.
-
-    A ``None`` among the names: that include has a name which needs a context.
-    """
+    """The arguments that a description declares, and the argument names of all includes (None: needs a context)."""
 
     declared: dict[str, Declared]
     given: list[str | None]
@@ -43,10 +40,7 @@ def check_is_description(description: Any) -> None:
 
 
 def check_required_arguments(description: Any, given: list[str]) -> None:
-    """Raise ``RuntimeError`` unless each required argument is given by the include itself or on the way to it.
-
-    Configurations that happen to be set do not count, as upstream.
-    """
+    """Raise ``RuntimeError`` unless each required argument is given by the include, or on the way to it."""
     check_is_description(description)
     required = {name: d for name, d in _summarize(description).declared.items() if d.required}
     offers = {id(d.given): d.given for d in required.values() if d.given is not None}
@@ -108,9 +102,7 @@ def _role(entity: object) -> ScanRole | None:
 
 
 def _walk(entities: Iterable[Any], conditional: bool) -> Iterator[tuple[Any, bool]]:
-    """Yield every entity that the scan meets, with True if it stands in a conditional offer.
-
-    Includes are not entered: each has a summary of its own."""
+    """Yield every entity that the scan meets, with True if it stands in a conditional offer."""
     for entity in entities:
         if _role(entity) is ScanRole.RESET:
             return

@@ -98,10 +98,7 @@ def normalize_to_list_of_entities(entities: Iterable[SomeEntitiesType]) -> list[
 
 
 class Action(LaunchDescriptionEntity):
-    """An intention, carried out by ``execute`` when its condition holds at that moment.
-
-    With a false condition nothing happens at all: no substitution is performed.
-    """
+    """An intention, carried out by ``execute`` when its condition holds; else no substitution is performed."""
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         """Remember results of the user's classes: the start that follows a plan does not call ``execute`` again."""
@@ -164,8 +161,7 @@ class Action(LaunchDescriptionEntity):
 
 
 def _tell_completion(action: Action, context: LaunchContext) -> None:
-    """Emit ``ExecutionComplete``, at once or when the action's future is done; only if a handler registered
-    by now would take it."""
+    """Emit ``ExecutionComplete`` once the action is done, only if a handler registered by now would take it."""
     event = ExecutionComplete(action=action)
     if not context.would_handle_event(event):
         return

@@ -31,10 +31,7 @@ _guests: dict[str, ModuleType] = {}  # modules of others that were imported with
 
 @contextmanager
 def installed(prefixes: Sequence[str] = ()) -> Iterator[None]:
-    """Make the public names ours within the block; may be nested.
-
-    The Python packages of the ament ``prefixes`` can be imported too, as in a sourced workspace.
-    """
+    """Make the public names ours within the block, and the Python packages of the ament ``prefixes``; may be nested."""
     global _depth
     if _depth:
         yield
@@ -60,8 +57,6 @@ def installed(prefixes: Sequence[str] = ()) -> Iterator[None]:
 
 
 class _Finder(MetaPathFinder):
-    """Finds the modules of the table for some packages."""
-
     def __init__(self, names: tuple[str, ...]) -> None:
         self._names = names
 
@@ -92,7 +87,6 @@ def _hide_real() -> dict[str, ModuleType]:
 
 
 def _withdraw(before: set[str]) -> None:
-    """Take our names, and what was imported with them, out of ``sys.modules``."""
     for name, module in list(sys.modules.items()):
         if is_public(name) or (name not in before and name.startswith(FALLBACK_NAMES) and _is_ours(module)):
             del sys.modules[name]

@@ -61,8 +61,5 @@ class LaunchDescription(LaunchDescriptionEntity):
     def get_launch_arguments_with_include_launch_description_actions(
         self, conditional_inclusion: bool = False
     ) -> list[tuple[Any, list[Any] | None]]:
-        """Return the arguments as ``get_launch_arguments``, each with the includes on the way to it (None: none).
-
-        That list is shared by everything below one include of this description, as upstream.
-        """
+        """Return the arguments as ``get_launch_arguments``, each with the includes on the way to it (None: none)."""
         return collect_arguments(self, conditional_inclusion)

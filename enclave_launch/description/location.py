@@ -33,10 +33,7 @@ def includes_below(include: object, context: LaunchContext) -> tuple[str, ...]:
 
 
 def annotate(error: BaseException, entity: object, context: LaunchContext) -> None:
-    """Record on ``error`` which entity raised it; the innermost record stays.
-
-    An error in a file that an include was about to load stands in that file, not at the include.
-    """
+    """Record on ``error`` which entity raised it; one in a file that an include was loading is in that file."""
     if place_of(error) is not None:
         return
     place = location_of(entity, context)

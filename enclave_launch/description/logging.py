@@ -1,8 +1,4 @@
-"""``launch.logging``: named loggers and where the log files go.
-
-Loggers are those of the standard library, below ``launch``. What is shown and written while a launch runs is
-the runtime's business; nothing here creates a file.
-"""
+"""``launch.logging``: named loggers of the standard library, below ``launch``, and where the log files go."""
 
 from __future__ import annotations
 

@@ -80,10 +80,7 @@ def get_node_name_count(context: LaunchContext, node_name: str) -> int:
 
 
 def warn_about_repeats(context: LaunchContext, node_name: str, started_by: str) -> None:
-    """Count one more node of this fully qualified name and warn if it is not the first.
-
-    ``started_by``: the process, or for a component its container.
-    """
+    """Count one more node of this name, started by a process or container, and warn if it is not the first."""
     add_node_name(context, node_name)
     count = get_node_name_count(context, node_name)
     if count > 1:

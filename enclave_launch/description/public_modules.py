@@ -98,7 +98,6 @@ def hidden_modules(name: str) -> Iterable[str]:
 
 
 def _names_of(name: str) -> dict[str, str]:
-    """Return each name of the module and the module of ours that has it."""
     if name in PATHS:
         rows = [_row(text) for text in PATHS[name].values()]
         names = {shared: row.module for row in rows for shared in row.shared}
@@ -139,8 +138,6 @@ def _available(names: Iterable[str]) -> list[str]:
 
 
 def _is_available(name: str, module: str) -> bool:
-    """Return False for a name that the package of an older release lacks; the module below the package always has
-    it."""
     gate = GATES.get(name)
     if gate is None or (module and module not in PATHS):
         return True

@@ -44,10 +44,7 @@ class LaunchDescriptionSource:
         self.__method = method
 
     def try_get_launch_description_without_context(self) -> LaunchDescription | None:
-        """Load it for looking only, if its path can be performed in an empty context; ``None`` if anything fails.
-
-        A file loaded for this is not kept as the one to visit: upstream loads it again then.
-        """
+        """Load it for looking only, with an empty context; None if anything fails. Upstream loads it again, too."""
         if self.__launch_description is not None:
             return self.__launch_description
         location = self.location_without_context()
@@ -107,11 +104,8 @@ def load_python_launch_file_as_module(python_launch_file_path: str) -> ModuleTyp
 
 
 def get_launch_description_from_python_launch_file(python_launch_file_path: str) -> LaunchDescription:
-    """Call the file's ``generate_launch_description()`` and return whatever it returns.
-
-    Raises ``InvalidPythonLaunchFileError`` without that function, ``PythonRefused`` under ``--no-python``,
-    and whatever the file raises, with the place in the file noted on it (``error_location``).
-    """
+    """Call the file's ``generate_launch_description()``; raises ``InvalidPythonLaunchFileError`` without one,
+    ``PythonRefused`` under ``--no-python``, and whatever the file raises, with its place."""
     results = current_host().user_code_results
     if results is None:
         return _run_python_launch_file(python_launch_file_path)
@@ -137,8 +131,7 @@ def _run_python_launch_file(python_launch_file_path: str) -> LaunchDescription:
 def get_launch_description_from_frontend_launch_file(
     frontend_launch_file_path: str, *, parser: type[Parser] = Parser
 ) -> LaunchDescription:
-    """Raises ``InvalidFrontendLaunchFileError`` when no front end can read the text, ``OSError``, and the
-    errors of elements and substitutions."""
+    """Raises ``InvalidFrontendLaunchFileError``, ``OSError``, and the errors of elements and substitutions."""
     root, implementation = parser.load(frontend_launch_file_path)
     return implementation.parse_description(root)
 
@@ -149,9 +142,7 @@ def get_launch_description_from_frontend_launch_file(
 def get_launch_description_from_any_launch_file(
     launch_file_path: str, *, parser: type[Parser] = Parser
 ) -> LaunchDescription:
-    """Load a launch file: ``.py`` as Python, then by the front ends; any other by the front ends, then as Python.
-
-    :raises InvalidLaunchFileError: all attempts failed; it has one line for each."""
+    """Load a launch file: ``.py`` as Python first, any other by the front ends; raises InvalidLaunchFileError."""
     name = os.path.basename(launch_file_path)
     extension = os.path.splitext(name)[1][1:]
     loaders: list[Callable[[str], LaunchDescription]] = [

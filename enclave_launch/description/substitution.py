@@ -68,10 +68,7 @@ SomeSubstitutionsType_types_tuple = (str, Substitution, collections.abc.Iterable
 
 
 def perform_substitutions(context: LaunchContext, subs: Iterable[Substitution], limit: int = MAX_TEXT) -> str:
-    """Perform each and concatenate.
-
-    Raises ``TypeError`` where one does not give text, ``SubstitutionFailure`` for more than ``limit`` characters.
-    """
+    """Perform each and concatenate; raises ``SubstitutionFailure`` for more than ``limit`` characters."""
     if type(subs) is list and len(subs) == 1:
         text = subs[0].perform(context)
         text = text if type(text) is str else "".join((text,))
@@ -83,9 +80,7 @@ def perform_substitutions(context: LaunchContext, subs: Iterable[Substitution], 
 
 
 def normalize_to_list_of_substitutions(subs: SomeSubstitutionsType | pathlib.Path) -> list[Substitution]:
-    """Return text as a ``TextSubstitution``, one substitution as a list, an iterable item by item.
-
-    :raises TypeError: ``subs`` is anything else."""
+    """Return text as a ``TextSubstitution``, one substitution as a list, an iterable item by item."""
     if isinstance(subs, str):
         return [TextSubstitution(text=subs)]
     if type(subs) is list:

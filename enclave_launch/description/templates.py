@@ -99,8 +99,6 @@ class _Signature:
 
 
 class _Templates:
-    """Base of actions and substitutions with declared templates."""
-
     _declared: ClassVar[dict[str, Template]] = {}
     __signature__ = _Signature()
 

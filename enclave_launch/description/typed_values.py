@@ -42,9 +42,7 @@ def is_valid_scalar_type(data_type: Any) -> bool:
 
 
 def extract_type(data_type: Any) -> tuple[Any, bool]:
-    """Split ``List[int]`` into ``(int, True)`` and ``bool`` into ``(bool, False)``.
-
-    :raises ValueError: it is another type."""
+    """Split ``List[int]`` into ``(int, True)`` and ``bool`` into ``(bool, False)``; raises ValueError."""
     if is_valid_scalar_type(data_type):
         return data_type, False
     items = getattr(data_type, "__args__", None)
@@ -81,11 +79,7 @@ def is_instance_of(value: Any, data_type: Any = None, *, can_be_str: bool = Fals
 
 
 def coerce_to_type(value: str, data_type: Any = None, *, can_be_str: bool = False) -> Any:
-    """Convert text to ``data_type``; None stands for whatever YAML 1.1 makes of it.
-
-    :param can_be_str: return text that does not convert unchanged
-    :raises ValueError: the text does not convert, or ``data_type`` is invalid.
-    :raises TypeError: ``value`` is not text."""
+    """Convert text to ``data_type``, None for YAML 1.1's; ``can_be_str``: what does not convert stays text."""
     ensure_argument_type(value, str, "value", "coerce_to_type")
     if data_type is str:
         return value
@@ -148,9 +142,7 @@ def coerce_list(value: list[str], data_type: Any = None, *, can_be_str: bool = F
 
 
 def get_typed_value(value: str | list[str], data_type: Any, *, can_be_str: bool = False) -> Any:
-    """Convert text or a list of texts to ``data_type``.
-
-    :raises TypeError: ``value`` is a list and ``data_type`` a scalar."""
+    """Convert text or a list of texts to ``data_type``; raises TypeError for a list and a scalar type."""
     if not isinstance(value, list):
         return coerce_to_type(value, data_type, can_be_str=can_be_str)
     if data_type is not None:
@@ -181,12 +173,9 @@ def is_normalized_substitution(x: Any) -> bool:
 
 
 def normalize_typed_substitution(value: Any, data_type: Any) -> Any:
-    """Return a scalar, a list of substitutions, or a list of scalars and those lists.
+    """Return a scalar, a list of substitutions, or a list of scalars and those lists; raises TypeError.
 
-    Anything that can be read as one substitution is: ``['a', TextSubstitution(text='b')]`` is the text ``ab``; a list
-    of two texts needs ``['a', [TextSubstitution(text='b')]]``. Raises ``TypeError`` if the value can never become a
-    ``data_type`` (``None``: any allowed type).
-    """
+    What can be read as one substitution is: a list of two texts needs ``['a', [TextSubstitution(text='b')]]``."""
     if isinstance(value, ScalarTypesTuple):
         if not is_instance_of(value, data_type):
             raise TypeError(f"value='{value}' is not an instance of {data_type}")
@@ -243,11 +232,7 @@ def _normalize_item(item: Any, item_type: type | None) -> Any:
 
 
 def perform_typed_substitution(context: LaunchContext, value: Any, data_type: Any) -> Any:
-    """Perform what ``normalize_typed_substitution`` returned and coerce the result to ``data_type``.
-
-    Raises ``TypeError`` for a value that is not normalized or not of the type, ``ValueError`` when the
-    performed text does not convert.
-    """
+    """Perform what ``normalize_typed_substitution`` returned and coerce it; raises TypeError, ValueError."""
     if isinstance(value, ScalarTypesTuple):
         if data_type is not None and not is_instance_of(value, data_type):
             raise TypeError(f"value=`{value}` is a scalar and not an instance of `{data_type}`")

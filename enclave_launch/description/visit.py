@@ -25,10 +25,7 @@ Surroundings = tuple[tuple[str, ...], "tuple[OpenFile, ...]"]
 
 
 def visit_all(entity: LaunchDescriptionEntity, context: LaunchContext) -> list[Any]:
-    """Visit ``entity`` and everything below it; give the futures of what was begun, with their entities.
-
-    An exception ends the walk; it carries the place of the entity that raised it (``location.place_of``).
-    """
+    """Visit ``entity`` and everything below it; give the futures of what was begun, with their entities."""
     futures: list[Any] = []
     outside = context.includes, context.open_files
     before = context.unfolded
@@ -74,10 +71,7 @@ def visit_all_entities_and_collect_futures(
 
 
 def handle_next(context: LaunchContext, describe: Callable[[Handler, Event], str | None]) -> list[Any]:
-    """Take one event from the queue through all its handlers; give the futures of what was begun.
-
-    ``describe`` names a handler's turn for ``context.on_event`` (``None``: as the event's own mark).
-    """
+    """Take one event through all its handlers; give the futures of what was begun."""
     event, mark = context._event_queue.get_nowait()
     futures: list[Any] = []
     for handler in context._event_handlers.matching(event):

@@ -12,9 +12,7 @@ from enclave_launch.source_location import SourceLocation
 def container_elsewhere(
     component: str, container: str, alike: tuple[str, ...], place: SourceLocation
 ) -> Diagnostic:
-    """Report a component whose container this launch does not start.
-
-    :param alike: containers of this launch with the same last name"""
+    """Report a component whose container this launch does not start."""
     text = (
         f"container {container!r} of component {component} is not started by this launch file; its permissions are "
         "not part of this plan"
@@ -34,10 +32,7 @@ def enclave_attribute_unused(process: str, enclave: str, attribute: str, place: 
 
 
 def enclave_of_several_launches(enclave: str, others: Sequence[str], added: Sequence[str]) -> Diagnostic:
-    """Report an enclave that several launches share.
-
-    :param others: the other launches
-    :param added: what their share permits the processes of this one"""
+    """Report an enclave that ``others`` share, and what their share permits the processes of this launch."""
     cost = f"; its processes may then also {some_of(added, 4)}" if added else ""
     text = f"enclave {enclave} is shared with {', '.join(others)}{cost}"
     remedy = (
@@ -54,9 +49,7 @@ def enclave_shared_with_launcher(enclave: str) -> Diagnostic:
 
 
 def enclave_too_deep(process: str, why: str, place: SourceLocation) -> Diagnostic:
-    """Report an enclave that no certificate can be made for.
-
-    :param why: the reason"""
+    """Report an enclave that no certificate can be made for."""
     return Diagnostic(Code.ENCLAVE_TOO_DEEP, process, f"{process}: {why}", place, "give it a shorter one")
 
 
@@ -81,8 +74,7 @@ def executable_without_enclave(process: str, place: SourceLocation) -> Diagnosti
 
 
 def machine_elsewhere(process: str, machine: str, place: SourceLocation) -> Diagnostic:
-    """Report that ``machine``, a hint for ``secure-plan hosts`` and ``secure-plan export``, has no effect on a
-    launch."""
+    """Report that ``machine``, a hint for ``secure-plan``, has no effect on a launch."""
     text = f"{process} is assigned to machine {machine!r}, but a launch starts everything on this host"
     return Diagnostic(
         Code.MACHINE_ELSEWHERE,
@@ -94,8 +86,7 @@ def machine_elsewhere(process: str, machine: str, place: SourceLocation) -> Diag
 
 
 def connext(process: str, place: SourceLocation) -> Diagnostic:
-    """Report a process on RTI Connext; it is not refused: the source of rmw_connextdds was read, the middleware
-    was not run."""
+    """Report a process on RTI Connext; not refused: its rmw was read, and not run."""
     text = (
         f"{process} runs on RTI Connext: rmw_connextdds reads enclaves (its source says so), but it was not "
         "tested; permissions name topics as ROS does (rt/chatter), topic aliases of plain Connext need both names"
@@ -104,10 +95,7 @@ def connext(process: str, place: SourceLocation) -> Diagnostic:
 
 
 def handshake_fails(fast: str, cyclone: str, *, planned: bool) -> Diagnostic:
-    """Report enclaves that cannot authenticate each other: the two DDS choose by certificate subject which side
-    begins a handshake.
-
-    :param planned: reported for a plan, before certificates exist"""
+    """Report enclaves that cannot authenticate each other; ``planned``: before certificates exist."""
     if fast == cyclone:
         text = (
             f"enclave {fast} has processes on Fast DDS and on Cyclone DDS: chance decides at each start which of them "
@@ -134,9 +122,7 @@ def domain_invalid(process: str, why: str, place: SourceLocation) -> Diagnostic:
 
 
 def domain_not_served(process: str, domain: int, served: str, place: SourceLocation) -> Diagnostic:
-    """Report a process in a domain that the permissions do not cover.
-
-    :param served: the domains of ``--domain-id``"""
+    """Report a process in a domain that the permissions do not cover."""
     option = "--domain-id (ProvisionOptions.domains)"
     text = f"{process} is in domain {domain}, but {option} permits {served} only"
     return Diagnostic(
@@ -165,9 +151,7 @@ def library_preloaded(process: str, variable: str, value: str, place: SourceLoca
 def middleware_refused(
     process: str, middleware: str, why: str, place: SourceLocation, *, by_launch_file: bool
 ) -> Diagnostic:
-    """Report a process whose middleware would not be secured.
-
-    :param by_launch_file: the launch file sets ``RMW_IMPLEMENTATION``, not the environment"""
+    """Report a process whose middleware would not be secured."""
     origin = "the launch file" if by_launch_file else "the environment"
     text = f"{process} would run on {middleware} (RMW_IMPLEMENTATION of {origin}) and not be secured: {why}"
     known = (
@@ -179,9 +163,7 @@ def middleware_refused(
 
 
 def prefix_refused(process: str, wrapper: str, why: str, place: SourceLocation) -> Diagnostic:
-    """Report a launch prefix that may not keep the security environment.
-
-    :param wrapper: the program between launcher and node"""
+    """Report a launch prefix that may not keep the security environment."""
     text = f"{process} would be started through {wrapper!r} and might not be secured: {why}"
     return Diagnostic(
         Code.PREFIX_REFUSED, process, text, place, f"if it keeps ROS_SECURITY_*, --accept-prefix {wrapper}"
@@ -204,10 +186,7 @@ def variable_overridden(process: str, variable: str, value: str, place: SourceLo
 
 
 def names_apart(what: str, name: str, on_dds: str, on_zenoh: str) -> Diagnostic:
-    """Report a name with ends on both middlewares.
-
-    :param on_dds: nodes with an end on DDS
-    :param on_zenoh: nodes with an end on Zenoh"""
+    """Report a name with ends on both middlewares."""
     text = f"{what} {name}: {on_dds} is on DDS and {on_zenoh} on Zenoh (RMW_IMPLEMENTATION); they cannot communicate"
     remedy = "give both the same middleware, or put a bridge between them and give it an enclave on each"
     return Diagnostic(Code.MIDDLEWARES_APART, name, text, None, remedy)
@@ -234,9 +213,7 @@ def enclave_on_both(enclave: str) -> Diagnostic:
 
 
 def zenoh_cannot_grant(enclave: str, gap: str) -> Diagnostic:
-    """Report a permission that Zenoh cannot express.
-
-    :param gap: such as a wildcard that Zenoh's key expressions do not have"""
+    """Report a permission that Zenoh cannot express."""
     text = f"enclave {enclave} is on Zenoh, where this cannot be granted and is denied: {gap}"
     return Diagnostic(Code.ZENOH_CANNOT_GRANT, enclave, text, None, "name what is meant, one by one")
 

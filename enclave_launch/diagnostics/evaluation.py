@@ -11,17 +11,13 @@ from enclave_launch.source_location import SourceLocation
 
 
 def argument_unknown(name: str, alike: str) -> Diagnostic:
-    """Report an argument that no launch file declares or reads.
-
-    :param alike: the suggestion printed after the name, or empty"""
+    """Report an argument that no launch file declares or reads."""
     text = f"no launch file declares or reads the argument {name!r}{alike}"
     return Diagnostic(Code.ARGUMENT_UNKNOWN, name, text, None, "secure-launch --show-args lists them")
 
 
 def command_stderr(message: str, command: str) -> Diagnostic:
-    """Report what ``$(command ...)`` wrote to stderr with ``on_stderr="warn"``.
-
-    :param message: launch's own sentence"""
+    """Report what ``$(command ...)`` wrote to stderr with ``on_stderr="warn"``."""
     return Diagnostic(Code.COMMAND_STDERR, command, message)
 
 
@@ -42,9 +38,7 @@ def include_left_out(path: str) -> Diagnostic:
 
 
 def launch_file_deprecated(file: str | None, reason: str) -> Diagnostic:
-    """Report a deprecated launch description.
-
-    :param file: None for a description that comes from no file"""
+    """Report a deprecated launch description, of a ``file`` or of code."""
     what = "deprecated launch description" if file is None else f"launch file [{file}] is deprecated"
     return Diagnostic(Code.LAUNCH_FILE_DEPRECATED, file or "", f"{what}: {reason}")
 
@@ -67,9 +61,7 @@ def ros_timer_on_wall_time(seconds: float, location: SourceLocation | None) -> D
 
 
 def node_name_repeated(node: str, count: int, started_by: str) -> Diagnostic:
-    """Report a repeated node name in the words of launch_ros.
-
-    :param count: nodes with this name so far"""
+    """Report a repeated node name in the words of launch_ros."""
     text = (
         f"{started_by}: there are now at least {count} nodes with the name {node} "
         "created within this launch context"
@@ -118,17 +110,12 @@ def program_not_installed(program: str) -> Diagnostic:
 
 
 def program_not_executable(program: str, text: str, location: SourceLocation | None) -> Diagnostic:
-    """Report a process whose start will fail.
-
-    :param text: the error of that start"""
+    """Report a process whose start will fail."""
     return Diagnostic(Code.PROGRAM_NOT_EXECUTABLE, program, text, location)
 
 
 def ros_distro_unknown(name: str, known: Sequence[str], taken: str) -> Diagnostic:
-    """Report an unknown ``ROS_DISTRO``.
-
-    :param known: the distributions with rules here
-    :param taken: the one whose rules are used"""
+    """Report an unknown ``ROS_DISTRO``, and the distribution whose rules are used."""
     text = f"ROS_DISTRO={quoted(name)} is not a known distribution: the rules of {taken} are followed"
     remedy = f"set it, or give --distro{did_you_mean(name, known)}"
     return Diagnostic(Code.ROS_DISTRO_UNKNOWN, name, text, None, remedy)

@@ -19,17 +19,13 @@ _LEARN = (
 
 
 def library_version(program: str, doubt: str, location: SourceLocation) -> Diagnostic:
-    """Report a library document made for another version of a package.
-
-    :param doubt: names the document, its version and the installed one"""
+    """Report a library document made for another version of a package."""
     remedy = "compare them (secure-nodl library show), and keep a corrected copy in a folder for --library"
     return Diagnostic(Code.LIBRARY_VERSION, program, f"library document {doubt}", location, remedy)
 
 
 def manifest_lacks(program: str, manifest: str, lacks: Sequence[str], place: SourceLocation) -> Diagnostic:
-    """Report names that a manifest lacks.
-
-    :param lacks: each name with the place that makes it"""
+    """Report names that a manifest lacks."""
     text = (
         f"the manifest of {program} ({manifest}) lacks {counted(len(lacks), 'interface')} that another description "
         f"has, so {_they_are(lacks)} not permitted: {some_of(lacks, _INTERFACES, '; ')}"
@@ -41,10 +37,7 @@ def manifest_lacks(program: str, manifest: str, lacks: Sequence[str], place: Sou
 def record_lacks(
     program: str, record: str, lacks: Sequence[str], unknown: Sequence[str], place: SourceLocation
 ) -> Diagnostic:
-    """Report what other descriptions have beyond a record.
-
-    :param lacks: each name with the place that says it
-    :param unknown: what the others leave open, so that nobody knows whether the record has it"""
+    """Report what other descriptions have beyond a record, and what they leave open."""
     texts = []
     if lacks:
         texts.append(
@@ -75,10 +68,7 @@ def record_undecided(
 def descriptions_differ(
     program: str, used: str, other: str, differing: Sequence[str], place: SourceLocation
 ) -> Diagnostic:
-    """Report that the source of a program and the library's document differ.
-
-    :param used: which of them the plan uses
-    :param differing: each name that only one of the two has, with its place"""
+    """Report that the source of a program and the library's document differ."""
     names = some_of(differing, _INTERFACES, "; ")
     text = f"{program}: its source and the library document ({other}) differ, {used}: {names}"
     remedy = "correct the one that is wrong (secure-nodl library check shows all)"
@@ -90,9 +80,7 @@ def _they_are(names: Sequence[str]) -> str:
 
 
 def recording_incomplete(node: str, why: str, manifest: str, place: SourceLocation) -> Diagnostic:
-    """Report an incomplete record.
-
-    :param manifest: the file that ``--learn`` wrote, with the reason in it"""
+    """Report an incomplete record."""
     remedy = "record it again in a run that gets so far (--learn); runs are merged"
     return Diagnostic(
         Code.RECORDING_INCOMPLETE,
@@ -113,10 +101,7 @@ def action_remap_idle(node: str, rule: str, action: str, distro: str, place: Sou
 
 
 def interface_unknown(node: str, why: str, program: str, place: SourceLocation) -> Diagnostic:
-    """Report a gap in a node's interfaces.
-
-    :param why: names the endpoint
-    :param program: what a manifest would describe"""
+    """Report a gap in a node's interfaces."""
     remedy = (
         "let it run once with --learn; grant what is known of the name as a wildcard with --accept-patterns; or "
         f"describe {program} in a NoDL manifest (--nodl), or the node in a policy file (--policy)"
@@ -137,10 +122,7 @@ def name_unremappable(node: str, name: str, place: SourceLocation) -> Diagnostic
 
 
 def no_manifest(subject: str, why: str, place: SourceLocation) -> Diagnostic:
-    """Report that no description was found.
-
-    :param subject: ``package/executable``, ``package/plugin`` or a node
-    :param why: where it was searched"""
+    """Report that no description was found."""
     return Diagnostic(Code.NO_MANIFEST, subject, f"no NoDL manifest for {subject}: {why}", place, _LEARN)
 
 
@@ -152,9 +134,7 @@ def node_name_unknown(subject: str, why: str, place: SourceLocation) -> Diagnost
 
 
 def node_name_impossible(node: str, why: str, place: SourceLocation) -> Diagnostic:
-    """Report a node name that rcl refuses.
-
-    :param why: the rule that it breaks"""
+    """Report a node name that rcl refuses."""
     return Diagnostic(Code.NODE_NAME_IMPOSSIBLE, node, f"node {node}: {why}", place, _OTHER_NAME)
 
 

@@ -187,11 +187,7 @@ class _Comparison:
         return self._about(kind, process, text, names, enclave=enclave, remedy=f"stop it, {_OR_PLAN_IT}")
 
     def _nameless(self, process: GraphProcess, enclave: str) -> DriftFinding:
-        """Report a participant without nodes.
-
-        One that shows only the middleware's own endpoints is a note: an observer, or a program that is starting. One
-        that shows none at all may have any.
-        """
+        # One that shows only the middleware's own endpoints is an observer, or starting; one without any may have any.
         topics = sorted({endpoint.topic for endpoint in process.endpoints})
         if topics:
             text = f"a participant with {', '.join(topics[:5])} is not planned"
@@ -233,10 +229,7 @@ class _Comparison:
         return (node.fqn.rpartition("/")[0] or "/") in self._expected.unnamed
 
     def _is_helper(self, node: GraphNode, process: GraphProcess) -> bool:
-        """Return True for a node that a library makes under a name of its own.
-
-        All that it has is granted to a planned node of its process; the plan grants its name by pattern.
-        """
+        # All that it has is granted to a planned node of its process; the plan grants its name by pattern.
         granted = [
             each.grant
             for other in process.nodes

@@ -52,20 +52,13 @@ class Expected(NamedTuple):
 
 
 def out_of_sight(documents: Iterable[Mapping[str, Any]]) -> tuple[str, ...]:
-    """Return the processes on Zenoh.
-
-    An observer takes part in DDS: to it they would look as if they were missing, and what runs beside them would be
-    overlooked.
-    """
+    """Return the processes on Zenoh: an observer takes part in DDS, and would miss them."""
     processes = (process for document in documents for process in document["processes"])
     return tuple(process["process"] for process in processes if process["middleware"] == ZENOH)
 
 
 def expected_in(documents: Iterable[Mapping[str, Any]], domain: int) -> Expected:
-    """Return what all launches in the domain expect; processes of other domains are left out.
-
-    ``documents`` are as ``report.contract.DryRun`` accepts them.
-    """
+    """Return what all launches in the domain expect, from the documents of their dry runs."""
     plans = tuple(documents)
     document = {
         part: [each for plan in plans for each in plan[part]] for part in ("processes", "components", "nodes")
@@ -101,7 +94,6 @@ def expected_in(documents: Iterable[Mapping[str, Any]], domain: int) -> Expected
 
 
 def _fqn(started: Mapping[str, Any]) -> str:
-    """Return the name as rcl has it: the root namespace if launch gives none."""
     return str(started["fqn"]).replace(UNSPECIFIED_NODE_NAMESPACE, "")
 
 

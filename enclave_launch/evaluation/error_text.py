@@ -65,7 +65,6 @@ def _text(error: BaseException) -> str:
 
 
 def _syntax(error: SyntaxError) -> str:
-    """Return the message of a syntax error: Python's have ``msg``, those of XML end in their place."""
     if getattr(error, "position", None) is not None:
         return "malformed XML: " + str(error).rpartition(": line")[0]
     return f"{type(error).__name__}: {error.msg}"

@@ -63,10 +63,8 @@ def evaluate(
 ) -> Evaluation:
     """Return everything that ``ros2 launch launch_file name:=value ...`` would start, in launch order.
 
-    ``arguments`` are (name, value) pairs, as plain text; ``launch_configurations`` are set before the file is
-    included (``launch-prefix``). Python launch files, ``$(command)`` and ``OpaqueFunction`` run for real.
-
-    Raises ``EvaluationError`` (file, line, element, include chain; ``cause`` is launch's own exception).
+    ``launch_configurations`` are set before the file is included. Python launch files, ``$(command)`` and
+    ``OpaqueFunction`` run for real. Raises ``EvaluationError``, whose ``cause`` is launch's own exception.
     """
     host = host or PlanHost()
     path = os.path.abspath(launch_file)
@@ -97,10 +95,7 @@ def top_description(path: str, arguments: Arguments) -> Any:
 
 @contextmanager
 def read_description(launch_file: str | os.PathLike[str], host: PlanHost) -> Iterator[LaunchDescription]:
-    """Load the description in ``launch_file`` without visiting it; usable within the block.
-
-    Raises ``EvaluationError`` as ``evaluate``.
-    """
+    """Load a description without visiting it; usable within the block. Raises ``EvaluationError``."""
     path = os.path.abspath(launch_file)
     with evaluation_surroundings(host):
         try:
@@ -115,8 +110,7 @@ def read_description(launch_file: str | os.PathLike[str], host: PlanHost) -> Ite
 
 @contextmanager
 def evaluation_surroundings(host: Host) -> Iterator[None]:
-    """Install what evaluation needs and undo it at the end: our packages under their public names, the host, the
-    environment."""
+    """Install what evaluation needs: our packages under their public names, the host, the environment."""
     with ExitStack() as stack:
         stack.enter_context(ENVIRONMENT_SWITCH.restored())
         stack.enter_context(environment_untouched())
@@ -133,9 +127,7 @@ def forget_elements_of_launch_files() -> None:
 
 
 def parse_arguments(words: Sequence[str]) -> list[tuple[str, str]]:
-    """Parse ``name:=value`` words; of a repeated name the last value is used.
-
-    :raises RuntimeError: a word has another form; the message is launch's."""
+    """Parse ``name:=value`` words, of which the last with a name is used; raises launch's RuntimeError."""
     parsed: dict[str, str] = {}
     for word in words:
         name, separator, value = word.partition(":=")
@@ -146,7 +138,6 @@ def parse_arguments(words: Sequence[str]) -> list[tuple[str, str]]:
 
 
 def _unknown_arguments(arguments: Arguments, looked_at: Collection[str]) -> Iterator[Diagnostic]:
-    """Yield a diagnostic for each argument that nothing read, which ``ros2 launch`` ignores silently."""
     for name, _ in arguments:
         if name not in looked_at:
             yield argument_unknown(name, did_you_mean(name, looked_at))
@@ -171,8 +162,7 @@ def _evaluation_error(error: Exception, path: str, host: PlanHost) -> Evaluation
 
 
 def launch_file_error(error: Exception, path: str) -> EvaluationError:
-    """Convert an exception of visiting the launch file at ``path`` to an error with its place, include chain and
-    remedy."""
+    """Convert an exception of visiting ``path`` to an error with its place, include chain and remedy."""
     location, helper = _location(error, path)
     where = f" (in {helper.file}:{helper.line})" if helper else ""
     return EvaluationError(error_text(error_location.likeliest(error)) + where, location, error)

@@ -67,7 +67,6 @@ class Explorer:
             self._settle_now()
 
     def _settle_now(self) -> None:
-        """Do everything that happens before the clock moves."""
         while self._host.loop.fire_due() or self._handle_event() or self._announce_start():
             pass
 
@@ -92,9 +91,7 @@ class Explorer:
         self._host.unforeseeable(Unforeseeable(what, location_of(written, self._context)))
 
     def _announce_start(self) -> bool:
-        """Emit ``OnProcessStart``, which is certain for a process that was started.
-
-        :returns: False if all were announced."""
+        """Emit ``OnProcessStart`` for each process that was started; False if all were announced."""
         if self._announced >= len(self._host.started):
             return False
         action = self._host.started[self._announced]
@@ -128,8 +125,7 @@ class Explorer:
         self._kept_alive.append(handler)
 
     def _note(self, handler: Handler, event: Event | None) -> None:
-        """Record a reaction, for engines that carry the plan out without launch and know nothing of the file's
-        handlers."""
+        # For engines that carry the plan out without launch and know nothing of the file's handlers.
         is_timer = isinstance(event, TimerEvent)
         if handler.internal and not is_timer:
             return
@@ -188,7 +184,6 @@ class Explorer:
             self._host.loop.restore(clock)
 
     def _note_failure(self, event: Event, error: Exception) -> None:
-        """Record a handler that fails here: at a real start it would end the launch at that point."""
         place = place_of(error) or location_of(event, self._context)
         what = f"what {event.name.rpartition('.')[2]} {event.subject()}".rstrip()
         self._host.unforeseeable(Unforeseeable(f"{what} would lead to: {error_text(error)}", place))
@@ -207,7 +202,6 @@ class Explorer:
 
 
 def _label(handler: Handler, event: Event) -> str | None:
-    """Return ``OnProcessExit talker-1`` or ``timer 2.5``, None for launch's internal handlers."""
     if isinstance(event, TimerEvent):
         return f"timer {event.subject()}" if handler.internal else None
     if handler.internal:

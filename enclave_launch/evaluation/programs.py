@@ -1,7 +1,4 @@
-"""Find missing programs before launch would notice them, when it spawns.
-
-Looks at the file system; asked before anything starts.
-"""
+"""Find missing programs before launch would notice them, when it spawns. Looks at the file system."""
 
 from __future__ import annotations
 
@@ -14,11 +11,7 @@ from enclave_launch.process import ResolvedProcess
 
 
 def missing_programs(processes: Iterable[ResolvedProcess]) -> list[tuple[ResolvedProcess, LaunchFileError]]:
-    """Return each process whose program cannot be executed, with the error, not raised.
-
-    The program is the first word of the command, a prefix such as ``gdb`` included. What a shell would run
-    is the shell's business.
-    """
+    """Return each process whose first word, a prefix such as ``gdb`` included, cannot be executed, and the error."""
     known: dict[tuple[str, str], bool] = {}
     errors = []
     for process in processes:
@@ -32,10 +25,7 @@ def missing_programs(processes: Iterable[ResolvedProcess]) -> list[tuple[Resolve
 
 
 def check_programs(processes: Iterable[ResolvedProcess]) -> None:
-    """Raise ``LaunchFileError`` unless all that starts by itself can be executed.
-
-    What only an event starts is not asked for: a process before it may bring its program.
-    """
+    """Raise ``LaunchFileError`` unless all that starts by itself, before any event, can be executed."""
     missing = missing_programs(process for process in processes if process.on_event is None)
     if missing:
         raise LaunchFileError("\n".join((*(str(error) for _, error in missing), "nothing was started")))

@@ -59,7 +59,6 @@ def frames(error: BaseException) -> Iterator[TracebackType]:
 
 
 def _is_no_xml(error: BaseException) -> bool:
-    """Return True if expat met something else than ``<`` first."""
     return isinstance(error, SyntaxError) and getattr(error, "code", None) == _XML_ERROR_SYNTAX
 
 

@@ -54,10 +54,7 @@ class LaunchFile:
 
 
 def read(file: str | bytes | os.PathLike[str] | TextIO) -> LaunchFile:
-    """Read the file at a path, cached while it is unchanged, or the rest of an open file.
-
-    Raises ``OSError``, ``UnicodeDecodeError``, ``LaunchFileTooLarge``.
-    """
+    """Read the file at a path, cached while it is unchanged; raises OSError, UnicodeDecodeError, LaunchFileTooLarge."""
     if not isinstance(file, str | bytes | os.PathLike):
         return LaunchFile(str(getattr(file, "name", "")), _limited(file.read()))
     path = os.fsdecode(file)
@@ -67,7 +64,6 @@ def read(file: str | bytes | os.PathLike[str] | TextIO) -> LaunchFile:
 
 @lru_cache(maxsize=256)
 def _version(path: str, *_state: int) -> LaunchFile:
-    """Read one version of a file."""
     return LaunchFile(path, _limited(read_text(path, limit=4 * MAX_CHARACTERS)))
 
 

@@ -25,10 +25,7 @@ class PythonRefused(RuntimeError):
 
 
 def run(path: str, *, allowed: bool) -> ModuleType:
-    """Execute the file at ``path`` as a new module, which ``sys.modules`` does not get to know.
-
-    Raises ``PythonRefused`` unless ``allowed``, ``OSError``, ``SyntaxError``, and whatever the file raises.
-    """
+    """Execute the file as a new module; raises ``PythonRefused`` unless ``allowed``, and whatever the file raises."""
     check_regular(path)  # a missing file is reported as such even where Python is refused
     if not allowed:
         raise PythonRefused(f"'{path}' would have to be run as Python, which --no-python refuses")

@@ -80,10 +80,7 @@ class UnexpectedEOF(TemplateSyntaxError):
 
 
 class VisitError(ValueError):
-    """A well-formed ``$(...)`` that names no substitution, or whose arguments its class refuses.
-
-    ``orig_exc`` is the complaint.
-    """
+    """A well-formed ``$(...)`` that names no substitution, or whose arguments its class refuses (``orig_exc``)."""
 
     def __init__(self, rule: str, template: str, orig_exc: Exception):
         super().__init__(f'Error trying to process rule "{rule}":\n\n{orig_exc}')
@@ -98,10 +95,7 @@ def unescape(text: str) -> str:
 
 
 def parse_template(text: str) -> Template:
-    """Parse ``text``; the empty text is one empty text part.
-
-    Raises ``UnexpectedCharacters`` or ``UnexpectedEOF``.
-    """
+    """Parse ``text``; raises ``UnexpectedCharacters`` or ``UnexpectedEOF``."""
     if "$(" not in text:
         return (unescape(text),)
     return _Scanner(text).template()
@@ -125,8 +119,6 @@ def print_template(template: Template) -> str:
 
 
 class _Context(NamedTuple):
-    """The form of text in one place of the grammar, and in the calls that stand there."""
-
     rule: str
     text: re.Pattern[str]  # a whole run of text
     argument: re.Pattern[str]  # a run of text inside an unquoted argument of a call here
@@ -156,8 +148,6 @@ _QUOTED = {
 
 
 class _Scanner:
-    """One pass over one text; each method reads from ``position`` and leaves it after what it read."""
-
     def __init__(self, text: str):
         self.text = text
         self.position = 0

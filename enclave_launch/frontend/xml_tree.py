@@ -23,10 +23,7 @@ _UNKNOWN = " " * (MAX_ENTITY_LENGTH + 1)
 
 
 def parse_launch_xml(text: str) -> XmlElement:
-    """Parse text and return the root element.
-
-    :raises xml.etree.ElementTree.ParseError: malformed; message and position are ElementTree's.
-    :raises RefusedXml: it declares entities that are not plain text or too long."""
+    """Return the root element; raises ElementTree's ParseError, and ``RefusedXml`` for unsafe entities."""
     parser = expat.ParserCreate(namespace_separator="}")
     parser.EntityDeclHandler = partial(_check_entity, parser, dict(_PREDEFINED))
     parser.SkippedEntityHandler = partial(_refuse_skipped_entity, parser)
@@ -47,9 +44,7 @@ def _check_entity(
     value: str | None,
     *_external: str | None,
 ) -> None:
-    """Refuse entities that are external, nested or too long.
-
-    :param declared: the entities so far with their whole text; of two with one name the first is used"""
+    """Refuse entities that are external, nested or too long; of two with one name the first is used."""
     line = parser.CurrentLineNumber
     if value is None:
         raise RefusedXml(f"entity '{name}' is external: nothing outside the file is read", line)
@@ -76,7 +71,6 @@ def _refuse_skipped_entity(parser: expat.XMLParserType, name: str, is_parameter:
 
 
 def _parse_error(message: str, code: int, position: tuple[int, int]) -> SyntaxError:
-    """Build the error that ElementTree raises."""
     error = ParseError(message)
     error.code = code
     error.position = position

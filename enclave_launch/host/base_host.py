@@ -139,10 +139,7 @@ class BaseHost:
             self.warnings.append(warning)
 
     def anonymous_name(self, name: str) -> str:
-        """Return ``name_host_pid_random``.
-
-        Two hosts with the same seed give the same names in the same order, so that a live run has the names of its
-        plan."""
+        # Two hosts with the same seed give the same names in the same order: a live run has those of its plan.
         if self.user_code_results is None:
             return self._new_anonymous_name(name)
         return self.user_code_results.call(("anonymous name", name), lambda: self._new_anonymous_name(name))

@@ -30,9 +30,7 @@ class PlanHost(BaseHost):
         user_code_results: UserCodeResults | None = None,
         **given: Any,
     ) -> None:
-        """Create a host that records instead of acting.
-
-        :param given: fields of ``HostOptions``, for callers that have only some"""
+        """Create a host that records instead of acting; ``given``: fields of ``HostOptions``."""
         super().__init__(options or HostOptions(**given), user_code_results)
         self.processes: list[ResolvedProcess] = []
         self.started: list[ExecuteLocal] = []  # action of each process, same order

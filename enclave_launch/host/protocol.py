@@ -120,9 +120,7 @@ class Host(Protocol):
         """Raises ``PackageNotFoundError`` (a ``KeyError``), ``ValueError`` for an impossible name."""
 
     def find_executable(self, package: str, executable: str) -> str:
-        """Return the file in the package's libexec directory.
-
-        :raises ament_index.ExecutableNotInstalledError: it is not there, or as ``find_package_prefix``."""
+        """Return the file in the package's libexec directory; raises ExecutableNotInstalledError."""
 
     def is_missing(self, path: str) -> bool:
         """Return True if ``path`` is inside the placeholder of a package that is not installed."""
@@ -133,8 +131,7 @@ class Host(Protocol):
     def run_command(
         self, command: Sequence[str], *, merge_stderr: bool = False, at_event: bool = False
     ) -> CommandResult:
-        """Run it without a shell, in our directory and environment. ``at_event``: the answer may be another when that
-        happens. Raises ``FileNotFoundError``."""
+        """Run it without a shell, in our directory and environment. Raises ``FileNotFoundError``."""
 
     def write_parameter_file(self, text: str) -> str:
         """Keep ``text`` for a process about to start; give the path to pass (``<params:N>`` in a dry run)."""

@@ -78,10 +78,7 @@ class RecordedResults:
         self._listeners: list[tuple[logging.Logger, logging.Handler, int]] = []
 
     def rewind(self) -> bool:
-        """Restore all objects to their state before the first visit, and replay from now on.
-
-        Returns False if that was done before: only one run can have the results.
-        """
+        """Restore all objects and replay from now on; False if done before: one run can have the results."""
         if self._replaying:
             return False
         for state in self._states.values():
@@ -194,8 +191,6 @@ class RecordedResults:
 
 
 class _Items(NamedTuple):
-    """The items of an iterator, which the replay needs as well."""
-
     items: list[Any]
 
 
@@ -272,8 +267,6 @@ def _set(configurations: dict[str, Any], name: str, before: Any, after: Any) -> 
 
 
 class _Before:
-    """The state before a call, to compute what the call changed."""
-
     def __init__(self, context: LaunchContext | None) -> None:
         self._context = context
         self._environment = environment_snapshot()
@@ -340,8 +333,6 @@ class _Before:
 
 
 class _ObjectState(NamedTuple):
-    """The attributes of one object; of the lists and dictionaries among them also the content."""
-
     subject: object
     attributes: dict[str, Any]
     contents: tuple[tuple[Any, Any], ...]

@@ -105,10 +105,7 @@ def derive_policy(
     options: PolicyOptions | None = None,
     also: Iterable[str] = (),
 ) -> DerivedPolicy:
-    """Derive the policy of all ``nodes``.
-
-    :param also: enclaves that must exist though no node in them is known
-    :raises ValueError: the distribution is unknown."""
+    """Derive the policy of all ``nodes``; ``also``: enclaves that must exist though no node in them is known."""
     chosen = options or PolicyOptions()
     collection = _Collection({path: {} for path in also}, {}, [], [])
     for node in nodes:
@@ -121,8 +118,6 @@ def derive_policy(
 
 
 class _Collection(NamedTuple):
-    """Permissions by enclave and profile while they come in."""
-
     profiles: dict[str, dict[ProfileKey, Reasons]]
     nodes: dict[str, list[RunningNode]]
     problems: list[list[Diagnostic]]  # of each node
@@ -161,10 +156,7 @@ class _Collection(NamedTuple):
 
 
 def _size_warnings(enclaves: Iterable[EnclavePolicy]) -> list[Diagnostic]:
-    """Warn, before anything is signed, about enclaves whose permissions come near what DDS can carry.
-
-    Only those with many rules are looked at: the others need not load the code that knows DDS.
-    """
+    # Only those with many rules are looked at: the others need not load the code that knows DDS.
     large = [enclave for enclave in enclaves if sum(len(p.rules) for p in enclave.profiles) > _MANY_RULES]
     if not large:
         return []
@@ -176,7 +168,6 @@ def _size_warnings(enclaves: Iterable[EnclavePolicy]) -> list[Diagnostic]:
 def _merged_reasons(
     enclave: EnclavePolicy, profiles: Mapping[ProfileKey, Reasons]
 ) -> dict[Rule, tuple[Reason, ...]]:
-    """Merge the reasons of all profiles, in the order of the rules."""
     if len(enclave.profiles) == 1:
         (by_rule,) = profiles.values()
         return {rule: _in_order(by_rule[rule]) for rule in enclave.profiles[0].rules}
@@ -195,7 +186,6 @@ def _in_order(reasons: list[Reason]) -> tuple[Reason, ...]:
 
 
 def _answered(document: PolicyDocument | None, node: RunningNode, operation: Operation) -> bool:
-    """Return True if the policy file has rules of this operation for exactly this node of this enclave."""
     return document is not None and any(
         rule.operation is operation
         for enclave in document.policy.enclaves
@@ -214,10 +204,7 @@ Added = Mapping[tuple[str, str], Mapping[Rule, Reason]]  # (namespace, node) -> 
 
 
 def merge_policy_file(derived: DerivedPolicy, document: PolicyDocument) -> DerivedPolicy:
-    """Unite by enclave and profile, with the reasons of both.
-
-    Warnings: the document's own, unused enclaves, denials of needs.
-    """
+    """Unite by enclave and profile, with the reasons of both; warn of unused enclaves and denials of needs."""
     theirs = {enclave.path: enclave for enclave in document.policy.enclaves}
     ours = {enclave.path for enclave in derived.policy.enclaves}
     warnings = [policy_file("policy file", text) for text in (*document.warnings, *document.notes)]
@@ -267,7 +254,6 @@ def _union(enclave: EnclavePolicy, added: Added) -> tuple[Profile, ...]:
 
 
 def _denials(path: str, reasons: Mapping[Rule, tuple[Reason, ...]]) -> list[Diagnostic]:
-    """Return a warning for each derived permission that a denial takes away: the node will lack it."""
     denials = [(rule, why) for rule, why in reasons.items() if rule.qualifier is Qualifier.DENY]
     return [
         policy_denies_need(

@@ -23,9 +23,7 @@ _TRANSITION_EVENT = "lifecycle_msgs/msg/TransitionEvent"
 
 
 def launcher_node(calls: Sequence[LauncherCall]) -> RunningNode:
-    """Return the node that makes ``calls`` (at least one).
-
-    A client of a node's transitions also follows its ``transition_event`` (launch_ros lifecycle_node.py)."""
+    """Return the node that makes ``calls``; a client of transitions also follows ``transition_event``."""
     endpoints: list[Endpoint] = []
     for call in calls:
         source = SourceRef(call.location.file, call.location.line)

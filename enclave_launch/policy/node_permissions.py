@@ -114,9 +114,7 @@ class NodePermissions(NamedTuple):
 
 
 def node_permissions(node: RunningNode, *, distro: str, options: PolicyOptions) -> NodePermissions:
-    """Return everything that ``node`` needs under its final name, with what ``options`` add.
-
-    :raises ValueError: the distribution is unknown."""
+    """Return everything that ``node`` needs under its final name, with what ``options`` add."""
     return _Collector(node, distro, options).collect()
 
 
@@ -169,10 +167,7 @@ class _Collector:
                 self._pattern(endpoint, filled)
 
     def _recorded(self, endpoint: Endpoint) -> None:
-        """Grant each reading of a recorded name, and warn if they are different names in this launch.
-
-        A value that cannot be a name is no reading of it.
-        """
+        # Each reading that can be a name, with a warning if they are different names in this launch.
         granted: dict[str, str] = {}
         sets: set[frozenset[str]] = set()
         for reading in (endpoint.name, *endpoint.readings):
@@ -334,7 +329,6 @@ class _Collector:
 def _built_in_rows(
     distro: str, library: ClientLibrary, conditions: frozenset[BuiltinCondition]
 ) -> tuple[tuple[Operation, str, str], ...]:
-    """Return operation, name as the client library writes it, and the row for a reader."""
     rows = built_in_interfaces(distro, library, conditions)
     return tuple((OPERATIONS[row.kind], row.name, str(row)) for row in rows)
 
@@ -357,9 +351,7 @@ def _expand_pattern(names: NodeNames, text: str) -> str:
 
 
 def conditions_of(node: RunningNode, also: Iterable[str] = ()) -> frozenset[BuiltinCondition]:
-    """Return which rows of the built-in interfaces hold for ``node``.
-
-    :param also: keys of ``ALSO`` for what else runs in it"""
+    """Return which rows of the built-in interfaces hold for ``node``; ``also``: keys of ``ALSO``."""
     met = {BuiltinCondition.ALWAYS}.union(*(ALSO[name] for name in also))
     if node.interface.parameter_services:
         met.add(BuiltinCondition.PARAMETERS)

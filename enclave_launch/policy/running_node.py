@@ -60,9 +60,7 @@ class RunningNode(NamedTuple):
 def node_of_process(
     process: ResolvedProcess, interface: NodeInterface, enclave: str, role: Role
 ) -> RunningNode:
-    """Return one node of ``process``.
-
-    :raises LaunchFileError: rcl would refuse to start because of a remap rule."""
+    """Return one node of ``process``; raises LaunchFileError if rcl would refuse to start."""
     given = _rules_of_command(process)
     inputs = program_inputs(process)
     if interface.global_arguments is False:  # rcl_node_options_t.use_global_arguments
@@ -94,7 +92,6 @@ def node_of_component(
 
 
 def _namespace(process: ResolvedProcess) -> str:
-    """Return the first ``__ns`` rule of the command line that is for every node."""
     rules = parse_ros_arguments(process.cmd).remaps
     return next((rule.partition(":=")[2] for rule in rules if rule.startswith("__ns:=")), "/")
 
@@ -133,9 +130,7 @@ def _named(
 
 
 def _rules_of_command(process: ResolvedProcess) -> tuple[ParsedRule, ...]:
-    """Return the rules that rcl reads there.
-
-    A rule that no ``remap`` wrote (``args``, the name) counts as written with the process."""
+    # A rule that no ``remap`` wrote (``args``, the name) counts as written with the process.
     places = {rule.word: rule.location for rule in process.remaps}
     rules = remap_arguments(process.cmd).items()
     return tuple(_parse(text, places.get(word), process.location) for word, text in rules)

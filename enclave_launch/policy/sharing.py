@@ -28,9 +28,7 @@ class Gain(NamedTuple):
 def gains_by_sharing(
     derived: DerivedPolicy, *, composed_only: bool = False, declared_only: bool = True
 ) -> tuple[Gain, ...]:
-    """Return each node that gains permissions by sharing its enclave, sorted.
-
-    :param declared_only: leave out what every node has anyway"""
+    """Return each node that gains permissions by sharing its enclave; ``declared_only``: beyond what all have."""
     found: list[Gain] = []
     for enclave, nodes in sorted(derived.nodes.items()):
         if len(nodes) < 2:

@@ -113,7 +113,6 @@ def _used(rule: Rule, enclave: str, used: set[tuple[str, Operation, str]]) -> bo
 
 
 def _parts_used(rule: Rule, enclave: str, used: set[tuple[str, Operation, str]]) -> bool:
-    """Return True for a part of a used action that was remapped by itself."""
     action, part, _ = rule.expression.partition("/_action/")
     actions = (Operation.EXECUTE, Operation.CALL)
     return bool(part) and any((enclave, operation, action) in used for operation in actions)

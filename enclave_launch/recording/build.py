@@ -30,10 +30,7 @@ _FLAGS = ("-std=gnu11", "-shared", "-fPIC", "-O2", "-Wl,-z,now")
 
 
 def recorder_library() -> Path:
-    """Return the path of the library, and build it if it is not there.
-
-    Raises ``RuntimeFailure`` if that is not possible.
-    """
+    """Return the path of the library, built if needed; raises ``RuntimeFailure`` if that is not possible."""
     text = SOURCE.read_bytes() + " ".join(_FLAGS).encode()
     wanted = _cache() / f"recorder-{hashlib.sha256(text).hexdigest()[:16]}-{platform.machine()}.so"
     if not _is_ours(wanted):
@@ -85,9 +82,7 @@ def _build(wanted: Path) -> None:
 def with_recorder(
     environment: Mapping[str, str], library: str, record: str, sanitizer: str | None = None
 ) -> dict[str, str]:
-    """Return ``environment`` with the recorder behind ``sanitizer``, the runtime that must come first, if the program
-    has one.
-    """
+    """Return ``environment`` with the recorder, behind the ``sanitizer`` that must come first."""
     present = [name for name in re.split(r"[ :]+", environment.get(PRELOAD, "")) if name]
     first = [sanitizer] if sanitizer and not any("libasan" in name for name in present) else []
     others = [name for name in present if name != library]

@@ -97,10 +97,7 @@ class PlannedGrants:
         return Need(enclave, node.fqn, OPERATIONS[asked.kind], asked.final), asked
 
     def granted(self, node: RecordedNode, line: EndpointMade, need: Need) -> tuple[Need, ...]:
-        """Return what the plan grants of ``need``: itself, or each part of an action that rules have moved apart.
-
-        Empty if ``need`` is not granted.
-        """
+        """Return what the plan grants of ``need``: itself, or each part of an action moved apart, or nothing."""
         if self.permits(need):
             return (need,)
         parts = tuple(
@@ -136,10 +133,7 @@ class PlannedGrants:
         return Description(named[0] if named else None, planned.origin, planned.missing, planned.descriptions)
 
     def rules_of(self, enclave: str) -> Iterable[Rule]:
-        """Yield what the plan allows in ``enclave``, without what every node has.
-
-        Of the launcher's own enclave nothing is yielded, as it is not recorded.
-        """
+        """Yield what the plan allows in ``enclave``, without what every node has; the launcher is not recorded."""
         if self._plan.launcher is not None and enclave == self._plan.launcher.enclave:
             return
         built_in = self._plan.derived.built_in_names(enclave)
@@ -160,7 +154,6 @@ class PlannedGrants:
 
 
 def _parts(node: RecordedNode, line: EndpointMade) -> list[EndpointMade]:
-    """Return the parts of the action ``line``, which come before it."""
     parts: list[EndpointMade] = []
     if line.kind.family != "action":
         return parts
@@ -178,7 +171,6 @@ def permits(rules: DdsRules, need: Need) -> bool:
 
 
 def _topics(need: Need) -> Iterator[tuple[str, str]]:
-    """Yield each DDS topic with its direction."""
     published, subscribed = dds_topics(need.operation, need.name)
     yield from ((topic, "publish") for topic in published)
     yield from ((topic, "subscribe") for topic in subscribed)

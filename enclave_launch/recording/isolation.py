@@ -32,10 +32,7 @@ class Isolation(str, Enum):
 
 
 def isolate(wanted: str = "auto") -> Isolation:
-    """Isolate this process: ``auto`` (a namespace if allowed, else local discovery), ``local`` or ``none``.
-
-    Return what was done.
-    """
+    """Isolate this process (``auto``: a namespace if allowed, else local discovery); return what was done."""
     if wanted == "none":
         return Isolation.NONE
     if wanted == "auto" and _a_child_can() and _enter_namespace():

@@ -118,10 +118,7 @@ def keep_record(folder: Path, run: RecordedRun, data: bytes) -> Path:
 
 
 def write_manifests(folder: Path) -> LearntFolder:
-    """Write the manifests of all records in ``folder``.
-
-    Raises ``ManifestError`` for one that cannot be written, or that somebody has made unreadable.
-    """
+    """Write the manifests of all records in ``folder``; raises ``ManifestError``."""
     records = [_read(path) for path in sorted((folder / RECORDS).glob("*.record"))]
     learnt = learn(records)
     programs = Counter((node.key.package, node.key.executable, node.key.plugin) for node in learnt.nodes)
@@ -168,7 +165,6 @@ def _notes(learnt: Learnt, records: Iterable[Record]) -> Iterable[str]:
 
 
 def _write(path: Path, data: bytes) -> None:
-    """Write the whole file or nothing."""
     with translated(OSError, ManifestError, f"{path}: cannot be written: "):
         path.parent.mkdir(parents=True, exist_ok=True)
         write_bytes(path, data)

@@ -1,7 +1,4 @@
-"""Who hears of a recording while it grows; and the listener of every one, which tells the launch of recorded endpoints.
-
-What an endpoint is says ``nodl.record.requested``.
-"""
+"""Who hears of a recording while it grows; and the listener of every one, which publishes recorded endpoints."""
 
 from __future__ import annotations
 
@@ -40,10 +37,7 @@ class Listener:
 
 
 class EndpointEvents(Listener):
-    """Recorded endpoints as events of the launch, each with the process and component that asked for it.
-
-    Endpoints of processes that the launch did not start are passed over.
-    """
+    """Recorded endpoints as events of the launch, each with the process and component that requested it."""
 
     def added(self, line: Line) -> None:
         if not isinstance(line, EndpointMade):

@@ -42,10 +42,7 @@ class Marked(NamedTuple):
 
 
 def questions(folder: Path) -> Questions:
-    """Return what the records of ``folder`` leave to decide.
-
-    Components are left out: their parameters do not come with a command line.
-    """
+    """Return what the records leave to decide; a component's parameters do not come with a command line."""
     found: dict[tuple[str, str], dict[str, object]] = {}
     for path in sorted(folder.glob("records/*.record")):
         for node in all_requested(read_record(path.read_bytes()).attributed()):
@@ -110,9 +107,7 @@ def _yaml(value: object) -> str:
 
 
 def _with_words(cmd: tuple[str, ...], words: Sequence[str], others: Sequence[str]) -> tuple[str, ...]:
-    """Return ``cmd`` with ``words`` exchanged for ``others``; launch puts a program's own arguments before ``--ros-
-    args``.
-    """
+    """Return ``cmd`` with ``words`` exchanged; launch puts a program's own arguments before ``--ros-args``."""
     end = cmd.index("--ros-args") if "--ros-args" in cmd else len(cmd)
     start = end - len(words)
     if start < 1 or list(cmd[start:end]) != list(words):

@@ -32,10 +32,7 @@ class Patch(NamedTuple):
 
 
 def manifest_patch(file: str, text: str, line: int, asked: RequestedEndpoint) -> Patch | None:
-    """Add one entry to the manifest ``text`` of ``file`` for the node that begins at ``line``.
-
-    Returns None if the name or the shape of the file does not let a line be added safely.
-    """
+    """Add one entry for the node at ``line``; None if no line can be added safely."""
     if not re.search(NAME_PATTERN, asked.name) or not re.search(TYPE_PATTERN, asked.type):
         return None
     added = _into_v1(text, line, asked) if text.lstrip()[:1] == "<" else _into_v2(text, asked)
@@ -47,10 +44,7 @@ def manifest_patch(file: str, text: str, line: int, asked: RequestedEndpoint) ->
 def policy_patch(
     enclave: str, node: str, asked: RequestedEndpoint, file: str, text: str = ""
 ) -> Patch | None:
-    """Return the change of a policy file that adds the one permission to what is derived.
-
-    ``text`` is what stands in ``file``; ``None`` if its shape does not let an enclave be added safely.
-    """
+    """Return the change of a policy file that adds the one permission; None if its shape does not allow it."""
     operation = OPERATIONS[asked.kind]
     element = KIND_OF[LIST_NAMES[operation]]
     namespace, name = split_fqn(node)
@@ -120,7 +114,6 @@ def _v2_entry(asked: RequestedEndpoint) -> str:
 
 
 def _into_v1(text: str, line: int, asked: RequestedEndpoint) -> str | None:
-    """Add the entry before the end of the ``node`` element that begins at ``line``, counted from 1."""
     lines = text.splitlines(keepends=True)
     for number in range(max(line - 1, 0), len(lines)):
         if "</node>" in lines[number]:

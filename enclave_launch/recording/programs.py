@@ -134,7 +134,6 @@ def _segments(head: bytes, file: BinaryIO, wide: bool, order: str) -> list[_Segm
 
 
 def _needed(file: BinaryIO, segments: Sequence[_Segment], wide: bool, order: str) -> list[str]:
-    """Return the libraries that the dynamic section asks for."""
     dynamic = next((segment for segment in segments if segment[0] == _DYNAMIC), None)
     if dynamic is None:
         return []

@@ -16,8 +16,6 @@ _OF_THE_LAUNCHER = frozenset({"run", "process", "component"})
 
 
 class _RecordFile:
-    """The part of one file that was read."""
-
     def __init__(self, path: Path) -> None:
         self.path = path
         self._read = 0
@@ -60,8 +58,7 @@ class RecordFiles:
         self._writer[pid] = process
 
     def new_lines(self) -> bytes:
-        """Return what processes wrote about themselves since the last call, oldest first. A file that cannot be read
-        any more is reported."""
+        """Return what processes wrote about themselves since the last call, oldest first."""
         accepted: list[tuple[int, int, bytes]] = []
         for process, file in self._files.items():
             try:

@@ -186,10 +186,7 @@ class Recording:
         return self._folder / "recorder.so"
 
     def _try_it(self) -> None:
-        """Run one program with the recorder before any node depends on it.
-
-        A folder without execution, or a libc of another kind, is reported now.
-        """
+        """Run one program with the recorder first: a folder without execution, a libc of another kind."""
         trial = self._library.with_name("trial")
         trial.touch()
         environment = {**os.environ, "LD_PRELOAD": str(self._library), RECORD_VARIABLE: str(trial)}
@@ -205,7 +202,6 @@ class Recording:
             )
 
     def _add(self, line: RecordedRun | StartedProcess | LoadedComponent) -> None:
-        """Add what the launcher itself knows."""
         if self._folder is not None:
             self._take(line_text(line))
 
@@ -235,10 +231,7 @@ class Recording:
                 self._untold.append((now, line))
 
     def _tell(self, now: float) -> None:
-        """Tell the listeners of a line once it is known which process of the launch it comes from.
-
-        A process may speak before the launch has said that it started.
-        """
+        """Inform the listeners of a line once its process is known: it may speak before it counts as started."""
         untold, self._untold = self._untold, []
         for since, line in untold:
             if self._has_origin(line) or now - since > _LONGEST_WAIT:

@@ -73,7 +73,6 @@ class Remedies:
             yield changed, self._policy_cures(changed, need)
 
     def _policy_file(self) -> str:
-        """Return the file in use, else one of this launch that is not there yet."""
         given = self._plan.planner.options.policy.policy_file
         if given is not None and given.file:
             return given.file

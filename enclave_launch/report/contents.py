@@ -57,11 +57,7 @@ def report_contents(
     root: str = "",
     endings: Iterable[Ending] | None = None,
 ) -> ReportContents:
-    """Collect what a report shows from a plan and its findings.
-
-    :param document: the dry run's JSON
-    :param judged: what ``check`` found in it
-    :param root: prefix to strip from paths"""
+    """Collect what a report shows from the dry run's JSON and its findings; ``root``: prefix to strip from paths."""
     plan = plan_from_document(document)
     return ReportContents(
         title,
@@ -108,8 +104,7 @@ def _influences(plan: PlanDocument) -> Iterator[Influence]:
 
 
 def counts(plan: PlanDocument) -> tuple[Count, ...]:
-    """Count what table 2 of the LiSA4ROS2 paper counts; ``ros_discovery_info``, which belongs to the middleware, is
-    not counted."""
+    """Count what table 2 of the LiSA4ROS2 paper counts, without the middleware's ``ros_discovery_info``."""
     return (
         Count("N", "nodes", len(plan.nodes), 0),
         _names(plan, "T", "topics", "publish", "subscribe"),

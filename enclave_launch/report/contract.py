@@ -20,7 +20,6 @@ JsonParameter = Union[JsonScalar, list[JsonScalar]]
 
 
 def _described(description: str, default: Any = ...) -> Any:
-    """Return a field with a description, required if it has no ``default``."""
     return Field(default, description=description)
 
 

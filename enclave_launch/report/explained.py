@@ -15,9 +15,7 @@ from keystore.formats.policy import Qualifier, Rule
 
 
 def explained(plan: LaunchPlan, subject: str) -> list[str]:
-    """Explain the permissions of ``subject`` in lines; none if it is not part of this launch.
-
-    Processes go by the names that the tree prints."""
+    """Explain the permissions of ``subject`` in lines; none if it is not part of this launch."""
     lines = explain(plan.derived, subject)
     path = subject if subject.startswith("/") else f"/{subject}"
     lines += [line for item in unknown_by_enclave(plan).get(path, ()) for line in _unknown(item)]
@@ -89,10 +87,7 @@ Wanted = Callable[[Rule, Reason], bool]
 
 
 def explain(derived: DerivedPolicy, subject: str) -> list[str]:
-    """Return everything that ``subject`` is: an enclave path, a node's full name, a topic, service or action.
-
-    Empty if it is none of these. A subject without leading slash is taken as an absolute name.
-    """
+    """Explain an enclave path, a node's full name, a topic, service or action; empty if it is none of these."""
     name = subject if subject.startswith("/") else f"/{subject}"
     lines: list[str] = []
     if name in derived.reasons:

@@ -98,9 +98,7 @@ _Key = tuple[str, "int | None", Operation, str]
 
 
 def plan_graph(document: Mapping[str, Any], root: str = "") -> EnclaveGraph:
-    """Build the graph of enclaves, members and channels from the dry run's JSON.
-
-    :param root: prefix to strip from paths, so that they read as a person would type them"""
+    """Build the graph of enclaves, members and channels from the dry run's JSON; ``root``: prefix to strip."""
     members = tuple(sorted(_members(document, root)))
     reasons: dict[_Key, list[UseReason]] = dict(_reasons(document, members, root))
     requested = {(enclave, operation, name) for enclave, _, operation, name in reasons}

@@ -114,14 +114,12 @@ def _table(headings: Iterable[str], rows: Iterable[Iterable[str]]) -> Iterator[s
 
 
 def escaped(text: str) -> str:
-    """Escape text so that it has no meaning within a line of Markdown (CommonMark 2.4: any ASCII punctuation may
-    be escaped)."""
+    """Escape text for a line of Markdown (CommonMark 2.4: any ASCII punctuation may be escaped)."""
     return _SPECIAL.sub(r"\\\1", printable(text))
 
 
 def code(text: str) -> str:
-    """Return a code span, also for text with backticks (CommonMark 6.1); a bar, which would end the cell of a
-    table, is escaped."""
+    """Return a code span, also for text with backticks (CommonMark 6.1) or with a bar, which would end a cell."""
     shown = printable(text).replace("|", "\\|")
     fence = "`" * (max(map(len, re.findall("`+", shown)), default=0) + 1)
     pad = " " if shown.startswith("`") or shown.endswith("`") or not shown else ""

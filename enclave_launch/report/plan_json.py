@@ -20,9 +20,7 @@ VERSION = 1
 
 
 def plan_document(plan: LaunchPlan, security: SecuritySettings | None = None) -> dict[str, object]:
-    """Return the plan as plain values.
-
-    :param security: how ``--secure`` would start the processes; None for an unsecured start"""
+    """Return the plan as plain values; ``security``: how ``--secure`` would start the processes."""
     return {
         "version": VERSION,
         "processes": [_process(item, security) for item in plan.processes],
@@ -156,7 +154,6 @@ def _program(interface: NodeInterface) -> str:
 
 
 def _declared(interface: NodeInterface) -> list[str] | None:
-    """Return the declared parameters, or None if the description does not say that it lists all of them."""
     return sorted(interface.parameters) if interface.parameters_complete and not interface.gaps else None
 
 

@@ -72,7 +72,6 @@ _SUMMED_UP = frozenset({
 
 
 def _folded(ordered: Judged, verbose: bool) -> Iterator[tuple[PlanFinding, str | None, list[PlanFinding]]]:
-    """Yield each finding with those that are reported together with it."""
     groups: dict[object, list[tuple[PlanFinding, str | None]]] = {}
     for number, (diagnostic, accepted) in enumerate(ordered):
         alone = verbose or accepted is not None or diagnostic.code not in _FOLDED

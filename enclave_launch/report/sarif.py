@@ -15,10 +15,7 @@ SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 def sarif_document(
     findings: Iterable[tuple[PlanFinding, str | None]], rules: Mapping[str, str], version: str, root: str
 ) -> dict[str, object]:
-    """Return findings as a SARIF log.
-
-    :param findings: each with the reason why it was accepted, or None
-    :param root: files below it get relative paths"""
+    """Return findings, each with the reason why it was accepted, as a SARIF log; paths below ``root`` are relative."""
     results = [_result(diagnostic, accepted, root) for diagnostic, accepted in findings]
     used = sorted({str(result["ruleId"]) for result in results})
     driver = {

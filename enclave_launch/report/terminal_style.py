@@ -46,10 +46,7 @@ class TerminalStyle(NamedTuple):
         return lines
 
     def listed(self, kind: str, diagnostics: Sequence[Diagnostic]) -> list[str]:
-        """Format ``diagnostics``, each as ``kind: text``.
-
-        Of many with the same code some are shown and the others counted; a remedy that several share is printed
-        once."""
+        """Format ``diagnostics`` as ``kind: text``; of many with one code some, a shared remedy once."""
         lines: list[str] = []
         for group in _by_code(diagnostics):
             remedies = {each.remedy for each in group}

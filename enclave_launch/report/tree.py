@@ -28,11 +28,7 @@ class Branch(NamedTuple):
 
 
 def plan_tree(plan: LaunchPlan, style: TerminalStyle | None = None) -> str:
-    """Format the plan as a tree; ends with a newline.
-
-    Interfaces that every node has are counted, not listed.
-
-    :param style: by default lines of any length, as for a pipe"""
+    """Format the plan as a tree; interfaces that every node has are counted, not listed."""
     style = style or TerminalStyle()
     lines = style.wrapped(style.one_line(f"{plan.launch_file} (as {plan.distro})"), "", "    ")
     gains = gains_by_sharing(plan.derived, composed_only=True)

@@ -9,9 +9,7 @@ UNKNOWN = "permissions unknown"
 
 
 def unknown_by_enclave(plan: LaunchPlan) -> dict[str, list[PlannedProcess | PlannedComponent]]:
-    """Return the items of each enclave whose interfaces are unknown, in launch order.
-
-    An ``executable`` is one of them unless a policy file lists its enclave."""
+    """Return the items of each enclave whose interfaces are unknown, in launch order."""
     answered = {enclave.path for enclave in plan.derived.policy.enclaves if enclave.profiles}
     unknown: dict[str, list[PlannedProcess | PlannedComponent]] = {}
     for process in plan.processes:
@@ -38,9 +36,7 @@ def label(item: PlannedProcess | PlannedComponent) -> str:
 
 
 def shown_fqn(item: PlannedProcess | PlannedComponent) -> str:
-    """Return the names of the item's nodes, or what launch knows of the name.
-
-    Without a placeholder for a namespace that was not given; empty if no name was given."""
+    """Return the names of the item's nodes, or what launch knows of the name; empty without one."""
     names = " ".join(dict.fromkeys(node.fqn for node in item.nodes))
     known = "" if UNSPECIFIED_NODE_NAME in (item.fqn or "") else item.fqn or ""
     return names or known.replace(UNSPECIFIED_NODE_NAMESPACE, "")

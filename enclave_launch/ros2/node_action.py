@@ -18,9 +18,7 @@ class EnclaveNodeActionExtension(NodeActionExtension):  # type: ignore[misc]  # 
     def prepare_for_execute(
         self, context: Any, ros_specific_arguments: dict[str, Any], node_action: Any
     ) -> tuple[list[Any], dict[str, Any]]:
-        """Secure a node about to start.
-
-        :raises EnclaveLaunchError: it cannot be secured; launch reports that and shuts down."""
+        """Secure a node about to start; raises EnclaveLaunchError, which launch reports before it shuts down."""
         session = session_of(context)
         if session is None:
             return [], ros_specific_arguments

@@ -51,9 +51,7 @@ def enclave_attribute(action: Any, context: Any) -> str | None:
 
 
 def observe_node(action: Any, context: Any, ros_specific_arguments: dict[str, Any]) -> ResolvedProcess:
-    """Describe a node that launch is about to start.
-
-    :param action: a ``launch_ros.actions.Node`` whose substitutions have been performed"""
+    """Describe the ``launch_ros.actions.Node`` that launch is about to start."""
     context.extend_locals({"ros_specific_arguments": ros_specific_arguments})
     cmd = tuple(perform_substitutions(context, part) for part in action.cmd)
     arguments = parse_ros_arguments(cmd)
@@ -90,9 +88,7 @@ def observe_node(action: Any, context: Any, ros_specific_arguments: dict[str, An
 
 
 def observe_executable(action: Any, context: Any) -> ResolvedProcess:
-    """Describe a process that launch is about to start.
-
-    :param action: an ``ExecuteProcess`` that is not a node, being prepared: its command and name are final"""
+    """Describe the ``ExecuteProcess``, not a node, that launch is about to start."""
     description = action.process_description
     cmd = tuple(description.final_cmd)
     prefix = cmd[: len(cmd) - len(description.cmd)]
@@ -123,10 +119,7 @@ def observe_executable(action: Any, context: Any) -> ResolvedProcess:
 
 
 def loads_components(action: Any) -> bool:
-    """Return True if a ``ComposableNodeContainer`` names composable nodes itself.
-
-    They are not read: upstream may hold them as iterators (``ComposableNode.remappings`` is one), and the load
-    needs them unconsumed."""
+    """Return True if a container names composable nodes itself; they are not read: they may be iterators."""
     return bool(getattr(action, "_ComposableNodeContainer__composable_node_descriptions", None))
 
 

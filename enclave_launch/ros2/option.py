@@ -48,9 +48,7 @@ class EnclaveOption(OptionExtension):  # type: ignore[misc]  # untyped without R
         parser.set_defaults(**{SECURE: False, "secure": None, "create_keystore": True})
 
     def prelaunch(self, launch_description: Any, args: argparse.Namespace) -> tuple[Any, ...]:
-        """Plan and secure the launch.
-
-        :raises RuntimeError: ros2 shows its message without a traceback."""
+        """Plan and secure the launch; raises RuntimeError, whose message ros2 shows without a traceback."""
         from enclave_launch.verb.options import build_parser
         from enclave_launch.verb.usage import (
             FOR_PLAN,
@@ -96,7 +94,6 @@ def names_keystore(words: Sequence[str]) -> bool:
 
 
 def _looked_at(args: argparse.Namespace) -> int:
-    """Print the plan as ``secure-launch --dry-run`` and similar options do, start nothing, return the exit status."""
     from enclave_launch.flow import resolve
     from enclave_launch.verb.options import resolve_options
     from enclave_launch.verb.secure_launch import show_plan
@@ -109,7 +106,6 @@ def _looked_at(args: argparse.Namespace) -> int:
 
 
 def _launched(description: Any, args: argparse.Namespace) -> int:
-    """Plan, sign and run as ``secure-launch --secure`` does; return the exit status."""
     from enclave_launch.verb.start import start
     from enclave_launch.verb.target import LaunchTarget
 

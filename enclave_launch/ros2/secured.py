@@ -45,12 +45,9 @@ def secured(
     resolve_options: ResolveOptions | None = None,
     security_options: SecurityOptions | None = None,
 ) -> LaunchDescription:
-    """Return a description that secures ``description``.
+    """Return a description that secures ``description``; the keystore is created if it does not exist.
 
-    The keystore is created if it does not exist.
-
-    :raises ProvisionError: the keystore cannot be used.
-    :raises UsageError: this package is not installed, so that launch does not find its extension."""
+    Raises ProvisionError for the keystore, UsageError if launch would not find our extension."""
     options = resolve_options or ResolveOptions()
     check_installed()
     release = choose_release(options.distro, os.environ.get("ROS_DISTRO"), search_prefixes())
@@ -64,9 +61,7 @@ def secured(
 def _enclosed(
     description: LaunchDescription, session: EnclaveSession, launch: ProvisionedLaunch
 ) -> LaunchDescription:
-    """Put ``description`` behind actions that begin ``session`` and point every process at the keystore.
-
-    :raises RuntimeFailure: processes are on Zenoh, and no router answers or can be started."""
+    """Put ``description`` behind actions that begin ``session``; raises RuntimeFailure without a Zenoh router."""
     serving = ExitStack()
     serving.enter_context(
         launch.serve_router(lambda text: print(f"enclave-launch: warning: {text}", file=sys.stderr))
@@ -91,9 +86,7 @@ def _read_secrets(launch: ProvisionedLaunch) -> Iterable[str]:
 
 
 def check_installed() -> None:
-    """Check that launch_ros finds our node extension, by entry point alone; without it nodes would start unsecured.
-
-    :raises UsageError: it does not."""
+    """Raise UsageError unless launch_ros finds our node extension: nodes would start unsecured."""
     found = [entry.value for entry in entry_points(group="launch_ros.node_action")]
     if not any(value.startswith(EXTENSION) for value in found):
         raise UsageError(

@@ -26,10 +26,7 @@ class EnclaveSession:
         context.extend_globals({KEY: self, "ros_adapter": _NoAdapter()})
 
     def enter(self, process: ResolvedProcess, *, loads_components: bool = False) -> StartAdditions:
-        """Provision the enclave of a process.
-
-        :raises EnclaveLaunchError: it has no manifest, loads what only a plan could have permitted, or its enclave
-            cannot be completed."""
+        """Provision the enclave of a process; raises EnclaveLaunchError if it cannot be completed."""
         if loads_components:
             raise ProvisionError(f"{process.location}: {process.fqn} loads components; {_NEEDS_PLAN}")
         return self._provider.ensure_late(process)

@@ -185,12 +185,9 @@ def _has(since: Since, distro: Distro, version: Version) -> bool:
 
 
 def choose_release(name: str | None, environment_name: str | None, prefixes: Sequence[str] = ()) -> Release:
-    """Return the release whose rules apply.
+    """Return the release of ``--distro``, else ``ROS_DISTRO``, else the newest; an installed launch refines it.
 
-    ``--distro`` decides, else ``ROS_DISTRO``, else the newest; an installed launch of the same series refines the
-    version. An unknown ``ROS_DISTRO`` counts as the newest.
-
-    :raises ValueError: ``name`` is unknown."""
+    Raises ValueError for an unknown ``name``; an unknown ``ROS_DISTRO`` counts as the newest."""
     if name:
         distro = Distro(name)
     else:

@@ -24,9 +24,7 @@ ALIASES: dict[str, dict[Source, set[str]]] = {
 
 
 def output_routes(setting: OutputSetting) -> Routes:
-    """Return where each stream goes.
-
-    :raises ValueError: an alias, source or destination is unknown to launch."""
+    """Return where each stream goes; raises ValueError for what launch does not know."""
     if isinstance(setting, str):
         if setting not in ALIASES:
             raise ValueError(

@@ -42,10 +42,7 @@ class RefusedParameters(ValueError):
 
 @lru_cache(maxsize=256)
 def sections_of_text(text: str) -> Mapping[str, Section]:
-    """Return parameters by section name, later ones over earlier ones.
-
-    Raises ``RefusedParameters``, and ``yaml.YAMLError`` for what is not YAML.
-    """
+    """Return parameters by section name, later ones over earlier ones; raises ``RefusedParameters``, YAMLError."""
     reader = _FileReader()
     for kind, scalar, style, line in parts_of(text):
         reader.take(kind, scalar, style, line)
@@ -104,8 +101,6 @@ def _first(slots: _Slots) -> ParameterValue:
 
 
 class _ValueReader:
-    """Scalars and lists. A list within a list replaces what is there, as in rcl."""
-
     def __init__(self) -> None:
         self.in_list = False
         self._type: type | None = None  # of the items so far
@@ -133,8 +128,6 @@ class _ValueReader:
 
 
 class _Path:
-    """Names joined by a separator, and how many were added. A name may hold the separator: it is given up in pieces."""
-
     def __init__(self, separator: str) -> None:
         self._separator = separator
         self.text = ""
@@ -153,8 +146,6 @@ class _Path:
 
 
 class _Section:
-    """The parameters of one section in their order."""
-
     def __init__(self) -> None:
         self.names: list[str] = []
         self.slots: list[_Slots] = []
@@ -179,8 +170,6 @@ class _Section:
 
 
 class _FileReader:
-    """The parts of one file, in their order. A key at the level of parameters is a group once a mapping follows it."""
-
     def __init__(self) -> None:
         self._sections: dict[str, _Section] = {}
         self._section = _Section()  # in turn

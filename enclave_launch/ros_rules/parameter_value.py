@@ -44,7 +44,6 @@ def plain_scalar(text: str) -> Scalar:
 
 
 def _strtoll(text: str) -> int | None:
-    """Return None outside of 64 bits."""
     digits = text.strip().lstrip("+-")
     base = 16 if digits[:2] in ("0x", "0X") else 8 if digits.startswith("0") else 10
     if len(digits) > _MOST_DIGITS:

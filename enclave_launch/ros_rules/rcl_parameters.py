@@ -35,8 +35,7 @@ Read = TypeVar("Read")
 
 
 class UnreadableParameters(Exception):
-    """A parameter file, or ``-p``, of which nothing is known: rcl would refuse to start the node, or it is only there
-    later."""
+    """A parameter file, or ``-p``, of which nothing is known: rcl would refuse it, or it is only there later."""
 
     def __init__(self, path: str, why: str) -> None:
         self.path, self.why = path, why
@@ -118,10 +117,7 @@ def _matches(pattern: Sequence[str], tokens: Sequence[str | None]) -> bool:
 
 
 def as_rcl_reads(value: Any) -> ParameterValue:
-    """Return a value that launch writes with PyYAML, as rcl's parser reads it back.
-
-    The two disagree on a few plain words: PyYAML writes the text ``1e3`` without quotes, rcl reads 1000.0.
-    """
+    """Return a value that PyYAML writes as rcl reads it back: ``1e3`` without quotes is 1000.0 there."""
     return (
         tuple(map(_item_as_rcl_reads, value))
         if isinstance(value, (list, tuple))

@@ -40,9 +40,7 @@ class LaunchCompanion(Protocol):
         return False
 
     def opened(self, launch: LaunchControl) -> None:
-        """Start accompanying ``launch``, before any process.
-
-        :raises EnclaveLaunchError: it cannot, so nothing is started."""
+        """Start accompanying ``launch``, before any process; raises EnclaveLaunchError if it cannot."""
 
     def prepared(self, process: ResolvedProcess, spec: ProcessSpec) -> ProcessSpec:
         """Return what to start for ``process``; called last, before each start."""
@@ -69,9 +67,7 @@ class Together:
         return any(each.records for each in self._companions)
 
     def opened(self, launch: LaunchControl) -> None:
-        """Open all companions.
-
-        :raises EnclaveLaunchError: one of them cannot accompany the launch."""
+        """Open all companions; raises EnclaveLaunchError if one of them cannot accompany the launch."""
         for each in self._companions:
             each.opened(launch)
 
@@ -94,8 +90,7 @@ class Together:
 
 
 def companion_first(companion: LaunchCompanion | None, observe: Observer) -> Observer:
-    """Return an observer that informs ``companion`` before ``observe``, so that what it records is visible to
-    others."""
+    """Return an observer that informs ``companion`` before ``observe``."""
     if companion is None:
         return observe
     inner = companion

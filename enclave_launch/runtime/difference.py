@@ -88,7 +88,6 @@ def _component_facts(component: ResolvedComponent) -> _Facts:
 
 
 def _same_program(process: ResolvedProcess, other: ResolvedProcess) -> bool:
-    """Return True if both run the same program, started at the same place in the launch files."""
     return process.program == other.program and process.location == other.location
 
 

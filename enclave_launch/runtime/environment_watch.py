@@ -49,9 +49,7 @@ class Unplanned(NamedTuple):
 
 
 def unplanned(watched: Watched, children: Mapping[int, set[int]]) -> Iterator[Unplanned]:
-    """Yield those of a process and its descendants that run with other variables than planned.
-
-    :param children: pids by the pid of their parent"""
+    """Yield those of a process and its descendants that run with other variables than planned."""
     for pid in (watched.pid, *descendants(watched.pid, children)):
         if pid == watched.pid or _speaks_dds(pid):
             environment = environment_of(pid)
@@ -61,10 +59,7 @@ def unplanned(watched: Watched, children: Mapping[int, set[int]]) -> Iterator[Un
 
 
 def environment_of(pid: int) -> dict[str, str] | None:
-    """Return the environment that ``pid`` was started with.
-
-    None if it cannot be known: the process has exited, belongs to another user, or has overwritten it (as programs
-    do that change their title), or /proc belongs to another PID namespace."""
+    """Return the environment that ``pid`` was started with; None if /proc does not show it."""
     if not proc_is_ours():
         return None
     try:

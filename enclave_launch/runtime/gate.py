@@ -31,10 +31,7 @@ class EnclaveGate(Protocol):
         """Return what ``ensure`` would if that needs no work: the enclave is unchanged since the last check."""
 
     def ensure(self, process: ResolvedProcess) -> StartAdditions:
-        """Return once the enclave of ``process`` is complete on disk; idempotent.
-
-        :raises EnclaveLaunchError: it cannot be; nothing that depends on it is started.
-        """
+        """Return once the enclave of ``process`` is complete on disk; raises EnclaveLaunchError."""
 
     def ensure_components(self, components: Sequence[ResolvedComponent]) -> None:
         """Check components about to be loaded into a running container."""
@@ -62,9 +59,7 @@ class LateProcess(RuntimeFailure):
 
 
 def identity(process: ResolvedProcess) -> tuple[object, ...]:
-    """Return what decides the permissions of a process.
-
-    Excludes its number, command line and parameter files, which differ between a dry run and a live one."""
+    """Return what decides the permissions of a process: what a dry run and a live one have in common."""
     return (
         process.kind,
         process.package,
@@ -129,8 +124,7 @@ class PlannedGate:
         return grant
 
     def ensure_components(self, components: Sequence[ResolvedComponent]) -> None:
-        """Refuse components that are not in the plan: a container reads its permissions once, at its start, so
-        nothing can be granted later."""
+        """Refuse components that are not in the plan: a container reads its permissions once, at its start."""
         for component in components:
             if component_identity(component) not in self._components:
                 what = f"component {component.program} for {component.container} at {component.location}"

@@ -102,7 +102,6 @@ class LaunchLog:
         return FileSink(self.directory / name, self._tell_on_screen, self._limit)
 
     def _tell_on_screen(self, text: str) -> None:
-        """Report trouble with a log file on the screen; called in the files' thread."""
         self._writers.screen.write(self.screen, (self._on_screen("ERROR", "launch", text) + "\n").encode())
 
     def close(self) -> None:
@@ -198,9 +197,7 @@ def log_base_directory(environment: Mapping[str, str]) -> Path:
 
 
 def make_log_directory(base: Path, now: datetime, host: str, pid: int) -> Path:
-    """Create ``<date>-<host>-<pid>`` below ``base`` and point the link ``latest`` beside it there.
-
-    :raises RuntimeFailure: it cannot be written."""
+    """Create ``<date>-<host>-<pid>`` and point the link ``latest`` there; raises RuntimeFailure."""
     directory = base / f"{now.strftime('%Y-%m-%d-%H-%M-%S-%f')}-{host}-{pid}"
     try:
         directory.mkdir(parents=True)
@@ -214,9 +211,7 @@ def make_log_directory(base: Path, now: datetime, host: str, pid: int) -> Path:
 
 
 def _renew_latest(link: Path, directory: Path) -> None:
-    """Replace the link atomically, since other launches do the same; leave alone what is no link, pass over a
-    failure.
-    """
+    """Replace the link atomically, since other launches do the same; leave alone what is no link."""
     if link.exists() and not link.is_symlink():
         return
     fresh = link.with_name(f".latest-{os.getpid()}")

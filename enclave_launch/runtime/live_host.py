@@ -198,7 +198,6 @@ class LiveHost(BaseHost):
         return self._companion.prepared(process, spec) if self._companion is not None else spec
 
     def _watched(self) -> list[Watched]:
-        """Return the running processes, each with the variables that its enclave needs."""
         running = ((live.process.process_name, live.pid) for live in self.processes)
         return [Watched(name, pid, self._planned.get(name, {})) for name, pid in running if pid is not None]
 

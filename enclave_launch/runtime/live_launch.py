@@ -67,10 +67,7 @@ _MOST_LAST_EVENTS = 100  # that lead to each other once everything is shut down 
 
 
 def run_launch(launch: LiveLaunch) -> int:
-    """Run it to the end; call it in the main thread. Gives the exit status: 0, or 1 when something failed.
-
-    :raises RuntimeFailure: as ``LiveLaunch.run``, and where this is not the main thread.
-    """
+    """Run it to the end in the main thread; return the exit status. Raises RuntimeFailure."""
     require_signals()
 
     async def main() -> int:
@@ -121,10 +118,7 @@ class LiveLaunch:
         self._context: LaunchContext
 
     async def run(self) -> int:
-        """Run to its end; cancelling it shuts down, in order, before it returns. Return the exit status.
-
-        :raises RuntimeFailure: before anything was started: no log directory, no rclpy where it is needed.
-        """
+        """Run to its end; cancelling it shuts down in order. Raises RuntimeFailure before anything was started."""
         async with AsyncExitStack() as stack:
             tree = ProcessTree(self._warden)  # first: the warden starts up while we go on
             self.warden_pid = tree.warden_pid
@@ -268,10 +262,7 @@ class LiveLaunch:
         await self._wait_for(pending)
 
     def _end_of_endless_events(self) -> None:
-        """Limit the events handled after all processes have exited, since an event that emits itself would never let
-        the launch end.
-
-        :raises _Over: the limit is reached."""
+        """Raise ``_Over`` at the limit of events after all processes: one may emit itself."""
         if not self._shutting_down or self._pending():
             return
         self._last_events += 1
@@ -308,7 +299,6 @@ class LiveLaunch:
             self._services.abandon()
 
     def _on_error(self, error: Exception) -> None:
-        """Log the error as launch does, with its place in the launch file if evaluation knows it."""
         self._failed = True
         file = self._source.launch_file
         reported = error if isinstance(error, EnclaveLaunchError) else launch_file_error(error, file)
@@ -332,10 +322,7 @@ class LiveLaunch:
         return 1 if self._failed or self._host.failed else 0
 
     def services(self) -> RosServices | None:
-        """Make the services when they are requested; ``None`` for a launch that is known to need none.
-
-        :raises RuntimeFailure: they are needed, and there is no rclpy.
-        """
+        """Make the services when requested, None for a launch that needs none; raises RuntimeFailure without rclpy."""
         if self._services is None and self._needs_ros_services is not False:
             self._services = RosServices(self._gate.launcher() if self._gate else None, self.say)
         return self._services
@@ -376,9 +363,7 @@ class _Over(Exception):
 
 
 def require_signals() -> None:
-    """Check that this is the main thread, which takes the signals, and that no event loop runs that we would block.
-
-    :raises RuntimeFailure: it is not, or one does."""
+    """Raise RuntimeFailure unless this is the main thread, which takes the signals, without an event loop."""
     if threading.current_thread() is not threading.main_thread():
         raise RuntimeFailure(
             "run() takes the signals of the process, which only its main thread can; "

@@ -171,7 +171,6 @@ class CalledAtEvent(EventHandler):
 
 
 def _emulate_tty(action: ExecuteLocal, context: LaunchContext) -> bool:
-    """Return the launch configuration ``emulate_tty``, or the action's attribute if it is not set."""
     if "emulate_tty" not in context.launch_configurations:
         return bool(action.emulate_tty)
     text = context.launch_configurations["emulate_tty"]
@@ -179,9 +178,7 @@ def _emulate_tty(action: ExecuteLocal, context: LaunchContext) -> bool:
 
 
 def _line_renderer(action: ExecuteLocal) -> Callable[[str], str] | None:
-    """Return how lines are formatted, None for launch's default.
-
-    The format is tried once here, so that no output is lost to a format error later."""
+    # The format is tried once here, so that no output is lost to a format error later.
     output_format = action.output_format
     if output_format == DEFAULT_FORMAT:
         return None

@@ -35,9 +35,7 @@ class Overlap:
 
 @contextmanager
 def _raised_limit() -> Iterator[None]:
-    """Raise the soft limit of open files, since each process takes three.
-
-    The warden runs already: its children keep the limit that the launcher was given."""
+    # Each process takes three files. The warden runs already: its children keep the launcher's limit.
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
     try:

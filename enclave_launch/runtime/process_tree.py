@@ -46,11 +46,7 @@ class ProcessSpec(NamedTuple):
         return ("/bin/sh", "-c", " ".join(self.cmd)) if self.shell else self.cmd
 
     def encoded(self) -> tuple[list[bytes], dict[bytes, bytes], bytes]:
-        """Encode command line, environment and working directory as the kernel takes them.
-
-        :raises OSError: EINVAL, with the text that no process can be started with: a NUL character, an environment
-        variable without a name or with ``=`` in it, a character that the locale's encoding does not have.
-        """
+        """Encode command line, environment and working directory for the kernel; raises OSError (EINVAL)."""
         environment = {}
         for name, value in self.environment.items():
             if not name or "=" in name:
@@ -173,8 +169,7 @@ class Child:
         self._tree.send("sweep", self.identifier, self.pid)
 
     def retire(self) -> None:
-        """Release the streams of an exited process; those that its descendants still write to stay open until the
-        launch ends."""
+        """Release the streams of an exited process, but those that its descendants still write to."""
         if all(pump.closed for pump in self.pumps):
             self.release()
         else:
@@ -223,11 +218,7 @@ class ProcessTree:
     async def spawn(
         self, spec: ProcessSpec, on_output: OnOutput, waits_for: Mapping[Stream, frozenset[Hold]] = NO_HOLDS
     ) -> Child:
-        """Start a process; returns once it has been executed. ``waits_for``: what pauses the reading of its streams.
-
-        :raises OSError: as ``exec`` would: missing file, no permission, no such directory; and as
-            ``ProcessSpec.encoded``.
-        """
+        """Start a process; returns once it has been executed. Raises OSError as ``exec`` and ``encoded`` do."""
         loop = asyncio.get_running_loop()
         argv, environment, cwd = spec.encoded()
         stdin, stdin_ours, opened = _open_streams(spec.emulate_tty)
@@ -330,7 +321,6 @@ def _closed_with(opened: contextlib.ExitStack, pair: tuple[int, int]) -> tuple[i
 
 
 def _open_output(emulate_tty: bool) -> tuple[int, int]:
-    """Open our end and the child's end of one output stream."""
     if not emulate_tty:
         return os.pipe()
     ours, theirs = os.openpty()

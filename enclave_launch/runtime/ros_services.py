@@ -37,9 +37,7 @@ def rclpy_available() -> bool:
 
 
 def require_rclpy() -> None:
-    """Check that the launcher's own node can be made here.
-
-    :raises RuntimeFailure: rclpy is not there, or this Python cannot import it or what its messages need (numpy)."""
+    """Raise RuntimeFailure unless rclpy, and what its messages need (numpy), can be imported here."""
     if not rclpy_available():
         raise RuntimeFailure(f"cannot run this launch file: {ALTERNATIVE}")
     why = ros_import_failure()
@@ -83,9 +81,7 @@ class RosServices:
         return self._loop.run_in_executor(None, self._load_all, tuple(components))
 
     def change_state(self, node: str, transition: int) -> asyncio.Future[bool]:
-        """Request a lifecycle transition.
-
-        :param transition: a constant of ``lifecycle_msgs/msg/Transition``"""
+        """Request a lifecycle transition, a constant of ``lifecycle_msgs/msg/Transition``."""
         return self._loop.run_in_executor(None, self._change_state, node, transition)
 
     def watch_state(self, node: str, on_transition: Callable[[Any], None]) -> None:
@@ -164,7 +160,6 @@ class RosServices:
             self._node.destroy_client(client)
 
     def _wait(self, come: Callable[[], bool], what: str) -> bool:
-        """Wait; False if the launch ended first."""
         while not come():
             if self._closing.is_set():
                 self._tell("WARNING", f"Abandoning wait for the {what}, due to shutdown.")

@@ -104,7 +104,6 @@ def _holds(log: LaunchLog, sinks: Sequence[Sink]) -> frozenset[Hold]:
 
 
 def _sinks_of(log: LaunchLog, name: str, stream: Stream, routes: Routes) -> Iterable[tuple[Sink, bool]]:
-    """Yield each sink of a stream, with True if its lines carry the time, as only launch.log's do."""
     wanted = routes["both"] | routes[stream]
     if "screen" in wanted:
         yield log.screen, False

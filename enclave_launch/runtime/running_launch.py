@@ -86,12 +86,7 @@ def printed(name: str, text: str = "") -> Condition:
 
 
 def endpoint_seen(name: str, endpoint: str, *, kind: EndpointKind | None = None, node: str = "") -> Condition:
-    """Return a condition that holds while a node of the process ``name`` has ``endpoint``.
-
-    :param endpoint: its final name, ``/chatter``
-    :param kind: consider only endpoints of this kind
-    :param node: consider only the node of this fully qualified name
-    :raises RuntimeFailure: from the condition, if the launch is not recorded."""
+    """Return a condition that holds while a node of the process ``name`` has the endpoint of this final name."""
 
     def holds(launch: RunningLaunch) -> bool:
         if not launch.is_recorded:
@@ -116,9 +111,7 @@ class RunningLaunch:
     """Made by ``enclave_launch.start``. As a context manager it is stopped at the end of the block."""
 
     def __init__(self, main: Main) -> None:
-        """Start the launch.
-
-        :raises RuntimeFailure: as ``run``, before anything was started."""
+        """Start the launch; raises RuntimeFailure as ``run``."""
         self._changed = threading.Condition()
         self._processes: dict[str, RunningProcess] = {}
         self._events: deque[RunEvent] = deque()
@@ -155,15 +148,11 @@ class RunningLaunch:
 
     @property
     def warden_pid(self) -> int | None:
-        """Return the pid of the process that is the parent of all others of this launch (``runtime.warden``); None
-        before it runs."""
+        """Return the pid of the parent of all other processes of this launch; None before it runs."""
         return self._service.warden_pid if self._service is not None else None
 
     def wait(self, timeout: float | None = None) -> int:
-        """Wait until all has ended; return the exit status.
-
-        :raises TimeoutError: after ``timeout`` seconds; the launch goes on.
-        """
+        """Wait until all has ended; return the exit status. Raises TimeoutError; the launch goes on."""
         self._wait_for(lambda: self._is_over, timeout, "the launch has not ended")
         self._thread.join()
         if self._error is not None:
@@ -172,13 +161,9 @@ class RunningLaunch:
         return self._exit_status
 
     def wait_until(self, condition: Condition, timeout: float | None = None) -> None:
-        """Wait until ``condition(self)`` holds: ``started(...)``, ``printed(...)``, ``endpoint_seen(...)``, or your
-        own.
+        """Wait until ``condition(self)`` holds, such as ``started(...)``; it is evaluated at each event.
 
-        It is evaluated whenever something happened.
-
-        :raises TimeoutError: after ``timeout`` seconds. :raises RuntimeFailure: the launch ended before.
-        """
+        Raises TimeoutError, and RuntimeFailure if the launch ended before."""
         self._wait_for(lambda: condition(self) or self._is_over, timeout, "the condition does not hold")
         if not condition(self):
             raise RuntimeFailure(
@@ -204,12 +189,7 @@ class RunningLaunch:
     def stop(
         self, reason: str = "stopped by the program that started it", timeout: float | None = None
     ) -> int:
-        """End every process in order (SIGINT, then SIGTERM, then SIGKILL) and wait. Returns the exit status.
-
-        Stopping what has ended already does nothing.
-
-        :raises TimeoutError: after ``timeout`` seconds; the end goes on.
-        """
+        """End every process (SIGINT, SIGTERM, SIGKILL), wait, return the exit status; raises TimeoutError."""
         if self._loop is not None and self._service is not None and not self._is_over:
             with contextlib.suppress(RuntimeError):  # its loop was closed in this moment: it is over
                 self._loop.call_soon_threadsafe(self._service.shut_down, reason)
@@ -242,7 +222,6 @@ class RunningLaunch:
         self._loop, self._service = asyncio.get_running_loop(), service
 
     def _observe(self, event: RunEvent) -> None:
-        """Remember an event and wake those who wait; called in the launch's thread."""
         with self._changed:
             self._remember(event)
             self._follow(event)
@@ -265,8 +244,7 @@ class RunningLaunch:
             self._processes[event.name] = _after(self._processes[event.name], event)
 
     def _wait_for(self, condition: Callable[[], bool], timeout: float | None, what: str) -> None:
-        """Wait for ``condition``, evaluated without the lock: it may do anything, such as resolve another launch
-        file."""
+        # Evaluated without the lock: it may do anything, such as resolve another launch file.
         deadline = None if timeout is None else time.monotonic() + timeout
         while True:
             seen = self._version

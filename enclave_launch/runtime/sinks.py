@@ -24,9 +24,7 @@ class Sink(Protocol):
     """The destination of what a ``SinkWriter`` queues."""
 
     def write(self, data: bytes) -> None:
-        """Write all of ``data``, in the writer's thread. Failures disable the sink; they never reach a
-        process.
-        """
+        """Write all of ``data``, in the writer's thread. Failures disable the sink; none reaches a process."""
 
 
 class ScreenSink:
@@ -148,9 +146,7 @@ class SinkWriter:
         return self._full
 
     def close(self) -> None:
-        """Write what is queued, at most for ``FLUSH_TIMEOUT``: a terminal stopped with Ctrl-S must not
-        hold us.
-        """
+        """Write what is queued, at most for ``FLUSH_TIMEOUT``: a terminal stopped with Ctrl-S must not hold us."""
         with self._changed:
             self._stopping = True
             self._changed.notify()
@@ -187,7 +183,6 @@ def _merged(batch: list[tuple[Sink, bytes]]) -> list[tuple[Sink, bytes]]:
 
 
 def _descriptor_of(stream: TextIO | None) -> int | None:
-    """Return the descriptor of ``stream``, None for one in memory, as test runners use."""
     if stream is None:
         return None
     try:

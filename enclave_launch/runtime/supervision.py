@@ -136,10 +136,7 @@ class SupervisedProcess:
             self._begin_escalation(patience, quiet)
 
     def signal(self, number: Signals, *, quiet: bool = False, whole_group: bool = True) -> None:
-        """Send a signal to the process.
-
-        :param whole_group: also to what it started; otherwise to the process alone, as a launch file's
-            ``SignalProcess``"""
+        """Send a signal to the process; ``whole_group``: also to what it started."""
         if self._child is None or not self._child.running:
             return
         if not quiet:

@@ -45,10 +45,7 @@ class Survivors:
             self._cgroup.take(warden)
 
     def end(self) -> None:
-        """Kill all that the launch left, until nothing more turns up.
-
-        Left alone are the children that this program had before the launch, and what runs in its own session.
-        """
+        """Kill all that the launch left, but not the program's earlier children and its own session."""
         if self._cgroup is not None:
             self._cgroup.kill()
         deadline = time.monotonic() + CLEARING

@@ -197,9 +197,7 @@ class Warden:
             self.connection.sendall(HEADER.pack(len(data)) + data)
 
     def spawn(self, identifier: int, program: list[Any], streams: list[int]) -> None:
-        """Start a program.
-
-        :param program: argv, env, cwd"""
+        """Start a program: argv, env, cwd."""
         parent = os.getpid()
         report, report_writer = os.pipe()  # close-on-exec: end of file means that exec succeeded
         with open(report, "rb") as reader:
@@ -355,9 +353,7 @@ def children_by_parent() -> dict[int, set[int]]:
 
 
 def proc_is_ours() -> bool:
-    """Return whether /proc shows our PID namespace. In a new one it may be that of the old, where numbers mean
-    others.
-    """
+    """Return whether /proc shows our PID namespace."""
     try:
         return os.readlink("/proc/self") == str(os.getpid())
     except OSError:
@@ -365,9 +361,7 @@ def proc_is_ours() -> bool:
 
 
 def descendants(root: int, children: Mapping[int, set[int]] | None = None) -> set[int]:
-    """Return the pids of all live processes below ``root``.
-
-    :param children: a recent result of ``children_by_parent``"""
+    """Return the pids of all live processes below ``root``."""
     children = children_by_parent() if children is None else children
     found: set[int] = set()
     waiting = [root]

@@ -40,9 +40,7 @@ class WardenChannel:
         self._loop.add_reader(self._socket, self._receive)
 
     def send(self, *message: Message, descriptors: Sequence[int] = ()) -> None:
-        """Queue a message, sent in order.
-
-        :param descriptors: closed by the channel once they are sent"""
+        """Queue a message; descriptors are closed once they are sent."""
         data = marshal.dumps(message)
         self._waiting.append((HEADER.pack(len(data)) + data, descriptors))
         self._flush()

@@ -16,10 +16,7 @@ from enclave_launch.recording.recording import Recording
 
 
 def audit_launch(plan: LaunchPlan, options: argparse.Namespace, settings: RunSettings) -> int:
-    """Run the launch and report what the plan would refuse.
-
-    :returns: the status of the launch; if that is 0, 1 if the plan would refuse something or not everything was
-        visible."""
+    """Run the launch and report what the plan would refuse; return 1 then, or if not everything was visible."""
     warn(*plan.problems)
     audit = Audit(plan)
     recording = Recording(new_run(plan.launch_file, plan.distro, "none"), [audit])

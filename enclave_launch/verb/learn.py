@@ -34,8 +34,7 @@ Start = Callable[["LaunchCompanion"], int]
 
 
 def learn_launch(target: LaunchTarget, options: argparse.Namespace, start: Start) -> int:
-    """Record one run (and a second one for ``--learn-parameters``), then write what was learnt. Gives the exit status
-    of the launch."""
+    """Record one run (two for ``--learn-parameters``), write what was learnt, return the status of the launch."""
     patience: float | None = options.learn_for
     folder = Path(options.learn).absolute()
     prepare_folder(folder)

@@ -119,9 +119,7 @@ EVALUATION: tuple[Option, ...] = (
 
 
 def size_in_bytes(text: str) -> int:
-    """Convert ``100M`` and the like to bytes.
-
-    :raises argparse.ArgumentTypeError: it is no size, or less than 4 KiB."""
+    """Convert ``100M`` and the like to bytes; raises argparse.ArgumentTypeError, also below 4 KiB."""
     found = re.fullmatch(r"(\d+)([kKmMgG]?)", text)
     size = int(found[1]) << {"": 0, "k": 10, "m": 20, "g": 30}[found[2].lower()] if found else 0
     if size < 4096:
@@ -198,9 +196,7 @@ def add_security_options(group: argparse._ArgumentGroup) -> None:
 
 
 def resolve_options(options: argparse.Namespace) -> ResolveOptions:
-    """Return what the options say about evaluation and permissions.
-
-    :raises UsageError: a path of ``--nodl`` or ``--source`` does not exist, or a pattern is malformed."""
+    """Return what the options say about evaluation and permissions; raises UsageError."""
     for name in ("nodl", "source"):
         for path in getattr(options, name):
             if not os.path.exists(path):

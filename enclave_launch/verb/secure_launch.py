@@ -42,8 +42,7 @@ from nodl.ament_index import search_prefixes
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run the command line ``argv`` (default: the program's own). Gives the exit status, never a traceback
-    for what a user can cause."""
+    """Run the command line ``argv`` (default: the program's own); return the exit status."""
     with safe_output():
         parser = build_parser()
         complete(parser, _offer)
@@ -78,9 +77,7 @@ def _main(line: CommandLine, parser: argparse.ArgumentParser) -> int:
 
 
 def _keystore(options: argparse.Namespace) -> str | None:
-    """Return the keystore that ``--secure`` uses, None without it.
-
-    :raises UsageError: ``--secure`` has none."""
+    """Return the keystore that ``--secure`` uses, None without it; raises UsageError if it has none."""
     if not options.secure:
         return None
     if options.keystore is None:

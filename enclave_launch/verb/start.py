@@ -76,8 +76,7 @@ def _launch_plainly(
 def _launch(
     plan: LaunchPlan, options: argparse.Namespace, keystore: str, companion: LaunchCompanion | None = None
 ) -> int | None:
-    """Provision and run; return the exit status, None if the launch ended to be renewed and started again
-    (``--restart-expiring``)."""
+    """Provision and run; return the exit status, None to renew and start again (``--restart-expiring``)."""
     warn(*(() if options.quiet else plan.warnings))
     if not options.provision_only:
         _check_before_keys_are_made(plan, keystore)
@@ -111,9 +110,7 @@ def _launch(
 
 
 def _check_before_keys_are_made(plan: LaunchPlan, keystore: str) -> None:
-    """Check what ``run`` would refuse in any case, before the keystore is touched.
-
-    :raises EnclaveLaunchError: as ``run``."""
+    """Check what ``run`` would refuse in any case, before the keystore is touched."""
     if plan.problems:
         return  # ``provision`` reports them
     check_programs(plan.evaluation.processes)

@@ -71,9 +71,7 @@ def _meant(package: str, prefixes: Sequence[str]) -> str:
 
 
 def parse_arguments(words: Sequence[str]) -> tuple[tuple[str, str], ...]:
-    """Parse ``name:=value`` words.
-
-    :raises UsageError: a word has another form; the message is upstream's."""
+    """Parse ``name:=value`` words; raises UsageError with upstream's message."""
     with translated(RuntimeError, UsageError):
         return tuple(evaluate.parse_arguments(words))
 

@@ -71,9 +71,7 @@ def check_options(line: CommandLine, parser: argparse.ArgumentParser) -> None:
 
 
 def check_views(line: CommandLine, actions: Sequence[argparse.Action]) -> bool:
-    """Return True if the launch is only shown, not started.
-
-    :raises UsageError: two options print, or one has no effect."""
+    """Return True if the launch is only shown; raises UsageError if two options print or one has no effect."""
     views = [name for name in _VIEWS if name in line.given]
     if len(views) > 1:
         raise UsageError(f"{_flags(actions, views)} each print something of their own: give one of them")

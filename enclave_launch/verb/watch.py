@@ -23,28 +23,20 @@ from nodl.graph.observing import chosen_source
 
 
 def watch_plain_launch(plan: LaunchPlan, options: argparse.Namespace, settings: RunSettings) -> int:
-    """Run and watch an unsecured launch.
-
-    :returns: its status, 1 if there were alarms
-    :raises UsageError: a process is on Zenoh."""
+    """Run and watch an unsecured launch; return its status, 1 if there were alarms. Raises UsageError."""
     watch = DriftWatch(_seen_document(plan), _options(options))
     return watch.status(run(plan, options=settings._replace(watch=watch)))
 
 
 def check_watch(plan: LaunchPlan) -> None:
-    """Check that the launch can be watched, before its keystore is touched.
-
-    :raises UsageError: a process is on Zenoh, or there is nothing to observe with."""
+    """Raise UsageError unless the launch can be watched, before its keystore is touched."""
     _seen_document(plan)
     with translated(NoDLError, UsageError, "--watch: "):
         chosen_source("auto")
 
 
 def watch_of_secured_launch(launch: ProvisionedLaunch, options: argparse.Namespace) -> DriftWatch:
-    """Return a watch with an enclave of its own in the launch's keystore, for the observer in use.
-
-    :raises ProvisionError: the enclave cannot be made
-    :raises UsageError: as ``check_watch``."""
+    """Return a watch with an enclave of its own, for the observer in use; raises ProvisionError, UsageError."""
     document = _seen_document(launch.plan)
     root = launch.settings.keystore
     with (
@@ -68,9 +60,7 @@ def _enclaves_now(root: str, security: Security) -> Mapping[int, str]:
 
 
 def _seen_document(plan: LaunchPlan) -> dict[str, object]:
-    """Return the plan's document.
-
-    :raises UsageError: no observer sees a process of it."""
+    """Return the plan's document; raises UsageError if no observer sees a process of it."""
     document = plan_document(plan)
     zenoh = out_of_sight([document])
     if zenoh:

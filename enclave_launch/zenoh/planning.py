@@ -39,9 +39,7 @@ _ENDS = (
 
 
 def report(plan: LaunchPlan, environment: Mapping[str, str]) -> LaunchPlan:
-    """Return the plan with its problems and warnings about Zenoh.
-
-    :param environment: the launcher's own"""
+    """Return the plan with its problems and warnings about Zenoh, in the launcher's ``environment``."""
     return plan._replace(
         problems=(*plan.problems, *middleware_problems(plan, environment)),
         warnings=(*plan.warnings, *middleware_notes(plan)),
@@ -125,9 +123,7 @@ def _ends(plan: LaunchPlan, processes: Iterable[PlannedProcess]) -> dict[_End, s
 
 
 def enclave_types(derived: DerivedPolicy, enclave: str) -> Types:
-    """Return the types of each name, if every node that requests it knows them.
-
-    A policy file gives no types: what it grants may have any."""
+    """Return the types of each name, if every node that requests it knows them."""
     return united_types(
         one
         for rule, reasons in derived.reasons.get(enclave, {}).items()
@@ -146,10 +142,7 @@ def _type(reason: Reason) -> str:
 
 
 def explain(plan: LaunchPlan, subject: str) -> Iterator[str]:
-    """Explain what ``subject`` means on Zenoh.
-
-    Yields all lines of an enclave, those that name a topic, service or part of an action; nothing for processes on
-    DDS."""
+    """Explain what ``subject`` means on Zenoh; nothing for processes on DDS."""
     domains = enclave_domains(item for item in plan.processes if item.middleware == ZENOH)
     for policy in plan.derived.policy.enclaves:
         if policy.path not in domains:

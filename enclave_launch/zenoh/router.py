@@ -186,7 +186,6 @@ class ZenohRouter:
         )  # fmt: skip
 
     def _follow(self, process: subprocess.Popen[bytes], seen: object) -> None:
-        """Follow the router until it has to be started again, or all is over."""
         refused = ""
         while not self._stop.wait(_LOOK):
             if process.poll() is not None and not self._answered.is_set():
@@ -242,7 +241,6 @@ def _state(path: str) -> object:
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:
-    """Interrupt the process as a terminal does, kill it after five seconds."""
     with contextlib.suppress(ProcessLookupError):
         process.send_signal(signal.SIGINT)
     try:

@@ -118,7 +118,7 @@ def create_enclaves(
     allow_all: bool = False,
     options: ProvisionOptions | None = None,
 ) -> ProvisionReport:
-    """Create enclaves in a keystore that exists: without ``allow_all`` new ones may do nothing, others what they may."""
+    """Create enclaves in a keystore that exists: without ``allow_all`` new ones may do nothing, others as before."""
     root = resolve_root(keystore)
     chosen = with_domains(root, _as_long_as_asked(options or ProvisionOptions()))
     ordered = sorted({validate_enclave_name(name) for name in names})

@@ -35,11 +35,9 @@ _MAX_BYTES = 4_000_000
 def read_document(
     path: str | Path, *, package: str | None = None, name: str | None = None, prefixes: Sequence[str] = ()
 ) -> tuple[ManifestNode, ...]:
-    """Read all nodes of one file, whichever version it is in; what begins with ``<`` is XML.
+    """Read all nodes of one file, whichever version it is in; ``name``: registered, by default from the file name.
 
-    ``name`` is the registered name of a v2 document (default: from the file name). Raises ``InvalidNoDLError`` with
-    file:line, also for a file that cannot be read.
-    """
+    Raises ``InvalidNoDLError``, also for a file that cannot be read."""
     file = str(path)
     return parse_document(_read(file), file, package=package, name=name, prefixes=prefixes)
 

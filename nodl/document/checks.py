@@ -1,7 +1,4 @@
-"""Small checkers over lined YAML values, from which the rules of a document are put together. Performs no I/O.
-
-Each takes a value and what to call it, and raises ``InvalidNoDLDocumentError`` with file:line, or is content.
-"""
+"""Small checkers over lined YAML values, which raise ``InvalidNoDLDocumentError`` with file:line. Performs no I/O."""
 
 from __future__ import annotations
 

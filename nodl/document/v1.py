@@ -99,7 +99,6 @@ def _node(element: XmlElement, file: str, package: str | None) -> ManifestNode:
 
 
 def _node_name(element: XmlElement, file: str) -> tuple[str | None, str]:
-    """Return namespace (if the name has one, as in ``/ns/node``) and node name."""
     written = element.get("name", "")
     try:
         if "/" not in written:
@@ -136,7 +135,6 @@ def _endpoints(element: XmlElement, file: str, own_prefix: str) -> list[Endpoint
 
 
 def _once(endpoints: Iterable[Endpoint]) -> tuple[Endpoint, ...]:
-    """Return each (kind, name, type) once, the first mention stays."""
     first: dict[tuple[EndpointKind, NameTemplate, str], Endpoint] = {}
     for endpoint in endpoints:
         first.setdefault((endpoint.kind, endpoint.name, endpoint.type), endpoint)

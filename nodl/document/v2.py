@@ -36,11 +36,7 @@ ANY_TYPE = "of any type"
 def parse_v2(
     text: bytes, file: str, *, package: str | None, name: str, prefixes: Sequence[str] = ()
 ) -> ManifestNode:
-    """Return the node of one document.
-
-    ``name`` as registered; ``prefixes`` to find ``nodl://`` includes. Reads the included files. Raises
-    ``InvalidNoDLError`` with file:line.
-    """
+    """Return the node of one document, registered as ``name``; reads included files. Raises ``InvalidNoDLError``."""
     return parse_root(
         check_document(parse_yaml(text, file)), file, package=package, name=name, prefixes=prefixes
     )
@@ -67,14 +63,12 @@ def parse_root(
 
 
 def _fields(root: YamlMap) -> dict[str, str | int | float | bool | None]:
-    """Return what our section of the document says in one word."""
     ours = section_of(root)
     given = ours.items if ours else {}
     return {key: value.value for key, value in given.items() if isinstance(value, YamlScalar)}
 
 
 def _identified(root: YamlMap, file: str, package: str | None, name: str) -> NodeInterface:
-    """Return the node without its interfaces."""
     fields = _fields(root)
     executable, plugin = _text(fields, "executable"), _text(fields, "plugin")
     if executable is None and plugin is None:

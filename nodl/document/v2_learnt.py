@@ -63,10 +63,7 @@ def learnt_from(root: YamlMap) -> LearntFrom:
 
 
 def learnt_names(root: YamlMap) -> dict[tuple[str, str], LearntName]:
-    """Return what was learnt, by list (``publishers``) and name of the standard entry.
-
-    Raises ``InvalidElementError`` for a bad name.
-    """
+    """Return what was learnt, by list (``publishers``) and name of the entry; raises ``InvalidElementError``."""
     rows = _section(root).get("endpoints")
     found: dict[tuple[str, str], LearntName] = {}
     for row in rows.items if isinstance(rows, YamlList) else ():
@@ -82,7 +79,6 @@ def learnt_names(root: YamlMap) -> dict[tuple[str, str], LearntName]:
 
 
 def _note(row: YamlMap) -> str:
-    """Return ``recorded in 2 runs``, and how sure its source is."""
     runs, undecided = _texts(row.items.get("runs")), _texts(row.items.get("undecided"))
     proof = row.items.get("proof")
     texts = [f"recorded in {counted(len(runs), 'run')}"] if runs else []

@@ -206,7 +206,6 @@ def _tf_listener(given: object) -> When | None:
 
 
 def _maps(given: Mapping[str, object], key: str) -> list[dict[str, str]]:
-    """Return the entries of a list of mappings; the schema has seen to the types of those that are used."""
     return given.get(key) or []  # type: ignore[return-value]
 
 

@@ -1,7 +1,4 @@
-"""``ManifestNode`` -> the text of a NoDL document, v1 or v2, sorted as it was read. Performs no I/O.
-
-What one version cannot say is returned as a list of notes, never dropped in silence.
-"""
+"""``ManifestNode`` -> the text of a NoDL document, v1 or v2, and notes of what it cannot say. Performs no I/O."""
 
 from __future__ import annotations
 
@@ -82,7 +79,6 @@ def v1_xml(nodes: Sequence[ManifestNode]) -> Written:
 
 
 def _identity(interface: NodeInterface) -> list[str]:
-    """Return our section, only if the registered name alone would not say the same."""
     fields: dict[str, str] = {}
     if interface.executable != interface.name:
         fields |= {"executable": interface.executable or "", "plugin": interface.plugin or ""}

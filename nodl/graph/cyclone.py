@@ -193,10 +193,7 @@ def configuration(environment: Mapping[str, str]) -> str:
 
 
 def security_properties(directory: Path) -> dict[str, str]:
-    """Return the properties of a participant in the enclave whose files are in ``directory``.
-
-    Names are as rmw_dds_common ``security.cpp`` has them. Raises ``ObserverError`` for a file that is missing.
-    """
+    """Return the properties of a participant in an enclave (rmw_dds_common ``security.cpp``); raises ObserverError."""
     missing = [name for name in _FILES.values() if not (directory / name).is_file()]
     if missing:
         raise ObserverError(f"{directory} is not the directory of an enclave: it has no {', '.join(missing)}")
@@ -240,18 +237,12 @@ def _properties(qos: Any) -> dict[str, str]:
 
 
 def _is_cyclone(guid: str, properties: Mapping[str, str]) -> bool:
-    """Return True for Cyclone DDS.
-
-    Vendor numbers begin unsecured GUIDs (DDSI-RTPS: eProsima has 01.0f); physical data is announced in clear.
-    """
+    # Vendor numbers begin unsecured GUIDs (DDSI-RTPS: eProsima has 01.0f); physical data is announced in clear.
     return not guid.startswith("010f") and not any(name.startswith("fastdds.") for name in properties)
 
 
 def quality_from(qos: Any, *, has_history: bool) -> Quality:
-    """Return the quality of an endpoint.
-
-    Fast DDS does not announce its history, and the binding then shows a default.
-    """
+    """Return the quality of an endpoint; Fast DDS does not announce its history."""
     fields: dict[str, Any] = {}
     for policy in qos:
         reader = _POLICIES.get(policy.__scope__)
@@ -273,7 +264,6 @@ _POLICIES: Mapping[str, Callable[[str, Any], dict[str, Any]]] = {
 
 
 def _word(policy: type) -> str:
-    """Return the class ``Policy.Durability.TransientLocal`` as NoDL v2 writes it: ``TRANSIENT_LOCAL``."""
     name = policy.__qualname__.rpartition(".")[2]
     return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).upper()
 

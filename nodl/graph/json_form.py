@@ -1,7 +1,4 @@
-"""A graph ⇄ JSON: how an observation is kept, and how a watcher tells it to another process. Performs no I/O.
-
-What is written are the announcements and lists that a graph is made of; reading joins them anew.
-"""
+"""A graph ⇄ JSON, by the announcements and lists that it is made of. Performs no I/O."""
 
 from __future__ import annotations
 

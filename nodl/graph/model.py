@@ -45,10 +45,7 @@ class SeenParticipant(NamedTuple):
 
     @property
     def claims_security(self) -> bool:
-        """Return True if its GUID begins as DDS-Security 9.3.3 makes it of a certificate: the highest bit is set.
-
-        Unsecured ones begin with the vendor's number. Peers that authenticate it have verified that.
-        """
+        """Return True if the highest bit of its GUID is set (DDS-Security 9.3.3), unlike a vendor's number."""
         return int(self.guid[:2], 16) & 0x80 != 0
 
     @property
@@ -158,10 +155,7 @@ class Graph(NamedTuple):
 
     @property
     def half_open(self) -> bool:
-        """Return True if discovery is under way: an interface lacks a part, or a participant has nothing at all.
-
-        What secured ones have is told only to those that they authenticate.
-        """
+        """Return True if discovery is under way: an interface lacks a part, or a participant has nothing at all."""
         return any(not each.complete for process in self.processes for each in process.interfaces) or any(
             not process.participant.claims_security and not process.announced for process in self.processes
         )
@@ -223,8 +217,6 @@ def _owners(listed: ParticipantList) -> list[Owner]:
 
 
 class _Attributor:
-    """Whose the endpoints of one participant are."""
-
     def __init__(
         self, parts: Sequence[tuple[SeenEndpoint, Part]], listed: ParticipantList | None, owners: Owners
     ) -> None:
@@ -274,10 +266,7 @@ def _interfaces(
 def _joined(
     kind: EndpointKind, name: str, members: Sequence[tuple[SeenEndpoint, Part]], by: Mapping[str, Attribution]
 ) -> Iterator[SeenInterface]:
-    """Yield the interfaces that the parts of one name make.
-
-    The topics of an action without any of its services are topics (``ros2 topic echo``).
-    """
+    """Yield the interfaces of one name; an action's topics without its services are topics (``ros2 topic echo``)."""
     if kind in _AS_TOPICS and all(part.part in ACTION_TOPICS for _, part in members):
         for endpoint, part in members:
             topic = part_of(
@@ -338,9 +327,7 @@ class GraphState:
             self.changes += 1
 
     def listed(self, message: ParticipantList, writer: str) -> None:
-        """Note a list; ``writer`` is the GUID of the participant that published ``message``, empty if that is not
-        known.
-        """
+        """Note a list; ``writer``: GUID of the participant that published it, empty if unknown."""
         if writer and writer != message.participant:
             text = f"participant {writer} publishes a list of the nodes of {message.participant}; it is not believed"
             if text not in self.forged:

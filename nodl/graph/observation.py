@@ -60,10 +60,7 @@ def _start(fields: Mapping[str, Any]) -> StartedNode:
 
 
 def command_lines(graph: Graph, host: str) -> dict[str, tuple[str, ...]]:
-    """Return the commands of the participants on this machine that say their pid, by their GUIDs.
-
-    A pid of another pid namespace (a container) may be somebody else's here: then the program in it is.
-    """
+    """Return the commands of the participants on this machine that say their pid, by their GUIDs."""
     found = {}
     for process in graph.processes:
         words = _command_line(process, host)

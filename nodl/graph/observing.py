@@ -47,10 +47,7 @@ class Where(NamedTuple):
 
 
 def chosen_source(wanted: str) -> str:
-    """Return what to observe with: for ``auto`` Cyclone DDS's binding, which sees more, else rclpy.
-
-    Raises ``ObserverError`` if that is not installed, or if this Python cannot make a node of rclpy.
-    """
+    """Return what to observe with: for ``auto`` Cyclone DDS's binding, else rclpy; raises ``ObserverError``."""
     for package in (wanted,) if wanted != "auto" else SOURCES[1:]:
         if importlib.util.find_spec(package) is not None:
             why = ros_import_failure() if package == "rclpy" else ""
@@ -112,7 +109,6 @@ class Quiet:
 
 
 def _ros_variables(where: Where) -> dict[str, str]:
-    """Return what rclpy reads from the environment when its context is made: the domain and the enclave."""
     wanted = {"ROS_DOMAIN_ID": str(where.domain_id)}
     if where.enclave_directory is not None:
         keystore, slash, enclave = str(where.enclave_directory.resolve()).rpartition("/enclaves/")

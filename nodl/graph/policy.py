@@ -66,7 +66,6 @@ def _profiles(found: dict[str, dict[EndpointKind, set[str]]]) -> list[str]:
 
 
 def _policy_text(enclaves: Mapping[str, Iterable[str]]) -> str:
-    """Render a policy. ``enclaves``: path → the lines of its profiles."""
     lines = ['<?xml version="1.0" encoding="UTF-8"?>', '<policy version="0.2.0">', "  <enclaves>"]
     for path, profiles in enclaves.items():
         lines += [f"    <enclave path={quoteattr(path)}>", "      <profiles>", *profiles]

@@ -132,7 +132,6 @@ class RclpyObserver:
 
 
 def _asked(ask: Any, name: str, namespace: str) -> Iterable[tuple[str, list[str]]]:
-    """Ask for what a node has; it may end meanwhile."""
     from rclpy.node import NodeNameNonExistentError
 
     try:
@@ -156,7 +155,6 @@ def _quality(profile: Any) -> Quality:
 
 
 def _united(before: GraphProcess, now: GraphProcess) -> GraphProcess:
-    """Return both, with what has ended meanwhile."""
     nodes = {(each.fqn, each.ordinal): each for each in before.nodes}
     for node in now.nodes:
         known = nodes.get((node.fqn, node.ordinal))

@@ -34,8 +34,6 @@ class LearntFromGraph(NamedTuple):
 
 
 class _Placed(NamedTuple):
-    """One node in one run, with the start it is explained by."""
-
     run: RecordedRun
     node: GraphNode
     start: StartedNode

@@ -61,10 +61,7 @@ def starts_of_plan(document: Mapping[str, Any]) -> tuple[StartedNode, ...]:
 
 
 def start_for(fqn: str, command: Sequence[str], starts: Iterable[StartedNode]) -> tuple[StartedNode, ...]:
-    """Return the starts that may be those of the node ``fqn`` in the process of ``command`` (empty: not known).
-
-    Several are returned if nothing distinguishes them.
-    """
+    """Return the starts that may be those of ``fqn`` in the process of ``command`` (empty: not known)."""
     known = [each for each in starts if not each.command or not command or _within(each.command, command)]
     named = [each for each in known if each.fqn == fqn]
     if named:

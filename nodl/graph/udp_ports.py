@@ -26,10 +26,7 @@ class UdpPorts:
     """As they are when first asked."""
 
     def pid(self, locators: Iterable[str]) -> int | None:
-        """Return the one process that receives at one of ``locators``, such as ``udp/192.0.2.2:7411@4``.
-
-        Returns None if they are of another machine, or no process or several are found.
-        """
+        """Return the one process that receives at one of ``locators``, such as ``udp/192.0.2.2:7411@4``, or None."""
         addresses = [
             (match[1], int(match[2])) for each in locators if (match := _LOCATOR.match(each.strip()))
         ]

@@ -55,10 +55,7 @@ class Part(NamedTuple):
 
 
 def part_of(topic: str, type_name: str, *, writes: bool) -> Part | None:
-    """Return the part of a name, None for the middleware's own topic and for what is not ROS.
-
-    Those fit neither prefix and suffix nor the rules of names.
-    """
+    """Return the part of a name, None for the middleware's own topic and for what is not ROS."""
     prefix, slash, rest = topic.partition("/")
     name = slash + rest
     if prefix == "rt":
@@ -73,11 +70,7 @@ def part_of(topic: str, type_name: str, *, writes: bool) -> Part | None:
 
 
 def ros_type(type_name: str) -> str:
-    """Return ``std_msgs/msg/String`` for ``std_msgs::msg::dds_::String_``; requests and the like as their service or
-    action.
-
-    What is not a name of rosidl stays as it is.
-    """
+    """Return ``std_msgs/msg/String`` for ``std_msgs::msg::dds_::String_``; another name stays as it is."""
     match = _TYPE.match(type_name)
     if not match:
         return type_name

@@ -126,9 +126,7 @@ class Record:
         return [started for pid, started in self._started.items() if pid not in heard]
 
     def mute(self) -> list[StartedProcess]:
-        """Return processes that the recorder is in and that never called rcl: no ROS, or a copy of librcl of their
-        own.
-        """
+        """Return recorded processes that never called rcl: no ROS, or a copy of librcl of their own."""
         speaking = {p.started.pid for p in self.attributed() if p.started is not None}
         unheard = {started.pid for started in self.silent()}
         return [s for pid, s in self._started.items() if pid not in speaking and pid not in unheard]

@@ -33,10 +33,7 @@ OBSERVED_HEAD = (
 
 
 def manifest_text(node: LearntNode, before: str = "", head: str = _HEAD) -> str:
-    """Return the document of ``node``; ``before`` is the text that stands there, ``head`` says where it is from.
-
-    Raises ``yaml.YAMLError`` for a text that is not YAML.
-    """
+    """Return the document of ``node``, joined with the text ``before``; raises ``yaml.YAMLError`` for that."""
     old = load_yaml(before) if before.strip() else None
     document = _united(_document(node), old if isinstance(old, dict) else {})
     dumper = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
@@ -120,7 +117,6 @@ def _quality(qos: tuple[int, ...]) -> dict[str, Any]:
 
 
 def _about(entry: LearntEndpoint) -> dict[str, Any]:
-    """Return what the standard entry cannot say."""
     name, origin = _plain_name(entry), entry.origin
     fields: dict[str, Any] = {"in": entry.kind.category, "name": name}
     if name != entry.name:
@@ -185,11 +181,7 @@ _SOURCE = ("parameter", "each", "suffix", "prefix")
 
 
 def _with_other_runs(new: dict[str, Any], old: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the row ``new`` united with ``old``, which has runs whose records are not in the folder.
-
-    Where a run proved the source of a name, that holds; else all that either says may be. A row without runs is a
-    person's and stays.
-    """
+    """Return the row united with ``old``, of other runs: where a run proved the source, that holds, else both."""
     if not old.get("runs"):
         return {**new, **old}
     runs = sorted({*old["runs"], *new["runs"]})
@@ -208,16 +200,12 @@ def _with_other_runs(new: dict[str, Any], old: Mapping[str, Any]) -> dict[str, A
 
 
 def _possible(row: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return the sources that a row names."""
     own = {name: row[name] for name in _SOURCE if name in row}
     return [*([own] if own else []), *row.get("candidates", ())]
 
 
 def _united_entries(new: Any, old: Any, dropped: set[Any], elsewhere: set[Any]) -> list[dict[str, Any]]:
-    """Return the entries of both; ``dropped``: names that the same records explained differently before.
-
-    ``elsewhere``: names that were seen in runs whose records are not in the folder, too.
-    """
+    """Return the entries of both; ``dropped``: explained differently before, unless seen ``elsewhere``."""
     ours = list(new or ())
     theirs = {each["name"]: each for each in old or () if isinstance(each, dict) and "name" in each}
     kept = [{**theirs.get(each["name"], {}), **each} for each in ours]

@@ -52,10 +52,7 @@ class Observation(NamedTuple):
 
     @property
     def values(self) -> Inputs:
-        """Return everything that the node could read.
-
-        A program that declares what stands on its command line copied it from there (topic_tools).
-        """
+        """Return everything that the node could read, with what it declares on its command line (topic_tools)."""
         words = {value for name, value in self.inputs.items() if name[0] in "<-"}
         own = {name: value for name, value in self.defaults.items() if value not in words}
         return {**own, **self.inputs}
@@ -202,7 +199,6 @@ def _texts_within(name: Name, seen: Observation) -> Iterable[Source]:
 
 
 def _with_further(source: Source, values: Mapping[str, str]) -> Iterable[Source]:
-    """Yield ``source``, and what its suffix may be if other parameters have a part in it."""
     yield source
     for parameter, text in values.items():
         if parameter == source.parameter:
@@ -213,13 +209,11 @@ def _with_further(source: Source, values: Mapping[str, str]) -> Iterable[Source]
 
 
 def _text(value: object) -> str | None:
-    """Return what a value is within a name; integers number robots and sensors."""
     is_number = isinstance(value, int) and not isinstance(value, bool)
     return str(value) if is_number or isinstance(value, str) else None
 
 
 def _within(name: str, parameter: str, entry: str, *, each: bool) -> Iterable[Source]:
-    """Yield what stands before and after ``entry`` in ``name``, for each place where it is a word of the name."""
     if not entry or _NEVER.search(parameter):
         return
     for place in range(len(name) - len(entry) + 1):
@@ -255,7 +249,6 @@ def _values(source: Source, seen: Observation) -> frozenset[str]:
 
 
 def _contradicts(name: Name, source: Source, other: Observation) -> bool:
-    """Return True if other values were given, the old name is there and none of the new ones is."""
     values = _values(source, other)
     if not values or name.name in values:
         return False
@@ -263,7 +256,6 @@ def _contradicts(name: Name, source: Source, other: Observation) -> bool:
 
 
 def _follows(name: Name, source: Source, other: Observation) -> bool:
-    """Return True if other values were given, all their names are there, and the old one is not."""
     values = _values(source, other)
     if not values or name.name in values or name in other.names:
         return False
@@ -271,7 +263,6 @@ def _follows(name: Name, source: Source, other: Observation) -> bool:
 
 
 def _with_default(origin: NameOrigin, observations: Sequence[Observation]) -> NameOrigin:
-    """Return ``origin`` with what the program declares where the launch gives nothing."""
     if origin.source is None or origin.source.each:
         return origin
 

@@ -14,10 +14,7 @@ _INTEGER, _STRING, _STRING_LIST = 2, 4, 9  # rcl_interfaces/msg/ParameterType
 
 
 def declared_values(event: bytes) -> Mapping[str, object]:
-    """Return by name the declared parameters that hold a text, an integer or a list of texts.
-
-    Of an event that was cut, those before.
-    """
+    """Return by name the declared parameters that hold a text, an integer or a list of texts."""
     found: dict[str, object] = {}
     if event[:2] not in (b"\0\0", b"\0\1"):
         return found

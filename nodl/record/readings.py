@@ -36,7 +36,6 @@ def _read_as(asked: RequestedEndpoint, readings: Sequence[str]) -> RequestedEndp
 
 
 def _readings(asked: RequestedEndpoint, node: RequestedNode) -> tuple[str, ...]:
-    """Return what the source may write, the likeliest first."""
     namespace, own_name = split_fqn(node.fqn)
     texts = set(_texts(node))
     if asked.moved or asked.spellings or asked.name in texts:
@@ -51,7 +50,6 @@ def _readings(asked: RequestedEndpoint, node: RequestedNode) -> tuple[str, ...]:
 
 
 def _texts(node: RequestedNode) -> Iterable[str]:
-    """Yield the texts that the node could read."""
     for value in (*node.parameters.values(), *node.declared.values()):
         yield from (
             each for each in (value if isinstance(value, list | tuple) else (value,)) if isinstance(each, str)

@@ -169,10 +169,7 @@ def requested_by(process: RecordedProcess, node: RecordedNode) -> RequestedNode:
 def requested_endpoint(
     process: RecordedProcess, node: RecordedNode, endpoint: EndpointMade
 ) -> RequestedEndpoint | None:
-    """Return ``endpoint`` of ``node`` by itself, as it comes in.
-
-    Returns None for what is only a part of an action, or rcl's call of itself.
-    """
+    """Return ``endpoint`` of ``node`` as it comes in; None for a part of an action, or rcl's own call."""
     if role_of(endpoint) in (EndpointRole.PART_OF_ACTION, EndpointRole.REPEATED):
         return None
     final = endpoint.final

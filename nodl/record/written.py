@@ -26,9 +26,7 @@ class Meant(NamedTuple):
 
 
 def meant_name(kind: EndpointKind, written: str, final: str, fqn: str, rules: RemapRules | None) -> Meant:
-    """Return what the source of the node ``fqn`` means by ``written``, which became ``final`` by the launch's
-    ``rules``.
-    """
+    """Return what the source of ``fqn`` means by ``written``, which became ``final`` by the launch's ``rules``."""
     name = private_name(written, fqn)
     if rules is None or not final or not fqn or final in final_names(kind, name, fqn, rules):
         return Meant(name)

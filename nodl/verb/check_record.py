@@ -82,10 +82,7 @@ def run(arguments: argparse.Namespace) -> int:
 def never_seen(
     records: Iterable[Path], prefixes: Iterable[Path], sources: Iterable[Path]
 ) -> dict[str, tuple[str, ...]]:
-    """Return, by node and program, the names that its source or the library has and no record of ``records`` shows.
-
-    Raises ``NoDLError`` for a broken document of the library.
-    """
+    """Return, by node, the names that its source or the library has and no record shows; raises ``NoDLError``."""
     nodes, _ = _recorded(_files(records))
     known = _Known(ManifestLookup((), ()), search_prefixes(map(str, prefixes)), tuple(map(str, sources)))
     unseen: dict[str, dict[tuple[object, ...], str]] = {}
@@ -123,8 +120,6 @@ def _recorded(files: Iterable[Path]) -> tuple[list[RequestedNode], list[str]]:
 
 
 class _Known(NamedTuple):
-    """The sources of descriptions; ``folders`` with source code."""
-
     lookup: ManifestLookup
     prefixes: tuple[str, ...]
     folders: tuple[str, ...]
@@ -155,17 +150,13 @@ def _inferred(node: RequestedNode, known: _Known) -> tuple[Sequence[NodeInterfac
 
 
 class _RecordedStart(NamedTuple):
-    """What the launch decided about the recorded node (``nodl.infer.start.Start``)."""
-
     node: RequestedNode
 
     def parameters(self, node: str | None) -> Mapping[str, object]:
         return self.node.parameters
 
     def final_name(self, node: str | None) -> tuple[str | None, str | None]:
-        """Return the final name of the recorded node; another one of its program has the name that the launch's rules
-        give it.
-        """
+        """Return the final name of the recorded node, or what the launch's rules make of another's."""
         namespace, name = split_fqn(self.node.fqn)
         if node is None or node == self.node.name:
             return name, namespace
@@ -183,7 +174,6 @@ def _of_library(node: RequestedNode, known: _Known) -> tuple[Sequence[NodeInterf
 
 
 def _at_this_start(node: RequestedNode, interfaces: Iterable[NodeInterface]) -> list[NodeInterface]:
-    """Apply parameters and words of the launch to descriptions that depend on them, with the nodes they bring."""
     namespace, name = split_fqn(node.fqn)
     situation = Situation(node.distro, name, namespace, node.parameters, node.arguments)
     documents = LibraryDocuments(Library(), node.distro)

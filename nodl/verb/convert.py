@@ -46,7 +46,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _emit_folder(nodes: Sequence[ManifestNode], folder: Path | None) -> None:
-    """Make all texts before the first file is written, so that an error leaves nothing behind."""
+    # All texts before the first file is written, so that an error leaves nothing behind.
     if folder is None:
         raise NoDLError(f"{len(nodes)} nodes become {len(nodes)} v2 documents: name a folder with -o")
     written = {folder / f"{_file_name(node)}.nodl.yaml": v2_yaml(node) for node in nodes}

@@ -69,9 +69,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _tell_guesses(system: InferredSystem) -> None:
-    """Report guesses: a manifest must name a program, and a source file that nothing installs does not say which it
-    becomes.
-    """
+    """Report guesses: a source file that nothing installs does not say which program it becomes."""
     for node in system.nodes:
         if node.executable is None and node.plugin is None and node.name:
             text = (
@@ -81,9 +79,7 @@ def _tell_guesses(system: InferredSystem) -> None:
 
 
 def _compare(system: InferredSystem, prefixes: Sequence[str]) -> int:
-    """Compare each program of ``system`` with its manifest. Return 1 if a manifest lacks something, or none was
-    found.
-    """
+    """Compare each program with its manifest; return 1 if a manifest lacks something, or none was found."""
     lookup = ManifestLookup(prefixes)
     programs: dict[tuple[str, str | None, str | None], list[NodeInterface]] = {}
     for node in system.nodes:
@@ -116,7 +112,6 @@ def _documents(
 
 
 def _writable(system: InferredSystem, with_gaps: bool) -> list[NodeInterface]:
-    """Return the nodes that documents are written of; those with open questions only if that is requested."""
     kept = []
     for node in system.nodes:
         questions = open_questions(node)

@@ -189,7 +189,6 @@ def _dry_run(words: Sequence[str]) -> Any:
 
 
 def _enclave_directory(arguments: argparse.Namespace) -> Path | None:
-    """Return where the observer's key and permissions are; ``None`` for an unsecured system."""
     secured = os.environ.get("ROS_SECURITY_ENABLE") == "true"
     keystore = arguments.keystore or (secured and os.environ.get("ROS_SECURITY_KEYSTORE"))
     enclave = arguments.enclave or (secured and os.environ.get("ROS_SECURITY_ENCLAVE_OVERRIDE"))

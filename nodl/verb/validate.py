@@ -25,10 +25,7 @@ def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) 
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print a line for each document: what it describes, or its first fault.
-
-    Returns 0 if all are valid, 1 if one is not, 2 if none was named or found.
-    """
+    """Print what each document describes, or its first fault; return 0 if all are valid, 1 not, 2 without any."""
     files = arguments.files or [str(path) for path in sorted(Path().glob("*.nodl.*"))]
     if not files:
         print(f"no documents here; name some, such as package{V1_SUFFIX}", file=sys.stderr)

@@ -139,8 +139,7 @@ class LoadComposableNodes(Action):
         return cls, kwargs
 
     def execute(self, context: LaunchContext) -> list[LaunchDescriptionEntity] | None:
-        """Raises ``RuntimeError`` when the container object was not executed yet, and as the components'
-        substitutions and parameters do."""
+        """Raises ``RuntimeError`` when the container object was not executed yet, and as the components do."""
         container = self.__container_name(context)
         service = f"{container}/_container/load_node"
         context.host.launcher_call(LauncherCall(service, _LOAD_NODE, location_of(self, context)))
@@ -200,16 +199,13 @@ def _performed(context: LaunchContext, substitutions: list[Substitution] | None)
 def _remap_rules(
     description: ComposableNode, context: LaunchContext, place: SourceLocation
 ) -> Iterator[RemapRule]:
-    """Return global rules, then the component's own."""
     own = performed_remaps(description.remappings or (), context)
     for rule in (*(context.launch_configurations.get("ros_remaps") or ()), *own):
         yield placed(rule, place)
 
 
 def _global_parameters(context: LaunchContext) -> Iterator[Any]:
-    """Yield values as normalized dicts and files by their absolute path.
-
-    :raises AssertionError: a file is missing."""
+    """Yield values as normalized dicts and files by absolute path; raises AssertionError for a missing file."""
     for item in context.launch_configurations.get("global_params") or ():
         if isinstance(item, tuple):
             yield normalize_parameter_dict({item[0]: item[1]})
@@ -223,7 +219,6 @@ def _global_parameters(context: LaunchContext) -> Iterator[Any]:
 def _values(
     context: LaunchContext, name: str, namespace: str | None, parameters: Parameters
 ) -> dict[str, ParameterValue]:
-    """Return the values of a load request; of repeats the node takes the last."""
     evaluated = evaluate_parameters(context, parameters)
     return {
         item.name: tuple(item.value) if isinstance(item.value, list) else item.value  # type: ignore[misc]

@@ -38,10 +38,7 @@ class SetEnvironmentVariable(TemplateAction):
 
 @expose_action("append_env")
 class AppendEnvironmentVariable(TemplateAction):
-    """Join a value to an environment variable, at its end or front; an unset one is simply set.
-
-    A variable that is set but empty still gets the separator.
-    """
+    """Join a value to an environment variable, at its end or front; an unset one is simply set."""
 
     name = template()
     value = template()
@@ -97,9 +94,7 @@ class ResetEnvironment(Action):
 
 @expose_action("set_ros_log_dir", feature=Feature.SET_ROS_LOG_DIR)
 class SetROSLogDir(TemplateAction):
-    """Join the value to the log directory in force, in ``ROS_LOG_DIR``: where processes started from here on write
-    their logs. Not in humble.
-    """
+    """Join the value to ``ROS_LOG_DIR``: where processes started from here on write their logs. Not in humble."""
 
     new_log_dir = template()
 

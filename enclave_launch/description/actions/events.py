@@ -28,8 +28,6 @@ class EmitEvent(TemplateAction):
 
 
 class _OfHandler(TemplateAction):
-    """An action about one event handler."""
-
     event_handler: BaseEventHandler = kept(keyword_only=False)
 
 

@@ -53,11 +53,7 @@ class Executable:
         additional_env: Mapping[SomeSubstitutionsType, SomeSubstitutionsType] | None = None,
         arguments: Iterable[SomeSubstitutionsType] | None = None,
     ) -> None:
-        """Describe a program to run.
-
-        :param cmd: each item is one argument, as those of ``arguments``
-        :param prefix: if given, the prefix filter is ignored
-        :param env: replaces the environment, to which ``additional_env`` adds"""
+        """Describe a program to run; with ``prefix`` the filter is ignored, ``env`` replaces the environment."""
         self.__cmd = [normalize_to_list_of_substitutions(word) for word in cmd]
         self.__cmd += [normalize_to_list_of_substitutions(word) for word in arguments or ()]
         self.__prefix = _DEFAULT_PREFIX if prefix is None else normalize_to_list_of_substitutions(prefix)

@@ -62,10 +62,7 @@ class OpaqueFunction(Action):
 
 
 class OpaqueCoroutine(Action):
-    """Run a coroutine function beside the launch; its result is ignored. A dry run does not run it.
-
-    Called as ``coroutine(context, *args, **kwargs)``, without the context if ``ignore_context``.
-    """
+    """Run a coroutine function, with the context unless ``ignore_context``; a dry run does not run it."""
 
     def __init__(
         self,
@@ -247,7 +244,6 @@ def _count(entity: Entity) -> int:
 
 
 def _size_of(function: Body) -> int:
-    """Count the entities of a body; of a function in Python only the call itself is known."""
     return getattr(function, "elements", 1)
 
 

@@ -36,10 +36,7 @@ class CyclicIncludeError(RuntimeError):
 
 
 def left_out(include: IncludeLaunchDescription, context: LaunchContext) -> bool:
-    """Return True, and warn, if ``include`` names a file that is missing and may be.
-
-    A description in memory has no file: its location is only a name.
-    """
+    """Return True, and warn, if ``include`` names a file that is missing and may be."""
     source = include.launch_description_source
     location = source.expand(context)
     if not context.host.allow_missing_packages or not source.is_file or os.path.exists(location):
@@ -81,10 +78,7 @@ Arguments = Iterable[tuple["SomeSubstitutionsType", "SomeSubstitutionsType"]]
 
 @expose_action("include")
 class IncludeLaunchDescription(Action):
-    """Loads another description and gives its entities, after setting the arguments one by one.
-
-    This opens no scope: whatever the included file sets stays set.
-    """
+    """Loads another description and gives its entities; opens no scope: what the file sets stays set."""
 
     scan_role = ScanRole.INCLUDE
 
@@ -165,7 +159,6 @@ class IncludeLaunchDescription(Action):
         return [*arguments, description]
 
     def __set_file_locals(self, context: LaunchContext) -> None:
-        """Set the locals of the current file; a description made in a script has its location in both."""
         path = os.path.abspath(self.__source.location)
         exists = os.path.exists(path)
         context.extend_locals(

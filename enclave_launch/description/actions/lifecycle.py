@@ -126,10 +126,7 @@ _TRANSITIONS = (
 
 @read_only("target_lifecycle_node")
 class OnStateTransition(EventHandler):
-    """Fires when everything that is given equals what the event says; ``matcher`` replaces all of it.
-
-    Raises ``RuntimeError`` for a target that is not a lifecycle node.
-    """
+    """Fires when everything that is given equals what the event says; raises ``RuntimeError`` for other targets."""
 
     target_lifecycle_node: LifecycleNode | None = None
 
@@ -221,10 +218,7 @@ class LifecycleTransition(Action):
         self.__handlers: dict[str, list[EventHandler]] = {}
 
     def execute(self, context: LaunchContext) -> list[LaunchDescriptionEntity]:
-        """Register handlers for every reached goal state, then send the first request to every node.
-
-        Raises ``ValueError`` for an id that is not a number, ``KeyError`` for one without a goal state.
-        """
+        """Register handlers for every reached goal state, then send the first request to every node."""
         names = [perform_substitutions(context, name) for name in self.__names]
         ids = [_transition_id(perform_substitutions(context, item)) for item in self.__ids]
         requests = {name: [_request(name, transition) for transition in ids] for name in names}
@@ -239,7 +233,6 @@ class LifecycleTransition(Action):
         return [*registrations, *(requests[name][0] for name in names)]
 
     def __after(self, name: str, transition: int, remaining: Sequence[Action]) -> EventHandler:
-        """Send the next request once ``transition`` has reached its goal, or end the sequence."""
         target = self.transition_targets[transition]
         done = OpaqueFunction(function=partial(self.__forget, name=name))
         handler = OnStateTransition(

@@ -62,10 +62,7 @@ class NodeActionExtension:
 
 @lru_cache(maxsize=1)
 def installed_extensions() -> tuple[NodeActionExtension, ...]:
-    """Return one instance of each extension; warn about one that cannot be loaded, as upstream does.
-
-    Extensions extend an installed launch_ros; without one the look-up (50 ms) is spared.
-    """
+    """Return one instance of each extension of an installed launch_ros; warn about one that cannot be loaded."""
     if not any(os.path.isdir(os.path.join(folder, "launch_ros")) for folder in sys.path):
         return ()
     import importlib.metadata  # only where ROS is installed: it takes long to load

@@ -141,8 +141,7 @@ class Node(ExecuteProcess):
 
     @property
     def node_name(self) -> str:
-        """Return the fully qualified name, with placeholders for what launch does not know. Raises ``RuntimeError``
-        before the action was executed."""
+        """Return the fully qualified name; raises ``RuntimeError`` before the action was executed."""
         if self.__final_name is None:
             raise RuntimeError("cannot access 'node_name' before executing action")
         return self.__final_name
@@ -167,7 +166,6 @@ class Node(ExecuteProcess):
         self.__settle_remaps(context)
 
     def __settle_names(self, context: LaunchContext) -> None:
-        """Raises ``InvalidNodeNameException``, ``InvalidNamespaceException``."""
         if self.__name is not None:
             self.__expanded_name = perform_substitutions(context, self.__name)
             validate_node_name(self.__expanded_name)
@@ -223,13 +221,11 @@ class Node(ExecuteProcess):
         )
 
     def __placed_remaps(self, process: ResolvedProcess) -> Iterator[RemapRule]:
-        """Return the rules of the launch file, each with its place in the file and on the command line."""
         first = len(process.prefix) + self.__first_remap + 1  # "-r" stands before each
         for number, rule in enumerate(self.__expanded_remapping_rules or ()):
             yield placed(rule, process.location, first + 2 * number)
 
     def __name_tokens(self) -> list[str | None]:
-        """Return tokens of the fully qualified name; an unknown namespace is taken to be ``/``."""
         known = self.node_name.replace(UNSPECIFIED_NODE_NAMESPACE, "").split("/")
         return [None if token == UNSPECIFIED_NODE_NAME else token for token in known if token]
 
@@ -261,7 +257,6 @@ def parse_remaps(remaps: list[Entity], parser: Parser) -> list[PlacedRule]:
 
 
 def _parse_parameter(param: Entity, parser: Parser) -> Any:
-    """Parse one ``param``: a file, or a dict of one name. Raises ``RuntimeError``, ``ValueError`` as upstream."""
     given = param.given
     if "from" not in given and "allow_substs" not in given and "name" in given:
         return _parse_named_parameters([param], parser)

@@ -1,8 +1,4 @@
-"""``executable``: the actions that start a process, and the handlers of its start, its output and its exit.
-
-Preparing performs all substitutions; starting is the host's business (``Host.start_process``): a dry run records, the
-runtime spawns, pipes output and emits the process events.
-"""
+"""``executable``: the actions that start a process, and the handlers of its start, its output and its exit."""
 
 from __future__ import annotations
 
@@ -140,8 +136,7 @@ class ExecuteLocal(Action):
 
     @property
     def process_details(self) -> dict[str, Any] | None:
-        """Return ``action``, ``name``, ``cmd``, ``cwd``, ``env`` and, once started, ``pid``; None before
-        ``prepare``."""
+        """Return ``action``, ``name``, ``cmd``, ``cwd``, ``env`` and, once started, ``pid``; None unprepared."""
         return self.__event_args
 
     @property
@@ -201,7 +196,6 @@ class ExecuteLocal(Action):
         return None
 
     def __routes(self, context: LaunchContext) -> Routes:
-        """Return where its output goes. Raises ``ValueError`` for what launch does not know."""
         output: Any = self.__output
         return output_routes(output if isinstance(output, dict) else perform_substitutions(context, output))
 
@@ -277,7 +271,6 @@ def _respawn(respawn: bool | SomeSubstitutionsType) -> Any:
 
 
 def _final_or_given(name: str) -> Any:
-    """Build a property of the process: the final value once it is prepared, before that the given one."""
 
     def get(process: ExecuteLocal) -> Any:
         description = process.process_description
@@ -309,16 +302,13 @@ class ExecuteProcess(ExecuteLocal):
 
     @classmethod
     def _parse_cmdline(cls, cmd: str, parser: Parser) -> list[SomeSubstitutionsType]:
-        """Split the text of a command line into its arguments, each a list of substitutions."""
         return split_words(parser.parse_substitution(cmd))
 
     @classmethod
     def parse(
         cls, entity: Entity, parser: Parser, ignore: list[str] | None = None
     ) -> tuple[type[Action], dict[str, Any]]:
-        """Read the element.
-
-        :param ignore: arguments that a subclass reads itself, or does not have"""
+        """Read the element; ``ignore``: what a subclass reads itself, or does not have."""
         _, kwargs = super().parse(entity, parser)
         skipped = ignore or ()
         if "cmd" not in skipped:

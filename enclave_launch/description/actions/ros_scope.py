@@ -98,10 +98,7 @@ class SetRemap(TemplateAction):
 
 @expose_action("set_parameter")
 class SetParameter(Action):
-    """Appends ``(name, value)`` to the list in the launch configuration ``global_params``.
-
-    Scoped as ``SetRemap`` is, leak included.
-    """
+    """Appends to the list in the configuration ``global_params``, scoped as ``SetRemap`` is, leak included."""
 
     def __init__(self, name: SomeSubstitutionsType, value: SomeParameterValue, **kwargs: Any):
         super().__init__(**kwargs)
@@ -145,10 +142,7 @@ class SetUseSimTime(TemplateAction):
     value: bool | SomeSubstitutionsType = template(read=lambda value: value)
 
     def execute(self, context: LaunchContext) -> None:
-        """Set it; older releases pass the text of the front ends on unevaluated, and refuse to switch it off.
-
-        Raises ``ValueError`` for what is not a bool, ``RuntimeError`` for ``False``.
-        """
+        """Set it; older releases pass text on unevaluated, and refuse to switch it off (``RuntimeError``)."""
         value = self.value
         if context.host.release.has(Feature.SIM_TIME_IN_FRONTENDS):
             context.simulated_time = perform_typed_substitution(

@@ -109,7 +109,6 @@ class TimerAction(Action):
         self._schedule(context, self.performed_period, mark)
 
     def _schedule(self, context: LaunchContext, seconds: float, mark: str | None) -> None:
-        """Schedule ``_fire``; timers on another clock override this."""
         context.asyncio_loop.call_later(seconds, self._fire, context, mark)
 
     def _fire(self, context: LaunchContext, mark: str | None) -> None:

@@ -286,10 +286,7 @@ def process_event_arguments(action: Any) -> dict[str, Any]:
 
 
 def suppose_process_event(matches: Callable[[Event], bool], started: Sequence[Any]) -> Event | None:
-    """Return the first exit or output, of the started processes in order, that ``matches``; None if none does.
-
-    ``matches`` is foreign code that may expect another kind of event; what it raises means no.
-    """
+    """Return the first exit or output that ``matches``, foreign code that may raise; None if none does."""
 
     for action in started:
         arguments = process_event_arguments(action)

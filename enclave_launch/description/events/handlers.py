@@ -67,10 +67,7 @@ class BaseEventHandler:
         return None
 
     def foresee(self, started: Sequence[Any]) -> Event | None:
-        """Return an event, not certain to happen, that this handler would answer; None if none can be supposed.
-
-        For the dry run. ``started`` are the process actions that were started so far, in order.
-        """
+        """Return an event that this handler would answer, for the dry run; None if none can be supposed."""
         return None
 
     def computes(self) -> bool:

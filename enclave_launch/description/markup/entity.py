@@ -112,9 +112,7 @@ def check_is_list_entity(data_type: Any) -> bool:
 
 
 def get_data_type_from_identifier(type_identifier: str) -> Any:
-    """Return the type of ``'list_of_int'``: ``List[int]``; of ``'yaml'``: None.
-
-    :raises ValueError: the identifier is unknown."""
+    """Return ``List[int]`` for ``'list_of_int'``, None for ``'yaml'``; raises ValueError."""
     if type_identifier == "yaml":
         return None
     scalar = _SCALARS.get(type_identifier.removeprefix("list_of_"))

@@ -76,23 +76,16 @@ def is_ours(name: str) -> bool:
 
 
 def expose_action(name: str, *, feature: Since | None = None) -> Callable[[Exposed], Exposed]:
-    """Register a class with a ``parse`` class method, or a parse function, as element ``name``.
-
-    ``feature`` (ours): the element is unknown to releases without it.
-    """
+    """Register a class with ``parse``, or a parse function, as element ``name``, of releases with ``feature``."""
     return _exposer("action", name, feature)
 
 
 def expose_substitution(name: str, *, feature: Since | None = None) -> Callable[[Exposed], Exposed]:
-    """Register a class with a ``parse`` class method, or a parse function, as ``$(name ...)``.
-
-    ``feature`` (ours): the substitution is unknown to releases without it.
-    """
+    """Register a class with ``parse``, or a parse function, as ``$(name ...)``, of releases with ``feature``."""
     return _exposer("substitution", name, feature)
 
 
 def _lookup(kind: str, name: str) -> ParseMethod | None:
-    """Return the registered parse method, imported if need be; None if the release in force has none."""
     gate = _GATES[kind].get(name)
     if gate is not None and not current_release().has(gate):
         return None
@@ -134,7 +127,6 @@ def forget(module: str) -> None:
 
 
 def _registered(method: Any) -> Any:
-    """Return what was exposed, without the wrappers of ``_checking_leftovers`` and others."""
     while hasattr(method, "__wrapped__"):
         method = method.__wrapped__
     return method

@@ -35,10 +35,7 @@ def replace_escaped_characters(data: str) -> str:
 
 
 def parse_substitution(string_value: str) -> list[Substitution]:
-    """Parse text into a new list of substitutions.
-
-    :raises UnexpectedCharacters, UnexpectedEOF: the grammar does not accept it.
-    :raises VisitError: a name is unknown, or a substitution refuses its arguments."""
+    """Parse text into a new list of substitutions; raises UnexpectedCharacters, UnexpectedEOF, VisitError."""
     global _shared_for
     if "$(" not in string_value:
         return [TextSubstitution(text=unescape(string_value))]
@@ -53,9 +50,7 @@ def parse_substitution(string_value: str) -> list[Substitution]:
 
 
 def parse_if_substitutions(value: Any) -> Any:
-    """Parse text with ``$(...)`` into substitutions and un-escape other text; lists item by item.
-
-    :raises ValueError: the plain items of a list differ in type."""
+    """Parse text with ``$(...)``, un-escape other text; lists item by item. Raises ValueError for mixed items."""
     if not isinstance(value, list):
         return _parse_if(value)
     result = [_parse_if(item) for item in value]

@@ -119,9 +119,7 @@ class Parser:
 
     @classmethod
     def is_extension_valid(cls, extension: str) -> bool:
-        """Return True if a front end has this name.
-
-        Deprecated upstream in favour of ``is_filename_valid``."""
+        """Return True if a front end has this name. Deprecated upstream."""
         warnings.warn(
             "Parser.is_extension_valid is deprecated, use Parser.is_filename_valid instead", stacklevel=2
         )
@@ -129,9 +127,7 @@ class Parser:
 
     @classmethod
     def get_parser_from_extension(cls, extension: str) -> type[Parser]:
-        """Return the front end of this name.
-
-        Deprecated upstream in favour of ``get_parsers_from_filename``."""
+        """Return the front end of this name. Deprecated upstream."""
         warnings.warn(
             "Parser.get_parser_from_extension is deprecated, use Parser.get_parsers_from_filename instead",
             stacklevel=2,
@@ -164,10 +160,7 @@ class Parser:
 
     @classmethod
     def load(cls, file: FilePath | TextIO) -> tuple[Entity, Parser]:
-        """Read a file in whichever syntax fits: those its name suggests first, then the others.
-
-        Raises ``InvalidFrontendLaunchFileError`` with one line per attempt, ``OSError`` when unreadable.
-        """
+        """Read a file in whichever syntax fits, by its name first; raises ``InvalidFrontendLaunchFileError``."""
         source = launch_file.read(file)
         suggested = cls.get_parsers_from_filename(source.name)
         others = [parser for parser in cls._implementations().values() if parser not in suggested]

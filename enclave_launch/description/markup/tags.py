@@ -91,10 +91,7 @@ _entry_points_loaded = False
 
 
 def registrations_of(kind: str, name: str) -> Iterator[Callable[[], object]]:
-    """Yield steps that may each register ``name``; the caller stops as soon as one has.
-
-    ``kind``: ``action`` or ``substitution``.
-    """
+    """Yield steps that may each register the action or substitution; the caller stops as soon as one has."""
     modules = _MODULES[kind]
     if name in modules:
         yield partial(importlib.import_module, _OURS + modules[name])

@@ -31,10 +31,6 @@ class Entity(BaseEntity):
         lines: Mapping[int, int] = _NO_LINES,
         line: int = 0,
     ) -> None:
-        """Wrap a value of a YAML file.
-
-        :param lines: line of each mapping or list, by its ``id``
-        :param line: line of this entity"""
         self._element = element
         self._type_name = type_name
         self._parent = parent
@@ -149,11 +145,7 @@ class Parser(BaseParser):
 
     @classmethod
     def load(cls, file: FilePath | TextIO) -> tuple[Entity, Parser]:
-        """Load a YAML file; return root entity and parser.
-
-        Raises ``yaml.YAMLError``, ``RefusedYaml``, ``OSError``, and ``RuntimeError`` or a Python exception for a
-        document that is not a mapping with one key.
-        """
+        """Load a YAML file; return root entity and parser. Raises YAMLError, ``RefusedYaml``, OSError, RuntimeError."""
         return cls.load_source(launch_file.read(file))
 
     @classmethod
@@ -179,6 +171,5 @@ class Parser(BaseParser):
 
 
 def _line_of(error: Exception) -> int:
-    """Return the line of a YAML error, 0 if it has none."""
     mark = getattr(error, "problem_mark", None)
     return mark.line + 1 if mark is not None else 0

@@ -132,11 +132,7 @@ class ParameterFile:
         )
 
     def evaluate(self, context: LaunchContext) -> Path:
-        """Return the path to pass on: the file itself, or a generated copy with the substitutions performed.
-
-        Raises ``FileNotFoundError`` for a missing file that is to be substituted, ``SubstitutionFailure``
-        when it is not YAML afterwards.
-        """
+        """Return the path to pass on: the file, or a copy with the substitutions performed."""
         if self.__evaluated is None:
             given = self.__param_file
             path = Path(

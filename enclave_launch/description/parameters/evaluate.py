@@ -44,10 +44,7 @@ def evaluate_parameters(context: LaunchContext, parameters: Parameters) -> Evalu
 def evaluate_parameter_dict(
     context: LaunchContext, parameters: ParametersDict
 ) -> dict[str, EvaluatedParameterValue]:
-    """Perform names and values of a normalized dict.
-
-    Raises ``TypeError`` for what cannot be a parameter: mappings, nulls, empty and mixed sequences.
-    """
+    """Perform names and values of a normalized dict; raises ``TypeError`` for what cannot be a parameter."""
     if not isinstance(parameters, Mapping):
         raise TypeError("expected dict")
     evaluated: dict[str, EvaluatedParameterValue] = {}
@@ -73,7 +70,6 @@ def _evaluate_value(context: LaunchContext, name: str, value: Any) -> Any:
 
 
 def _read(context: LaunchContext, name: str, substitutions: tuple[Substitution, ...]) -> Any:
-    """Read the joined text of the substitutions as YAML; empty text stays text."""
     if len(substitutions) == 1 and isinstance(substitutions[0], yaml_text.YamlConstant):
         return substitutions[0].value
     text = perform_substitutions(context, list(substitutions))

@@ -52,9 +52,7 @@ def _normalize(item: Any) -> ParameterFile | Parameter | ParametersDict:
 def normalize_parameter_dict(
     parameters: SomeParametersDict, *, _prefix: Sequence[Substitution] = ()
 ) -> ParametersDict:
-    """Normalize parameters; nested dicts become dotted names.
-
-    :raises TypeError: a value is None or another object that is no parameter value."""
+    """Normalize parameters; nested dicts become dotted names. Raises TypeError."""
     if not isinstance(parameters, Mapping):
         raise TypeError("expected dict")
     normalized: ParametersDict = {}

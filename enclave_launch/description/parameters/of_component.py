@@ -44,9 +44,7 @@ def to_parameters_list(
 ) -> list[ParameterAssignment]:
     """Return dicts as they are, files as far as they apply to this node, in order.
 
-    A file with sections of which none applies contributes the preceding set once more, as upstream does. Raises
-    ``FileNotFoundError`` for a missing file, ``RuntimeError`` for a ``Parameter`` description.
-    """
+    A file of which no section applies contributes the preceding set once more, as upstream does."""
     section = (node_name or "").lstrip("/")
     if namespace and namespace != "/":
         section = f"{namespace.strip('/')}/{section}"
@@ -78,7 +76,6 @@ def _read(context: LaunchContext, path: os.PathLike[str]) -> Any:
 
 
 def _applicable(document: Any, section: str) -> tuple[Mapping[str, Any], bool]:
-    """Return what of a parameter file applies to this node, and whether the file has sections at all."""
     sections = dict(_sections(document, ()))
     if not sections:
         return document, False

@@ -50,7 +50,6 @@ class NodeParameters:
         return ("--params-file", self.__write_file(context, section, item))
 
     def __file_words(self, context: LaunchContext, path: str) -> Sequence[str]:
-        """Return the words for a file of the user's, or for one made from it by substitutions."""
         text = context.host.parameter_file(path)
         if text is not None:
             self.__written[path] = partial(parameters_of_text, text, path)
@@ -89,9 +88,7 @@ def _as_written(value: Any) -> ParameterValue:
 
 
 def _global_words(context: LaunchContext) -> Iterator[tuple[str, str]]:
-    """Yield ``-p`` with Python's ``str`` of the value, as launch does.
-
-    :raises AssertionError: a file is missing."""
+    """Yield ``-p`` with Python's ``str`` of the value, as launch does; raises AssertionError for a missing file."""
     for item in context.launch_configurations.get("global_params") or ():
         if isinstance(item, tuple):
             yield "-p", f"{item[0]}:={item[1]}"

@@ -137,7 +137,6 @@ class PythonExpression(Substitution):
 
 
 def _literal_names(modules: Any) -> list[str]:
-    """Return the comma-separated names; only literal text counts."""
     parts = list(modules)
     if not parts:
         return []

@@ -128,8 +128,7 @@ def _not_checked(examined: Examined) -> list[str]:
 
 
 def summary(contents: ReportContents, scope: Mapping[str, Any], at: str) -> str:
-    """Write ``README.md`` of the folder: its contents, which part supports which requirement, what was checked and
-    what was not."""
+    """Write ``README.md`` of the folder: its contents, requirements, what was checked and what was not."""
     return "\n".join(_lines(contents, scope, at)) + "\n"
 
 
@@ -158,10 +157,7 @@ def _lines(contents: ReportContents, scope: Mapping[str, Any], at: str) -> Itera
 
 
 def statement(files: Mapping[str, bytes], judged: Judged, checked: list[str]) -> bytes:
-    """Write the in-toto statement about ``files``.
-
-    :param judged: the findings
-    :param checked: the code of every check that was made"""
+    """Write the in-toto statement about ``files``; ``checked``: the code of every check that was made."""
     failed, warned = _codes(judged, "error"), _codes(judged, "warning")
     content: dict[str, Any] = {
         "_type": STATEMENT,

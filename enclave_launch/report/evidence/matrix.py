@@ -42,10 +42,7 @@ def rows(graph: EnclaveGraph) -> Iterator[Row]:
 
 
 def csv_text(found: Iterable[Row]) -> str:
-    """Render with a heading; no cell begins like a formula, since spreadsheets would compute it.
-
-    Source: OWASP, "CSV Injection".
-    """
+    """Render with a heading; no cell begins like a formula (OWASP, "CSV Injection")."""
     stream = io.StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(Row._fields)

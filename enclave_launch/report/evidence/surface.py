@@ -45,10 +45,7 @@ def _enclave(graph: EnclaveGraph, enclave: str) -> dict[str, Any]:
 
 
 def _accepted(graph: EnclaveGraph, enclave: str, held: list[ChannelUse]) -> list[dict[str, Any]]:
-    """List what comes in: messages of subscriptions, requests to servers.
-
-    ``sent_by`` names the enclaves of this launch that may send it; if it is empty, only processes outside of the
-    launch could."""
+    # ``sent_by``: enclaves of this launch that may send it; if empty, only processes outside of it could.
     coming_in = sorted({(use.operation, use.channel) for use in held if use.operation not in OUTWARD})
     return [
         {

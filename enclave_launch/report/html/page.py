@@ -44,18 +44,13 @@ def html_report(contents: ReportContents) -> str:
 
 
 def script_data(content: object) -> str:
-    """Render JSON for a ``script`` element of a data type: no ``<`` in it can end the element or begin a comment.
-
-    Source: HTML standard, "Restrictions for contents of script elements".
-    """
+    """Render JSON so that no ``<`` can end the ``script`` element (HTML, "Restrictions for contents of script")."""
     escaped = json_text(content, separators=(",", ":"))
     return escaped.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
 
 
 def graph_data(graph: EnclaveGraph) -> dict[str, Any]:
-    """Return the lists that the script draws, searches and shows on a click; they refer to each other by number.
-
-    Names are made printable here, once, so that the script shows what the tables show."""
+    """Return the lists that the script draws and searches, with printable names; they refer to each other by number."""
     return {
         "enclaves": [printable(path) for path in graph.enclaves],
         "members": [
@@ -100,7 +95,6 @@ def _policy(scripts: list[str], style: str) -> str:
 
 
 def _source(inline: str) -> str:
-    """Return the hash source of an inline element (CSP level 3, 6.7.3.3)."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(inline.encode()).digest()).decode()}'"
 
 
@@ -109,9 +103,7 @@ def _asset(name: str) -> str:
 
 
 def _script(name: str) -> str:
-    """Return a script in printable ASCII without its source map.
-
-    Nothing on the way to the browser then has a reason to change it, and developer tools request nothing."""
+    # Printable ASCII without source map: nothing changes it on the way, and developer tools request nothing.
     text = _SOURCE_MAP.sub("", _asset(name))
     return _UNUSUAL.sub(lambda match: f"\\u{ord(match[0]):04x}", text)
 

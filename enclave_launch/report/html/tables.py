@@ -21,8 +21,7 @@ SOON = 30
 
 
 def text(value: object) -> str:
-    """Escape ``value`` as text of an element or of a quoted attribute; unprintable characters become visible
-    escapes."""
+    """Escape ``value`` as text of an element or attribute; unprintable characters become visible escapes."""
     return html.escape(printable(str(value)))
 
 
@@ -32,19 +31,14 @@ def row(cells: Iterable[str], *, attributes: str = "") -> str:
 
 
 def table(caption: str, headings: Iterable[str], rows: Iterable[str]) -> str:
-    """Return a table.
-
-    :param caption: trusted text, as ``headings``"""
+    """Return a table; ``caption`` and ``headings`` are trusted text."""
     head = "".join(f'<th scope="col">{heading}</th>' for heading in headings)
     body = "\n".join(rows)
     return f"<table><caption>{caption}</caption><thead><tr>{head}</tr></thead>\n<tbody>\n{body}\n</tbody></table>\n"
 
 
 def permissions(contents: ReportContents) -> str:
-    """Return a folded table for each enclave, the first one open.
-
-    Interfaces that every node has are only counted: they are most of all rows and the same everywhere. The page's
-    script adds them on request."""
+    """Return a folded table for each enclave; interfaces that every node has are only counted at first."""
     parts = []
     for number, (enclave, uses) in enumerate(contents.uses_of().items()):
         own = [use for use in uses if not use.built_in]

@@ -55,10 +55,7 @@ OPTIONS = {
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write the files. Returns 1 if the checks find an error that nobody accepted.
-
-    Raises ``UsageError`` for a secret beside a launch file, whose code could read it.
-    """
+    """Write the files; return 1 if the checks find an error. Raises ``UsageError`` for a readable secret."""
     if (options.passphrase_env or options.pin_env) and not is_saved_plan(options.words):
         raise UsageError(
             "evidence: --passphrase-env and --pin-env go with a saved plan (PLAN.json of secure-launch --dry-run "
@@ -100,7 +97,6 @@ def _examine(options: argparse.Namespace) -> Examined:
 
 
 def _time(text: str | None) -> datetime:
-    """Return ``--at``, else ``SOURCE_DATE_EPOCH`` (reproducible-builds.org), else now."""
     epoch = os.environ.get("SOURCE_DATE_EPOCH", "")
     try:
         if text is not None:
@@ -136,9 +132,7 @@ def _defaults(keystore: Path, now: datetime) -> dict[str, Any]:
 
 
 def _bill_of_materials(file: Path) -> dict[str, Any]:
-    """Return the BOM-Link (CycloneDX specification, "BOM-Link") and the hash of ``file``.
-
-    :raises UsageError: it is not a CycloneDX document."""
+    """Return the BOM-Link (CycloneDX specification, "BOM-Link") and the hash of ``file``; raises UsageError."""
     with translated(OSError, UsageError, f"--sbom {file}: "):
         data = read_bytes(file)
     with translated(ValueError, UsageError, f"--sbom {file} is not JSON: "):

@@ -175,7 +175,6 @@ def _deployment(
     lost: tuple[Unexpressed, ...],
     options: argparse.Namespace,
 ) -> Deployment:
-    """Return the deployment of all hosts together."""
     graph = flow_graph(plan_from_document(document))
     notes = differences(document, Engine(options.format))
     file = Path([word for word in options.words if ":=" not in word][-1])

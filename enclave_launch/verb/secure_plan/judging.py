@@ -38,12 +38,9 @@ def judged(
     within: str = DEFAULT_MARGIN,
     now: datetime | None = None,
 ) -> list[tuple[PlanFinding, str | None]]:
-    """Return findings of the dry run's JSON ``document``, of the rules in ``expect``, and of ``keystore``, if one is
-    given.
+    """Return findings of the dry run's JSON, of the rules in ``expect``, and of ``keystore``, if one is given.
 
-    ``expect`` is by default ``EXPECTATIONS`` in the working directory, if it is there; what expires ``within`` that
-    time is a finding. Raises ``UsageError`` for rules that are missing or not understood, ``ProvisionError`` for the
-    keystore.
+    Raises ``UsageError`` for rules that are missing or not understood, ``ProvisionError`` for the keystore.
     """
     expected = expectations(expect)
     findings = [*check_plan(document), *rule_findings(document, expected.never)]

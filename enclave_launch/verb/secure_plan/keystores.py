@@ -53,9 +53,7 @@ def zenoh_changes(before: Path | str, after: Path | str) -> tuple[FileDifference
 def endings(
     keystore: Path | str, within: str | None = None, now: datetime | None = None
 ) -> tuple[Ending, ...]:
-    """Return everything that expires, the earliest first.
-
-    :param within: only what expires within a duration such as ``30d``"""
+    """Return everything that expires (``within`` such as ``30d``), the earliest first."""
     with keystore_errors():
         report = status(keystore, now=now)
         chosen = report.expiries if within is None else report.due(parse_duration(within))

@@ -27,9 +27,7 @@ FORM: Option = ("--format", one_of("text", "json"), "how to print (text)")
 
 
 def read_plan(words: Sequence[str], options: argparse.Namespace) -> Mapping[str, Any]:
-    """Return the dry run's JSON document of the plan that ``words`` name.
-
-    :raises UsageError: the file does not exist or is not a plan, or as ``resolve``."""
+    """Return the dry run's JSON document of the plan that ``words`` name; raises UsageError."""
     if is_saved_plan(words):
         return read_saved(Path(words[0]))
     return plan_of(words, options)
@@ -41,9 +39,7 @@ def is_saved_plan(words: Sequence[str]) -> bool:
 
 
 def plan_of(words: Sequence[str], options: argparse.Namespace) -> Mapping[str, Any]:
-    """Return the dry run's JSON document of a launch file.
-
-    :raises UsageError: it does not exist, or as ``resolve``."""
+    """Return the dry run's JSON document of a launch file; raises UsageError."""
     target = find_target(words, search_prefixes(options.prefix))
     with stdout_is_for_the_plan():
         plan = resolve(target.launch_file, target.arguments, options=resolve_options(options))

@@ -59,11 +59,7 @@ def report_text(
     keystore: Path | str | None = None,
     expect: Path | None = None,
 ) -> str:
-    """Return the report in the given form.
-
-    :param document: the dry run's JSON
-    :raises UsageError: the rules of ``expect`` cannot be read.
-    :raises ProvisionError: the keystore cannot be read."""
+    """Return the report on the dry run's JSON in the given form; raises UsageError and ProvisionError."""
     if form in ("dot", "mermaid"):
         return (dot if form == "dot" else mermaid)(plan_graph(document))
 

@@ -54,8 +54,6 @@ class Checkout(NamedTuple):
 
 
 class _Launch(NamedTuple):
-    """A launch file of the repository that ``inside`` is in: a file there, or a package and a file name."""
-
     inside: Path
     file: Path | None
     in_package: tuple[str, ...]
@@ -66,16 +64,12 @@ class _Launch(NamedTuple):
 
 
 def names_revision(word: str) -> bool:
-    """Return whether ``word`` is ``REVISION:PATH`` or ``REVISION:``, as ``git show`` has it, and no file of that
-    name.
-    """
+    """Return whether ``word`` is ``REVISION:PATH`` or ``REVISION:``, as ``git show`` has it, and no file."""
     return bool(_REVISION_AND_PATH.fullmatch(word)) and not os.path.exists(word)
 
 
 def plans_of(word: str, words: Sequence[str], options: argparse.Namespace) -> Revised:
-    """Plan what ``word`` (``REVISION:`` or ``REVISION:PATH``) names, and ``words`` as they are now.
-
-    :raises UsageError: git refuses, the revision lacks the file, or as ``resolve``."""
+    """Plan what ``word`` (``REVISION:[PATH]``) names, and ``words`` as they are now; raises UsageError."""
     found = _REVISION_AND_PATH.fullmatch(word)
     assert found, "checked by names_revision"
     revision, path = found["revision"], found["path"]
@@ -160,7 +154,6 @@ def _then_prefixes(old: Checkout, scratch: Path, options: argparse.Namespace) ->
 def _outside(
     plans: Sequence[Mapping[str, Any]], old: Checkout, prefixes: Sequence[Path], options: argparse.Namespace
 ) -> Iterator[str]:
-    """Yield the packages of the plans that were not taken from the revision."""
     started = (one for plan in plans for one in (*plan["processes"], *plan["components"]))
     searched = search_prefixes([*map(str, prefixes), *(str(old.then(each)) for each in options.prefix)])
     for package in {one["package"] for one in started} - {None}:
@@ -232,9 +225,7 @@ def _in(old: Checkout, file: Path, revision: str) -> Path:
 
 @contextmanager
 def checkout(revision: str, inside: Path) -> Iterator[Checkout]:
-    """Check out all files of ``revision`` of the repository that contains ``inside``, in a temporary folder.
-
-    :raises UsageError: git refuses; the words are its own."""
+    """Check out all files of ``revision`` in a temporary folder; raises UsageError with git's words."""
     top = Path(_git(inside, "rev-parse", "--show-toplevel"))
     commit = _git(top, "rev-parse", "--verify", "--quiet", "--end-of-options", f"{revision}^{{commit}}")
     with tempfile.TemporaryDirectory(prefix="secure-plan-") as scratch:

@@ -56,10 +56,7 @@ def source_packages(sources: Path) -> dict[str, Path]:
 
 
 def install_sources(sources: Path, target: Path) -> dict[str, Path]:
-    """Make an install prefix below ``target`` for each package below ``sources``.
-
-    :returns: the prefix of each package by its name
-    :raises UsageError: a ``setup.py`` fails."""
+    """Make an install prefix for each package below ``sources``; raises UsageError if a ``setup.py`` fails."""
     prefixes = {}
     for name, folder in sorted(source_packages(sources.resolve()).items()):
         prefix = target / name
@@ -162,9 +159,7 @@ def _install_python(name: str, folder: Path, prefix: Path) -> None:
 
 
 def _setup_arguments(folder: Path) -> dict[str, Any]:
-    """Return what ``setup.py`` and ``setup.cfg`` install.
-
-    :raises UsageError: ``setup.py`` fails or takes longer than a minute."""
+    """Return what ``setup.py`` and ``setup.cfg`` install; raises UsageError, also after a minute."""
     last = ""
     given: dict[str, Any] = {}
     with tempfile.TemporaryDirectory(prefix="secure-plan-") as scratch:
