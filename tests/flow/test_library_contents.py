@@ -268,6 +268,28 @@ def test_a_controller_manager_gets_what_its_spawners_load(launch: Launch, tmp_pa
     assert "/controller_manager/set_parameters" not in allowed(plan, "call_services")
 
 
+HARDWARE = (
+    "&lt;robot name='r'&gt;&lt;ros2_control name='Arm'&gt;&lt;hardware&gt;&lt;plugin&gt;{plugin}&lt;/plugin&gt;"
+    "&lt;/hardware&gt;&lt;transmission&gt;&lt;plugin&gt;a/Gear&lt;/plugin&gt;&lt;/transmission&gt;"
+    "&lt;/ros2_control&gt;&lt;/robot&gt;"
+)
+
+
+@pytest.mark.parametrize("distro", ["humble", "jazzy"])
+def test_hardware_that_nobody_describes_is_a_gap(launch: Launch, tmp_path: Path, distro: str) -> None:
+    file = tmp_path / "cm.yaml"
+    file.write_text(
+        "controller_manager: {ros__parameters: {arm: {type: joint_state_broadcaster/JointStateBroadcaster}}}"
+    )
+    text = CONTROL.format(urdf=HARDWARE, file=file, words="")
+    plan = launch(text.format(plugin="mock_components/GenericSystem"), distro)
+    assert not plan.problems
+    assert ("/arm" in [node.fqn for node in plan.nodes]) and ("Gear" not in problems(plan))
+    assert "hardware component 'Arm' of class 'own/Hw' needs is not known" in problems(
+        launch(text.format(plugin="own/Hw"), distro)
+    )
+
+
 def test_an_ekf_subscribes_its_inputs_and_publishes_tf_in_its_namespace_too(launch: Launch) -> None:
     node = (
         '<node pkg="robot_localization" exec="ekf_node" name="ekf" namespace="r1">'

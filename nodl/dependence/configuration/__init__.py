@@ -34,7 +34,7 @@ def read_configuration(kind: str, file: str, situation: Situation, place: Source
     if kind == "ros_gz_bridge arguments":
         return of_arguments(situation.words, place)
     if kind == "ros2_control":
-        return of_robot_description(situation.launched.robot_description, place)
+        return of_robot_description(situation.launched.robot_description, place, situation.distro)
     if kind == "rviz" and not file:
         file = os.path.expanduser("~/.rviz2/default.rviz")  # rviz_common: visualization_frame.cpp
     if not file:
