@@ -1,9 +1,4 @@
-"""Report what is not installed and how to get it: a Python package, or an add-on.
-
-The main job (evaluate, assign enclaves, look manifests up, derive the policy, provision, run) works without the
-add-ons: inference, recording, observation, review and reports, deployment, Zenoh. A distribution may leave them out.
-Whoever needs one imports it where it is requested; ``installed`` says whether it is there.
-"""
+"""Report what is not installed and how to get it: a Python package, or an add-on (ARCHITECTURE.md)."""
 
 from __future__ import annotations
 

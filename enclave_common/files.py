@@ -1,8 +1,6 @@
 """Read a file that somebody else wrote, in bounded time and memory.
 
-A path in a launch file, a manifest or a keystore may name anything: a pipe that nobody writes to, a device that
-never ends, a file that fills the memory. Each of these is refused with an ``OSError`` that says why, so that callers
-treat it as any other file that cannot be read. Touches the file system, reads only.
+A path may name anything: a pipe that nobody writes to, a device that never ends. Each is refused with an ``OSError``.
 """
 
 from __future__ import annotations

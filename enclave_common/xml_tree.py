@@ -1,8 +1,4 @@
-"""Elements with line numbers, as expat reads them: launch files, NoDL v1 and files of tools.
-
-expat and not lxml: to load lxml takes longer than to read every manifest of a launch. Signed documents, which are held
-against a schema, are read by lxml (``keystore.formats.safe_xml``).
-"""
+"""Elements with line numbers, as expat reads them: loading lxml takes longer than reading all manifests."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""enclave-launch: a launch file in, secured processes out.
-
-``resolve`` → ``LaunchPlan`` → ``provision`` → ``ProvisionedLaunch`` → ``run``; see ``enclave_launch.flow``.
-Each public name is imported when it is first used: a dry run loads neither ``cryptography`` nor ``asyncio``.
-"""
+"""enclave-launch: a launch file in, secured processes out (``enclave_launch.flow``). Names are loaded when used."""
 
 from __future__ import annotations
 

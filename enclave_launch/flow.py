@@ -3,11 +3,8 @@
     plan = resolve("demo.launch.xml")                   decides everything, does nothing
     launch = provision(plan, "keystore")                keys, certificates, signed permissions
     status = run(launch)                                every process starts with its enclave
-    with start(launch) as running: ...                  the same beside the caller's own work
 
-``run`` also takes a bare plan, what ``evaluate_launch`` gives, or only a ``launch_source``, and then starts it
-unsecured, as ``secure-launch`` without ``--secure`` does; inside a running event loop await ``run_async``. Errors are
-``EnclaveLaunchError``; ``str(error)`` is for a person.
+``run`` also takes a bare plan, ``evaluate_launch``'s result or a ``launch_source``, and starts it unsecured.
 """
 
 from __future__ import annotations

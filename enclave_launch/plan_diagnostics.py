@@ -1,7 +1,4 @@
-"""The diagnostics of a plan: problems, at which ``--secure`` stops and a dry run only warns, and notes.
-
-What could not be found out stands in the plan as a value with a reason; here it becomes a diagnostic.
-"""
+"""The diagnostics of a plan: problems, at which ``--secure`` stops and a dry run only warns, and notes."""
 
 from __future__ import annotations
 

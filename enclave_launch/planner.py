@@ -1,7 +1,4 @@
-"""From an evaluation to the plan: assign enclaves, join interfaces with final names, derive the policy.
-
-Takes an ``Evaluation`` and a way to look up node interfaces; gives a ``LaunchPlan``. Performs no I/O.
-"""
+"""From an evaluation to the plan: assign enclaves, join interfaces with final names, derive the policy. No I/O."""
 
 from __future__ import annotations
 

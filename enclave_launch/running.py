@@ -1,9 +1,7 @@
-"""The last step: a planned or provisioned launch becomes processes. Joins the plan with the runtime.
+"""The last step: a planned or provisioned launch becomes processes.
 
-The file is visited by a host that starts processes; the results that the user's code gave for the plan are replayed
-(``host.user_code_results``). Behind the gate each process is compared with the plan. Starts processes; nothing comes
-after.
-"""
+The file is visited by a host that starts processes, with the recorded results of the user's code; behind the gate each
+process is compared with the plan."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""A provisioned launch: the plan, the keystore it is signed into, and what each process gets from it.
-
-Stands between the plan and the runtime's gate. ``ensure`` is called before every start: it holds the enclave against
-what was provisioned (a few file reads) and hands out the arguments and variables that rcl reads.
-"""
+"""A provisioned launch: the plan, the keystore it is signed into, and what each process gets from it."""
 
 from __future__ import annotations
 

@@ -1,12 +1,7 @@
 """The ament resource index: which installed package lies where, and what it registered.
 
-An install prefix (``/opt/ros/jazzy``, ``~/ws/install/pkg``) holds one marker file per resource below
-``share/ament_index/resource_index/<type>/<name>``. Every function takes the prefixes to search, first
-hit wins, and reads the disk at that moment: nothing is cached, nothing is global.
-``search_prefixes`` makes the list from ``--prefix`` options and ``AMENT_PREFIX_PATH``.
-
-Rules as in ament_index_cpp/ament_index_python (ament/ament_index, ``packages.py``, ``resources.py``) and,
-for launch files of a package, ``ros2launch/api/api.py``.
+Every function takes the prefixes to search, first hit wins; nothing is cached. Rules as in ament_index_python
+(``packages.py``, ``resources.py``) and, for launch files of a package, ``ros2launch/api/api.py``.
 """
 
 from __future__ import annotations

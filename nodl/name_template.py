@@ -1,8 +1,4 @@
-"""Names whose text may depend on parameters: literal text mixed with what only launch can tell.
-
-A manifest gives literal names. Inference also finds ``create_publisher(T, self.get_parameter('t').value)``:
-the name is then the parameter ``t``, to be filled in with what the launch file sets.
-"""
+"""Names whose text may depend on parameters: ``create_publisher(T, self.get_parameter('t').value)``."""
 
 from __future__ import annotations
 

@@ -1,9 +1,4 @@
-"""The interfaces of one node, before any launch file renames it.
-
-Every source of knowledge (NoDL v1, NoDL v2, inference from Python or C++) ends in these values;
-whoever derives permissions from them no longer asks where they came from, but can always tell
-(``source``).
-"""
+"""The interfaces of one node, before any launch file renames it; every source of knowledge ends in these values."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""ROS arguments: of a command line, or given in code (``rclpy.init(args=...)``, ``Node(cli_args=...)``).
-
-Performs no I/O. As rcl reads them (ros2/rcl, ``arguments.c``): flags between ``--ros-args``
-and ``--`` or the end, and outside of it each word that is a rule (``a:=b``), which is deprecated and still obeyed.
-"""
+"""ROS arguments of a command line or given in code (``rclpy.init(args=...)``), as rcl reads them. Performs no I/O."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""The values of the NoDL v1 Python API, for code that was written for it.
-
-Inside this project the model is ``nodl.node_interface``; these are made from it on request.
-"""
+"""The values of the NoDL v1 Python API, made from ``nodl.node_interface`` for code that was written for it."""
 
 from __future__ import annotations
 

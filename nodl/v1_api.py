@@ -1,8 +1,4 @@
-"""The NoDL v1 Python API (``nodl_python``) on top of our reader: same names, arguments and errors.
-
-Searches ``AMENT_PREFIX_PATH``. What differs is what was broken: comments inside ``<node>`` are fine, and
-a name listed with two roles keeps both.
-"""
+"""The NoDL v1 Python API (``nodl_python``) on top of our reader: same names, arguments and errors."""
 
 from __future__ import annotations
 

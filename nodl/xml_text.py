@@ -1,8 +1,4 @@
-"""XML text -> elements with line numbers and their text; for NoDL v1, robot descriptions and behavior trees.
-
-Nothing outside the document is ever read, and nothing in it can grow: a DOCTYPE, where entities would be
-declared, is refused.
-"""
+"""XML text -> elements with line numbers and their text; a DOCTYPE, where entities would be declared, is refused."""
 
 from __future__ import annotations
 

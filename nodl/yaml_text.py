@@ -1,8 +1,4 @@
-"""Parse YAML (or JSON) into plain values that know their line.
-
-Only the standard scalar types, no tags that make objects; duplicate keys are errors; aliases are allowed
-but what they unfold to is limited, as are size and depth.
-"""
+"""Parse YAML (or JSON) into plain values that know their line; duplicate keys are errors, aliases are limited."""
 
 from __future__ import annotations
 

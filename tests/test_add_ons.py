@@ -81,25 +81,42 @@ def python(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
     )
 
 
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return copy_without((), tmp_path_factory.mktemp("whole"))
+
+
+@pytest.fixture(scope="module")
+def plans(whole: Path) -> dict[str, str]:
+    """The dry run of the whole installation, by its form."""
+    return {
+        form: python(whole, *DRY_RUN, TALKER, "--format", form).stdout for form in ("tree", "json", "policy")
+    }
+
+
+@pytest.fixture(scope="module")
+def core(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return copy_without(REMOVALS["all"], tmp_path_factory.mktemp("core"))
+
+
 @pytest.mark.parametrize("add_on", REMOVALS)
-def test_the_main_job_works_without_an_add_on(add_on: str, tmp_path: Path) -> None:
-    whole, folder = copy_without((), tmp_path / "whole"), copy_without(REMOVALS[add_on], tmp_path / "part")
-    for form in ("tree", "json", "policy"):
-        expected, found = (python(root, *DRY_RUN, TALKER, "--format", form) for root in (whole, folder))
-        assert (found.returncode, found.stdout) == (0, expected.stdout), found.stderr
+def test_the_main_job_works_without_an_add_on(add_on: str, plans: dict[str, str], tmp_path: Path) -> None:
+    folder = copy_without(REMOVALS[add_on], tmp_path / "part")
+    for form, expected in plans.items():
+        found = python(folder, *DRY_RUN, TALKER, "--format", form)
+        assert (found.returncode, found.stdout) == (0, expected), found.stderr
     made = python(folder, "keystore.verb", "create", "ks")
     assert made.returncode == 0, made.stderr
     policy = folder / "policy.xml"
-    policy.write_text(python(folder, *DRY_RUN, TALKER, "--format", "policy").stdout)
+    policy.write_text(plans["policy"])
     applied = python(folder, "keystore.verb", "apply-policy", "ks", str(policy))
     assert applied.returncode == 0, applied.stderr
     assert (folder / "ks/enclaves/permissions.p7s").is_file()
 
 
 @pytest.mark.parametrize("add_on", ADD_ONS)
-def test_a_verb_of_an_add_on_that_is_not_installed_says_so(add_on: str, tmp_path: Path) -> None:
-    for removed in (ADD_ONS[add_on], REMOVALS["all"]):
-        folder = copy_without(removed, tmp_path / str(len(removed)))
+def test_a_verb_of_an_add_on_that_is_not_installed_says_so(add_on: str, core: Path, tmp_path: Path) -> None:
+    for folder in (copy_without(ADD_ONS[add_on], tmp_path), core):
         ran = python(folder, *NEEDS[add_on])
         assert ran.returncode == 1
         assert "is not part of this installation" in ran.stderr
@@ -123,9 +140,9 @@ def test_a_process_on_zenoh_is_refused_without_that_add_on(
 
 
 def test_a_keystore_with_a_zenoh_router_says_that_its_rules_do_not_follow_without_that_add_on(
-    tmp_path: Path,
+    whole: Path, tmp_path: Path
 ) -> None:
-    whole, folder = copy_without((), tmp_path / "whole"), copy_without(ADD_ONS["zenoh"], tmp_path / "part")
+    folder = copy_without(ADD_ONS["zenoh"], tmp_path / "part")
     keystore = str(tmp_path / "ks")
     for words in (("create", keystore), ("create-enclave", keystore, "/a"), ("zenoh", keystore)):
         assert python(whole, "keystore.verb", *words).returncode == 0

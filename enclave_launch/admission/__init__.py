@@ -1,8 +1,4 @@
-"""Admit a process to a secured start: nothing on its way takes the enclave away again.
-
-``wrappers``: what stands between us and the program keeps its environment. ``middleware``: its RMW reads enclaves.
-``variables``: nothing in its environment turns security off; its DDS domain. The plan asks before anything is signed.
-"""
+"""Admit a process to a secured start: nothing on its way takes the enclave away again."""
 
 from collections.abc import Iterator
 from typing import NamedTuple

@@ -1,8 +1,4 @@
-"""Write generated files, replacing those of the previous run.
-
-Only files that carry our mark are replaced or removed; anything else in the folder is somebody's work. All are written
-aside first: an interrupted run leaves each file whole, and the next run completes it.
-"""
+"""Write generated files, replacing only those with our mark; an interrupted run leaves each file whole."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""``lifecycle_msgs.msg`` as far as launch files use it: constants that name lifecycle transitions.
-
-From ros2/rcl_interfaces ``lifecycle_msgs/msg/{State,Transition}.msg``. Put in place only where the real package
-is not installed.
-"""
+"""``lifecycle_msgs.msg`` as far as launch files use it, put in place where the real package is not installed."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Modules under upstream's names, made from the table ``upstream_paths``.
-
-Each name is looked up in our module when it is first asked for, so that a launch file loads only what it mentions.
-"""
+"""Modules under upstream's names, made from the table ``upstream_paths``; each name is looked up when first used."""
 
 from __future__ import annotations
 

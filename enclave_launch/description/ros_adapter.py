@@ -1,8 +1,4 @@
-"""API of ``launch_ros.ros_adapters``: launch's own ROS node.
-
-A real one needs rclpy; it is made only when something asks for it while processes really run. A dry run
-never does: what would be asked of the node is recorded as a ``LauncherCall`` instead.
-"""
+"""API of ``launch_ros.ros_adapters``: launch's own ROS node, made only while processes really run."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""The upstream module of each public name, and ours.
-
-Launch files and third-party helpers import from upstream's packages and from the modules below them. ``install``
-builds modules of these names from this table; nothing else in this package cares where upstream has a name.
-"""
+"""The upstream module of each public name, and ours: nothing else in this package cares where upstream has a name."""
 
 from __future__ import annotations
 

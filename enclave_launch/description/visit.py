@@ -1,8 +1,4 @@
-"""Visit a description depth-first, and let handlers answer events.
-
-The walk takes no recursion, so that depth costs no stack: each entity is visited, then all that its visit gave, then
-its next sibling. Events are handled one at a time, by every handler that matches.
-"""
+"""Visit a description depth-first, without recursion, and let handlers answer events, one at a time."""
 
 from __future__ import annotations
 

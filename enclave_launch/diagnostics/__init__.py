@@ -1,9 +1,6 @@
-"""Diagnostics of a launch: typed values, each worded in this room and nowhere else.
+"""Diagnostics of a launch: typed values, each worded in this room and nowhere else. Performs no I/O.
 
-A ``Diagnostic`` is a value like any other: reports print it, programs ask for its ``code`` and ``location`` (JSON,
-SARIF), tests compare it. Whether it stops ``--secure`` is said by the list it stands in (``LaunchPlan.problems`` or
-``warnings``). Performs no I/O.
-"""
+Whether one stops ``--secure`` is said by the list it stands in (``LaunchPlan.problems`` or ``warnings``)."""
 
 from __future__ import annotations
 

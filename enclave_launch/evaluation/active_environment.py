@@ -1,9 +1,7 @@
 """Switch the process between the environments of several launches.
 
-Environment variables, imported modules and ``sys.path`` exist once in a process, and several launches may run in it. A
-launch visits its description in turns: an event at a time, without waiting in between. While a launch is active, the
-process looks as that launch left it. Before another one becomes active, or a description is evaluated, its environment
-is saved and the program's own is restored. A launch that is alone stays active, so that turns cost nothing.
+Variables, imported modules and ``sys.path`` exist once in a process. A launch visits its description in turns; before
+another one becomes active its environment is saved. A launch that is alone stays active, so that turns cost nothing.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""A launch file and its arguments in, the processes it would start out: the dry run as one call.
-
-The visit and the events run against a ``PlanHost``; our process is left as it was: environment, modules, path.
-"""
+"""The dry run as one call: a launch file and arguments in, processes out; our process is left as it was."""
 
 from __future__ import annotations
 

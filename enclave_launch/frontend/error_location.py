@@ -1,8 +1,4 @@
-"""Locate an exception in its file. The exception keeps its type and text; the place rides along.
-
-Upstream's errors carry no position, and library callers catch them by type, so the position is an attribute
-of the exception object. Read by the evaluation when it turns the exception into a ``LaunchFileError``.
-"""
+"""Locate an exception in its file: callers catch errors by type, so the place is an attribute of the object."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""Read a launch file once per version, and keep what was parsed from it. Touches the file system, read only.
-
-A file is known by its real state (path, modification time, size): the argument scan, the include itself and
-repeated includes then read and parse once. Only text and immutable trees are kept, never entities or actions.
-"""
+"""Read a launch file once per version (path, modification time, size); only text and immutable trees are cached."""
 
 from __future__ import annotations
 

@@ -1,8 +1,6 @@
 """Run a Python launch file. This is foreign code with all rights of the user: alone here, behind a switch.
 
-The compiled code of a file is kept while the file is unchanged; the file itself runs each time that upstream
-would run it. Nothing is written: no ``__pycache__`` beside the launch file.
-"""
+Nothing is written: no ``__pycache__`` beside the launch file."""
 
 from __future__ import annotations
 

@@ -1,9 +1,4 @@
-"""The interface of evaluation to the world.
-
-Actions and substitutions do not look a package up, run a command, write a file or start a process themselves:
-they ask ``context.host``. ``PlanHost`` records and writes nothing (the dry run); the runtime's host does it
-for real, driven by the very same evaluation.
-"""
+"""The interface of evaluation to the world: actions and substitutions ask ``context.host``, which records or acts."""
 
 from __future__ import annotations
 

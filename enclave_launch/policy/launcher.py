@@ -1,9 +1,6 @@
 """The launcher's own node: where a launch must load components or change lifecycle states, it talks too.
 
-Takes the calls that evaluation found, gives a ``RunningNode`` like any other: exactly these calls and
-what every rclpy node has. Its name is fixed, so that its permissions are (``launch_ros_<pid>``, as real
-launch calls its node, would need wildcards).
-"""
+Its name is fixed, so that its permissions are: real launch's ``launch_ros_<pid>`` would need wildcards."""
 
 from __future__ import annotations
 

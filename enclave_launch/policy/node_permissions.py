@@ -1,9 +1,6 @@
-"""The permissions of one running node: each of its final names, with the reason.
+"""The permissions of one running node: each of its final names, with the reason. Performs no I/O.
 
-Takes a ``RunningNode``, gives ``NodePermissions``; ``derivation`` collects them by enclave. Performs no I/O.
-Order of things as in rcl: the name's parameters are filled in, it is expanded under the node's final name
-and namespace, then the first matching remap rule replaces it (``nodl.remap``).
-"""
+As in rcl: parameters are filled in, the name is expanded, then the first matching remap rule replaces it."""
 
 from __future__ import annotations
 

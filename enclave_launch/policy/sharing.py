@@ -1,7 +1,4 @@
-"""Rights that nodes gain by sharing an enclave: the design article's concern about composition, made visible.
-
-DDS enforces the union of an enclave; in a container all nodes even share memory. Only reads.
-"""
+"""Rights that nodes gain by sharing an enclave, whose union DDS enforces. Only reads."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""``--learn``: a launch is run to see what its nodes ask for; records and manifests end in a folder. Writes them.
-
-    DIR/records/RUN.record            what was recorded, one file for each run
-    DIR/PACKAGE__PROGRAM.nodl.yaml    one manifest for each node of a program, made of all records of the folder
+"""``--learn``: a launch is run to see what its nodes ask for. Writes DIR/records/RUN.record, and manifests.
 
 Manifests are made again from all records each time and united with what stands in them: nothing goes away because it
 was not seen this time.

@@ -1,8 +1,4 @@
-"""The change that allows one refused endpoint, tried on a copy before anybody is told of it.
-
-Patches of one launch stand on each other: each is a change of its file as the earlier ones leave it, so that they apply
-one after another. Reads the files that it would patch.
-"""
+"""The change that allows one refused endpoint, tried on a copy first; each is made on top of the earlier ones."""
 
 from __future__ import annotations
 

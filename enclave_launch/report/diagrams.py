@@ -1,8 +1,6 @@
 """The graph of a plan in two languages that draw pictures: dot (Graphviz) and Mermaid (in Markdown on code hosts).
 
-Elements are numbered; names stand in quoted labels only, escaped by the rules of each language, since whoever writes a
-launch file chooses them. What every node has is left out: it would connect all with all.
-"""
+Elements are numbered; names stand in quoted labels only, escaped. What every node has is left out."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""A plan as a graph: nodes in their enclaves, and the topics, services and actions that they share. Performs no I/O.
-
-What the HTML report, dot and Mermaid draw. Elements go by numbers, so that no name of a launch file becomes an
-identifier in another language.
-"""
+"""A plan as a graph, for pictures: elements go by numbers, so that no name is an identifier in another language."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""The report as Markdown, for wikis, pull requests and archives that show no HTML.
-
-Names stand in code spans that no name can end; everything else that a launch file chose is escaped.
-"""
+"""The report as Markdown; names stand in code spans that no name can end, all else from a launch file is escaped."""
 
 from __future__ import annotations
 

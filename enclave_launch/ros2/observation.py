@@ -1,8 +1,4 @@
-"""Describe what upstream's actions are about to start: a ``ResolvedProcess`` for enclave and policy.
-
-Reads an action of real launch at the moment its extension point is called: names, namespace and remap rules
-are final then. Next: ``session``. Touches nothing.
-"""
+"""Describe what upstream's actions are about to start, when names are final: a ``ResolvedProcess``. Touches nothing."""
 
 from __future__ import annotations
 

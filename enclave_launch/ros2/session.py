@@ -1,8 +1,4 @@
-"""The enclaves of one secured description under upstream's engine, in a program of its own.
-
-``enter`` is called for every process just before it starts and returns when its enclave is complete on disk. There is
-no launch file to plan from, only actions as they come: each is planned and provisioned as it appears.
-"""
+"""The enclaves of one description under upstream's engine: each is planned and provisioned just before its process."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Route the output of a process: ``output=`` of a process action.
-
-Rules and messages of launch/logging/__init__.py (``get_output_loggers``).
-"""
+"""Route the output of a process: ``output=`` of a process action (launch/logging, ``get_output_loggers``)."""
 
 from __future__ import annotations
 

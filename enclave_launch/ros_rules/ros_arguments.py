@@ -1,9 +1,6 @@
-"""Read a node's command line as rcl does: remap rules, parameter sources, the enclave.
+"""Read a node's command line as rcl does (``arguments.c``): remap rules, parameter sources, the enclave. No I/O.
 
-Performs no I/O. launch never looks into ``args`` and ``ros_args``, but the process does.
-Rules from ros2/rcl ``arguments.c``: ROS arguments stand between ``--ros-args`` and ``--`` (or the end);
-outside of them a word with ``:=`` is still taken as a remap rule (deprecated there).
-"""
+ROS arguments stand between ``--ros-args`` and ``--`` (or the end); elsewhere ``a:=b`` is a remap rule, deprecated."""
 
 from __future__ import annotations
 

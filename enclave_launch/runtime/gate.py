@@ -1,9 +1,4 @@
-"""Between a process and its start stands its enclave: complete on disk, and no more than the plan foresaw.
-
-The runtime knows only ``EnclaveGate``; what makes keys and permissions sits behind it. ``PlannedGate``
-holds every process of a live run against the plan that was signed: plans are fixed before the first
-process.
-"""
+"""Between a process and its start stands its enclave: complete on disk, and no more than the plan foresaw."""
 
 from __future__ import annotations
 

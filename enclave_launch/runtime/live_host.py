@@ -1,8 +1,4 @@
-"""The evaluation's seam to the world, live: what ``start_process`` gets is started.
-
-Takes what the visit of the description decides, one action at a time; each process starts in a task of its
-own, as launch does it, and only once the gate has said that its enclave is complete.
-"""
+"""The evaluation's seam to the world, live: each process starts in a task of its own, once its enclave is complete."""
 
 from __future__ import annotations
 

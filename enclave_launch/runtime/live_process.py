@@ -1,8 +1,4 @@
-"""One process action of a live run: its supervision on one side, the launch's events on the other.
-
-Comes from ``LiveHost.start_process``. What happens to the process becomes launch events; the events that
-launch addresses to processes (shutdown, signal, stdin) become calls on it.
-"""
+"""One process action of a live run: what happens to the process becomes launch events, and these become calls on it."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""All processes of one launch: spawned, signalled and awaited through the warden. Touches the world.
-
-Lives in one asyncio loop. ``Child`` is one incarnation of a process: its pid, its three streams, its exit
-status. Next: ``supervision`` decides when to start, escalate and start again.
-"""
+"""All processes of one launch: spawned, signalled and awaited through the warden, in one asyncio loop."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Our end of the socket to the warden: framed messages out, with descriptors, and in. Never blocks the event loop.
-
-The frames are described in ``warden``; next is ``process_tree``, which gives the messages their meaning.
-"""
+"""Our end of the socket to the warden: framed messages out, with descriptors, and in. Never blocks the event loop."""
 
 from __future__ import annotations
 

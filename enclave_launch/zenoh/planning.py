@@ -1,8 +1,4 @@
-"""Report what follows from processes on Zenoh in a plan. Only reads the plan.
-
-Nodes on the two never meet. What the launcher itself must call and cannot reach is refused; all else is reported, since
-a bridge may stand between them.
-"""
+"""Report what follows from processes on Zenoh in a plan: nodes on DDS and Zenoh never meet, unless by a bridge."""
 
 from __future__ import annotations
 

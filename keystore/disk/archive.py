@@ -1,7 +1,7 @@
-"""Write and read files of a keystore as a tar archive: the same files give the same bytes, nothing strange is read.
+"""Write and read files of a keystore as a tar archive: the same files give the same bytes.
 
-An archive from elsewhere may name paths outside of the keystore, links, devices, one file twice, or never end. Only its
-regular files are taken, by name, into memory; what is written from them is decided by whoever knows the manifest.
+An archive from elsewhere may name paths outside, links, devices, one file twice, or never end: only its regular files
+are taken, by name, into memory.
 """
 
 from __future__ import annotations

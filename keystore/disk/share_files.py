@@ -1,8 +1,6 @@
 """The shares on disk, one file for each enclave in ``private/shares``, and which launches are running.
 
-A running launch holds a lock on a file of its own there; the kernel drops it when the launch dies. Cheap: both are
-asked before a launch. The files of shares are written by ``store``.
-"""
+A running launch holds a lock on a file of its own there, which the kernel drops when the launch dies."""
 
 from __future__ import annotations
 

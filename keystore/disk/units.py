@@ -1,7 +1,4 @@
-"""What a generated systemd unit says of itself, and how it is read back.
-
-systemd ignores settings that begin with ``X-`` (systemd.unit(5)).
-"""
+"""What a generated systemd unit says of itself (settings ``X-...``, which systemd ignores), and how it is read back."""
 
 from __future__ import annotations
 

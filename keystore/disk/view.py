@@ -1,8 +1,4 @@
-"""A keystore as it stands on disk, read only: what the other modules ask.
-
-A view caches what does not change while the lock is held (CA certificates, settings); make a new one after
-writing. It proves nothing about signatures, see ``keystore.verify`` for that.
-"""
+"""A keystore as it stands on disk, read only. A view caches what the lock protects: make a new one after writing."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""The one place that says what an enclave name is. Pure; every entry point of the three packages asks here.
-
-Rules: rcl's ``rcl_validate_enclave_name`` (the namespace rules of rmw, absolute) and SROS2's length limit,
-tightened by what the DDS implementations can carry.
-"""
+"""What an enclave name is: rcl's ``rcl_validate_enclave_name``, tightened to what DDS can carry."""
 
 from __future__ import annotations
 

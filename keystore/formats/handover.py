@@ -1,7 +1,4 @@
-"""What a permissions CA says before it is replaced: which CAs to trust from then on.
-
-It travels in every later bundle, signed, so that a host which missed the steps in between can follow.
-"""
+"""What a permissions CA says before it is replaced: which CAs to trust then. It is in every later bundle."""
 
 from __future__ import annotations
 

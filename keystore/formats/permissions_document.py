@@ -1,9 +1,6 @@
 """A permissions document, ours or another tool's: read, held against another one, given new dates.
 
-For ``check``, ``verify`` and ``renew``, where no policy is at hand: the permissions an enclave has are the only record
-of what it may do. Takes the signed content as bytes; the signature is not its business. Touches no files but the
-bundled schema.
-"""
+The permissions that an enclave has are the only record of what it may do. The signature is not checked here."""
 
 from __future__ import annotations
 

@@ -1,8 +1,6 @@
 """Topic expressions with wildcards: what one matches, whether two can meet, whether one covers another.
 
-``*`` any text (also ``/``), ``?`` any one character, ``[abc]``, ``[a-z]``, ``[!abc]`` one of a set: the
-subset of fnmatch(3) that Cyclone DDS and Fast DDS read alike. Pure functions over text.
-"""
+``*`` (also ``/``), ``?``, ``[abc]``, ``[a-z]``, ``[!abc]``: the subset of fnmatch(3) that both DDS read alike."""
 
 from __future__ import annotations
 

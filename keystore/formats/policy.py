@@ -1,8 +1,4 @@
-"""An SROS2 access-control policy (version 0.2.0) as plain values.
-
-Source of the format: ros2/design articles/ros2_access_control_policies, and the schema
-sros2/policy/schemas/policy.xsd. Reading and writing the XML is ``keystore.formats.policy_xml``.
-"""
+"""An SROS2 access-control policy (version 0.2.0, ros2/design articles/ros2_access_control_policies) as plain values."""
 
 from __future__ import annotations
 

@@ -1,8 +1,6 @@
 """The shares of an enclave's permissions: what each launch asks for, and all of it together. Performs no I/O.
 
-Several launch files may run on one keystore and meet in an enclave (with the default scope all use ``/``). Each owns
-its share; the enclave is granted the union. ``owner`` names the launch: the path of its launch file.
-"""
+Launches may meet in an enclave (with the default scope all use ``/``): each owns its share, by its launch file."""
 
 from __future__ import annotations
 

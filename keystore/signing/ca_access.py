@@ -1,7 +1,4 @@
-"""How to get at the keys of the CAs: where passphrase and PIN are, never what they are.
-
-References only, read when something is signed; most launches sign nothing and never look.
-"""
+"""How to get at the keys of the CAs: where passphrase and PIN are, never what they are; read to sign."""
 
 from __future__ import annotations
 

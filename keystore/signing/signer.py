@@ -1,10 +1,6 @@
-"""Where a CA's key lives: one small interface, a file and a PKCS#11 token behind it.
+"""Where a CA's key lives: ``Signer.sign`` is the only thing a CA key is ever asked, in a file or a PKCS#11 token.
 
-    Signer.sign(data) -> signature      the only thing a CA key is ever asked
-
-``keystore.signing.authority`` makes certificates with it, ``keystore.signing.smime`` signed documents. Private keys and
-passphrases stay inside these objects: no ``repr``, message or attribute shows them.
-"""
+Private keys and passphrases stay inside these objects: no ``repr``, message or attribute shows them."""
 
 from __future__ import annotations
 

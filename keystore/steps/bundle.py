@@ -1,9 +1,6 @@
 """A bundle of some enclaves for one host: exactly the files their processes read, nothing that signs.
 
-Never copied: ``private/``, unsigned twins, keys of other enclaves (a nested enclave's directory holds
-those of the enclaves below it), strays. Every file is named one by one from the list in
-``keystore.disk.layout``.
-"""
+Every file is named one by one from the list in ``layout``: never ``private/``, unsigned twins, others' keys, strays."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""A keystore held against what is wanted of it. Reads only; ``reconciliation`` writes.
-
-``compare`` answers for a whole launch before it starts, ``differences`` for one enclave before each of its processes.
-"""
+"""A keystore held against what is wanted of it: a whole launch, or one enclave before a process. Reads only."""
 
 from __future__ import annotations
 

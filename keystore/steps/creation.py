@@ -1,8 +1,4 @@
-"""A new keystore, or the missing parts of one: CAs, governance, settings. The same call completes what an
-interrupted run left; what is there is never replaced.
-
-A new CA's certificate and key are published together (``steps.incoming_ca``).
-"""
+"""A new keystore, or the missing parts of one: CAs, governance, settings; what is there is never replaced."""
 
 from __future__ import annotations
 

@@ -1,8 +1,6 @@
 """Write one signed bundle for each host: its enclaves, no CA key, and a manifest with the hash of every file.
 
-The same keystore and the same enclaves give the same bytes: the manifest signed last for a host is stored in
-``private/bundles`` and used again if nothing changed. A new manifest gets a higher number, by which the host recognises
-an earlier bundle.
+The manifest signed last is used again if nothing changed; a new one gets a higher number, which hosts compare.
 """
 
 from __future__ import annotations

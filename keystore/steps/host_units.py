@@ -1,7 +1,4 @@
-"""Generated systemd units on the host that runs them: installed, removed, restarted in order, looked at.
-
-Which units are ours is read from the files in ``/etc/systemd/system`` themselves; nothing is remembered elsewhere.
-"""
+"""Generated systemd units on the host that runs them, known by the files themselves: installed, removed, restarted."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""What a keystore holds, as plain values for reports: every key and certificate, the governance, what is granted.
-
-``granted`` is what signed permissions say. Reads only, no private key; proves no signature (see ``verify``).
-"""
+"""What a keystore holds, as plain values for reports. Reads no private key, proves no signature (see ``verify``)."""
 
 from __future__ import annotations
 

@@ -1,11 +1,7 @@
 """Enclaves brought to exactly the wanted state: what a launch calls before it starts anything.
 
-    provision      policies -> what each enclave should have; as ``create_enclaves``, ``apply_policy``, ``drop_shares``
-    bring_about    compare (``comparison``, no lock)  -> as wanted -> done
-                                                      -> reconcile (``reconciliation``, under the lock)
-
-Idempotent: what is as wanted is not touched, keys are never replaced unless asked. An interrupted run is completed
-by the next one, because the comparison finds every missing step again.
+Compared without the lock, reconciled under it. Keys are never replaced unless asked; an interrupted run is completed by
+the next one, because the comparison finds every missing step again.
 """
 
 from __future__ import annotations

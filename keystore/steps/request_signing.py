@@ -1,7 +1,4 @@
-"""Where the CA is: certificates for keys that were made on their hosts.
-
-``sign_requests`` issues them; ``accept_certificates`` takes those that another identity CA issued for them.
-"""
+"""Where the CA is: certificates for keys that were made on their hosts, by our identity CA or another one."""
 
 from __future__ import annotations
 

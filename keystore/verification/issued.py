@@ -1,8 +1,6 @@
 """What stands in the keystore held against what the register says was issued last.
 
-A backup restored, an older CRL copied back, a document of the past: each was signed here once and proves nothing about
-today. Where there is no register (a bundle, a host) only fingerprints can be shown and required.
-"""
+What was put back was signed here once, and proves nothing about today. Without a register fingerprints can be shown."""
 
 from __future__ import annotations
 

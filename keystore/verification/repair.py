@@ -1,7 +1,4 @@
-"""Repairs as lines for a shell: the keystore's real path in them, anything to know behind a ``#``.
-
-Where no command can help (a lost CA key) the repair is a sentence instead.
-"""
+"""Repairs as lines for a shell, anything to know behind a ``#``; a sentence where no command can help."""
 
 from __future__ import annotations
 

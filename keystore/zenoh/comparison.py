@@ -1,8 +1,4 @@
-"""Two configurations of a router, or of a session, compared: who may do what else, and which protection is gone.
-
-One of them is what follows from the permissions that are signed, or what was there before. Told in ROS words, since
-nobody reads 15 000 rules.
-"""
+"""Two configurations of a router, or of a session, compared, in ROS words: who may do what else, what protects less."""
 
 from __future__ import annotations
 

@@ -1,9 +1,6 @@
 """The ``include`` of NoDL v2: which files a document draws in, each once, none from where it should not.
 
-``nodl://<package>/<name>`` is a resource of the ament index, else one of those in ``common``; ``local://<path>`` a file
-relative to the including one, inside the same package. Files are compared by their resolved path, so that neither
-``x/../x`` nor a link hides a cycle. Reads files.
-"""
+Files are compared by their resolved path, so that neither ``x/../x`` nor a link hides a cycle. Reads files."""
 
 from __future__ import annotations
 

@@ -1,9 +1,4 @@
-"""Our section of a NoDL v2 document, ``codegen.enclave_launch``: its rules, and its reading into values.
-
-It says who runs the node (``executable``, ``plugin``, ``node`` ...), what of the listed names depends on how launch
-starts it (``nodl.dependence``; the written form is in docs/library.md), and for a library where that is known from.
-What was learnt of its names from runs stands there too: ``v2_learnt``.
-"""
+"""Our section of a NoDL v2 document, ``codegen.enclave_launch``: its rules, and its reading (docs/library.md)."""
 
 from __future__ import annotations
 

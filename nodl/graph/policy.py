@@ -1,9 +1,6 @@
 """An observed graph → an SROS2 policy (version 0.2.0) of exactly what was seen, under final names. Performs no I/O.
 
-DDS checks processes, so all nodes of a participant share an enclave: the one that the process announces, else (``/`` is
-what rcl takes where nobody chose) one named after its first node. Names as the schema has them: ros2/sros2
-``policy/schemas/policy.xsd``.
-"""
+All nodes of a participant share an enclave: the one that it announces, else one named after its first node."""
 
 from __future__ import annotations
 

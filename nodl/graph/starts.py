@@ -1,7 +1,4 @@
-"""Find how a node was started, from the command line of its process or the plan of a launch file. Performs no I/O.
-
-A plan is the JSON of ``secure-launch --dry-run --format json`` (docs/dry-run-json.md).
-"""
+"""Find how a node was started, from the command line of its process or the dry run's JSON. Performs no I/O."""
 
 from __future__ import annotations
 

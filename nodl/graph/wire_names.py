@@ -1,8 +1,4 @@
-"""DDS topic and type names → what a ROS node means by them. Performs no I/O.
-
-Prefixes and suffixes as rmw gives them (ros2/design articles/topic_and_service_names); the five names below an action
-as ``rcl_action`` gives them.
-"""
+"""DDS topic and type names → what a ROS node means (ros2/design topic_and_service_names, rcl_action). No I/O."""
 
 from __future__ import annotations
 

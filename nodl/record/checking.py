@@ -1,8 +1,4 @@
-"""A description of a node (manifest, inference, library table) held against what the node was recorded to ask.
-
-Each name of the description is resolved as rcl would resolve it for the recorded node: under its final name, with the
-rules and parameters that the launch gave it.
-"""
+"""A description of a node held against what the node was recorded to ask, with each name as rcl would resolve it."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""Observations of nodes → what a manifest of each program says. Performs no I/O.
-
-All records together: the union of what was asked for, each entry with the runs that saw it. A record proves that
-something is there, never that it is not.
-"""
+"""Observations of nodes → what a manifest of each program says: the union, with the runs. Performs no I/O."""
 
 from __future__ import annotations
 

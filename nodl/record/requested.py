@@ -1,8 +1,4 @@
-"""What a recorded node asked for: its own endpoints, apart from those that libraries make for every node.
-
-The library that called rcl tells them apart; only parameter services and the like, which the client libraries
-themselves write, are told by name and type.
-"""
+"""What a recorded node asked for, apart from what libraries make for every node, as told by who called rcl."""
 
 from __future__ import annotations
 

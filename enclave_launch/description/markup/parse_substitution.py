@@ -1,8 +1,4 @@
-"""Text -> substitution objects (API of ``launch.frontend.parse_substitution``).
-
-The grammar is in ``enclave_launch.frontend.substitution_grammar``. Launch files repeat themselves, and our
-own substitutions never change once built, so what a text gave is kept and its objects are shared.
-"""
+"""Text -> substitution objects (API of ``launch.frontend.parse_substitution``), cached: they never change."""
 
 from __future__ import annotations
 

@@ -1,9 +1,6 @@
 """Import the module that registers an element or substitution of XML and YAML launch files.
 
-Upstream imports every installed extension before the first file is parsed. Here a name that is not registered yet
-brings in the one module of ours that has it, then all of ours, then the entry points of other installed packages. The
-result is the same, without the 60 ms that entry points take.
-"""
+Upstream imports every installed extension first, which takes 60 ms; here only ours that has the name, then all."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""The tables of the report as HTML, a function for each section.
-
-Text that others chose becomes HTML by ``text``: everything that enters a page goes through it.
-"""
+"""The tables of the report as HTML; text that others chose becomes HTML by ``text``, everything that enters a page."""
 
 from __future__ import annotations
 
