@@ -148,6 +148,15 @@ def test_the_other_end_of_rviz_and_of_a_default_of_the_library_is_optional() -> 
     assert code("demo/node", "node.cpp:12") == "no-publisher"
 
 
+def test_of_two_topics_of_transforms_one_may_have_no_publisher() -> None:
+    def found(published: str) -> dict[str, str]:
+        given = check_plan(two({"subscribe": ["/r/tf", "/r/tf_static"]}, {"publish": [published]}))
+        return {each.subject: each.code for each in given if "publishes" in each.text}
+
+    assert found("/r/tf") == {"/r/tf_static": "other-end-optional"}
+    assert found("/tf") == {"/r/tf": "no-publisher", "/r/tf_static": "no-publisher"}
+
+
 def test_a_wildcard_that_planning_told_of_is_not_told_again() -> None:
     checked = document({"/a": {"/n": {"publish": ["/x*", "/y*"]}}})
     checked["diagnostics"] = [told("pattern-accepted", "/n", "node /n may publish /x*: a pattern")]

@@ -75,6 +75,7 @@ def _missing_ends(plan: PlanDocument, document: Document) -> Iterator[PlanFindin
                 text = f"nothing in this plan {verb} {name}, which {use}"
                 place = _first_place(using)
                 optional = code != "no-subscriber" and using and all(map(_is_optional, using))
+                optional = optional or (here == "subscribe" and _other_transforms(name) in others)
                 yield finding("other-end-optional" if optional else code, name, text, place)
 
 
@@ -87,6 +88,14 @@ def _is_optional(user: _User) -> bool:
 
 
 _LIBRARY = "/nodl/library/documents/"
+_TRANSFORMS = {"tf": "tf_static", "tf_static": "tf"}
+
+
+def _other_transforms(topic: str) -> str | None:
+    """Return the topic to which a listener to transforms subscribes beside ``topic``: many robots publish one only."""
+    namespace, slash, last = topic.rpartition("/")
+    other = _TRANSFORMS.get(last)
+    return other and namespace + slash + other
 
 
 def near_names(plan: PlanDocument, document: Document) -> Iterator[PlanFinding]:

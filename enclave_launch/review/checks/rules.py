@@ -14,7 +14,8 @@ _TABLE: Mapping[str, tuple[str, str]] = {
     "no-publisher": ("A topic is subscribed and nothing in this plan publishes it.", _OTHER_END),
     "no-subscriber": ("A topic is published and nothing in this plan subscribes it.", _OTHER_END),
     "other-end-optional": (
-        "rviz2, or a node of the library by a default name, uses what nothing in this plan offers.", _OTHER_END),
+        "rviz2, a listener to transforms, or a node of the library by a default name, uses what nothing in this "
+        "plan offers.", _OTHER_END),
     "no-server": ("A service or action is called and nothing in this plan serves it.", _OTHER_END),
     "ends-not-judged": ("Names have one end only among what is known of this plan, which has gaps.",
                         "close the gaps, and check again"),
