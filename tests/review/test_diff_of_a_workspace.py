@@ -204,6 +204,18 @@ def test_a_package_without_sources_in_a_repository_is_refused(
     assert "no sources of package 'vendor'" in capsys.readouterr().err
 
 
+def test_the_build_type_decides_what_installs_a_package(
+    workspace: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A ``CMakeLists.txt`` that lies beside ``setup.py`` builds nothing of a Python package."""
+    write(workspace / "robot_py" / "CMakeLists.txt", "install(DIRECTORY launch DESTINATION share/robot_py)\n")
+    git(workspace, "add", "-A")
+    assert main(["diff", "main:", *NAMED]) == 0
+    change(workspace / "robot_py" / "package.xml", "ament_python", "ament_cmake")
+    assert main(["diff", "main:", *NAMED]) == 1
+    assert "robot_py/lib/robot_py' does not exist" in capsys.readouterr().err
+
+
 def test_a_setup_py_that_fails_names_the_way_out(workspace: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write(workspace / "robot_py" / "setup.py", "raise SystemExit('needs a compiler')\n")
     git(workspace, "commit", "-q", "-am", "broken")

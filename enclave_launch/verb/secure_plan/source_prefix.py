@@ -18,10 +18,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from enclave_common.files import read_bytes
 from enclave_launch.errors import UsageError
 from nodl.ament_index import INDEX_FOLDER
+from nodl.errors import InvalidXMLError
 from nodl.infer.cpp.reading.cmake import Build, BuildReader, absolute
 from nodl.infer.cpp.reading.project import find_packages
+from nodl.xml_text import parse_xml
 
 _KEYWORDS = frozenset({
     "DESTINATION", "RENAME", "RUNTIME", "LIBRARY", "ARCHIVE", "OBJECTS", "FRAMEWORK", "BUNDLE", "INCLUDES", "EXPORT",
@@ -63,12 +66,22 @@ def install_sources(sources: Path, target: Path) -> dict[str, Path]:
         (prefix / INDEX_FOLDER / "packages").mkdir(parents=True)
         (prefix / INDEX_FOLDER / "packages" / name).touch()
         _place(folder / "package.xml", prefix / "share" / name / "package.xml")
-        if (folder / "CMakeLists.txt").is_file():
+        if (folder / "CMakeLists.txt").is_file() and not _is_python(folder):
             _InstallRules(name, prefix).read(str(folder), dict(_FOLDERS))
         elif (folder / "setup.py").is_file():
             _install_python(name, folder, prefix)
         prefixes[name] = prefix
     return prefixes
+
+
+def _is_python(folder: Path) -> bool:
+    """Return True if colcon builds the package with ``setup.py``, whatever else lies beside it (REP 149)."""
+    manifest = str(folder / "package.xml")
+    try:
+        kinds = parse_xml(read_bytes(manifest), manifest).iter("build_type")
+    except (OSError, InvalidXMLError):
+        return False
+    return any(kind.text.strip() == "ament_python" for kind in kinds)
 
 
 class _InstallRules(BuildReader):
