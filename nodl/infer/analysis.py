@@ -29,7 +29,6 @@ from nodl.infer.interpreter.statements import STATEMENTS
 from nodl.infer.models import foreign
 from nodl.infer.models.foreign import is_node_class
 from nodl.infer.net import unsettled_places
-from nodl.infer.paths import Decisions, refine
 from nodl.infer.program import Program, ProgramTarget, SourceModule
 from nodl.infer.results import interfaces_of
 from nodl.infer.start import LaunchKey
@@ -117,6 +116,7 @@ WIDEN_TEXTS_FROM = 4
 def settle(run: Run, at_end: bool = True) -> None:
     """Call all callbacks until neither state nor findings change; ``at_end``: the program itself has ended."""
     run.repeated += 1
+    guards, run.guards = run.guards, ()
     outermost = run.settle is not _no_settling
     run.settle = _no_settling
     expected: set[object] = set()
@@ -136,6 +136,7 @@ def settle(run: Run, at_end: bool = True) -> None:
     else:
         run.findings.gap(SourceRef(run.main.path), "the callbacks do not settle; names may be missing")
     run.repeated -= 1
+    run.guards = guards
     run.settle = settle_meanwhile if outermost else _no_settling
 
 
@@ -243,14 +244,8 @@ def start_function(program: Program, module: SourceModule, path: list[str]) -> R
 
 
 def _followed(program: Program, main: SourceModule, body: Callable[[Run], None]) -> Run:
-    def follow(decisions: Decisions | None) -> Run:
-        run = new_run(program, main)
-        run.decisions = decisions
-        _guarded(run, lambda: body(run))
-        return run
-
-    run = follow(None)
-    refine(run, follow)
+    run = new_run(program, main)
+    _guarded(run, lambda: body(run))
     return run
 
 

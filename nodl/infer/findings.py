@@ -78,7 +78,6 @@ class Findings:
     def __init__(self) -> None:
         self.nodes: dict[NodeRecord, None] = {}
         self.gaps: dict[tuple[SourceRef, str], None] = {}
-        self.by_path = False  # of several runs, one for each outcome of undecided tests
         self.homeless: NodeRecord | None = None
         self.global_arguments: Value = BOTTOM  # a list handed to rclpy.init(args=...)
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from nodl.infer.findings import Findings, FoundEndpoint, NodeRecord, OptionDefaults
 from nodl.infer.start import LaunchKey
-from nodl.infer.text import Hole, Input, NodePart, Piece, Text
+from nodl.infer.text import Hole, Input, NodePart, Piece, Text, is_condition, text_of
 from nodl.infer.values import Sequence, Unknown, Value
 from nodl.name_template import NameTemplate, ParameterPart, Part, UnknownPart, melted
 from nodl.node_interface import Certainty, ClientLibrary, Endpoint, Gap, NodeInterface
@@ -22,29 +22,20 @@ def interfaces_of(findings: Findings, origin: LaunchKey) -> list[NodeInterface]:
     for record in findings.nodes:
         if record.created or record.endpoints:
             interfaces.extend(_interfaces_of_node(record, findings, origin))
-    return _united(interfaces) if findings.by_path else interfaces
-
-
-def _united(interfaces: list[NodeInterface]) -> list[NodeInterface]:
-    """Return one interface for what is the same node on several paths."""
-    united: dict[object, NodeInterface] = {}
-    for each in interfaces:
-        key = each._replace(endpoints=(), gaps=(), parameters=())
-        known = united.get(key)
-        if known is None:
-            united[key] = each
-            continue
-        united[key] = known._replace(
-            endpoints=tuple(dict.fromkeys((*known.endpoints, *each.endpoints))),
-            gaps=tuple(dict.fromkeys((*known.gaps, *each.gaps))),
-            parameters=tuple(sorted({*known.parameters, *each.parameters})),
-        )
-    return list(united.values())
+    return interfaces
 
 
 def _interfaces_of_node(record: NodeRecord, findings: Findings, origin: LaunchKey) -> list[NodeInterface]:
     gaps = _arguments_in_code(record, findings)
-    endpoints = tuple(dict.fromkeys(e for found in record.endpoints for e in _endpoints(found)))
+    found_anyway = set(record.endpoints)
+    endpoints = tuple(
+        dict.fromkeys(
+            each
+            for found in record.endpoints
+            if _without_conditions(found) not in found_anyway - {found}
+            for each in _endpoints(found)
+        )
+    )
     gaps.extend(Gap(source, why) for source, why in record.gaps)
     names: list[str | None] = [*_plain_texts(record.names)] or [None]
     if not record.created:
@@ -110,6 +101,13 @@ def _endpoints(found: FoundEndpoint) -> list[Endpoint]:
         Endpoint(found.kind, each, found.type, found.source, certainty_of(each), qos=found.qos)
         for each in templates(found.name)
     ]
+
+
+def _without_conditions(found: FoundEndpoint) -> FoundEndpoint:
+    if not isinstance(found.name, Text):
+        return found
+    pieces = (piece for piece in found.name.pieces if not (isinstance(piece, Input) and is_condition(piece)))
+    return found._replace(name=text_of(pieces))
 
 
 def certainty_of(template: NameTemplate) -> Certainty:

@@ -72,9 +72,20 @@ class ProgramState:
     def mark(self) -> int:
         return len(self._trail)
 
-    def branches(self, alternatives: Iterable[Alternative]) -> bool:
-        """Run each alternative from the present state and join what they leave. False: none falls through."""
+    def branches(
+        self, alternatives: Iterable[Alternative], joined: Callable[[Value, Value], Value] | None = None
+    ) -> bool:
+        """Run each alternative from the present state and join what they leave. False: none falls through.
+
+        ``joined``: what a cell holds where both of two alternatives fall through.
+        """
         outcomes = self._run_each(alternatives)
+        if joined and len(outcomes) == 2:
+            first, second = outcomes
+            for place, (cells, key, _) in {**first, **second}.items():
+                before = (cells, key, cells.get(key, _absent(cells)))
+                value = joined(first.get(place, before)[2], second.get(place, before)[2])
+                first[place] = second[place] = cells, key, value
         if outcomes:
             self._merge(outcomes)
         return bool(outcomes)

@@ -26,6 +26,19 @@ class Input(NamedTuple):
     edits: tuple[Edit, ...] = ()
 
 
+class Guard(NamedTuple):
+    """What is asked of an input: the edit that keeps a name where it holds, with its arguments."""
+
+    asked: Input
+    edit: str
+    given: tuple[str, ...]
+
+    @property
+    def piece(self) -> Input:
+        """The piece of a text that is empty where the condition holds; elsewhere there is no such text."""
+        return Input(self.asked.name, self.asked.owner, None, ((self.edit, self.given),))
+
+
 class NodePart(NamedTuple):
     """The node's ``name``, ``namespace`` or ``fqn`` (fully qualified name), whatever launch makes of it."""
 
@@ -206,6 +219,23 @@ def edited(text: Text, method: str, arguments: tuple[str, ...]) -> TextAtom | No
     if method not in ("lstrip", "rstrip", "strip") or not first or not last:
         return None
     return text_of((first, *pieces[1:-1], last))
+
+
+def constant_text(atom: object) -> object:
+    """Return the ``str`` of a text that is known but for the conditions under which it is meant; else ``atom``."""
+    if not isinstance(atom, Text):
+        return atom
+    last = atom.pieces[-1]
+    before = atom.pieces[:-1] if isinstance(last, str) else atom.pieces
+    known = all(isinstance(each, Input) and is_condition(each) for each in before)
+    return (last if isinstance(last, str) else "") if known else atom
+
+
+def is_condition(piece: Input) -> bool:
+    """Return True if the input is not part of the text, but decides whether it is meant."""
+    return (
+        bool(piece.edits) and piece.edits[0][0].startswith("only if ") and piece.edits[0][0] != "only if set"
+    )
 
 
 def input_of(text: object) -> Input | None:

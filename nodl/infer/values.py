@@ -12,7 +12,7 @@ import ast
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
-from nodl.infer.text import Text, common_text
+from nodl.infer.text import Text, common_text, constant_text
 
 if TYPE_CHECKING:
     from nodl.infer.findings import NodeRecord
@@ -143,8 +143,11 @@ OTHER = "[other]"  # the cell of a dictionary for keys that are not constants
 OTHER_KEYS = "[keys]"
 
 
+LAZY = "lazy"  # the kind of iterators and of views of dictionaries
+
+
 class Sequence(HeapObject):
-    """A list, tuple or set."""
+    """A list, tuple or set, or what gives elements where it is iterated over."""
 
     __slots__ = ("kind",)
 
@@ -341,8 +344,8 @@ def boolean(outcome: bool | None) -> Value:
 
 
 def constant_strings(value: Value) -> list[str]:
-    """Return the strings among the alternatives that are known in full."""
-    return [atom for atom in value if isinstance(atom, str)]
+    """Return the strings among the alternatives that are known in full, whatever condition they are meant under."""
+    return [atom for atom in map(constant_text, value) if isinstance(atom, str)]
 
 
 def sole(value: Value | None) -> object:

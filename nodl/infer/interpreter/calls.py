@@ -125,7 +125,7 @@ def _recursive(run: Run, function: FunctionValue, cells: LocalCells, call: Call)
 
 def _remembered(run: Run, function: FunctionValue, cells: LocalCells, call: Call) -> Value:
     """Return the result of an earlier call that left the state as it found it, while the state is the same."""
-    key = (function, tuple(cells.values()), id(call.node))
+    key = (function, tuple(cells.values()), id(call.node), run.guards)
     version = run.state.version()
     known = run.memo.get(key)
     if known is not None and known[0] == version:
@@ -153,6 +153,7 @@ def _run_body(run: Run, function: FunctionValue, cells: LocalCells, call: Call) 
     frame.function = function
     frame.entry = call.node
     frame.forks = frame.loop_forks = run.state.forks
+    frame.guards = len(run.guards)
     run.entries.setdefault(function.node, {})[call.node] = None
     run.stack.append(function.node)
     frame.mark = run.state.mark()

@@ -6,13 +6,14 @@ A branch is only left out on certainty. A test that asks for the value of a para
 from __future__ import annotations
 
 import ast
+import functools
 import operator
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
 from nodl.infer.interpreter.define import is_enumeration
 from nodl.infer.interpreter.run import Frame, Run
-from nodl.infer.text import Input, Piece, Text, TextAtom, input_of, make_text, pieces_of
+from nodl.infer.text import Guard, Input, Text, TextAtom, constant_text, input_of, make_text, pieces_of
 from nodl.infer.values import (
     CONSTANTS,
     ITEMS,
@@ -24,11 +25,12 @@ from nodl.infer.values import (
     ModuleValue,
     Sequence,
     Value,
+    contains,
+    join_all,
     sole,
 )
 
-Condition = tuple[Input, str, tuple[str, ...]]
-"""What is asked of an input: the edit that keeps a name where it holds, with its arguments."""
+T = TypeVar("T")
 
 OPPOSITE = {
     "only if true": "only if false", "only if false": "only if true",
@@ -76,23 +78,11 @@ def decide(run: Run, test: ast.expr, frame: Frame) -> bool | None:
     return truth(run.evaluate(test, frame))
 
 
-def forked(run: Run, test: ast.expr, frame: Frame) -> bool | None:
-    """Return the outcome of a test of a parameter, on the path that is followed; ``None``: both, joined."""
-    if run.state.forks or run.repeated:
-        return None
-    condition = _condition(run, test, frame)
-    if condition is None:
-        return None
-    run.conditional = True
-    return None if run.decisions is None else run.decisions.next(condition)
-
-
-def _condition(run: Run, test: ast.expr, frame: Frame) -> Condition | None:
+def condition_of(run: Run, test: ast.expr, frame: Frame) -> Guard | None:
     """Return what ``test`` requires of a parameter; ``None`` if that cannot be said."""
     if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not):
-        found = _condition(run, test.operand, frame)
-        return None if found is None else (found[0], OPPOSITE[found[1]], found[2])
-    if not _only_reads(test):
+        return opposite(condition_of(run, test.operand, frame))
+    if not _may_ask(test):
         return None
     if isinstance(test, ast.Compare):
         return _comparison(run, test, frame) if len(test.ops) == 1 else None
@@ -100,13 +90,40 @@ def _condition(run: Run, test: ast.expr, frame: Frame) -> Condition | None:
     if asked is None:
         return None
     if all(isinstance(default, bool) for default in defaults):
-        return asked, "only if true", ()
+        return Guard(asked, "only if true", ())
     if all(isinstance(default, str) for default in defaults):
-        return asked, "only if different", ("",)
-    return (asked, "only if different", ("0",)) if _whole_numbers(defaults) else None
+        return Guard(asked, "only if different", ("",))
+    return Guard(asked, "only if different", ("0",)) if _whole_numbers(defaults) else None
 
 
-def _comparison(run: Run, test: ast.Compare, frame: Frame) -> Condition | None:
+def opposite(condition: Guard | None) -> Guard | None:
+    """Return the condition that holds where ``condition`` does not."""
+    return condition and condition._replace(edit=OPPOSITE[condition.edit])
+
+
+def under(run: Run, condition: Guard | None, action: Callable[[], T]) -> T:
+    """Run ``action`` where the condition holds: the interfaces that it makes depend on it."""
+    before = run.guards
+    if condition is not None and condition not in before:
+        run.guards = (*before, condition)
+    result = action()
+    run.guards = before
+    return result
+
+
+def either(condition: Guard, first: Value, second: Value) -> Value:
+    """Return what a variable holds: ``first`` where the condition holds, else ``second``."""
+    sides = ((condition, first, second), (condition._replace(edit=OPPOSITE[condition.edit]), second, first))
+    return join_all(
+        tuple(
+            only_if(held, atom) if isinstance(atom, str | Text) and not contains(other, atom) else atom
+            for atom in value
+        )
+        for held, value, other in sides
+    )
+
+
+def _comparison(run: Run, test: ast.Compare, frame: Frame) -> Guard | None:
     asked, defaults = _asked(run, test.left, frame)
     other = test.comparators[0]
     if asked is None:
@@ -120,16 +137,13 @@ def _comparison(run: Run, test: ast.Compare, frame: Frame) -> Condition | None:
     if isinstance(test.ops[0], ast.In | ast.NotIn):
         among = _texts_in(value)
         edit = "only if among" if isinstance(test.ops[0], ast.In) else "only if not among"
-        return None if among is None else (asked, edit, among)
+        return None if among is None else Guard(asked, edit, among)
     if not isinstance(test.ops[0], ast.Eq | ast.NotEq) or len(value) != 1 or type(value[0]) not in (str, int):
         return None
     if type(value[0]) is not type(defaults[0]):
         return None
-    return (
-        asked,
-        "only if equal" if isinstance(test.ops[0], ast.Eq) else "only if different",
-        (str(value[0]),),
-    )
+    edit = "only if equal" if isinstance(test.ops[0], ast.Eq) else "only if different"
+    return Guard(asked, edit, (str(value[0]),))
 
 
 def _whole_numbers(defaults: Value) -> bool:
@@ -162,10 +176,13 @@ def is_plain_parameter(asked: Input) -> bool:
 _READS = frozenset({"get_parameter", "get_parameter_value", "declare_parameter"})
 
 
-def _only_reads(node: ast.expr) -> bool:
-    """Return whether evaluating it once more changes nothing."""
+@functools.lru_cache(maxsize=8192)
+def _may_ask(node: ast.expr) -> bool:
+    """Return True for a value or a comparison of values, where evaluating it once more changes nothing."""
     calls = (part for part in ast.walk(node) if isinstance(part, ast.Call))
-    return all(isinstance(call.func, ast.Attribute) and call.func.attr in _READS for call in calls)
+    return isinstance(node, ast.Name | ast.Attribute | ast.Subscript | ast.Call | ast.Compare) and all(
+        isinstance(call.func, ast.Attribute) and call.func.attr in _READS for call in calls
+    )
 
 
 def narrowed(run: Run, test: ast.expr, outcome: bool, frame: Frame) -> None:
@@ -196,11 +213,9 @@ def narrowed(run: Run, test: ast.expr, outcome: bool, frame: Frame) -> None:
         run.state.write(cells, key, kept)
 
 
-def only_if(condition: Condition, text: TextAtom) -> Text:
+def only_if(condition: Guard, text: TextAtom) -> Text:
     """Return ``text`` if the condition holds, and nothing otherwise."""
-    asked, edit, given = condition
-    test: Piece = Input(asked.name, asked.owner, None, ((edit, given),))
-    return make_text((test, *(pieces_of(text) if text else ())))
+    return make_text((condition.piece, *(pieces_of(text) if text else ())))
 
 
 def compare(run: Run, node: ast.Compare, frame: Frame) -> Value:
@@ -236,6 +251,7 @@ def compare_values(op: ast.cmpop, left: Value, right: Value) -> bool | None:
 
 
 def _compare_atoms(op: ast.cmpop, left: object, right: object) -> bool | None:
+    left, right = constant_text(left), constant_text(right)
     if isinstance(op, ast.In | ast.NotIn):
         found = _is_among(left, right)
         return None if found is None else found is isinstance(op, ast.In)

@@ -7,12 +7,13 @@ import ast
 from nodl.infer.interpreter.conditions import is_plain_parameter, only_if
 from nodl.infer.interpreter.define import enumeration_members, is_constant, is_enumeration
 from nodl.infer.interpreter.run import Arguments, Frame, Run
-from nodl.infer.text import Input, Text, input_of, make_text
+from nodl.infer.text import Guard, Input, Text, constant_text, input_of, make_text
 from nodl.infer.values import (
     ABSENT,
     ANY,
     BOTTOM,
     ITEMS,
+    LAZY,
     OTHER,
     OTHER_KEYS,
     RESULT,
@@ -90,11 +91,11 @@ def chosen_by_parameter(obj: Dictionary, key: Value, default: Value | None = Non
         if not certain or type(cell.constant) is not str or not isinstance(text, str | Text):
             return None
         keys.append(cell.constant)
-        found.append(only_if((asked, "only if equal", (cell.constant,)), text))
+        found.append(only_if(Guard(asked, "only if equal", (cell.constant,)), text))
     for other in default or ():
         if not isinstance(other, str | Text):
             return None
-        found.append(only_if((asked, "only if not among", tuple(keys)), other))
+        found.append(only_if(Guard(asked, "only if not among", tuple(keys)), other))
     return tuple(found) or None
 
 
@@ -103,6 +104,7 @@ def dictionary_item(run: Run, obj: Dictionary, key: Value, node: ast.AST, frame:
     chosen = chosen_by_parameter(obj, key)
     if chosen is not None:
         return chosen
+    key = tuple(map(constant_text, key))
     result: Value = BOTTOM
     everything = False
     everywhere = not obj.escaped
@@ -226,6 +228,8 @@ EDITED = unknown("an element of a list that is edited")
 
 def assign(run: Run, target: ast.expr, value: Value, frame: Frame) -> None:
     """Bind ``value`` to a name, field or element, or take it apart for a tuple or list of targets."""
+    if any(type(atom) is Sequence and atom.kind == LAZY for atom in value):
+        value = _stored(run, value, target)
     if isinstance(target, ast.Name):
         run.assign_name(target.id, value, frame)
     elif isinstance(target, ast.Attribute):
@@ -236,6 +240,14 @@ def assign(run: Run, target: ast.expr, value: Value, frame: Frame) -> None:
         _unpack(run, target.elts, value, frame)
     elif isinstance(target, ast.Starred):
         assign(run, target.value, value, frame)
+
+
+def _stored(run: Run, value: Value, node: ast.AST) -> Value:
+    """Return ``value`` as it is in a variable: what an iterator or a view of a dictionary gives later is not known."""
+    later = unknown("what an iterator or view gives later")
+    lazy = [atom.items.any_element() for atom in value if isinstance(atom, Sequence) and atom.kind == LAZY]
+    others = tuple(atom for atom in value if not (isinstance(atom, Sequence) and atom.kind == LAZY))
+    return join(run.sequence(node, "list", Items(None, join(join_all(lazy), later))), others)
 
 
 def store_attribute(run: Run, owners: Value, name: str, value: Value, node: ast.AST, frame: Frame) -> None:

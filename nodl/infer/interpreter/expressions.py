@@ -8,13 +8,34 @@ import operator
 from collections.abc import Callable
 from functools import partial
 
-from nodl.infer.interpreter.conditions import compare, decide, forked, narrowed, only_if, truth, truth_of
+from nodl.infer.interpreter.conditions import (
+    compare,
+    condition_of,
+    decide,
+    either,
+    narrowed,
+    only_if,
+    opposite,
+    truth,
+    truth_of,
+    under,
+)
 from nodl.infer.interpreter.define import make_function
 from nodl.infer.interpreter.elements import assign, copy_dictionary, elements, store_item, subscript
 from nodl.infer.interpreter.formatting import as_texts, f_string, percent
 from nodl.infer.interpreter.loops import comprehension, dict_comprehension
 from nodl.infer.interpreter.run import Arguments, Evaluator, Frame, Run
-from nodl.infer.text import Hole, Text, TextAtom, concatenate, concatenations, input_of, make_text, with_edit
+from nodl.infer.text import (
+    Guard,
+    Hole,
+    Text,
+    TextAtom,
+    concatenate,
+    concatenations,
+    input_of,
+    make_text,
+    with_edit,
+)
 from nodl.infer.values import (
     ANY,
     BOTTOM,
@@ -275,16 +296,17 @@ def _dict(run: Run, node: ast.Dict, frame: Frame) -> Value:
 
 def _conditional(run: Run, node: ast.IfExp, frame: Frame) -> Value:
     outcome = decide(run, node.test, frame)
-    if outcome is None:
-        outcome = forked(run, node.test, frame)
     if outcome is not None:
         return run.evaluate(node.body if outcome else node.orelse, frame)
+    condition = condition_of(run, node.test, frame)
 
     def side(expression: ast.expr, holds: bool) -> Value:
         narrowed(run, node.test, holds, frame)
-        return run.evaluate(expression, frame)
+        held = condition if holds else opposite(condition)
+        return under(run, held, lambda: run.evaluate(expression, frame))
 
-    return join_all(run.state.each((lambda: side(node.body, True), lambda: side(node.orelse, False))))
+    body, orelse = run.state.each((lambda: side(node.body, True), lambda: side(node.orelse, False)))
+    return either(condition, body, orelse) if condition else join(body, orelse)
 
 
 def _boolean(run: Run, node: ast.BoolOp, frame: Frame) -> Value:
@@ -321,7 +343,7 @@ def _otherwise(before: Value, value: Value) -> Value:
     asked = input_of(before[0]) if len(before) == 1 else None
     if asked is None or asked.edits != (("unless empty", ()),):
         return value
-    condition = asked._replace(edits=()), "only if equal", ("",)
+    condition = Guard(asked._replace(edits=()), "only if equal", ("",))
     return tuple(only_if(condition, atom) if isinstance(atom, str | Text) else atom for atom in value)
 
 

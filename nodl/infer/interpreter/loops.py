@@ -10,7 +10,7 @@ from typing import NamedTuple
 from nodl.infer.interpreter.conditions import decide, narrowed
 from nodl.infer.interpreter.elements import assign, elements, store_item
 from nodl.infer.interpreter.run import Frame, Run
-from nodl.infer.values import Dictionary, Items, LocalCells, Value, join_all
+from nodl.infer.values import LAZY, Dictionary, Items, LocalCells, Value, join_all
 
 MAX_UNROLLED = 64  # turns, those of the loops around multiplied
 MAX_UNROLLED_AGAIN = 16  # in what is repeated itself
@@ -177,7 +177,7 @@ def comprehension(run: Run, node: ast.ListComp | ast.SetComp | ast.GeneratorExp,
 
     exact = _generate(run, node.generators, inner, emit, frame)
     _leave(inner)
-    kind = "set" if isinstance(node, ast.SetComp) else "list"
+    kind = {ast.SetComp: "set", ast.GeneratorExp: LAZY}.get(type(node), "list")
     return run.sequence(node, kind, Items(tuple(collected)) if exact else Items(None, join_all(collected)))
 
 

@@ -9,13 +9,13 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Iterable
 from functools import partial
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 from nodl.infer.findings import Findings, OptionDefaults
 from nodl.infer.packages import find_package
 from nodl.infer.program import Program, SourceModule
 from nodl.infer.state import Allocations, ProgramState, Written
-from nodl.infer.text import Text
+from nodl.infer.text import Guard, Text
 from nodl.infer.values import (
     ANY,
     BOTTOM,
@@ -42,17 +42,14 @@ from nodl.infer.values import (
 )
 from nodl.source_ref import SourceRef
 
-if TYPE_CHECKING:
-    from nodl.infer.paths import Decisions
-
 
 class Frame:
     """The variables of a running function, class body or module."""
 
     __slots__ = (
-        "again", "cells", "closure", "depth", "early", "entry", "exits", "forks", "function", "globals", "is_class",
-        "is_comprehension", "jump", "loop_forks", "mark", "module", "nonlocals", "returned", "runs_more", "trying",
-        "unsettled", "yielded",
+        "again", "cells", "closure", "depth", "early", "entry", "exits", "forks", "function", "globals", "guards",
+        "is_class", "is_comprehension", "jump", "loop_forks", "mark", "module", "nonlocals", "returned", "runs_more",
+        "trying", "unsettled", "yielded",
     )  # fmt: skip
 
     def __init__(self, module: ModuleValue, cells: dict[object, Value], closure: Frame | None, depth: int):
@@ -75,6 +72,7 @@ class Frame:
         self.jump = ""  # the break or continue that certainly ended the latest statement
         self.forks = 0  # undecided branches when the frame was entered, and when its innermost loop was
         self.loop_forks = 0
+        self.guards = 0  # how many conditions held when the frame was entered
         self.again = False  # the cells also hold an earlier call, whose inner functions live on
         self.is_class = False
         self.is_comprehension = False
@@ -221,7 +219,7 @@ class Run(Allocations):
         self.recursions: dict[ast.AST, Any] = {}  # functions that are calling themselves
         self.options = OptionDefaults()
         self.settle: Callable[[Run], None] = lambda run: None  # runs the callbacks; set by who drives the run
-        self.decisions: Decisions | None = None
+        self.guards: tuple[Guard, ...] = ()  # of parameters, that hold at the current point
         self.environment = FieldCells()  # variables that the program sets itself
         # Calls that left the state as it was: at which version, with what result.
         self.memo: dict[tuple[object, ...], tuple[object, Value]] = {}
@@ -232,7 +230,6 @@ class Run(Allocations):
         self.gave_up = False
         self.called_back: dict[tuple[object, int | None], object] = {}  # the state before the latest call
         self.without_value = 0  # inside bodies whose handlers catch a parameter that has no value
-        self.conditional = False  # an undecided test asks for the value of a parameter
 
     # --- syntax -----------------------------------------------------------------------------------------
 
@@ -244,12 +241,15 @@ class Run(Allocations):
     def execute(self, body: list[ast.stmt], frame: Frame) -> bool:
         """Run statements in order. False: control cannot reach the end of ``body``."""
         self.spend(len(body))
-        statements = self._statements
+        statements, guards = self._statements, self.guards
+        passes = True
         for statement in body:
             handler = statements.get(type(statement))
             if handler is not None and not handler(self, statement, frame):
-                return False
-        return True
+                passes = False
+                break
+        self.guards = guards
+        return passes
 
     def spend(self, count: int) -> None:
         """Count ``count`` units of work. Raises ``BudgetExceeded`` when there were too many."""

@@ -8,11 +8,12 @@ from functools import partial
 from typing import Any
 
 from nodl.infer.interpreter import imports, loops
-from nodl.infer.interpreter.conditions import decide, forked, narrowed
+from nodl.infer.interpreter.conditions import condition_of, decide, either, narrowed, only_if, opposite, under
 from nodl.infer.interpreter.define import define_class, define_function, program_classes
 from nodl.infer.interpreter.elements import assign, delete
 from nodl.infer.interpreter.expressions import binary_operation
 from nodl.infer.interpreter.run import Arguments, Executor, Frame, Run
+from nodl.infer.text import Guard, Text
 from nodl.infer.values import (
     ANY,
     NONE,
@@ -82,20 +83,30 @@ def _as_load(target: ast.expr) -> ast.expr:
 
 def _if(run: Run, node: ast.If, frame: Frame) -> bool:
     outcome = decide(run, node.test, frame)
-    if outcome is None:
-        outcome = forked(run, node.test, frame)
     if outcome is not None:
         return run.execute(node.body if outcome else node.orelse, frame)
+    condition = condition_of(run, node.test, frame)
+    passing: list[Guard | None] = []
 
     def side(body: list[ast.stmt], holds: bool) -> bool:
+        held = condition if holds else opposite(condition)
         narrowed(run, node.test, holds, frame)
-        return run.execute(body, frame)
+        passes = under(run, held, lambda: run.execute(body, frame))
+        if passes:
+            passing.append(held)
+        return passes
 
-    return run.state.branches((lambda: side(node.body, True), lambda: side(node.orelse, False)))
+    sides = (lambda: side(node.body, True), lambda: side(node.orelse, False))
+    passes = run.state.branches(sides, partial(either, condition) if condition else None)
+    if condition and len(passing) == 1 and passing[0] is not None:
+        run.guards = (*run.guards, passing[0])  # to the end of this block
+    return passes
 
 
 def _return(run: Run, node: ast.Return, frame: Frame) -> bool:
     value = NONE if node.value is None else run.evaluate(node.value, frame)
+    for condition in run.guards[frame.guards :]:
+        value = tuple(only_if(condition, atom) if isinstance(atom, str | Text) else atom for atom in value)
     frame.returned = join(frame.returned, value)
     _leave(run, frame)
     if frame.early or frame.trying:

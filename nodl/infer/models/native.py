@@ -17,13 +17,14 @@ from nodl.infer.interpreter.elements import (
 from nodl.infer.interpreter.formatting import joined, str_format, text_value
 from nodl.infer.interpreter.run import Call, Run
 from nodl.infer.models.stdlib import call_each, store_pairs
-from nodl.infer.text import MAX_LENGTH, Text, TextAtom, edited, input_of, with_edit
+from nodl.infer.text import MAX_LENGTH, Text, TextAtom, constant_text, edited, input_of, make_text, with_edit
 from nodl.infer.values import (
     ABSENT,
     ANY,
     BOOLEAN,
     BOTTOM,
     ITEMS,
+    LAZY,
     NONE,
     OTHER,
     OTHER_KEYS,
@@ -86,6 +87,13 @@ def _text_method(run: Run, text: TextAtom, name: str, call: Call) -> Value:
         return _constant_method(run, text, name, arguments, call)
     if name in ("startswith", "endswith", "isdigit", "isalpha"):
         return BOOLEAN
+    known = constant_text(text)
+    if isinstance(known, str):  # beside the conditions under which it is meant
+        conditions = text.pieces[: len(text.pieces) - bool(known)]
+        made = _constant_method(run, known, name, arguments, call)
+        return tuple(
+            make_text((*conditions, each)) if isinstance(each, str) and each else each for each in made
+        )
     divided = input_of(text)
     if name == "split" and divided is not None and all(isinstance(each, str) for each in arguments):
         part = with_edit(divided, "split", tuple(str(each) for each in arguments))
@@ -170,6 +178,7 @@ def _get(run: Run, owner: Dictionary, call: Call) -> Value:
     picked = chosen_by_parameter(owner, key, call.args.at(1, "default"))
     if picked is not None:
         return picked
+    key = tuple(map(constant_text, key))
     found: Value = BOTTOM
     missing = False
     for atom in key:
@@ -194,11 +203,11 @@ def _pairs(run: Run, owner: Dictionary, call: Call) -> Value:
     keys, values = keys_of(owner), values_of(owner)
     if keys.exact is not None and values.exact is not None:
         pairs = tuple(run.tuple_of((key, value)) for key, value in zip(keys.exact, values.exact, strict=True))
-        return run.sequence(call.node, "list", Items(pairs))
+        return run.sequence(call.node, LAZY, Items(pairs))
     key, value = keys.any_element() or ANY, values.any_element() or ANY
     if len(owner.cells.get(OTHER_KEYS, BOTTOM)) > 1 and len(value) > 1:
         key = ANY  # which of them goes with which value was not kept
-    return run.sequence(call.node, "list", Items(None, run.tuple_of((key, value))))
+    return run.sequence(call.node, LAZY, Items(None, run.tuple_of((key, value))))
 
 
 def _update(run: Run, owner: Dictionary, call: Call) -> Value:
@@ -237,8 +246,8 @@ DictionaryMethod = Callable[[Run, Dictionary, Call], Value]
 _DICTIONARY: dict[str, DictionaryMethod] = {
     "get": _get,
     "setdefault": _setdefault,
-    "keys": lambda run, owner, call: run.sequence(call.node, "list", keys_of(owner)),
-    "values": lambda run, owner, call: run.sequence(call.node, "list", values_of(owner)),
+    "keys": lambda run, owner, call: run.sequence(call.node, LAZY, keys_of(owner)),
+    "values": lambda run, owner, call: run.sequence(call.node, LAZY, values_of(owner)),
     "items": _pairs,
     "update": _update,
     "pop": _pop_item,

@@ -27,7 +27,7 @@ from nodl.infer.models.signatures import (
     Helper,
     library_node,
 )
-from nodl.infer.text import NodePart, Text, concatenate, make_text
+from nodl.infer.text import NodePart, Text, concatenate, constant_text, make_text, pieces_of
 from nodl.infer.values import (
     ANY,
     BOTTOM,
@@ -64,10 +64,12 @@ def initialise_node(run: Run, instance: Instance, path: str, call: Call) -> None
     record.source = call.source
     library = library_node(path)
     default: Value = (library.name,) if library else unknown("a node without a name")
-    record.names = join(record.names, call.args.at(0, "node_name") or default)
+    names = call.args.at(0, "node_name") or default
+    record.names = join(record.names, tuple(map(constant_text, names)))
     for fixed in library.endpoints if library else ():
-        record.add_endpoint(fixed.kind, fixed.name, fixed.type, call.source)
-    record.namespaces = join(record.namespaces, call.args.at(1 if library else -1, "namespace") or NONE)
+        add_endpoint(run, record, fixed.kind, fixed.name, fixed.type, call)
+    namespaces = call.args.at(1 if library else -1, "namespace") or NONE
+    record.namespaces = join(record.namespaces, tuple(map(constant_text, namespaces)))
     record.lifecycle = record.lifecycle or is_lifecycle(path)
     local = call.args.at(-1, "cli_args")
     record.arguments = join(record.arguments, strings_in(run, local, call) if local else BOTTOM)
@@ -82,7 +84,7 @@ def initialise_node(run: Run, instance: Instance, path: str, call: Call) -> None
         assign_parameters(run, record, overrides, call)
     if truth(call.args.at(-1, "enable_logger_service") or (False,)) is not False:
         for service, service_type in LOGGER_SERVICES.items():
-            record.add_endpoint(EndpointKind.SERVICE_SERVER, f"~/{service}", service_type, call.source)
+            add_endpoint(run, record, EndpointKind.SERVICE_SERVER, f"~/{service}", service_type, call)
 
 
 def strings_in(run: Run, value: Value, call: Call) -> Value:
@@ -211,9 +213,26 @@ def add_endpoints(run: Run, made: EndpointCall, records: list[NodeRecord], call:
     for record in records:
         for name in names_of(names):
             for interface_type in kinds:
-                record.add_endpoint(made.kind, name, interface_type, call.source, qos)
+                add_endpoint(run, record, made.kind, name, interface_type, call, qos)
     for callback in made.callbacks:
         register(run, callback, call)
+
+
+def add_endpoint(
+    run: Run,
+    record: NodeRecord,
+    kind: EndpointKind,
+    name: object,
+    type_name: str,
+    call: Call,
+    qos: QosPolicies = (),
+) -> None:
+    """Add an endpoint to the node, under the conditions on the node's parameters that hold here."""
+    conditions = [guard.piece for guard in run.guards if guard.asked.owner is record]
+    if conditions and isinstance(name, str | Text):
+        pieces = pieces_of(name)
+        name = make_text((*(each for each in conditions if each not in pieces), *(pieces if name else ())))
+    record.add_endpoint(kind, name, type_name, call.source, qos)
 
 
 def register(run: Run, callback: CallbackArgument, call: Call, at_any_time: bool = False) -> None:
@@ -261,7 +280,7 @@ def _helper(run: Run, helper: Helper, call: Call) -> None:
                 if switch is not None and truth(switch) is True:
                     continue
             for name in _fixed_names(fixed, call):
-                record.add_endpoint(fixed.kind, name, fixed.type, call.source)
+                add_endpoint(run, record, fixed.kind, name, fixed.type, call)
 
 
 def _fixed_names(fixed: FixedEndpoint, call: Call) -> Value:
@@ -304,14 +323,14 @@ def _wait_until_active(run: Run, record: NodeRecord, call: Call) -> Value:
     for index, (keyword, default) in enumerate((("navigator", "bt_navigator"), ("localizer", "amcl"))):
         for name in as_texts(call.args.at(index, keyword) or (default,)):
             service = concatenate(name, "/get_state")
-            record.add_endpoint(CLIENT, service, "lifecycle_msgs/srv/GetState", call.source)
+            add_endpoint(run, record, CLIENT, service, "lifecycle_msgs/srv/GetState", call)
     return NONE
 
 
 def _manage_lifecycle(run: Run, record: NodeRecord, call: Call) -> Value:
     """Model ``BasicNavigator``, which calls every lifecycle manager that it finds while it runs."""
     name = unknown("the services of lifecycle managers that are found at run time")[0]
-    record.add_endpoint(CLIENT, name, "nav2_msgs/srv/ManageLifecycleNodes", call.source)
+    add_endpoint(run, record, CLIENT, name, "nav2_msgs/srv/ManageLifecycleNodes", call)
     return NONE
 
 
@@ -388,7 +407,7 @@ def _parameter_client(run: Run, path: str, call: Call) -> Value:
     for record in records_of(run, call.args.at(0, "node"), call):
         for service, interface in PARAMETER_SERVICES.items():
             for text in text_value(concatenate(name, f"/{service}") for name in as_texts(remote)):
-                record.add_endpoint(CLIENT, text, interface, call.source)
+                add_endpoint(run, record, CLIENT, text, interface, call)
     return _object_of(run, path, call)
 
 

@@ -19,6 +19,7 @@ from nodl.infer.values import (
     BOOLEAN,
     BOTTOM,
     COMMAND_LINE,
+    LAZY,
     NONE,
     OF_A_NODE,
     OTHER,
@@ -104,13 +105,13 @@ def _enumerate(run: Run, call: Call) -> Value:
     start = sole(call.args.at(1, "start") or (0,))
     if items.exact is not None and type(start) is int:
         pairs = tuple(run.tuple_of(((start + index,), element)) for index, element in enumerate(items.exact))
-        return run.sequence(call.node, "list", Items(pairs))
+        return run.sequence(call.node, LAZY, Items(pairs))
     pair = run.tuple_of((unknown("a number of a loop"), items.any_element() or ANY))
-    return run.sequence(call.node, "list", Items(None, pair))
+    return run.sequence(call.node, LAZY, Items(None, pair))
 
 
-def _some(run: Run, call: Call) -> Value:
-    """Model ``sorted``, ``reversed``, ``set``: a list of any of the elements, in any order."""
+def _sorted(run: Run, call: Call) -> Value:
+    """Return a list of any of the elements, in any order."""
     element = _items(run, call).any_element()
     call_each(run, call.args.keywords.get("key", NONE), element, call)
     return run.sequence(call.node, "list", Items(None, element))
@@ -130,14 +131,14 @@ def _map(run: Run, call: Call) -> Value:
     given = [_items(run, call, index).any_element() or ANY for index in range(1, len(call.args.positional))]
     arguments = Arguments(given, more=call.args.more)
     element = run.call(call.args.at(0) or ANY, arguments, call.node, call.frame)
-    return run.sequence(call.node, "list", Items(None, element))
+    return run.sequence(call.node, LAZY, Items(None, element))
 
 
 def _filter(run: Run, call: Call) -> Value:
     """Return any of the elements; the function is called for each."""
     element = _items(run, call, 1).any_element()
     call_each(run, call.args.at(0) or NONE, element, call)
-    return run.sequence(call.node, "list", Items(None, element))
+    return run.sequence(call.node, LAZY, Items(None, element))
 
 
 def _extreme(run: Run, call: Call) -> Value:
@@ -239,6 +240,32 @@ def _has(run: Run, owner: object, name: object) -> bool:
     return isinstance(cls, ClassValue) and any(base.cells.get(name) for base in program_classes(cls))
 
 
+_CLASSES: dict[type, str] = {str: "str", bool: "bool", int: "int", float: "float", Dictionary: "dict"}
+
+
+def _isinstance(run: Run, call: Call) -> Value:
+    """Tell texts, numbers and containers apart; of all others nobody knows."""
+    given, classes = call.args.at(0) or ANY, call.args.at(1) or ANY
+    asked = {
+        atom.path if isinstance(atom, External) else "" for cls in classes for atom in _alternatives(cls)
+    }
+    if not all(
+        path in {f"builtins.{name}" for name in (*_CLASSES.values(), "list", "tuple", "set")}
+        for path in asked
+    ):
+        return BOOLEAN
+    kinds = {atom.kind if isinstance(atom, Sequence) else _CLASSES.get(type(atom), "") for atom in given}
+    if not kinds <= {*_CLASSES.values(), "list", "tuple", "set"}:
+        return BOOLEAN
+    outcomes = {f"builtins.{kind}" in asked or (kind == "bool" and "builtins.int" in asked) for kind in kinds}
+    return tuple(outcomes)
+
+
+def _alternatives(cls: object) -> Value:
+    exact = cls.items.exact if isinstance(cls, Sequence) else None
+    return (cls,) if exact is None else tuple(atom for element in exact for atom in element)
+
+
 def _type(run: Run, call: Call) -> Value:
     """Return the class of an object, else unknown; with three arguments, a class that is not followed."""
     if len(call.args.positional) == 3:
@@ -291,8 +318,11 @@ _BUILT_IN: dict[str, Callable[[Run, Call], Value]] = {
         "list": _made("list"),
         "tuple": _made("tuple"),
         **dict.fromkeys(("set", "frozenset"), _set),
-        "iter": lambda run, call: call.args.at(0) or ANY,  # walking along it gives the same
-        **dict.fromkeys(("sorted", "reversed"), _some),
+        "iter": _made(LAZY),
+        "reversed": lambda run, call: run.sequence(
+            call.node, LAZY, Items(None, _items(run, call).any_element())
+        ),
+        "sorted": _sorted,
         "enumerate": _enumerate,
         "map": _map,
         "filter": _filter,
@@ -303,7 +333,8 @@ _BUILT_IN: dict[str, Callable[[Run, Call], Value]] = {
         "setattr": _setattr,
         "hasattr": _hasattr,
         "type": _type,
-        **dict.fromkeys(("any", "all", "callable", "isinstance"), lambda run, call: BOOLEAN),
+        **dict.fromkeys(("any", "all", "callable"), lambda run, call: BOOLEAN),
+        "isinstance": _isinstance,
         **dict.fromkeys(("eval", "exec", "compile"), _dynamic_code),
         "__import__": import_dynamic,
         **dict.fromkeys(("vars", "globals", "locals"), _variables),
@@ -442,7 +473,7 @@ FUNCTIONS: dict[str, Model] = {
     "collections.deque": _BUILT_IN["builtins.list"],
     **dict.fromkeys(("copy.copy", "copy.deepcopy"), _copy),
     "random.choice": _BUILT_IN["builtins.next"],
-    "importlib.import_module": import_dynamic,
+    **dict.fromkeys(("importlib.import_module", "importlib.reload"), import_dynamic),
     **dict.fromkeys(
         ("yaml.safe_load", "yaml.load", "json.load", "json.loads"), lambda run, call: unknown(CONTENTS)
     ),
