@@ -75,10 +75,13 @@ def expected_in(documents: Iterable[Mapping[str, Any]], domain: int) -> Expected
         for node in _described(document["nodes"], started, _open(plans))
         if node.enclave in enclaves or node.enclave not in elsewhere
     }
+    known = {(node.program, node.enclave) for node in nodes.values()}
     for fqn, count in Counter(_fqn(each) for each in started if each["fqn"]).items():
         starter = next(each for each in started if each["fqn"] and _fqn(each) == fqn)
-        if fqn not in nodes and UNSPECIFIED_NODE_NAME not in fqn:
-            program = f"{starter['package']}/{starter.get('executable') or starter.get('plugin')}"
+        program = f"{starter['package']}/{starter.get('executable') or starter.get('plugin')}"
+        # Nodes of a known program have the names that rcl gives them, by the user's own ROS arguments, too.
+        described = (program, _enclave(starter)) in known
+        if fqn not in nodes and not described and UNSPECIFIED_NODE_NAME not in fqn:
             nodes[fqn] = ExpectedNode(
                 fqn, _enclave(starter), program, described=False, always=starter["on_event"] is None
             )

@@ -222,17 +222,28 @@ class _Collector:
 
     def _introspection(self, operation: Operation, name: str, reason: Reason) -> None:
         """Grant servers and clients to publish requests and responses (rcl service_event_publisher.c)."""
-        services = [name] if operation in _SERVICES else [f"{name}/_action/{p}" for p in ACTION_SERVICES]
+        types = {name: reason.type}
+        if operation not in _SERVICES:
+            send, cancel, result = (f"{name}/_action/{part}" for part in ACTION_SERVICES)
+            own = reason.type
+            types = {
+                send: own and f"{own}_SendGoal",
+                cancel: "action_msgs/srv/CancelGoal",
+                result: own and f"{own}_GetResult",
+            }
         note = "the service's calls are published (introspection)"
-        for service in services:
-            event = Permission(Operation.PUBLISH, f"{service}/_service_event", reason._replace(note=note))
-            self._result.permissions.append(event)
+        for service, service_type in types.items():
+            published = reason._replace(note=note, type=_event_of(service_type))
+            self._result.permissions.append(
+                Permission(Operation.PUBLISH, f"{service}/_service_event", published)
+            )
 
     def _service_events(self) -> None:
         """Add the topic below the name of each introspected service (rcl service_event_publisher.c)."""
         for operation, name, reason in tuple(self._result.permissions):
             if operation in _SERVICES:
-                events = reason._replace(note="service introspection, by --also service-events")
+                note = "service introspection, by --also service-events"
+                events = reason._replace(note=note, type=_event_of(reason.type))
                 event = Permission(Operation.PUBLISH, f"{name}/_service_event", events)
                 self._result.permissions.append(event)
 
@@ -370,3 +381,8 @@ def _listens_to_tf(interface: NodeInterface) -> bool:
         endpoint.kind is EndpointKind.SUBSCRIPTION and endpoint.name.parts == ("/tf",)
         for endpoint in interface.endpoints
     )
+
+
+def _event_of(service_type: str) -> str:
+    """Return the type of what service introspection publishes (rosidl; ``Foo.srv`` has ``Foo_Event``)."""
+    return f"{service_type}_Event" if service_type else ""

@@ -231,10 +231,12 @@ def test_interfaces_that_a_manifest_repeats_are_not_doubled(node: NodeMaker) -> 
 
 
 INTROSPECTED = {
-    "serve": {"publish /a/_service_event"},
-    "call": {"publish /a/_service_event"},
+    "serve": {"publish /a/_service_event": "p/srv/T_Event"},
+    "call": {"publish /a/_service_event": "p/srv/T_Event"},
     "action": {
-        f"publish /a/_action/{part}/_service_event" for part in ("send_goal", "cancel_goal", "get_result")
+        "publish /a/_action/send_goal/_service_event": "p/action/T_SendGoal_Event",
+        "publish /a/_action/cancel_goal/_service_event": "action_msgs/srv/CancelGoal_Event",
+        "publish /a/_action/get_result/_service_event": "p/action/T_GetResult_Event",
     },
 }
 
@@ -242,11 +244,13 @@ INTROSPECTED = {
 @pytest.mark.parametrize("kind", INTROSPECTED)
 def test_what_is_introspected_publishes_its_calls(kind: str, node: NodeMaker) -> None:
     (found,) = node(f"{kind} a").interface.endpoints
+    found = found._replace(type=f"p/{'action' if kind == 'action' else 'srv'}/T")
     silent, told = (derive(node(found._replace(introspected=each))) for each in (False, True))
-    assert declared(told) - declared(silent) == INTROSPECTED[kind]
+    assert declared(told) - declared(silent) == set(INTROSPECTED[kind])
     for rule, (reason, *_) in told.reasons["/"].items():
         if rule.expression.endswith("/_service_event"):
             assert reason.note == "the service's calls are published (introspection)"
+            assert reason.type == INTROSPECTED[kind][f"publish {rule.expression}"]
 
 
 def test_a_name_as_long_as_dds_takes_is_granted_and_a_longer_one_is_not(node: NodeMaker) -> None:

@@ -184,8 +184,8 @@ def graph_of(plan: LaunchPlan) -> Graph:
 
 
 @pytest.fixture
-def live_graph(learnt: Learnt, tmp_path: Path, domain_id: int) -> Iterator[Graph]:
-    """Of another launch file than the one that was learnt, while it runs."""
+def other_launch(learnt: Learnt, tmp_path: Path, domain_id: int) -> Iterator[dict[str, str]]:
+    """Another launch file than the one that was learnt, while it runs; its environment."""
     variables = environment(learnt.release, tmp_path, ROS_DOMAIN_ID=str(domain_id))
     command = [sys.executable, "-m", "enclave_launch", "--prefix", str(WORKSPACE)]
     launch = subprocess.Popen(
@@ -196,15 +196,20 @@ def live_graph(learnt: Learnt, tmp_path: Path, domain_id: int) -> Iterator[Graph
         stderr=subprocess.DEVNULL,
     )
     try:
-        look = [str(rclpy_python(learnt.release)), str(Path(__file__).parent / "live_graph.py"), "12"]
-        seen = subprocess.run(look, env=variables, capture_output=True, text=True, check=True, timeout=180)
-        yield {
-            node: {kind: {row[0] for row in rows} for kind, rows in kinds.items() if rows}
-            for node, kinds in json.loads(seen.stdout.splitlines()[-1]).items()
-        }
+        yield variables
     finally:
         launch.send_signal(signal.SIGINT)
         launch.wait(30)
+
+
+@pytest.fixture
+def live_graph(learnt: Learnt, other_launch: dict[str, str]) -> Graph:
+    look = [str(rclpy_python(learnt.release)), str(Path(__file__).parent / "live_graph.py"), "12"]
+    seen = subprocess.run(look, env=other_launch, capture_output=True, text=True, check=True, timeout=180)
+    return {
+        node: {kind: {row[0] for row in rows} for kind, rows in kinds.items() if rows}
+        for node, kinds in json.loads(seen.stdout.splitlines()[-1]).items()
+    }
 
 
 def test_after_one_run_another_launch_has_all_it_needs_and_what_is_beyond_is_told(
@@ -236,6 +241,17 @@ def test_with_marker_values_the_plan_of_another_launch_is_its_live_graph(
     plan = resolved("other.launch.xml", learnt.release, folder)
     assert graph_of(plan) == live_graph
     assert all(each.code is not Code.RECORD_UNDECIDED for each in plan.warnings)
+
+
+@pytest.mark.dds
+def test_another_launch_runs_as_planned(learnt: Learnt, other_launch: dict[str, str]) -> None:
+    """With namespaces of the user's own ROS arguments, and with the events of an introspected service."""
+    command = [sys.executable, "-m", "enclave_launch.verb.secure_plan", "drift", "--prefix", str(WORKSPACE)]
+    ran = subprocess.run(
+        [*command, "--nodl", str(learnt.folder), "--for", "60s", "rclpy_nodes", "other.launch.xml"],
+        env=other_launch, cwd=ROOT, capture_output=True, text=True, timeout=180,
+    )  # fmt: skip
+    assert (ran.returncode, ran.stdout.partition(";")[0]) == (0, "as planned"), ran.stdout
 
 
 LAZY = """import rclpy
