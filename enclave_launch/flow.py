@@ -128,7 +128,6 @@ def launch_source(
 
 
 def _missing_programs(evaluation: Evaluation) -> list[Diagnostic]:
-    """Report programs that ``run`` would refuse."""
     placeholders = f"{MISSING_PREFIX}/"
     real = [item for item in evaluation.processes if not "".join(item.cmd[:1]).startswith(placeholders)]
     return [

@@ -74,7 +74,6 @@ def _live(launch: Launch, settings: RunSettings) -> partial[LiveLaunch]:
 
 
 def _expiry_watch(launch: Launch) -> AbstractContextManager[None]:
-    """Warn while a provisioned launch runs that what its processes use is about to expire."""
     if isinstance(launch, _UNSECURED):
         return nullcontext()
 
@@ -123,7 +122,6 @@ def _companion(launch: Launch, settings: RunSettings) -> LaunchCompanion | None:
 
 
 def _recording(launch: Launch, settings: RunSettings) -> LaunchCompanion | None:
-    """Return what records the launch; without a request only where that is possible and installed."""
     secured = not isinstance(launch, _UNSECURED)
     if settings.record is False or (settings.record is None and not secured):
         return None

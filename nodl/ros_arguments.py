@@ -1,63 +1,109 @@
-"""ROS arguments of a command line or given in code (``rclpy.init(args=...)``), as rcl reads them. Performs no I/O."""
+"""ROS arguments of a command line, or given in code, as rcl reads them (ros2/rcl ``arguments.c``). Performs no I/O.
+
+They stand between ``--ros-args`` and ``--`` (or the end); elsewhere ``a:=b`` is a remap rule, deprecated.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
+from enclave_common.shell_words import split_words
 from nodl.remap import InvalidRemapRuleError, parse_rule
 
 REMAP = ("-r", "--remap")
 PARAMETER = ("-p", "--param")
 _FILE = "--params-file"
+_ENCLAVE = ("-e", "--enclave")
 _WITH_VALUE = frozenset(
-    {*REMAP, *PARAMETER, _FILE, "-e", "--enclave", "--log-level", "--log-config-file", "--log-file-name"}
+    {*REMAP, *PARAMETER, _FILE, *_ENCLAVE, "--log-level", "--log-config-file", "--log-file-name"}
 )
 
 
-class GivenParameter(NamedTuple):
-    """``-p [NODE:]NAME:=VALUE``; ``node`` is empty where every node gets it."""
+class ParameterFileArgument(NamedTuple):
+    """``--params-file PATH``."""
 
-    node: str
+    path: str
+
+
+class ParameterRule(NamedTuple):
+    """``-p [NODE:]NAME:=VALUE``; ``value`` is YAML."""
+
     name: str
     value: str
+    node: str | None = None
 
 
-class WrittenRosArguments(NamedTuple):
-    """``rules`` as written; ``files``: parameter files."""
+class RosArguments(NamedTuple):
+    """In command-line order. Of remap rules the first match wins, of parameters and enclaves the last."""
 
-    rules: tuple[str, ...] = ()
-    parameters: tuple[GivenParameter, ...] = ()
-    files: tuple[str, ...] = ()
-
-
-def ros_arguments(words: Iterable[str]) -> WrittenRosArguments:
-    """Read the flags among ``words``. What rcl would refuse is left out: the program ends there."""
-    pairs = [(REMAP[0], word) if not flag and _is_rule(word) else (flag, word) for flag, word in flags(words)]
-    parameters = (_parameter(value) for flag, value in pairs if flag in PARAMETER)
-    return WrittenRosArguments(
-        tuple(value for flag, value in pairs if flag in REMAP),
-        tuple(parameter for parameter in parameters if parameter is not None),
-        tuple(value for flag, value in pairs if flag == _FILE),
-    )
+    remaps: tuple[str, ...] = ()
+    parameters: tuple[ParameterFileArgument | ParameterRule, ...] = ()
+    enclave: str | None = None
 
 
-def flags(words: Iterable[str]) -> Iterator[tuple[str, str]]:
-    """Yield each flag that takes a value, with it; a word that is not among ROS arguments with no flag."""
-    reading = False
-    left = iter(words)
-    for word in left:
+def parse_ros_arguments(arguments: Iterable[str]) -> RosArguments:
+    """Read the words after the executable. What rcl would refuse is skipped: the process says so itself."""
+    remaps: list[str] = []
+    parameters: list[ParameterFileArgument | ParameterRule] = []
+    enclave: str | None = None
+    for _, flag, value in _with_bare_rules(arguments):
+        if flag in REMAP:
+            remaps.append(value)
+        elif flag == _FILE:
+            parameters.append(ParameterFileArgument(value))
+        elif flag in _ENCLAVE:
+            enclave = value
+        elif flag in PARAMETER and ":=" in value:
+            parameters.append(_parameter_rule(value))
+    return RosArguments(tuple(remaps), tuple(parameters), enclave)
+
+
+def remap_arguments(arguments: Sequence[str]) -> dict[int, str]:
+    """Return the remap rules of ``parse_ros_arguments``, in their order, each by the index of its word."""
+    return {index: value for index, flag, value in _with_bare_rules(arguments) if flag in REMAP}
+
+
+def words_after_program(cmd: Sequence[str], prefix_length: int, *, shell: bool) -> list[str]:
+    """Return the words that the program itself gets; a shell splits its command line again."""
+    return (shell_words(cmd) if shell else list(cmd))[prefix_length + 1 :]
+
+
+def shell_words(cmd: Sequence[str]) -> list[str]:
+    """Split a command that goes through a shell. What the shell would refuse stays as it is."""
+    try:
+        return split_words(" ".join(cmd))
+    except ValueError:
+        return list(cmd)
+
+
+def flags(words: Iterable[str]) -> Iterator[tuple[int, str, str]]:
+    """Yield the index of a value, its flag and the value; a word that is not among ROS arguments has no flag."""
+    inside = False
+    left = enumerate(words)
+    for index, word in left:
         if word == "--ros-args":
-            reading = True
-        elif not reading:
-            yield "", word
+            inside = True
+        elif not inside:
+            yield index, "", word
         elif word == "--":
-            reading = False
+            inside = False
         elif word in _WITH_VALUE:
-            yield word, next(left, "")
+            value = next(left, None)
+            if value is not None:
+                yield value[0], word, value[1]
 
 
-def _is_rule(word: str) -> bool:
+def _with_bare_rules(words: Iterable[str]) -> Iterator[tuple[int, str, str]]:
+    for index, flag, word in flags(words):
+        if flag or is_bare_rule(word):
+            yield index, flag or REMAP[0], word
+
+
+def is_bare_rule(word: str) -> bool:
+    """Return True if rcl takes ``word`` outside of its arguments as a remap rule."""
+    if ":=" not in word:
+        return False
     try:
         parse_rule(word)
     except InvalidRemapRuleError:
@@ -65,7 +111,7 @@ def _is_rule(word: str) -> bool:
     return True
 
 
-def _parameter(text: str) -> GivenParameter | None:
-    left, separator, value = text.partition(":=")
-    node, _, name = left.rpartition(":")
-    return GivenParameter(node, name, value) if separator and name else None
+def _parameter_rule(text: str) -> ParameterRule:
+    target, _, value = text.partition(":=")
+    node, colon, name = target.rpartition(":")
+    return ParameterRule(name, value, node if colon else None)

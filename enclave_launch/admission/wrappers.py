@@ -12,7 +12,7 @@ from collections.abc import Collection, Iterator, Sequence
 from typing import NamedTuple
 
 from enclave_launch.process import ResolvedProcess
-from enclave_launch.ros_rules.ros_arguments import shell_words
+from nodl.ros_arguments import shell_words
 
 
 class Keeper(NamedTuple):
@@ -145,7 +145,6 @@ def _of_prefix(words: Sequence[str], *, program_follows: bool) -> Iterator[Obsta
 
 
 def _own_words(keeper: Keeper, words: Sequence[str]) -> tuple[list[str], list[str]]:
-    """Split words into those that a wrapper takes itself and those of what it starts."""
     left, at = keeper.words, 0
     while at < len(words):
         word = words[at]
@@ -163,7 +162,6 @@ _LONGEST = 50_000  # characters of a shell's command line; the reader of shlex i
 
 
 def _shell_operator(text: str) -> str | None:
-    """Return the first part of ``text`` that makes it more than one program with its words."""
     if len(text) > _LONGEST:
         return f"more than {_LONGEST} characters"
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from enclave_launch.deployment.deployment import File
 from enclave_launch.errors import UsageError
 from keystore.disk.units import MARK
+from keystore.disk.versions import write_new
 
 _HEAD = 400  # bytes in which the mark stands
 
@@ -43,10 +44,7 @@ def _write_aside(path: Path, file: File) -> Path:
     path.parent.mkdir(parents=True, exist_ok=True)
     aside = path.with_name(f".{path.name}.{os.getpid()}.partial")
     aside.unlink(missing_ok=True)
-    descriptor = os.open(aside, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW, file.mode)
-    with os.fdopen(descriptor, "w", encoding="utf-8") as stream:
-        os.fchmod(descriptor, file.mode)
-        stream.write(file.text)
+    write_new(aside, file.text.encode(), file.mode)
     return aside
 
 

@@ -10,9 +10,9 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from enclave_launch.process import UNSPECIFIED_NODE_NAME, UNSPECIFIED_NODE_NAMESPACE, Respawn
-from enclave_launch.ros_rules.ros_arguments import parse_ros_arguments, words_after_program
 from enclave_launch.security_environment import ENABLE, KEYSTORE, NO_KEYSTORE, OVERRIDE, STRATEGY
 from keystore.formats.hosts import Needs
+from nodl.ros_arguments import parse_ros_arguments, words_after_program
 
 LONGEST_NAME = 40
 """With a suffix it stays a DNS label (63 characters, RFC 1123), which Kubernetes asks for."""

@@ -272,7 +272,6 @@ def _hardening_of(needs: Needs) -> Iterator[str]:
 
 
 def _expiry(deployment: Deployment, keystore: str, setup: tuple[str, ...]) -> str:
-    """Return the service that fails, and so is listed by ``systemctl --failed``, when something expires soon."""
     command = ["secure-keystore", "status", keystore, "--within", _EXPIRES_SOON]
     script = " && ".join((*(f". {shlex.quote(file)}" for file in setup), f"exec {shlex.join(command)}"))
     lines = (

@@ -69,8 +69,6 @@ def public_module(name: str) -> ModuleType:
 
 
 class _Loader(Loader):
-    """Gives the module that the table describes, the same object each time."""
-
     def create_module(self, spec: ModuleSpec) -> ModuleType:
         return public_module(spec.name)
 

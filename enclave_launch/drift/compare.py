@@ -166,7 +166,6 @@ class _Comparison:
             yield self._about(Kind.NOT_AUTHENTICATED, process, text, enclave=enclave, remedy=remedy)
 
     def _enclave(self, process: GraphProcess) -> str:
-        """Return the enclave that is proved; empty if nothing proves one."""
         if self._security is None or not process.participant.claims_security:
             return ""
         return self._security.enclaves.get(process.participant.subject_hash, "")
@@ -335,7 +334,6 @@ class _End(NamedTuple):
 
 
 def _between(topic: str, writer: _End, reader: _End) -> Iterator[DriftFinding]:
-    """Yield why data does not go from one to the other, though both are on one topic."""
     types = ros_type(writer.endpoint.type), ros_type(reader.endpoint.type)
     subject = f"{writer.owner} -> {reader.owner}"
     who = f"{writer.who}; {reader.who}"

@@ -105,7 +105,6 @@ def _enclave(started: Mapping[str, Any]) -> str:
 
 
 def _open(plans: Iterable[Mapping[str, Any]]) -> frozenset[str]:
-    """Return the nodes of which the plan says that it does not know a name."""
     unknown = Code.INTERFACE_UNKNOWN.value
     diagnostics = (each for plan in plans for each in plan["diagnostics"])
     return frozenset(each["subject"] for each in diagnostics if each["code"] == unknown)

@@ -189,7 +189,6 @@ class Explorer:
         self._host.unforeseeable(Unforeseeable(f"{what} would lead to: {error_text(error)}", place))
 
     def _report_unreached(self) -> None:
-        """Report handlers with entities that no event of this dry run could reach."""
         for handler in self._context._event_handlers.all():
             if handler.internal or id(handler) in self._fired or not isinstance(handler, EventHandler):
                 continue
@@ -225,7 +224,6 @@ def _ends_with(handler: Handler) -> str | None:
 
 
 def _is_ours(handler: Handler) -> bool:
-    """Return True if the callback is part of this package, registered by one of its actions."""
     callback = getattr(handler, "callback", None)
     return getattr(callback, "__module__", "").startswith("enclave_launch.")
 

@@ -16,8 +16,8 @@ from enclave_launch.interfaces.situation import parameters_of_node
 from enclave_launch.policy.program_inputs import own_words
 from enclave_launch.process import Evaluation, ResolvedProcess
 from enclave_launch.ros_rules.rcl_parameters import resolve_parameters
-from enclave_launch.ros_rules.ros_arguments import ParameterFileArgument, parse_ros_arguments
 from nodl.dependence import Launched, Spawned
+from nodl.ros_arguments import ParameterFileArgument, parse_ros_arguments
 
 _MANAGER = ("-c", "--controller-manager")
 _FILES = ("-p", "--param-file")

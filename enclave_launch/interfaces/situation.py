@@ -13,10 +13,10 @@ from enclave_launch.policy.running_node import RunningNode, node_of_component, n
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
 from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.ros_rules.rcl_parameters import parameters_of_text, resolve_parameters
-from enclave_launch.ros_rules.ros_arguments import parse_ros_arguments
 from nodl.dependence import Situation
 from nodl.node_interface import NodeInterface
 from nodl.remap import NodeNames
+from nodl.ros_arguments import parse_ros_arguments
 from nodl.source_ref import SourceRef
 
 

@@ -239,7 +239,6 @@ class _Collector:
             )
 
     def _service_events(self) -> None:
-        """Add the topic below the name of each introspected service (rcl service_event_publisher.c)."""
         for operation, name, reason in tuple(self._result.permissions):
             if operation in _SERVICES:
                 note = "service introspection, by --also service-events"

@@ -13,8 +13,8 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from enclave_launch.process import ResolvedProcess
-from enclave_launch.ros_rules.ros_arguments import is_bare_rule
 from nodl.name_template import NameTemplate, ParameterPart, Part, UnknownPart
+from nodl.ros_arguments import flags, is_bare_rule
 
 
 class ProgramInputs(NamedTuple):
@@ -84,13 +84,5 @@ def own_words(process: ResolvedProcess) -> Sequence[str]:
     """Return the words after the executable that are no ROS arguments."""
     program = _file_name(process.executable)
     start = next((i for i, word in enumerate(process.cmd) if _file_name(word) == program), 0)
-    words: list[str] = []
-    inside = False
-    for word in process.cmd[start + 1 :]:
-        if word == "--ros-args":
-            inside = True
-        elif inside:
-            inside = word != "--"
-        elif not is_bare_rule(word):
-            words.append(word)
-    return words
+    given = flags(process.cmd[start + 1 :])
+    return [word for _, flag, word in given if not flag and not is_bare_rule(word)]

@@ -17,11 +17,11 @@ from enclave_launch.errors import LaunchFileError
 from enclave_launch.policy.program_inputs import ProgramInputs, environment_inputs, program_inputs
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
 from enclave_launch.ros_rules.parameter_value import ParameterValue
-from enclave_launch.ros_rules.ros_arguments import parse_ros_arguments, remap_arguments
 from enclave_launch.source_location import SourceLocation
 from nodl.names import join
 from nodl.node_interface import RANDOM_ENDING, Gap, NodeInterface
 from nodl.remap import InvalidRemapRuleError, ParsedRule, RemapRules, parse_rule
+from nodl.ros_arguments import parse_ros_arguments, remap_arguments
 
 _UNDECIDED = "whether the node listens to what the launch gives it (use_global_arguments) is not known"
 

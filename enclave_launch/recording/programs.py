@@ -61,7 +61,6 @@ def _state(path: str) -> tuple[int, int]:
 
 @lru_cache(maxsize=1024)
 def _looked_at(path: str, state: tuple[int, int]) -> ProgramToRecord:
-    """Look at a program once, as launches start one many times; ``state`` changes with the file."""
     return look_at_program(path)
 
 

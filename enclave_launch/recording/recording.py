@@ -25,7 +25,6 @@ from enclave_launch.recording.listeners import EndpointEvents, Listener
 from enclave_launch.recording.markers import Marked, MarkerRun
 from enclave_launch.recording.programs import look_at_command
 from enclave_launch.recording.record_files import RecordFiles
-from enclave_launch.ros_rules.ros_arguments import parse_ros_arguments
 from enclave_launch.runtime.companion import LaunchControl
 from enclave_launch.runtime.process_tree import ProcessSpec
 from enclave_launch.runtime.run_events import LaunchOver, ProcessExited, ProcessStarted, RunEvent
@@ -39,6 +38,7 @@ from nodl.record.lines import (
     StartedProcess,
     line_text,
 )
+from nodl.ros_arguments import parse_ros_arguments
 
 INTERVAL = 0.1
 """Seconds between two looks at the record."""

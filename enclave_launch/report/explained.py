@@ -33,7 +33,6 @@ def explained(plan: LaunchPlan, subject: str) -> list[str]:
 
 
 def _descriptions(item: PlannedProcess | PlannedComponent, name: str | None) -> Iterator[str]:
-    """List the names that any description has, or ``name`` alone, with the descriptions that have them."""
     shown = sorted(
         {each for described in item.descriptions for each in described.names if name in (None, each[1])}
     )

@@ -22,8 +22,8 @@ from enclave_launch.process import (
 )
 from enclave_launch.ros_rules.namespaces import enclave_scope
 from enclave_launch.ros_rules.rcl_parameters import resolve_parameters
-from enclave_launch.ros_rules.ros_arguments import parse_ros_arguments, words_after_program
 from enclave_launch.source_location import SourceLocation
+from nodl.ros_arguments import parse_ros_arguments, words_after_program
 
 if TYPE_CHECKING:
     from enclave_launch.ros2.session import EnclaveSession
@@ -148,7 +148,6 @@ def _performed(variables: Any, context: Any) -> dict[str, str]:
 
 
 def _prefix(action: Any, context: Any, cmd: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the words that launch will put before the command, if its filter permits them."""
     description = action.process_description
     pattern = getattr(description, "_Executable__prefix_filter", None)  # upstream shows the prefix only
     if (

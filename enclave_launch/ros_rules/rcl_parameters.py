@@ -28,7 +28,7 @@ from enclave_launch.ros_rules.parameter_file import (
     value_of_text,
 )
 from enclave_launch.ros_rules.parameter_value import ParameterValue, Scalar, plain_scalar, type_slot
-from enclave_launch.ros_rules.ros_arguments import ParameterFileArgument, ParameterRule
+from nodl.ros_arguments import ParameterFileArgument, ParameterRule
 
 Section = Mapping[str, ParameterValue]
 Read = TypeVar("Read")

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TypeVar
 
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
-from enclave_launch.ros_rules.ros_arguments import parse_ros_arguments
+from nodl.ros_arguments import parse_ros_arguments
 
 Item = TypeVar("Item", ResolvedProcess, ResolvedComponent)
 _Facts = Mapping[str, object]

@@ -8,8 +8,8 @@ from typing import NamedTuple, Protocol
 
 from enclave_launch.errors import RuntimeFailure
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
-from enclave_launch.ros_rules.ros_arguments import parse_ros_arguments
 from enclave_launch.runtime.difference import compared, compared_component
+from nodl.ros_arguments import parse_ros_arguments
 
 
 class StartAdditions(NamedTuple):

@@ -145,7 +145,6 @@ class RosServices:
         return response is not None and bool(response.success)
 
     def _call(self, kind: Any, service: str, request: Any) -> Any:
-        """Call ``service`` and return its response, None if the launch ended first."""
         client = self._node.create_client(kind, service)
         try:
             if not self._wait(lambda: client.wait_for_service(timeout_sec=0.2), f"'{service}' service"):

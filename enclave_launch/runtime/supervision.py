@@ -34,7 +34,6 @@ def pause_after(short_lives: int) -> float:
 
 
 def _remedy(error: OSError) -> str:
-    """Return what to do if the system, not the program, prevents a start."""
     if error.errno in (EMFILE, ENFILE):
         return "; each process takes three descriptors of the launcher: raise its limit (ulimit -Hn)"
     return ""

@@ -45,13 +45,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line ``argv`` (default: the program's own); return the exit status."""
     with safe_output():
         parser = build_parser()
-        complete(parser, _offer)
+        complete(parser, offer_launches)
         line = read_command_line(parser, argv)
         return guarded("secure-launch", lambda: _main(line, parser), EnclaveLaunchError)
-
-
-def _offer(parser: argparse.ArgumentParser) -> None:
-    offer_launches(parser)
 
 
 def _main(line: CommandLine, parser: argparse.ArgumentParser) -> int:
@@ -77,7 +73,6 @@ def _main(line: CommandLine, parser: argparse.ArgumentParser) -> int:
 
 
 def _keystore(options: argparse.Namespace) -> str | None:
-    """Return the keystore that ``--secure`` uses, None without it; raises UsageError if it has none."""
     if not options.secure:
         return None
     if options.keystore is None:
@@ -132,7 +127,6 @@ def _plan_text(plan: LaunchPlan, options: argparse.Namespace, keystore: str | No
 
 
 def _policy_text(plan: LaunchPlan) -> str:
-    """Raises ``ManifestError`` when there is no enclave to write: SROS2's schema wants at least one."""
     known = tuple(enclave for enclave in plan.derived.policy.enclaves if enclave.profiles)
     if not known:
         nothing = "no enclave with known permissions: there is no policy to print"

@@ -110,7 +110,6 @@ def _launch(
 
 
 def _check_before_keys_are_made(plan: LaunchPlan, keystore: str) -> None:
-    """Check what ``run`` would refuse in any case, before the keystore is touched."""
     if plan.problems:
         return  # ``provision`` reports them
     check_programs(plan.evaluation.processes)

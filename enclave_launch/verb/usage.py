@@ -105,7 +105,6 @@ PERMISSIVE_NOTICE = (
 
 
 def _flags(actions: Iterable[argparse.Action], names: Collection[str]) -> str:
-    """List flags as a person writes them, in the order of the help text."""
     return ", ".join(
         next((flag for flag in action.option_strings if flag.startswith("--")), action.dest)
         for action in actions

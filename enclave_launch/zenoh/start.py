@@ -95,7 +95,6 @@ def _program(plan: LaunchPlan) -> str | None:
 def _explained(
     keystore: Path, environment: Mapping[str, str], say: Callable[[str], None]
 ) -> Callable[[str], bool]:
-    """Return what explains the trace of the router's access control, if ``RUST_LOG`` asks for it."""
     if "interceptor" not in environment.get("RUST_LOG", ""):
         return lambda line: False
 

@@ -87,7 +87,6 @@ def is_crl(pem: bytes) -> bool:
 
 @lru_cache(maxsize=4)  # a launch asks for the same file before each of its processes
 def _parsed(pem: bytes) -> x509.CertificateRevocationList | None:
-    """Return the CRL if it has all required fields, None otherwise."""
     try:
         crl = x509.load_pem_x509_crl(pem)
         _ = crl.issuer, crl.extensions, moment(crl, "last_update"), moment(crl, "next_update")

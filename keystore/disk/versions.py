@@ -144,6 +144,20 @@ def write_new(path: Path, data: bytes, mode: int, *, durable: bool = False) -> N
             os.fsync(descriptor)
 
 
+@contextmanager
+def written_aside(target: Path) -> Iterator[Path]:
+    """Yield a name beside ``target``; what is made there takes its place at the end, whole or not at all."""
+    aside = target.with_name(f".{target.name}.{os.getpid()}.partial")
+    aside.unlink(missing_ok=True)
+    try:
+        yield aside
+        os.replace(aside, target)
+    finally:
+        if aside.is_dir():
+            shutil.rmtree(aside)
+        aside.unlink(missing_ok=True)
+
+
 def make_directories(root: Path, relative: str) -> None:
     """Make the missing directories above ``relative``, below ``root``.
 

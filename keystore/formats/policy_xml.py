@@ -80,8 +80,6 @@ def parse_policy(document: bytes, where: str = "policy.xml", folder: Path | None
 
 
 class _PolicyReader:
-    """One walk over one policy; collects rules by enclave and profile."""
-
     def __init__(self, folder: Path | None):
         self._reader = IncludingReader(folder)
         self._enclaves: dict[str, Profiles] = {}

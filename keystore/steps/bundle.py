@@ -5,7 +5,6 @@ Every file is named one by one from the list in ``layout``: never ``private/``, 
 from __future__ import annotations
 
 import os
-import shutil
 from collections.abc import Iterable, Iterator, Mapping
 from datetime import datetime
 from enum import Enum
@@ -14,7 +13,7 @@ from pathlib import Path
 from keystore.disk import layout, safe_files, store
 from keystore.disk.archive import archive_bytes
 from keystore.disk.store import Content, Link
-from keystore.disk.versions import write_new, write_tree
+from keystore.disk.versions import write_new, write_tree, written_aside
 from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import DamagedKeystoreError, InvalidInputError, StorageError, printable
 from keystore.formats.validity import utc_now
@@ -130,16 +129,9 @@ def _public_files(
 
 def _write(target: Path, files: Mapping[str, Content | Link]) -> None:
     target.parent.mkdir(parents=True, exist_ok=True)
-    aside = target.with_name(f".{target.name}.{os.getpid()}.partial")
-    try:
+    with written_aside(target) as aside:
         if target.name.endswith((".tar", ".tar.gz")):
             content = archive_bytes(files, compressed=target.name.endswith(".gz"))
             write_new(aside, content, store.PRIVATE_MODE, durable=True)  # it holds keys
         else:
             write_tree(aside, files, durable=True)
-        os.rename(aside, target)
-    finally:
-        if aside.is_dir():
-            shutil.rmtree(aside)
-        elif aside.exists():
-            aside.unlink()

@@ -148,7 +148,6 @@ def _in_git_work_tree(root: Path) -> bool:
 
 
 def _add_ca(opened: Store, role: Role, options: CreateOptions) -> tuple[str, list[str]]:
-    """Import or make the CA for ``role``; what was done and what to know of it, in words."""
     view = KeystoreView(opened.root)
     _refuse_foreign_enclaves(view, role)
     given = options.imported.get(role)
@@ -249,7 +248,6 @@ def _shared_ca_warnings(role: Role, options: CreateOptions) -> list[str]:
 
 
 def _external_ca(role: Role, options: CreateOptions) -> CertificateFacts:
-    """Raises InvalidInputError for one that cannot serve, and for the permissions CA, which signs here."""
     place = options.imported[role].certificate
     if role is not Role.IDENTITY:
         raise InvalidInputError("only the identity CA can be external: permissions are signed here")

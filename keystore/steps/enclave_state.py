@@ -240,7 +240,6 @@ def _key_is_ours(enclave: _Enclave, register: Register, key_pem: bytes) -> bool:
 
 
 def _permissions_problem(enclave: _Enclave, expected: bytes | None) -> str | None:
-    """Return why ``expected`` (None: whatever it is) is not what our CA signed; None if it is."""
     signed = enclave.read(layout.PERMISSIONS)
     if signed is None:
         return "no permissions"

@@ -16,7 +16,7 @@ from keystore.disk.archive import archive_bytes
 from keystore.disk.crl_file import crl_number, crl_validity
 from keystore.disk.register_file import read_register
 from keystore.disk.store import Content, Store
-from keystore.disk.versions import write_new
+from keystore.disk.versions import write_new, written_aside
 from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import InvalidInputError, StorageError, printable
 from keystore.formats.bundle import BundledEnclave, Manifest, manifest_json, parse_manifest, pin
@@ -212,15 +212,12 @@ def _write(output: Path, host: str, content: bytes, root: Path) -> Path:
     target = output / f"{host}{SUFFIX}"
     if Path(os.path.realpath(output)).is_relative_to(root):
         raise InvalidInputError(f"{printable(output)} lies in the keystore; choose another place")
-    aside = output / f".{host}{SUFFIX}.{os.getpid()}.partial"
     try:
         output.mkdir(parents=True, exist_ok=True)
-        write_new(aside, content, store.PRIVATE_MODE)
-        os.rename(aside, target)
+        with written_aside(target) as aside:
+            write_new(aside, content, store.PRIVATE_MODE)
     except OSError as error:
         raise StorageError.of(error, "writing the bundle") from None
-    finally:
-        aside.unlink(missing_ok=True)
     return target
 
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from enclave_common.terminal import printable as printable_line
 from keystore.disk.units import Unit, in_restart_order, parse_unit
-from keystore.disk.versions import write_new
+from keystore.disk.versions import write_new, written_aside
 from keystore.errors import InvalidInputError, StorageError, printable
 from keystore.formats.bundle import Manifest
 
@@ -231,13 +231,8 @@ def _install_parameters(source: Path, target: Path) -> list[Path]:
 
 
 def _replace(path: Path, text: str) -> None:
-    aside = path.with_name(f".{path.name}.{os.getpid()}.partial")
-    aside.unlink(missing_ok=True)
-    try:
+    with written_aside(path) as aside:
         write_new(aside, text.encode(), _PUBLIC, durable=True)
-        os.replace(aside, path)
-    finally:
-        aside.unlink(missing_ok=True)
 
 
 def _restart(names: list[str], options: UnitOptions) -> str | None:

@@ -73,7 +73,6 @@ def kept_permissions(
 
 
 def _document(view: KeystoreView, enclave: str, last: SignedPermissions | None) -> bytes:
-    """Return the document signed last, from ``permissions.xml`` if the signed file was damaged."""
     twin = view.enclave_file(enclave, layout.PERMISSIONS_XML)
     if last is not None and twin is not None and fingerprint(twin) == last.document:
         return twin

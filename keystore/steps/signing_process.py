@@ -95,7 +95,6 @@ def _policy_text(one: EnclavePolicy, options: ProvisionOptions) -> str:
 
 
 def _decided(options: ProvisionOptions) -> dict[str, Any]:
-    """Return what a plan decides, and nothing else."""
     return {
         "domains": str(options.domains) if options.domains is not None else None,
         "enclave_domains": {name: str(domains) for name, domains in options.enclave_domains.items()},

@@ -35,18 +35,13 @@ VERBS = (
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; errors become one line on stderr and an exit status, and nothing is printed twice."""
     with safe_output():
-        return _main(argv)
-
-
-def _main(argv: Sequence[str] | None) -> int:
-    parser = build_parser()
-    complete(parser, _offer)
-    arguments = parser.parse_args(argv)
-    return guarded("secure-keystore", lambda: int(arguments.run(arguments)), KeystoreError)
+        parser = build_parser()
+        complete(parser, _offer)
+        arguments = parser.parse_args(argv)
+        return guarded("secure-keystore", lambda: int(arguments.run(arguments)), KeystoreError)
 
 
 def _offer(parser: argparse.ArgumentParser) -> None:
-    """Offer enclaves for completion where they must exist."""
     existing = (each for each in parsers(parser) if not each.prog.endswith("create-enclave"))
     complete_with(existing, "enclaves", _enclaves)
 

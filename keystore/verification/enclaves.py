@@ -295,7 +295,6 @@ class _EnclaveCheck:
             yield self._finding(Severity.NOTE, "wildcard", layout.PERMISSIONS, f"grants by wildcard: {shown}")
 
     def _reach(self, grants: tuple[Grant, ...], mine: Grant) -> Iterator[Finding]:
-        """Report what the document permits beyond the names it lists, and to whom else."""
         if mine.default is Qualifier.ALLOW:
             yield self._distrusted(
                 "default-allow", "permits on Cyclone DDS whatever no rule names (its default is ALLOW)"

@@ -73,7 +73,6 @@ class RouterLogExplainer:
         return self._once((found.name, said.what, said.why), said)
 
     def _once(self, key: tuple[str, ...], said: Explanation) -> Explanation | None:
-        """Join a token and the messages that follow it to one refusal."""
         if key in self._told:
             return None
         self._told.add(key)
@@ -125,7 +124,6 @@ class RouterLogExplainer:
         return self._granted[enclave]
 
     def _former(self) -> Mapping[str, str]:
-        """Names of certificates that no enclave has any more, and whose they were."""
         register = read_register(self._view.root)
         held = register.certificates.values() if register is not None else ()
         present = {self._view.common_name(enclave) for enclave in self._view.enclaves()}
@@ -156,7 +154,6 @@ def _stranger(found: Dropped, what: str, former: str) -> Explanation:
 
 
 def _policy(enclave: str, about: Meaning) -> str:
-    """Return a policy that grants it; "" for a name that no policy may grant."""
     assert about.use is not None, "asked before"
     operation, name = operation_of(about.use, about.name)
     namespace, _, node = about.node.rpartition("/")

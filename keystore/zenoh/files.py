@@ -189,7 +189,6 @@ def _topics(grant: Grant, qualifier: Qualifier) -> TopicSets:
 
 
 def _domains(grant: Grant) -> Domains:
-    """Return the domains of all that it allows; our own documents have one set of domains."""
     allowed = [rule for rule in grant.rules if rule.qualifier is Qualifier.ALLOW]
     spans = [span for rule in allowed for span in rule.domains]
     return Domains((low, HIGHEST_ID if high is None else high) for low, high in spans)

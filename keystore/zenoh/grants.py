@@ -90,7 +90,6 @@ def grants_of_topics(allow: TopicSets, deny: TopicSets, types: Types = MappingPr
 
 
 def _uses(publish: set[str], subscribe: set[str]) -> Iterator[tuple[Use, str, tuple[str, str]]]:
-    """Use, name, and the topics that are published and subscribed for it."""
     for topic in sorted(publish):
         if topic.startswith("rt/"):
             yield Use.PUBLISH, topic[2:], (topic, "")

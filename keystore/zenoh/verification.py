@@ -81,7 +81,6 @@ def _sessions(view: KeystoreView, address: RouterAddress) -> Iterator[Finding]:
 
 
 def _told(view: KeystoreView, file: str, wanted: bytes, found: bytes) -> Iterator[Finding]:
-    """Say in ROS words what differs."""
     all_of = differences(read_configuration(wanted, file), read_configuration(found, file))
     for one in islice(all_of, _TOLD):
         severity = Severity.ERROR if one.more else Severity.WARNING

@@ -100,7 +100,6 @@ def _text(fields: dict[str, str | int | float | bool | None], key: str) -> str |
 
 
 def _node_name_from(name: str) -> str | None:
-    """Return the registered name as node name, if it can be one."""
     try:
         validate_node_name(name)
     except InvalidNameError:
@@ -166,7 +165,6 @@ def _field(entry: YamlMap, key: str) -> tuple[str, SourceRef]:
 
 
 def _is_placeholder(entry: YamlMap, type_name: str) -> bool:
-    """Return True if the type stands there only because NoDL v2 demands one."""
     description = entry.items.get("description")
     said = description.value if isinstance(description, YamlScalar) else ""
     return said == ANY_TYPE or type_name.startswith("unknown/")

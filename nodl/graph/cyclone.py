@@ -306,8 +306,6 @@ def _list_reader(participant: Any) -> Any:
 
 
 class _Raw:
-    """A message, undecoded; the binding adds ``sample_info``."""
-
     def __init__(self, raw: bytes) -> None:
         self.raw = bytes(raw)
 

@@ -283,7 +283,6 @@ def _joined(
 
 
 def _by_type(members: Sequence[tuple[SeenEndpoint, Part]]) -> dict[str, list[tuple[SeenEndpoint, Part]]]:
-    """Sort by type; parts that do not have one belong to each that the others have."""
     types = sorted({part.type for _, part in members if part.type}) or [""]
     return {each: [(e, part) for e, part in members if part.type in ("", each)] for each in types}
 

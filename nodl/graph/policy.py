@@ -71,7 +71,6 @@ def _policy_text(enclaves: Mapping[str, Iterable[str]]) -> str:
 
 
 def _profile_lines(namespace: str, node: str, names: Names) -> list[str]:
-    """Render the profile of one node; groups without names are left out."""
     lines = [f"        <profile ns={quoteattr(namespace)} node={quoteattr(node)}>"]
     for group, child, attribute, kind in _GROUPS:
         of_kind = sorted(set(names.get(kind, ())))

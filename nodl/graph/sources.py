@@ -81,7 +81,6 @@ def _same_program(one: _Placed, other: _Placed) -> bool:
 
 
 def _own_name(placed: _Placed) -> str:
-    """Return what the program calls the node; empty if the launch renames it, so that nobody can see."""
     name = split_fqn(placed.node.fqn)[1]
     renamed = any(
         rule.replacement == name and rule.kind.value == "__node" and rule.node is None
@@ -147,7 +146,6 @@ def _endpoint(interface: SeenInterface, placed: _Placed, others: Sequence[_Place
 
 
 def _left(kind: EndpointKind, candidates: Sequence[str], runs: Sequence[_Placed]) -> Iterator[str]:
-    """Yield those that explain a name in the most runs; a run that lacks it altogether decides nothing."""
     explained = {
         each: sum(
             any((kind, final) in run.ends for final in final_names(kind, each, run.node.fqn, run.start.rules))
@@ -160,7 +158,6 @@ def _left(kind: EndpointKind, candidates: Sequence[str], runs: Sequence[_Placed]
 
 
 def _values(start: StartedNode) -> set[object]:
-    """Return all texts that the start gives: names may be any of them."""
     found: set[object] = set()
     for value in (*start.parameters.values(), *arguments_as_inputs(start.arguments).values()):
         found.update([value] if isinstance(value, str) else value if isinstance(value, list | tuple) else [])

@@ -126,7 +126,7 @@ def _of_component(fields: Mapping[str, Any]) -> StartedNode:
 
 def _ros_words(words: Sequence[str]) -> tuple[tuple[str, ...], dict[str, object], tuple[str, ...]]:
     """Return rules, parameters and the words that are not ROS's, of what follows the program (rcl ``arguments.c``)."""
-    found = [(flag, word) for flag, word in flags(words) if word or not flag]
+    found = [(flag, word) for _, flag, word in flags(words) if word or not flag]
     rules = tuple(word for flag, word in found if flag in REMAP)
     given = (word.partition(":=") for flag, word in found if flag in PARAMETER)
     others = tuple(word for flag, word in found if not flag)

@@ -42,7 +42,6 @@ class UdpPorts:
 
     @cached_property
     def _sockets(self) -> dict[int, list[tuple[str, str]]]:
-        """Map each port to the addresses it is bound at, and the sockets' inodes."""
         found: dict[int, list[tuple[str, str]]] = {}
         for name, size in _FORMATS.items():
             for fields in _rows(Path("/proc/net", name)):

@@ -11,7 +11,7 @@ from nodl.infer.text import Hole, Input, NodePart, Piece, Text, is_condition, te
 from nodl.infer.values import Sequence, Unknown, Value
 from nodl.name_template import NameTemplate, ParameterPart, Part, UnknownPart, melted
 from nodl.node_interface import Certainty, ClientLibrary, Endpoint, Gap, NodeInterface
-from nodl.ros_arguments import ros_arguments
+from nodl.ros_arguments import parse_ros_arguments
 
 MAX_ALTERNATIVES = 16
 
@@ -208,8 +208,8 @@ def _arguments_in_code(record: NodeRecord, findings: Findings) -> list[Gap]:
     if record.use_global_arguments != (False,):
         given.extend(findings.global_arguments)
     for words in given:
-        found = ros_arguments(words) if isinstance(words, tuple) else None
-        if found is None or found.rules or found.parameters or found.files:
+        found = parse_ros_arguments(words) if isinstance(words, tuple) else None
+        if found is None or found.remaps or found.parameters:
             return [Gap(record.source, "remap rules or parameters given in code are not followed")]
     return []
 

@@ -102,7 +102,6 @@ def _matching(node: RequestedNode, interfaces: Sequence[NodeInterface]) -> NodeI
 
 
 def _is_named(node: RequestedNode, described: str | None) -> bool:
-    """Return True if ``described`` is the node's name, or has a random ending and begins as it does."""
     if described is None or not described.endswith(RANDOM_ENDING):
         return described == node.name
     stem = described.removesuffix(RANDOM_ENDING) + "_"

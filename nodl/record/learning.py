@@ -228,7 +228,6 @@ def _entry(name: Name, origin: NameOrigin, names: set[Name], seen: Sequence[_See
 
 
 def _common(qualities: Sequence[tuple[int, ...]]) -> tuple[int, ...]:
-    """Return what all have; 0, which is "the system's", if one has another, as a parameter may decide it."""
     first = qualities[0]
     if any(len(each) != len(first) for each in qualities):
         return ()

@@ -141,7 +141,6 @@ def _about(entry: LearntEndpoint) -> dict[str, Any]:
 
 
 def _united(new: dict[str, Any], old: Mapping[str, Any]) -> dict[str, Any]:
-    """Return ``new``, with all of ``old`` that it does not say itself."""
     united = {**{key: value for key, value in old.items() if key not in new}, **new}
     section = _section_of(new)
     ours, theirs = section.get("endpoints", []), _section_of(old).get("endpoints", [])

@@ -36,23 +36,19 @@ PREFIX: Option = (
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; return the exit status."""
     with safe_output():
-        return _main(argv)
+        parser = build_parser()
+        complete(parser)
+        arguments = parser.parse_args(argv)
+        return guarded(f"secure-nodl {arguments.verb}", lambda: _run(arguments), NoDLError)
 
 
-def _main(argv: Sequence[str] | None) -> int:
-    parser = build_parser()
-    complete(parser)
-    arguments = parser.parse_args(argv)
-
-    def work() -> int:
-        try:
-            return int(arguments.run(arguments))
-        except BrokenPipeError:
-            raise
-        except OSError as error:
-            raise NoDLError(f"{error.filename}: {error.strerror}") from error
-
-    return guarded(f"secure-nodl {arguments.verb}", work, NoDLError)
+def _run(arguments: argparse.Namespace) -> int:
+    try:
+        return int(arguments.run(arguments))
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        raise NoDLError(f"{error.filename}: {error.strerror}") from error
 
 
 def build_parser() -> argparse.ArgumentParser:

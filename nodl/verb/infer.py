@@ -79,7 +79,6 @@ def _tell_guesses(system: InferredSystem) -> None:
 
 
 def _compare(system: InferredSystem, prefixes: Sequence[str]) -> int:
-    """Compare each program with its manifest; return 1 if a manifest lacks something, or none was found."""
     lookup = ManifestLookup(prefixes)
     programs: dict[tuple[str, str | None, str | None], list[NodeInterface]] = {}
     for node in system.nodes:

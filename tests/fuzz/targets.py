@@ -16,7 +16,6 @@ from enclave_common.yaml_reader import load_yaml
 from enclave_launch.frontend.substitution_grammar import TemplateSyntaxError, parse_template, print_template
 from enclave_launch.frontend.xml_tree import parse_launch_xml as parse_launch_xml
 from enclave_launch.ros_rules.parameter_file import RefusedParameters, sections_of_text
-from enclave_launch.ros_rules.ros_arguments import parse_ros_arguments
 from keystore.disk.archive import archive_bytes, read_archive
 from keystore.disk.store import Content
 from keystore.errors import KeystoreError
@@ -43,6 +42,7 @@ from nodl.graph.json_form import NotAGraph, graph_document
 from nodl.graph.json_form import graph_from_document as observed_from
 from nodl.record.lines import read_lines
 from nodl.remap import InvalidRemapRuleError, parse_rule
+from nodl.ros_arguments import parse_ros_arguments
 from tests.graph.made import one_node
 from tests.graph.test_discovery_info import encoded
 

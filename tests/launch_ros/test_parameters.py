@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from enclave_launch.description.parameters import yaml_text
 from enclave_launch.process import Evaluation
 from enclave_launch.ros_rules.rcl_parameters import as_rcl_reads, resolve_parameters
-from enclave_launch.ros_rules.ros_arguments import ParameterFileArgument, ParameterRule, parse_ros_arguments
+from nodl.ros_arguments import ParameterFileArgument, ParameterRule, parse_ros_arguments
 
 Evaluate = Callable[..., Evaluation]
 

@@ -80,8 +80,6 @@ class LifecycleNode(Node):
 
 
 class _ChangeStateHandler(EventHandler):
-    """Passes requests for this node on to the host, which calls the service."""
-
     event_class: type[Event] | None = ChangeState
     internal = True
 

@@ -36,7 +36,7 @@ from enclave_launch.host.environment import changed
 from enclave_launch.process import EnclaveRequest, ResolvedProcess, Respawn
 from enclave_launch.ros_rules.namespaces import enclave_scope
 from enclave_launch.ros_rules.output import Routes, output_routes
-from enclave_launch.ros_rules.ros_arguments import RosArguments, parse_ros_arguments, words_after_program
+from nodl.ros_arguments import RosArguments, parse_ros_arguments, words_after_program
 
 if TYPE_CHECKING:
     from enclave_launch.description.events.handlers import ActionMatcher, OnEvent

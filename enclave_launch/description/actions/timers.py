@@ -150,8 +150,6 @@ class TimerAction(Action):
 
 
 class _OnTimerEvent(BaseEventHandler):
-    """The one handler, per context, of all its timers."""
-
     event_class = TimerEvent
     internal = True
 

@@ -20,7 +20,7 @@ from enclave_launch.ros_rules.rcl_parameters import (
     parameters_of_text,
     resolve_parameters,
 )
-from enclave_launch.ros_rules.ros_arguments import ParameterFileArgument, ParameterRule
+from nodl.ros_arguments import ParameterFileArgument, ParameterRule
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch_context import LaunchContext

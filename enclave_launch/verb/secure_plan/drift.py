@@ -91,7 +91,6 @@ Findings = Callable[..., "list[DriftFinding]"]
 
 
 def _looked(options: argparse.Namespace, domain: int, findings: Findings) -> tuple[Graph, list[DriftFinding]]:
-    """Raises ``CannotObserve``."""
     try:
         if options.graph is not None:
             graph = read_observed(options.graph).graph

@@ -95,7 +95,6 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _check(options: argparse.Namespace) -> None:
-    """Raises ``UsageError`` for what no engine could take."""
     if options.format != "systemd" and not options.image:
         raise UsageError(f"--format {options.format} needs --image")
     paths = [("--host-keystore", options.host_keystore), *(("--setup", file) for file in options.setup)]
@@ -141,7 +140,6 @@ def _refuse_nowhere(placement: Placement) -> None:
 
 
 def _refuse_separate_networks(placement: Placement, engine: Engine, host_network: bool) -> None:
-    """Raises ``UsageError`` if containers could not reach those of other hosts."""
     hosts = [host for host, own in placement.hosts.items() if own]
     if engine is Engine.COMPOSE and len(hosts) > 1 and not host_network:
         raise UsageError(
@@ -152,7 +150,6 @@ def _refuse_separate_networks(placement: Placement, engine: Engine, host_network
 
 
 def _report(processes: list[DeployedProcess], engine: Engine, setup: list[str]) -> None:
-    """Warn about what works only if the host is prepared for it."""
     warnings = []
     for one in processes:
         if one.needs.devices and not one.needs.groups and engine is not Engine.KUBERNETES:

@@ -78,7 +78,6 @@ def _paths(graph: FlowGraph, source: str, target: str) -> str:
 
 
 def _enclaves(plan: PlanDocument, end: str, operations: Collection[Operation]) -> list[str]:
-    """Return the enclave ``end``, that of the node, or those that use the name so."""
     homes = {**{node.fqn: node.enclave for node in plan.nodes}, **{path: path for path in plan.enclaves}}
     if end in homes:
         return [homes[end]]

@@ -166,7 +166,6 @@ def _outside(
 
 
 def _located(words: Sequence[str], options: argparse.Namespace) -> _Launch:
-    """Find the repository of a launch file: of the file, or of the sources of its package."""
     searched = search_prefixes(options.prefix)
     first, *rest = words
     if os.path.isfile(first):

@@ -172,7 +172,6 @@ def _install_python(name: str, folder: Path, prefix: Path) -> None:
 
 
 def _setup_arguments(folder: Path) -> dict[str, Any]:
-    """Return what ``setup.py`` and ``setup.cfg`` install; raises UsageError, also after a minute."""
     last = ""
     given: dict[str, Any] = {}
     with tempfile.TemporaryDirectory(prefix="secure-plan-") as scratch:

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from enclave_launch.ros_rules.ros_arguments import (
+from nodl.ros_arguments import (
     ParameterFileArgument,
     ParameterRule,
     RosArguments,
