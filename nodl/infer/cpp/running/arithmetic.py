@@ -94,6 +94,8 @@ def _held(atom: object, kind: re.Match[str]) -> object:
     """Return a number as an integer holds it; one that not every integer of the kind has is not known."""
     if isinstance(atom, Text):
         return Unknown("a letter as a number")
+    if isinstance(atom, Param) and any(isinstance(each, float) for each in atom.default):
+        return Unknown("a parameter as a whole number")
     if not isinstance(atom, int | float):
         return atom
     is_small = kind[0] == "short" or kind["bits"] in ("8", "16")

@@ -59,6 +59,7 @@ def run_callbacks(run: Machine) -> None:
     """
     rounds = _Rounds(run)
     run.calls_back = True
+    run.store.as_others_find_it()
     for name in ("on_init", *HOOKS[:2]):
         _find_overrides(run)
         for key, (atom, frame) in list(run.callbacks.items()):

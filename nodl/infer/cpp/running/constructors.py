@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES, Call, is_harmless_class
 from nodl.infer.cpp.reading.declarations import Class, Field, Function, FunctionParameter
@@ -17,9 +18,9 @@ from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.arithmetic import as_type
 from nodl.infer.cpp.running.contents import copied, elements_copied, handed_over, items_of
 from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
-from nodl.infer.cpp.running.overloads import chosen
+from nodl.infer.cpp.running.overloads import candidates
 from nodl.infer.cpp.running.references import as_referred_to
-from nodl.infer.cpp.running.static_types import check_hidden, seen_type
+from nodl.infer.cpp.running.static_types import check_hidden, seen_type, written_as
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     END,
@@ -388,9 +389,11 @@ def construct_class(
         run.gap(node, frame, f"the bases of {cls.name} are deeper than is followed")
         return
     this.bindings[cls] = run.names.bindings(cls, kind)
-    constructor = chosen(
-        run.names.find_methods(cls, cls.name) if cls.name in run.names.methods[cls] else [], arguments
-    )
+    own = run.names.find_methods(cls, cls.name) if cls.name in run.names.methods[cls] else []
+    fitting = candidates(own, arguments, written=partial(written_as, run, node, frame))
+    if len(fitting) > 1:
+        run.gap(node, frame, f"which constructor of {cls.name} a text is for is not known")
+    constructor = next(iter(fitting), None)
     path = (*frame.path[-24:], (frame.file.file, node.start_byte))
     inner = run.frame(
         (cls, this, path), Frame(cls.file, cls.scope, None, this, this.bindings[cls], path=frame.path)

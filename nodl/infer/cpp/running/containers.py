@@ -31,7 +31,7 @@ from nodl.infer.cpp.running.values import (
     plain,
     unknown,
 )
-from nodl.infer.cpp.syntax import children
+from nodl.infer.cpp.syntax import Node, children, field_of, text
 
 
 def is_standard(name: str) -> bool:
@@ -143,8 +143,14 @@ def _map_call(run: Machine, atom: Map, name: str, site: CallSite) -> Value:
         for pair in pairs:
             atom = _entered(atom, pair.items[0], pair.items[1])
         return becomes(atom if pairs else atom._replace(open=True))
-    if name in ("erase", "clear"):
-        return becomes(Map(()) if name == "clear" else atom._replace(open=True))
+    if name == "clear":
+        return becomes(Map(()))
+    if name == "erase":
+        certain = len(first) == 1 and all(
+            len(k) == 1 and plain(k[0]) is not None for k in (first, *dict(atom.entries))
+        )
+        left = tuple(entry for entry in atom.entries if entry[0] != first)
+        return becomes(atom._replace(entries=left) if certain else atom._replace(open=True))
     if name in ("at", "find") and values:
         found = element(run, atom, first)
         return found if name == "at" else (END, Group((first, found)))
@@ -232,10 +238,20 @@ def _text_call(run: Machine, atom: Text | Param, name: str, site: CallSite) -> V
         adds = name in ("append", "push_back") and len(values) == 1
         changed = literal("") if name == "clear" else unknown(f"what {name}() makes of a text")
         found = added((atom,), values[0]) if adds else changed
-        assign(run, site.receiver, found, site.frame)
+        assign(run, _changed(site.receiver), found, site.frame)
         return found
     known = settled_text(run, atom)
-    return (not known,) if name == "empty" and known is not None else unknown(f"the result of {name}()")
+    if known is None or name not in ("empty", "size", "length"):
+        return unknown(f"the result of {name}()")
+    return (not known if name == "empty" else len(known.encode()),)
+
+
+def _changed(receiver: Node) -> Node:
+    """Return the text that ``text.append(a).append(b)`` changes."""
+    callee = field_of(receiver, "function") if receiver.type == "call_expression" else None
+    if text(field_of(callee, "field")) not in _CHANGES_TEXT:
+        return receiver
+    return _changed(field_of(callee, "argument") or receiver)
 
 
 _CHANGES_TEXT = frozenset({

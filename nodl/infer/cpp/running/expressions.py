@@ -12,7 +12,7 @@ from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.constructors import as_map, cast, construct, default_value, made
 from nodl.infer.cpp.running.contents import items_of
 from nodl.infer.cpp.running.invocation import by_operator, pointed_to
-from nodl.infer.cpp.running.launch_values import settled_text
+from nodl.infer.cpp.running.launch_values import decided, settled, settled_text
 from nodl.infer.cpp.running.machine import NEXT, Frame, Machine, expression
 from nodl.infer.cpp.running.static_types import class_of_member, current_object, seen_type
 from nodl.infer.cpp.running.values import (
@@ -33,7 +33,6 @@ from nodl.infer.cpp.running.values import (
     join,
     literal,
     plain,
-    truth,
     unknown,
 )
 from nodl.infer.cpp.running.variables import member, variable
@@ -313,18 +312,18 @@ def binary(run: Machine, node: Node, frame: Frame) -> Value:
     if operator == "/" and (has_text(left) or has_text(right)):
         return concatenated(left, literal("/"), right)
     if len(left) == 1 and len(right) == 1:
-        return computed(operator, left[0], right[0])
+        return computed(operator, settled(run, left)[0], settled(run, right)[0])
     return unknown(f"the value of {text(node)[:60]}")
 
 
 def _logical(run: Machine, either: bool, left: Value, right_node: Node | None, frame: Frame) -> Value:
-    known = truth(left)
+    known = decided(run, left)
     if known is either and known is not None:
         if right_node is not None:
             run.kill(right_node, frame, "the condition before decides")
         return (either,)
     if known is not None:
-        value = truth(run.evaluate(right_node, frame))
+        value = decided(run, run.evaluate(right_node, frame))
         return (value,) if value is not None else unknown("a condition")
     found: list[Value] = []
 
@@ -333,7 +332,7 @@ def _logical(run: Machine, either: bool, left: Value, right_node: Node | None, f
         return NEXT
 
     run.branches([second, lambda: NEXT])
-    right = truth(found[0])
+    right = decided(run, found[0])
     return (either,) if right is either else unknown("a condition")
 
 
@@ -371,7 +370,7 @@ def unary(run: Machine, node: Node, frame: Frame) -> Value:
     if own is not None:
         return own
     if operator in ("!", "not"):
-        known = truth(value)
+        known = decided(run, value)
         return unknown("a condition") if known is None else (not known,)
     if operator == "-" and len(value) == 1 and isinstance(value[0], int | float):
         return (-value[0],)
@@ -409,7 +408,7 @@ def method_pointer(run: Machine, node: Node, frame: Frame) -> Value | None:
 @expression("conditional_expression")
 def conditional(run: Machine, node: Node, frame: Frame) -> Value:
     """Evaluate ``a ? b : c``: the side that is chosen, the other one dead; both joined if that is not decided."""
-    known = truth(run.evaluate(field_of(node, "condition"), frame))
+    known = decided(run, run.evaluate(field_of(node, "condition"), frame))
     sides = {True: field_of(node, "consequence"), False: field_of(node, "alternative")}
     if known is not None:
         other = sides[not known]
@@ -488,6 +487,8 @@ def _with_new_entries(
 
 def element(run: Machine, atom: object, key: Value) -> Value:
     """Evaluate ``container[key]``."""
+    if isinstance(atom, Param):
+        (atom,) = settled(run, (atom,))
     if isinstance(atom, Map):
         definite = [value for known, value in atom.entries if len(key) == 1 and known == key]
         if definite and not atom.open:

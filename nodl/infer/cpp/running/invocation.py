@@ -16,7 +16,7 @@ from nodl.infer.cpp.running.contents import copied, handed_over
 from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
 from nodl.infer.cpp.running.memory import MEMORY_DEPTH, CallOutcome, Changes
 from nodl.infer.cpp.running.overloads import candidates, chosen
-from nodl.infer.cpp.running.static_types import declared_type
+from nodl.infer.cpp.running.static_types import declared_type, written_as
 from nodl.infer.cpp.running.unknown_calls import unknown_call
 from nodl.infer.cpp.running.values import Bound, Lambda, Obj, Value, join, unknown
 from nodl.infer.cpp.syntax import Node, children, field_of, template_arguments, text, unwrapped
@@ -153,7 +153,7 @@ def call_functions(
 ) -> Value:
     """Return what the overloads that fit best may return; ``unknown_call`` decides if none fits."""
     _check_special(run, functions, node, frame)
-    fitting = candidates(functions, values, run.makes_interfaces)
+    fitting = candidates(functions, values, run.makes_interfaces, partial(written_as, run, node, frame))
     if not fitting:
         return unknown_call(run, functions[0].name, values, node, [], frame)
     return _any_of(run, [partial(invoke, run, each, None, values, node, frame, types) for each in fitting])
@@ -193,7 +193,7 @@ def call_methods(
 ) -> Value:
     """Call as ``call_functions``; ``exactly``: of this class, whatever the object is."""
     _check_special(run, methods, node, frame)
-    fitting = candidates(methods, values, run.makes_interfaces)
+    fitting = candidates(methods, values, run.makes_interfaces, partial(written_as, run, node, frame))
     if not fitting:
         return unknown_call(run, f"{methods[0].owner}::{methods[0].name}", values, node, [], frame)
     if this_object is not None and not exactly and len(values) < len(fitting[0].parameters):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from nodl.infer.cpp.findings import AllocatedNode
 from nodl.infer.cpp.running.machine import Machine
-from nodl.infer.cpp.running.values import Atom, NodeNamePart, Param, Text, plain
+from nodl.infer.cpp.running.values import Atom, NodeNamePart, Param, Text, Value, literal, plain, truth
 from nodl.name_template import ParameterPart
 
 
@@ -29,6 +29,47 @@ def settled_text(run: Machine, atom: Atom) -> str | None:
         if isinstance(atom, Param) or any(isinstance(part, ParameterPart) for part in parts):
             return None
     return text_of(run, atom)
+
+
+def decided(run: Machine, value: Value) -> bool | None:
+    """Return whether ``value`` is certainly true or false in this run."""
+    return truth(settled(run, value))
+
+
+def settled(run: Machine, value: Value) -> Value:
+    """Return ``value`` with what a launch, else the default, gives a parameter; as it was if there is no launch."""
+    if run.start is None or not any(isinstance(atom, Text | Param) for atom in value):
+        return value
+    return tuple(_settled(run, atom) for atom in value)
+
+
+def _settled(run: Machine, atom: Atom) -> Atom:
+    if isinstance(atom, Param):
+        return _settled_parameter(run, atom)
+    if not isinstance(atom, Text) or plain(atom) is not None:
+        return atom
+    known = text_of(run, atom)
+    return atom if known is None else literal(known)[0]
+
+
+def _settled_parameter(run: Machine, param: Param) -> Atom:
+    """Return the value of a parameter that is declared once, by the first node, and that the program does not set."""
+    record, name = param.record, param.name
+    run.size.get("nodes")
+    if record is not next(iter(run.nodes.values())) or record.arguments or name in record.overrides:
+        return param
+    declared: Value | None = record.parameters.get(name)
+    if declared is None or len(declared) > 1:
+        return param
+    value = given_by_launch(run, record, name)
+    if value is not None and param.item is not None:
+        value = value[param.item] if isinstance(value, list | tuple) and param.item < len(value) else None
+    if isinstance(value, str):
+        return literal(value)[0]
+    if isinstance(value, bool | int | float):
+        return value
+    found = param.default if value is None else ()
+    return found[0] if len(found) == 1 and plain(found[0]) is not None else param
 
 
 def given_by_launch(run: Machine, record: AllocatedNode, name: str) -> object | None:
@@ -69,12 +110,12 @@ def _part_text(run: Machine, part: object) -> str | None:
 
 def _parameter_part(run: Machine, part: ParameterPart) -> str | None:
     run.size.get("nodes")
-    for record in run.nodes.values():
-        if part.name in record.parameters:
-            value = given_by_launch(run, record, part.name)
-            texts = part.texts({} if value is None else {part.name: value})
-            return texts[0] if len(texts) == 1 else None
-    return None
+    found = [record for record in run.nodes.values() if part.name in record.parameters]
+    if len(found) != 1:
+        return None
+    value = given_by_launch(run, found[0], part.name)
+    texts = part.texts({} if value is None else {part.name: value})
+    return texts[0] if len(texts) == 1 else None
 
 
 def _static_name(record: AllocatedNode) -> str | None:

@@ -22,13 +22,15 @@ def candidates(
     functions: Sequence[Function],
     arguments: Sequence[Value],
     makes: Callable[[Function], bool] = lambda function: False,
+    written: Callable[[], Sequence[str]] = tuple,
 ) -> Sequence[Function]:
     """Find the overloads that fit best: several where a text may be meant in several ways, or where one
-    that ``makes`` interfaces may be meant by an argument that is not known."""
+    that ``makes`` interfaces may be meant by an argument that is not known. ``written``: see ``written_as``."""
     fitting = [each for each in functions if _takes(each, len(arguments))]
     if len(fitting) <= 1:
         return fitting or (functions if len(functions) == 1 else ())
-    scores = [sum(map(_likeness, each.parameters, arguments)) for each in fitting]
+    kinds = [*written(), *[""] * len(arguments)]
+    scores = [sum(map(_likeness, each.parameters, arguments, kinds)) for each in fitting]
     best = [each for each, score in zip(fitting, scores, strict=True) if score == max(scores)]
     atoms = [atom for value in arguments for atom in value or (Unknown("nothing"),)]
     if any(isinstance(atom, Text) for atom in atoms) and len(best) <= MAX_OVERLOADS:
@@ -37,21 +39,33 @@ def candidates(
     return best if is_open and any(map(makes, best)) else best[:1]
 
 
+def _of_text(kind: str, written: str, is_generic: bool) -> float:
+    """Rate a parameter's type for a text: a literal is rather any template's ``T``, or ``true``, than a
+    ``std::string`` ([over.ics.rank]).
+    """
+    if "char" in kind or "string" in kind:
+        return {"char": 3 if "char" in kind else 2, "string": -3 if "char" in kind else 3}.get(written, 3)
+    if is_generic:
+        return 2.8 if written == "char" else 1
+    return 2.6 if written == "char" and "bool" in kind else -3
+
+
+_GENERIC = re.compile(r"(?:const )?[A-Z]\w*(?: ?[&*]+)?")
+
+
 def _takes(function: Function, count: int) -> bool:
     required = sum(1 for p in function.parameters if p.default is None and "..." not in p.type)
     return function.variadic or required <= count <= len(function.parameters)
 
 
-def _likeness(parameter: FunctionParameter, value: Value) -> int:
+def _likeness(parameter: FunctionParameter, value: Value, written: str) -> float:
     """Rate how well an argument fits a parameter, by their looks."""
     atom = value[0] if value else None
     kind = parameter.type
     is_text = "string" in kind or "char" in kind
-    is_generic = (
-        re.fullmatch(r"(?:const )?[A-Z]\w*(?: ?[&*]+)?", kind) is not None and "Descriptor" not in kind
-    )
+    is_generic = _GENERIC.fullmatch(kind) is not None and "Descriptor" not in kind
     if isinstance(atom, Text):
-        return 3 if is_text else (1 if is_generic else -3)
+        return _of_text(kind, written, is_generic)
     if isinstance(atom, Obj):
         names = {atom.type.last, *(c.name for c in atom.bindings)}
         if atom.node is not None and ("Node" in kind or "node" in kind):

@@ -10,6 +10,7 @@ from nodl.infer.cpp.reading.declarations import type_text
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.constructors import declared_value, fields_of
 from nodl.infer.cpp.running.contents import copied, iterated
+from nodl.infer.cpp.running.launch_values import decided, settled
 from nodl.infer.cpp.running.machine import (
     BREAK,
     CONTINUE,
@@ -24,7 +25,7 @@ from nodl.infer.cpp.running.machine import (
 from nodl.infer.cpp.running.memory import Changes
 from nodl.infer.cpp.running.references import bind_reference, elements_written
 from nodl.infer.cpp.running.static_types import element_type, seen_type
-from nodl.infer.cpp.running.values import BOTTOM, Const, Group, Obj, Seq, Value, join, truth, unknown
+from nodl.infer.cpp.running.values import BOTTOM, Const, Group, Obj, Seq, Value, join, unknown
 from nodl.infer.cpp.running.variables import member
 from nodl.infer.cpp.syntax import Node, children, field_of, parse_expression, text, unwrapped, walk
 
@@ -175,7 +176,7 @@ def condition_value(run: Machine, condition: Node | None, frame: Frame) -> bool 
     if inner is not None and inner.type == "declaration":
         run.execute(inner, frame)
         return None
-    return truth(run.evaluate(inner, frame))
+    return decided(run, run.evaluate(inner, frame))
 
 
 @statement("preproc_if", "preproc_ifdef", "preproc_elif")
@@ -192,7 +193,7 @@ def preprocessor_branches(run: Machine, node: Node, frame: Frame) -> int:
 def switch_statement(run: Machine, node: Node, frame: Frame) -> int:
     """Run the case that is chosen and those it falls through to; any of the cases if that is not decided."""
     condition = field_of(node, "condition")
-    subject = run.evaluate(field_of(condition, "value") or unwrapped(condition), frame)
+    subject = settled(run, run.evaluate(field_of(condition, "value") or unwrapped(condition), frame))
     cases = [c for c in children(field_of(node, "body")) if c.type == "case_statement"]
     chosen = _chosen_case(run, node, cases, subject, frame)
     loop = _Switch(run.store.mark())

@@ -13,7 +13,7 @@ from nodl.infer.cpp.reading.type_names import NO_TYPE, Type
 from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.values import Obj
-from nodl.infer.cpp.syntax import Node, callee_name, field_of, template_arguments, text, unwrapped
+from nodl.infer.cpp.syntax import Node, callee_name, children, field_of, template_arguments, text, unwrapped
 
 
 def check_hidden(run: Machine, cls: Class, node: Node, frame: Frame) -> None:
@@ -92,6 +92,35 @@ def declared_type(run: Machine, node: Node, frame: Frame) -> tuple[Type, bool]:
         return NO_TYPE, False
     kind = run.names.resolve(outside.type, outside.scope, outside.file)
     return kind, outside.pointer or kind.pointer
+
+
+def written_as(run: Machine, call: Node, frame: Frame) -> list[str]:
+    """Return for each argument of a call or an object's declaration ``char`` for a literal or ``const char *``,
+    ``string`` for a ``std::string``, else nothing.
+    """
+    found = []
+    for each in children(_given(call)):
+        kind, pointer = declared_type(run, each, frame)
+        is_string = (kind.name in ("std::string", "string") and not kind.pointer) or text(each).startswith(
+            "std::string("
+        )
+        is_char = (
+            each.type in _LITERALS or (pointer and kind.name == "char") or text(each).endswith(".c_str()")
+        )
+        found.append("char" if is_char else "string" if is_string else "")
+    return found
+
+
+def _given(call: Node) -> Node | None:
+    if call.type == "declaration":
+        made = [each for each in children(call) if each.type.endswith("declarator")]
+        return field_of(made[0], "value") if len(made) == 1 else None
+    if call.type == "field_initializer":
+        return call.named_children[-1]
+    return call if call.type in ("argument_list", "initializer_list") else field_of(call, "arguments")
+
+
+_LITERALS = ("string_literal", "raw_string_literal", "concatenated_string")
 
 
 def is_pointer(run: Machine, node: Node, frame: Frame) -> bool:

@@ -203,3 +203,52 @@ def test_a_name_from_a_parameter_of_another_node_is_not_known(tmp_path: Path) ->
     )
     assert found.problems
     assert not any(may(found, name) for name in ("/cloud/one", "/cloud/data", "/b"))
+
+
+DECIDES = (
+    HEAD
+    + """
+class Demo : public rclcpp::Node {
+public:
+  Demo() : Node("demo") {
+    if (declare_parameter("camera", true)) { pub("camera"); }
+    int legs = 0;
+    declare_parameter("legs", 2);
+    get_parameter("legs", legs);
+    for (int i = 0; i < legs; ++i) { pub("leg" + std::to_string(i)); }
+    const auto mode = declare_parameter<std::string>("mode", "");
+    pub(mode.size() && mode[0] == 'f' ? "fast" : "slow");
+    declare_parameter("spare", false);
+    set_parameter(rclcpp::Parameter("spare", true));
+    if (get_parameter("spare").as_bool()) { pub("spare"); }
+  }
+  void pub(std::string t) { create_publisher<std_msgs::msg::Bool>(t, 1); }
+};
+int main(int argc, char ** argv) {
+  rclcpp::init(argc, argv);
+  auto demo = std::make_shared<Demo>();
+  auto beside = std::make_shared<rclcpp::Node>("beside");
+  if (beside->declare_parameter("on", false)) { beside->create_publisher<std_msgs::msg::Bool>("beside", 1); }
+  rclcpp::spin(demo);
+}
+"""
+)
+PARAMETERS = (
+    '<param name="camera" value="false"/><param name="legs" value="3"/><param name="mode" value="flat"/>'
+)
+
+
+def test_a_parameter_decides_what_a_launch_makes(tmp_path: Path) -> None:
+    """But for one that the program sets itself, and those of a node beside the first."""
+    package(tmp_path / "src/demo", {"src/demo.cpp": DECIDES}, "add_executable(filter_node src/demo.cpp)\n")
+    install(tmp_path)
+    every = {"/camera", "/leg0", "/leg1", "/leg2", "/fast", "/slow", "/spare", "/beside"}
+    for parameters, decided in ((PARAMETERS, {"/leg2", "/fast"}), ("", {"/camera", "/slow"})):
+        found = plan(tmp_path, f'<launch><node pkg="demo" exec="filter_node">{parameters}</node></launch>')
+        assert not found.problems
+        assert {name for name in every if may(found, name)} == decided | {
+            "/leg0",
+            "/leg1",
+            "/spare",
+            "/beside",
+        }

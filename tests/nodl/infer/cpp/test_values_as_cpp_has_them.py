@@ -107,10 +107,41 @@ PROGRAMS: dict[str, tuple[str, str, str, set[str], set[str]]] = {
         'struct Derived : Base { using Base::Base; void go() override { make("derived"); } };\n',
         {"base"}, {"derived"},
     ),
-    "overloads that look alike may both be meant": (
-        'pub(f("x"));', "",
-        'std::string f(const char *) { return "of_letters"; } std::string f(std::string) { return "of_text"; }\n',
-        {"of_letters"}, set(),
+    "a literal is rather letters than a text": (
+        'pub(f("x")); std::string t = "y"; pub(f(t) + "_2");', "",
+        'std::string f(const char *) { return "letters"; } std::string f(std::string) { return "text"; }\n',
+        {"letters", "text_2"}, {"text", "letters_2"},
+    ),
+    "a literal is rather true, or of any type, than a text": (
+        'pub(f("x")); pub(g("x")); std::string t = "y"; pub(f(t) + "_2"); pub(g(t) + "_2");', "",
+        'std::string f(bool) { return "true"; } std::string f(std::string) { return "text"; }\n'
+        'template <class T> std::string g(const T &) { return "any"; }\n'
+        'std::string g(const std::string &) { return "of_text"; }\n',
+        {"true", "any", "text_2", "of_text_2"}, {"text", "of_text", "true_2", "any_2"},
+    ),
+    "a literal chooses a constructor as a function": (
+        'H a("lit"); H b(std::string("text")); pub(a.t); pub(b.t + "_2");', "",
+        'struct H { std::string t; explicit H(bool) : t("true") {} explicit H(std::string s) : t(s) {} };\n',
+        {"true", "text_2"}, {"lit", "true_2"},
+    ),
+    "changes of a text in a row": (
+        'std::string t = "a"; t.append("b").append("c"); pub(t); t.append("d").insert(0, "x"); pub(t + "_e");',
+        "", "", {"abc"}, {"a", "ab", "abcd_e"},
+    ),
+    "other arguments say which constructor a literal is for": (
+        'H h(1, "", "n"); pub(h.t);', "",
+        "struct H { std::string t; H(int, std::string, std::string n) : t(n) {}\n"
+        'H(int, std::string, bool, std::string) : t("long") {} H(int, bool, int) : t("number") {} };\n',
+        {"n"}, {"long", "number"},
+    ),
+    "elements that are swapped": (
+        'std::vector<S> v(2); v[1].t = "b"; std::swap(v[0], v[1]); pub(v[0].t + "_0"); pub(v[1].t + "_1");', "",
+        'struct S { std::string t = "a"; };\n', {"b_0", "a_1"}, {"a_0", "b_1"},
+    ),
+    "an entry that is erased by its name is gone": (
+        'std::map<std::string, std::string> m{{"a", "one"}, {"b", "two"}}; m.erase("a");'
+        "for (auto & [k, v] : m) { pub(v); }",
+        "", "", {"two"}, {"one"},
     ),
     "nothing follows a call that only throws": (
         'try { fail(); pub("dead"); } catch (...) { pub("caught"); }',
@@ -222,3 +253,29 @@ def test_an_element_that_is_made_of_pieces_is_a_gap(tmp_path: Path) -> None:
     )
     system = infer(tmp_path, in_class(body, "std::map<std::string, H> m_;", before))
     assert gaps(system)
+
+
+LIFECYCLE = """
+#include <rclcpp_lifecycle/lifecycle_node.hpp>
+class Demo : public rclcpp_lifecycle::LifecycleNode {
+public:
+  Demo() : LifecycleNode("n") {}
+  int on_configure(const rclcpp_lifecycle::State &) override { name_ = "arm"; return 0; }
+  int on_activate(const rclcpp_lifecycle::State &) override {
+    create_publisher<std_msgs::msg::String>(name_ + "/state", 1);
+    return 0;
+  }
+  std::string name_;
+};
+int main() {
+  auto n = std::make_shared<Demo>();
+  std::thread t([] {});
+  n->configure();
+  rclcpp::spin(n->get_node_base_interface());
+}
+"""
+
+
+def test_a_node_is_configured_before_it_is_activated(tmp_path: Path) -> None:
+    """Also if its main program starts it: what a member holds before is in no name."""
+    assert certain(tmp_path, HEAD + LIFECYCLE) == {"arm/state"}
