@@ -26,6 +26,9 @@ CONDITIONS: dict[str, Callable[..., bool]] = {
 }
 """Edits that keep a name where they hold and drop it elsewhere."""
 
+ONLY_IF_UNSET: Edit = ("only if unset", ())
+"""The same for a parameter that launch does not set: the name is made of what the code takes then."""
+
 
 PARAMETER_REFERENCE = re.compile(r"\$\(param ([^ ()$]+)(?: ([^ ()$]*))?\)")
 """``$(param NAME)`` or ``$(param NAME DEFAULT)`` in the text of a template."""
@@ -50,6 +53,8 @@ class ParameterPart(NamedTuple):
         """Return what this part may stand for: normally one text; none if it has no value."""
         values: Sequence[object] = () if self.default is None else (self.default,)
         given = self._given(parameters)
+        if self.edits[:1] == (ONLY_IF_UNSET,):
+            return () if given else ("",)
         if given:
             values = [value for each in given for value in self._items(each)]
         if not values and self.is_condition:
@@ -59,7 +64,7 @@ class ParameterPart(NamedTuple):
     @property
     def is_condition(self) -> bool:
         """It adds nothing to the name, which only exists where the parameter has a certain value."""
-        return bool(self.edits) and self.edits[-1][0] in CONDITIONS
+        return bool(self.edits) and (self.edits[-1][0] in CONDITIONS or self.edits[-1] == ONLY_IF_UNSET)
 
     def may_be_none(self, parameters: Mapping[str, object]) -> bool:
         """Return whether it certainly stands for no text at all: an empty list, a condition that does not hold."""

@@ -160,10 +160,11 @@ def _call_back(run: Run, callback: object, arity: int | None, widen_texts: bool)
 
 def _call_at_any_time(run: Run) -> None:
     """Call what other code may have called while the program ran: variables hold any of their values since then."""
-    for callback, since in list(run.at_any_time.items()):
+    for since, callbacks in itertools.groupby(list(run.at_any_time), key=run.at_any_time.__getitem__):
         if run.state.changed_since(since):
+            calls = [_called_from_outside(run, each, run.callbacks[each]) for each in callbacks]
             mix = functools.partial(run.state.join_seen, since, mixed=True)
-            run.state.aside(mix, _called_from_outside(run, callback, run.callbacks[callback]))
+            run.state.aside(mix, functools.partial(run.state.branches, (*calls, lambda: True)))
 
 
 def _expect_escaped(run: Run, expected: set[object]) -> None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from nodl.infer.findings import Findings, FoundEndpoint, NodeRecord, OptionDefaults
 from nodl.infer.start import LaunchKey
-from nodl.infer.text import Hole, Input, NodePart, Piece, Text, is_condition, text_of
+from nodl.infer.text import Hole, Input, NodePart, Piece, Text, is_condition, is_of_inputs, text_of
 from nodl.infer.values import Sequence, Unknown, Value
 from nodl.name_template import NameTemplate, ParameterPart, Part, UnknownPart, melted
 from nodl.node_interface import Certainty, ClientLibrary, Endpoint, Gap, NodeInterface
@@ -183,7 +183,7 @@ def _default_texts(value: Value, item: int | str | None) -> list[str | None]:
             texts.extend(_default_items(atom, item))
         elif isinstance(atom, str | int | float):
             texts.append(str(atom))
-        elif isinstance(atom, Text):
+        elif isinstance(atom, Text) and not is_of_inputs(atom):
             texts.extend(_plain_texts((atom,)) or [None])
         else:
             texts.append(None)

@@ -231,6 +231,11 @@ def constant_text(atom: object) -> object:
     return (last if isinstance(last, str) else "") if known else atom
 
 
+def is_of_inputs(text: Text) -> bool:
+    """Return True if inputs alone decide the text: neither unknown parts nor the node's name."""
+    return not any(isinstance(piece, Hole | NodePart) for piece in text.pieces)
+
+
 def is_condition(piece: Input) -> bool:
     """Return True if the input is not part of the text, but decides whether it is meant."""
     return (

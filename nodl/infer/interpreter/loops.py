@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
@@ -60,6 +61,7 @@ def _looped(run: Run, node: Loop, frame: Frame, turns: Callable[[], _Turns]) -> 
     return outcome.passes
 
 
+@functools.lru_cache(maxsize=4096)
 def _breaks(node: Loop) -> bool:
     return any(isinstance(inner, ast.Break) for inner in ast.walk(node))
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from nodl.infer.findings import NodeRecord
-from nodl.infer.interpreter.conditions import truth
+from nodl.infer.interpreter.conditions import only_if, truth
 from nodl.infer.interpreter.elements import elements
 from nodl.infer.interpreter.run import Call, Run
-from nodl.infer.text import Input, make_text, with_edit
+from nodl.infer.text import Guard, Input, Text, is_of_inputs, make_text, with_edit
 from nodl.infer.values import (
     ABSENT,
     ANY,
@@ -29,6 +29,7 @@ from nodl.infer.values import (
     present,
     unknown,
 )
+from nodl.name_template import ONLY_IF_UNSET
 
 PARAMETER_CLASS = "rclpy.parameter.Parameter"
 
@@ -72,10 +73,14 @@ def _inputs(run: Run, record: NodeRecord, names: list[str]) -> Value:
         held = record.cells.get(name, ABSENT)
         result = join(result, present(held))
         if ABSENT[0] in held:
-            text = make_text((Input(name, record),))
-            if run.without_value and record.parameters.get(name) == BOTTOM:
-                text = with_edit(Input(name, record), "only if set", ())
-            result = join(result, (text,))
+            asked, declared = Input(name, record), record.default(name)
+            unset = Guard(asked, *ONLY_IF_UNSET)
+            others = [
+                only_if(unset, each) for each in declared if isinstance(each, Text) and is_of_inputs(each)
+            ]
+            only_set = others or (run.without_value and not declared)
+            text = with_edit(asked, "only if set", ()) if only_set else make_text((asked,))
+            result = join(result, (text, *others))
     return result
 
 
