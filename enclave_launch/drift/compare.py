@@ -121,6 +121,8 @@ class _Comparison:
             else:
                 remedy += (
                     "; or the observer's enclave is not trusted there: another CA, revoked, other governance"
+                    "; or its DDS and theirs do not authenticate each other: use --with rclpy, with the "
+                    "RMW_IMPLEMENTATION of the launch"
                 )
         found = finding(Kind.OUT_OF_SIGHT, "", text, remedy=remedy)
         return found._replace(level=Level.CANNOT_TELL)
