@@ -98,6 +98,13 @@ def test_a_behavior_tree_says_what_bt_navigator_calls(launch: Launch, tmp_path: 
     assert allowed(plan, "call_actions") == ["/navigate_to_pose", "/turn"] and not plan.problems
     tree.write_text(TREE.format("turn", "<MyNode/>"))
     assert "node 'MyNode' of the behavior tree uses is not known" in problems(launch(node))
+    tree.write_text(TREE.format("turn", "<GoalUpdater/>"))
+    assert "/goal_update" in allowed(launch(node), "subscribe")
+    assert "/goals_update" in allowed(launch(node, "kilted"), "subscribe")
+    node = node.replace("</node>", '<param name="goal_updater_topic" value="/person"/></node>')
+    plan = launch(node)
+    assert "/person" in allowed(plan, "subscribe") and not plan.problems
+    assert not {"/goal_update", "/goals_update"} & set(allowed(plan, "subscribe"))
     tree.write_text("<root>\n</tree>")
     assert f"the behavior tree cannot be read: {tree}:2: not well-formed XML: mismatched tag" in problems(
         launch(node)

@@ -42,7 +42,7 @@ def read_configuration(kind: str, file: str, situation: Situation, place: Source
             gaps=(Gap(place, f"launch names no {kind} file, from which its topics would follow"),)
         )
     if kind == "behavior_tree":
-        return of_tree(file)
+        return of_tree(file, situation)
     if kind == "rviz" and not os.path.isfile(file) and not file.startswith(f"{MISSING_PREFIX}/"):
         return rviz.default(SourceRef(file))
     try:

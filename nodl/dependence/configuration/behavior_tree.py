@@ -11,6 +11,8 @@ from collections.abc import Iterator
 
 from enclave_common.files import read_bytes
 from enclave_common.xml_tree import XmlElement
+from nodl.builtin_interfaces import DISTROS
+from nodl.dependence import Situation
 from nodl.dependence.configuration.configured import Configured, collected, endpoint_named
 from nodl.errors import InvalidXMLError
 from nodl.names import shown
@@ -65,6 +67,7 @@ _TOPICS = {
     "IsStuck": ("", "odom", "nav_msgs/msg/Odometry"),
 }
 _PATH_VALID = "IsPathValid"
+_ONE_GOAL = DISTROS[: DISTROS.index("kilted")]
 _OF_NAV2 = """
 AreErrorCodesPresent ArePosesNear ConcatenatePaths DistanceController DistanceTraveled GetCurrentPose
 GetPoseFromPath GlobalUpdatedGoal GoalReached GoalUpdated GoalUpdatedController InitialPoseReceived
@@ -83,24 +86,24 @@ _SILENT = frozenset((*_OF_NAV2.split(), *_OF_BEHAVIOR_TREE_CPP.split()))
 _MODELS = ("Action", "Condition", "Decorator", "Control")  # elements whose attribute ID is the node
 
 
-def of_tree(file: str) -> Configured:
-    """Return what the tree in ``file`` uses."""
+def of_tree(file: str, situation: Situation) -> Configured:
+    """Return what the tree in ``file`` uses in ``situation``, that of its navigator."""
     place = SourceRef(file)
     try:
         root = parse_xml(read_bytes(file, _MAX_BYTES), file)
     except (OSError, InvalidXMLError) as error:
         return Configured(gaps=(Gap(place, f"the behavior tree cannot be read: {error}"),))
-    return collected(_used(root, place))
+    return collected(_used(root, place, situation))
 
 
-def _used(root: XmlElement, place: SourceRef) -> Iterator[Endpoint | Gap]:
+def _used(root: XmlElement, place: SourceRef, situation: Situation) -> Iterator[Endpoint | Gap]:
     models = {part for model in root.iter("TreeNodesModel") for part in model.iter()}
     for element in root.iter():
         if element not in models:
-            yield from _of_node(element, place)
+            yield from _of_node(element, place, situation)
 
 
-def _of_node(element: XmlElement, place: SourceRef) -> Iterator[Endpoint | Gap]:
+def _of_node(element: XmlElement, place: SourceRef, situation: Situation) -> Iterator[Endpoint | Gap]:
     tag = element.get("ID", element.tag) if element.tag in _MODELS else element.tag
     if tag in _ACTIONS or tag in _CANCELS:
         name, type_name = _ACTIONS[_CANCELS.get(tag, tag)]
@@ -113,8 +116,12 @@ def _of_node(element: XmlElement, place: SourceRef) -> Iterator[Endpoint | Gap]:
         yield _named(EndpointKind.SUBSCRIPTION, element.get(port) or default, type_name, tag, place)
     elif tag == _PATH_VALID:
         yield _named(EndpointKind.SERVICE_CLIENT, "is_path_valid", "nav2_msgs/srv/IsPathValid", tag, place)
-    elif tag == "GoalUpdater":
-        yield Gap(place, "the topics of the node GoalUpdater are parameters that are not looked at")
+    elif tag == "GoalUpdater":  # reads parameters, which the navigator hands to its trees
+        goal = str(situation.parameters.get("goal_updater_topic", "goal_update"))
+        yield _named(EndpointKind.SUBSCRIPTION, goal, "geometry_msgs/msg/PoseStamped", tag, place)
+        if situation.distro not in _ONE_GOAL:
+            goals = str(situation.parameters.get("goals_updater_topic", "goals_update"))
+            yield _named(EndpointKind.SUBSCRIPTION, goals, "nav_msgs/msg/Goals", tag, place)
     elif tag not in _SILENT:
         yield Gap(place, f"what the node {shown(tag)} of the behavior tree uses is not known")
 
