@@ -57,6 +57,9 @@ LIBRARY_CLASSES: dict[str, ClassModel] = {}
 LIBRARY_FUNCTIONS: dict[str, FunctionModel] = {}
 LIBRARY_METHODS: dict[tuple[str, str], FunctionModel] = {}
 NODE_METHODS: dict[str, FunctionModel] = {}
+IN_PLACE_OF_SOURCE: dict[str, Callable[[Machine, Call], Value | None]] = {}
+"""Models of functions and methods, by their whole name, that run also where their source is in reach: everyday helpers
+that a program calls a thousand times."""
 
 # Classes that make no interface of their own, whoever they get. rclcpp: read in include/rclcpp of humble to rolling.
 _HARMLESS_CLASSES = re.compile(

@@ -255,6 +255,8 @@ def _with_first(file: str, files: Sequence[str]) -> tuple[str, ...]:
 
 def _is_test(file: str, workspace: Workspace) -> bool:
     package = workspace.package_of(file)
+    if package is not None and package.name.endswith(("_test", "_tests")):
+        return True
     relative = os.path.relpath(file, package.folder) if package else os.path.basename(file)
     return any(part in _TESTS for part in Path(relative).parts[:-1])
 

@@ -7,12 +7,19 @@ from __future__ import annotations
 
 from nodl.builtin_interfaces import PARAMETER_SERVICES
 from nodl.infer.cpp.findings import AllocatedNode
-from nodl.infer.cpp.libraries import Call, library_class, library_function, library_method, node_method
+from nodl.infer.cpp.libraries import (
+    IN_PLACE_OF_SOURCE,
+    Call,
+    library_class,
+    library_function,
+    library_method,
+    node_method,
+)
 from nodl.infer.cpp.models.interfaces import CLI, SUB, node_of, owner_in
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.contents import handed_over, nodes_in
 from nodl.infer.cpp.running.launch_values import text_of
-from nodl.infer.cpp.running.machine import Machine
+from nodl.infer.cpp.running.machine import Machine, registered
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     Map,
@@ -132,6 +139,30 @@ def _declare_if_not(run: Machine, call: Call) -> Value:
         if owner.node is not None:
             read(run, owner.node, call.value(1), _default(call.value(2)))
     return BOTTOM
+
+
+@registered(
+    IN_PLACE_OF_SOURCE, ("nav2::declare_or_get_parameter", "nav2::LifecycleNode::declare_or_get_parameter")
+)
+def _declare_or_get(run: Machine, call: Call) -> Value | None:
+    """Model ``(node, name, default)``, ``(logger, parameters of the node, name, default)``, and the node's method."""
+    rest = call.values
+    owners = [call.receiver] if call.receiver is not None else []
+    while not owners and len(rest) > 1:
+        owners, rest = nodes_in(rest[0]), rest[1:]
+    if len(owners) != 1 or owners[0].node is None or not rest:
+        return None
+    given = rest[1] if len(rest) > 1 else BOTTOM
+    default = tuple(
+        atom for atom in given if not (isinstance(atom, Obj) and atom.type.last == "ParameterDescriptor")
+    )
+    record = owners[0].node
+    record.declare("warn_on_missing_params", (False,))
+    record.declare("strict_param_loading", (False,))
+    for name in parameter_names(run, rest[0]) if not default else ():
+        if name is not None:
+            record.declare(name, BOTTOM)
+    return read(run, record, rest[0], _default(default))
 
 
 @library_function("nav2_util::get_plugin_type_param", "nav2::get_plugin_type_param")

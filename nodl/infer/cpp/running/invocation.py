@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 
-from nodl.infer.cpp.libraries import Call
+from nodl.infer.cpp.libraries import IN_PLACE_OF_SOURCE, Call
 from nodl.infer.cpp.reading.declarations import Function, FunctionParameter, parameters_of, type_text
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.assignments import assign
@@ -152,11 +152,30 @@ def call_functions(
     types: Sequence[Type],
 ) -> Value:
     """Return what the overloads that fit best may return; ``unknown_call`` decides if none fits."""
+    known = _in_place(run, functions[0], None, values, node, frame, types)
+    if known is not None:
+        return known
     _check_special(run, functions, node, frame)
     fitting = candidates(functions, values, run.makes_interfaces, partial(written_as, run, node, frame))
     if not fitting:
         return unknown_call(run, functions[0].name, values, node, [], frame)
     return _any_of(run, [partial(invoke, run, each, None, values, node, frame, types) for each in fitting])
+
+
+def _in_place(
+    run: Machine, function: Function, this: Obj | None, values: Sequence[Value], node: Node, frame: Frame,
+    types: Sequence[Type],
+) -> Value | None:  # fmt: skip
+    """Return what the model of a function gives that runs in place of its source; ``None`` if it has none."""
+    whole = (function.owner,) if function.owner else function.scope
+    model = IN_PLACE_OF_SOURCE.get("::".join((*whole, function.name)))
+    if model is None:
+        return None
+    found = model(run, Call(node, frame, list(values), list(types), [], this))
+    if found is not None:
+        run.handle(node, frame)
+        run.called.add(function)
+    return found
 
 
 def _check_special(run: Machine, functions: Sequence[Function], node: Node, frame: Frame) -> None:
@@ -192,6 +211,9 @@ def call_methods(
     bindings: dict[str, Type] | None = None,
 ) -> Value:
     """Call as ``call_functions``; ``exactly``: of this class, whatever the object is."""
+    known = _in_place(run, methods[0], this_object, values, node, frame, types)
+    if known is not None:
+        return known
     _check_special(run, methods, node, frame)
     fitting = candidates(methods, values, run.makes_interfaces, partial(written_as, run, node, frame))
     if not fitting:

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.nodl.infer.cpp.workspace import HEAD, endpoints, gaps, in_class, infer
+from nodl.infer import infer_paths
+from tests.nodl.infer.cpp.workspace import HEAD, endpoints, gaps, in_class, infer, package
 
 pytest.importorskip("tree_sitter_cpp", reason="the extra cpp is not installed")
 
@@ -124,3 +125,31 @@ def test_an_interface_to_the_planning_scene_has_a_node_of_its_own(tmp_path: Path
         ("planning_scene_interface_*", "/arm")
     ]
     assert not gaps(system)
+
+
+def test_parameters_of_nav2_need_no_look_at_its_source(tmp_path: Path) -> None:
+    """But for a function of that name in another namespace, which is followed."""
+    before = (
+        "namespace nav2 { template <class T, class N> T declare_or_get_parameter(N n, std::string name, T value)"
+        "{ return n->has_parameter(name) ? n->get_parameter(name).template get_value<T>() : other(n, name); } }\n"
+        "namespace own { template <class T, class N> T declare_or_get_parameter(N n, std::string name, T value)"
+        '{ return "own_" + name; } }\n'
+    )
+    body = (
+        'create_publisher<std_msgs::msg::String>(nav2::declare_or_get_parameter(this, "map", std::string("m")), 1);'
+        'create_publisher<std_msgs::msg::String>(own::declare_or_get_parameter(this, "odom", std::string("o")), 1);'
+    )
+    system = infer(tmp_path, in_class(body, before=before))
+    assert endpoints(system) == {("publisher", "param:map"), ("publisher", "own_odom")}
+    assert not gaps(system)
+    assert {"map", "strict_param_loading"} <= set(system.nodes[0].parameters)
+
+
+def test_nodes_of_a_package_of_tests_that_nobody_makes_are_not_listed(tmp_path: Path) -> None:
+    source = HEAD + (
+        'class Demo : public rclcpp::Node { public: Demo() : Node("n") '
+        '{ create_publisher<std_msgs::msg::String>("t", 1); } };\n'
+    )
+    for name, made in (("demo_tests", set()), ("demo_nodes", {("publisher", "t")})):
+        folder = package(tmp_path / name, {"include/demo.hpp": source})
+        assert endpoints(infer_paths([folder])) == made
