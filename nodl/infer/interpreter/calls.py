@@ -1,4 +1,4 @@
-"""Calls of functions and classes of the program: arguments, bodies, generators, recursion, memory, constructors."""
+"""Calls of functions and classes of the program: arguments, bodies, generators, recursion, constructors."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def call_function(run: Run, function: FunctionValue, call: Call) -> Value:
     if node in run.stack:
         return _recursive(run, function, cells, call)
     mark = run.state.mark()
-    result = _remembered(run, function, cells, call)
+    result = _run_body(run, function, cells, call)
     if is_generator(function):  # its body may go on at any time, when somebody asks for the next value
         later = Partial((function,), tuple(call.args.positional), tuple(call.args.keywords.items()))
         run.register_callback((later,), 0, mark)
@@ -121,21 +121,6 @@ def _recursive(run: Run, function: FunctionValue, cells: LocalCells, call: Call)
         run.gap(call.node, call.frame, f"the recursion of {function.name} does not settle")
     del run.recursions[function.node]
     return recursion.result
-
-
-def _remembered(run: Run, function: FunctionValue, cells: LocalCells, call: Call) -> Value:
-    """Return the result of an earlier call that left the state as it found it, while the state is the same."""
-    key = (function, tuple(cells.values()), id(call.node), run.guards)
-    version = run.state.version()
-    known = run.memo.get(key)
-    if known is not None and known[0] == version:
-        return known[1]
-    result = _run_body(run, function, cells, call)
-    if (
-        run.state.version() == version and not run.recursions
-    ):  # whose result grows without a change of the state
-        run.memo[key] = (version, result)
-    return result
 
 
 def _run_body(run: Run, function: FunctionValue, cells: LocalCells, call: Call) -> Value:

@@ -221,8 +221,6 @@ class Run(Allocations):
         self.settle: Callable[[Run], None] = lambda run: None  # runs the callbacks; set by who drives the run
         self.guards: tuple[Guard, ...] = ()  # of parameters, that hold at the current point
         self.environment = FieldCells()  # variables that the program sets itself
-        # Calls that left the state as it was: at which version, with what result.
-        self.memo: dict[tuple[object, ...], tuple[object, Value]] = {}
         self.unrolled = 1  # turns of the unrolled loops around, multiplied
         self.repeated = 0  # inside a loop or callback: one allocation may stand for many objects
         self.steps = 0
