@@ -317,7 +317,8 @@ def declared_names(node: Node) -> list[DeclaredVariable]:
     """Return the variables of a declaration."""
     found: list[DeclaredVariable] = []
     values = node.children_by_field_name("default_value") or node.children_by_field_name("value")
-    for declarator in node.children_by_field_name("declarator"):
+    declarators = node.children_by_field_name("declarator")
+    for index, declarator in enumerate(declarators):
         value = None
         inner: Node | None = declarator
         pointer, array, size = False, False, ""
@@ -335,7 +336,8 @@ def declared_names(node: Node) -> list[DeclaredVariable]:
                 (c for c in inner.named_children if c.type.endswith(("declarator", "identifier"))), None
             )
         if inner is not None:
-            later = [v for v in values if v.start_byte >= declarator.end_byte]
+            end = declarators[index + 1].start_byte if index + 1 < len(declarators) else node.end_byte
+            later = [v for v in values if declarator.end_byte <= v.start_byte < end]
             written = type_text(node)
             if array and (pointer or written not in ("char", "unsigned char")):
                 counted = f", {size}" if size.isdigit() else ""

@@ -16,7 +16,7 @@ from nodl.infer.cpp.reading.known_headers import KNOWN_HEADERS, ROS_LIBRARIES
 from nodl.infer.cpp.reading.type_names import NO_TYPE, Type
 from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.arithmetic import as_type
-from nodl.infer.cpp.running.contents import copied, elements_copied, handed_over, items_of
+from nodl.infer.cpp.running.contents import copied, elements_copied, handed_over, items_of, takes_another
 from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
 from nodl.infer.cpp.running.overloads import candidates
 from nodl.infer.cpp.running.references import as_referred_to
@@ -221,7 +221,7 @@ def text_of(run: Machine, values: Sequence[Value]) -> Value:
 def _copies(run: Machine, cls: Class, value: Value) -> bool:
     """Return whether an object of the class, or of a derived one, is all that a constructor gets."""
     derived = all(isinstance(atom, Obj) and cls in run.names.ancestry(atom.cls) for atom in value)
-    return bool(value) and derived and cls.name not in run.names.methods[cls]
+    return bool(value) and derived and not any(map(takes_another, run.names.methods[cls].get(cls.name, ())))
 
 
 def _all_of(kind: Type, value: Value) -> bool:

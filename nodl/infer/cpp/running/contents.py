@@ -72,7 +72,7 @@ def _copy(run: Machine, atom: object, node: Node, frame: Frame, cls: Class | Non
     target = cls if cls is not None and cls in run.names.ancestry(atom.cls) else atom.cls
     if atom.heap and target is not cls:
         return atom
-    own = [each for each in run.names.methods[target].get(target.name, ()) if _takes_another(each)]
+    own = [each for each in run.names.methods[target].get(target.name, ()) if takes_another(each)]
     if any(map(run.makes_interfaces, own)) or (
         own and any("string" in f.type for f in target.fields.values())
     ):
@@ -82,8 +82,6 @@ def _copy(run: Machine, atom: object, node: Node, frame: Frame, cls: Class | Non
         for each in run.names.ancestry(target)
         for name in each.fields
     }
-    if target is atom.cls and any(nodes_in(value or BOTTOM) for value in cells.values()):
-        return atom
     kind = atom.type if target is atom.cls else Type(target.qualified)
     key = ("copy", atom, frame.file.file, node.start_byte, frame.path, target)
     twin = run.obj(key, kind, cls=target, bindings=atom.bindings, foreign_base=atom.foreign_base)
@@ -120,7 +118,7 @@ def _elements_copied(run: Machine, atom: object, node: Node, frame: Frame) -> ob
     return atom
 
 
-def _takes_another(constructor: Function) -> bool:
+def takes_another(constructor: Function) -> bool:
     """Return whether it copies or moves an object of its class."""
     given = [each for each in constructor.parameters if each.default is None]
     words = re.findall(r"\w+", given[0].type) if len(given) == 1 else []

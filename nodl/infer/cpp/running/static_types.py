@@ -99,7 +99,7 @@ def written_as(run: Machine, call: Node, frame: Frame) -> list[str]:
     ``string`` for a ``std::string``, else nothing.
     """
     found = []
-    for each in children(_given(call)):
+    for each in children(_given(call, frame)):
         kind, pointer = declared_type(run, each, frame)
         is_string = (kind.name in ("std::string", "string") and not kind.pointer) or text(each).startswith(
             "std::string("
@@ -111,10 +111,12 @@ def written_as(run: Machine, call: Node, frame: Frame) -> list[str]:
     return found
 
 
-def _given(call: Node) -> Node | None:
+def _given(call: Node, frame: Frame) -> Node | None:
     if call.type == "declaration":
         made = [each for each in children(call) if each.type.endswith("declarator")]
-        return field_of(made[0], "value") if len(made) == 1 else None
+        if len(made) > 1:  # the path ends in the name of the variable that is made
+            made = [each for each in made if text(field_of(each, "declarator")) in frame.path[-1:]]
+        return field_of(made[0], "value") if made else None
     if call.type == "field_initializer":
         return call.named_children[-1]
     return call if call.type in ("argument_list", "initializer_list") else field_of(call, "arguments")

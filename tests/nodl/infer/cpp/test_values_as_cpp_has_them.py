@@ -134,6 +134,24 @@ PROGRAMS: dict[str, tuple[str, str, str, set[str], set[str]]] = {
         'H(int, std::string, bool, std::string) : t("long") {} H(int, bool, int) : t("number") {} };\n',
         {"n"}, {"long", "number"},
     ),
+    "several variables of one declaration": (
+        'std::string q = "q"; H a("lit"), b(q); pub(a.t); pub(b.t + "_2"); pub(x_); pub(y_); pub(z_);',
+        'std::string x_, y_ = "given", z_{"last"};',
+        'struct H { std::string t; explicit H(bool) : t("true") {} explicit H(std::string s) : t(s) {} };\n',
+        {"true", "q_2", "given", "last"}, {"lit"},
+    ),
+    "members of one declaration have a value each": (
+        'pub(x_.t); pub(y_.t + "_2");', 'S x_, y_{std::string("m")};',
+        'struct S { std::string t = "d"; S() {} explicit S(std::string s) : t(s) {} };\n', {"d", "m_2"}, {"m", "d_2"},
+    ),
+    "a copy of an object that holds a node is another object": (
+        'B b(this); b.with("x").build(); b.in_brackets("y").build(); B c = b; c.t = "c"; c.build(); b.build();', "",
+        'struct B { rclcpp::Node * n; std::string t = "none"; explicit B(rclcpp::Node * n) : n(n) {}\n'
+        "B with(std::string x) const { B c = *this; c.t = x; return c; }\n"
+        "B in_brackets(std::string x) const { B c(*this); c.t = x; return c; }\n"
+        "void build() const { n->create_publisher<std_msgs::msg::String>(t, 1); } };\n",
+        {"x", "y", "c", "none"}, set(),
+    ),
     "elements that are swapped": (
         'std::vector<S> v(2); v[1].t = "b"; std::swap(v[0], v[1]); pub(v[0].t + "_0"); pub(v[1].t + "_1");', "",
         'struct S { std::string t = "a"; };\n', {"b_0", "a_1"}, {"a_0", "b_1"},
