@@ -64,7 +64,7 @@ def assignment(run: Machine, node: Node, frame: Frame) -> Value:
             return before
         value = copied(run, value, node, frame, cls)
         if any(isinstance(atom, Seq | Map) for atom in value):
-            value = elements_copied(run, declared_type(run, left, frame)[0], value, node, frame)
+            value = elements_copied(run, seen_type(run, left, frame), value, node, frame)
     elif operator == "+=":
         before = run.evaluate(left, frame)
         if has_text(before) and any(isinstance(atom, int | float) for atom in value):

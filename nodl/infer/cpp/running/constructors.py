@@ -115,6 +115,8 @@ _ITERATORS = re.compile(
 def converted(run: Machine, kind: Type, value: Value, node: Node, frame: Frame) -> Value:
     """Convert ``Foo x = y``: a copy of an object, as a Foo, or a Foo made of y."""
     cls = run.class_of(kind, frame)
+    if any(isinstance(atom, Seq | Map) for atom in value) and cls is None:
+        return elements_copied(run, kind, value, node, frame)
     if cls is None or any(isinstance(atom, Obj) for atom in value):
         return copied(run, value, node, frame, cls)
     if any(isinstance(atom, Seq | Group) for atom in value) or not run.names.find_methods(cls, cls.name):
@@ -170,14 +172,15 @@ def _sequence(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame
         for each in given
     ]
     if len(given) == 1 and given[0].type != "initializer_list" and any(isinstance(a, Seq) for a in items[0]):
-        return items[0]
+        return elements_copied(run, kind, items[0], node, frame)
     parent = given[0].parent if given else None
     if parent is None or parent.type != "argument_list":
         return (open_sequence(items) if kind.name in ORDERED else Seq(tuple(items)),)
     if len(items) > 1 and END in items[1]:
         parts = [items_of(run, atom) for atom in items[0]]
         listed = [item for part, _ in parts for item in part]
-        return (Seq(tuple(listed)) if len(parts) == 1 and parts[0][1] else open_sequence(listed),)
+        found = Seq(tuple(listed)) if len(parts) == 1 and parts[0][1] else open_sequence(listed)
+        return elements_copied(run, kind, (found,), node, frame)
     count = items[0][0] if len(items[0]) == 1 else None
     return _repeated(run, node, inner, count, frame, items[1] if len(items) > 1 else None)
 
@@ -273,7 +276,9 @@ def _aggregate(
         if name:
             member = cls.fields.get(name)
             inner = run.names.resolve(member.type, cls.scope, cls.file, bindings) if member else NO_TYPE
-            members[name] = values[position] if values else in_braces(run, value, inner, frame)
+            given_value = values[position] if values else in_braces(run, value, inner, frame)
+            by_value = member is not None and not member.pointer and not inner.pointer
+            members[name] = elements_copied(run, inner, given_value, item, frame) if by_value else given_value
     return construct(run, kind, [], node, frame, members=members)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from nodl.infer.cpp.running.arithmetic import added
 from nodl.infer.cpp.running.assignments import assign, with_entry
 from nodl.infer.cpp.running.constructors import ORDERED, construct, made
-from nodl.infer.cpp.running.contents import copied, handed_over, items_of
+from nodl.infer.cpp.running.contents import copied, elements_copied, handed_over, items_of
 from nodl.infer.cpp.running.expressions import element
 from nodl.infer.cpp.running.invocation import CallSite
 from nodl.infer.cpp.running.launch_values import settled_text
@@ -120,7 +120,11 @@ def _inserted(run: Machine, atom: object, source: Value, site: CallSite) -> Valu
     items = [item for each in source for item in items_of(run, each)[0]]
     exact = isinstance(atom, Seq) and all(items_of(run, each)[1] for each in source)
     longer = (*(atom.items if isinstance(atom, Seq) else ((atom,),)), *items)
-    assign(run, site.receiver, (Seq(longer) if exact else open_sequence(longer),), site.frame)
+    kind, _ = declared_type(run, site.receiver, site.frame)
+    after = elements_copied(
+        run, kind, (Seq(longer) if exact else open_sequence(longer),), site.node, site.frame
+    )
+    assign(run, site.receiver, after, site.frame)
     return BOTTOM
 
 
@@ -208,6 +212,8 @@ def _sequence_call(run: Machine, atom: Seq | Group, name: str, site: CallSite) -
         before = run.evaluate(site.given[0], site.frame)
         assign(run, site.given[0], (atom,), site.frame)
         assign(run, site.receiver, before, site.frame)
+    elif name == "assign" and len(values) == 2 and END in values[1]:
+        _inserted(run, Seq(()), first, site)
     elif (after := _rearranged(atom, name, values)) is not None:
         assign(run, site.receiver, (after,), site.frame)
     return unknown(f"the result of {name}()")
