@@ -10,8 +10,9 @@ from nodl.infer.cpp.libraries import Call, library_class
 from nodl.infer.cpp.reading.declarations import parameters_of
 from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.constructors import text_of
-from nodl.infer.cpp.running.contents import items_of
+from nodl.infer.cpp.running.contents import copied, items_of
 from nodl.infer.cpp.running.machine import NEXT, Frame, Machine, registered
+from nodl.infer.cpp.running.static_types import is_pointer
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     Bound,
@@ -28,7 +29,7 @@ from nodl.infer.cpp.running.values import (
     plain,
     unknown,
 )
-from nodl.infer.cpp.syntax import Node, field_of, text
+from nodl.infer.cpp.syntax import Node, children, field_of, text
 
 Standard = Callable[[Machine, Sequence[Value], Node, Frame], Value]
 STANDARD: dict[str, Standard] = {}
@@ -78,7 +79,23 @@ def _to_string(run: Machine, values: Sequence[Value], node: Node, frame: Frame) 
     "std::make_pair", "std::pair", "std::make_tuple", "std::tuple", "std::tie", "std::forward_as_tuple"
 )
 def _pair(run: Machine, values: Sequence[Value], node: Node, frame: Frame) -> Value:
-    return (Group(tuple(values)),)
+    return (Group(tuple(_by_value(run, values, node, frame))),)
+
+
+def _by_value(run: Machine, values: Sequence[Value], call: Node, frame: Frame) -> list[Value]:
+    """Return the arguments as somebody keeps them who copies objects; not those behind pointers and ``std::tie``."""
+    given = children(field_of(call, "arguments"))
+    if len(given) != len(values) or _TIES.search(text(field_of(call, "function"))):
+        return list(values)
+    return [
+        copied(run, value, each, frame)
+        if each.type in ("identifier", "field_expression") and not is_pointer(run, each, frame)
+        else value
+        for value, each in zip(values, given, strict=True)
+    ]
+
+
+_TIES = re.compile(r"\b(?:tie|forward_as_tuple)\b")
 
 
 @_standard("std::get")
@@ -94,6 +111,7 @@ def _bind(run: Machine, values: Sequence[Value], node: Node, frame: Frame) -> Va
     """Bind a method to its object, or a function; where arguments are bound, too, placeholders are not known."""
     if not values:
         return BOTTOM
+    values = _by_value(run, values, node, frame)
     found: list[Bound | Lambda] = []
     for atom in values[0]:
         objects = [each for each in values[1] if isinstance(each, Obj)] if len(values) > 1 else []

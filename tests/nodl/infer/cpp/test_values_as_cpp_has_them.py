@@ -160,6 +160,14 @@ PROGRAMS: dict[str, tuple[str, str, str, set[str], set[str]]] = {
         'struct S { std::string t = "d"; };\nstruct H { std::vector<S> v; };\n',
         {"kept", "a", "b", "c", "e", "h", "i"}, {"d"},
     ),
+    "a pair and a bound call keep copies, but not of what a pointer shows": (
+        'B a{this, "a"}; auto p = std::make_pair(1, a); p.second.t = "pair"; auto f = std::bind(&B::go, a);'
+        'auto g = std::bind(&B::go, &b_); B * c = &b_; auto q = std::make_pair(1, c); a.t = "later"; b_.t = "shown";'
+        'p.second.go(); f(); g(); q.second->go(); a.go();', "B b_{this, \"b\"};",
+        "struct B { rclcpp::Node * n; std::string t;\n"
+        "void go() { n->create_publisher<std_msgs::msg::String>(t, 1); } };\n",
+        {"pair", "a", "shown", "later"}, {"b"},
+    ),
     "elements that are swapped": (
         'std::vector<S> v(2); v[1].t = "b"; std::swap(v[0], v[1]); pub(v[0].t + "_0"); pub(v[1].t + "_1");', "",
         'struct S { std::string t = "a"; };\n', {"b_0", "a_1"}, {"a_0", "b_1"},
