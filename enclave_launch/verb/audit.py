@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
+from enclave_common.new_file import write_text
 from enclave_common.terminal import warn
 from enclave_launch.errors import RuntimeFailure, translated
 from enclave_launch.flow import run
@@ -27,5 +28,5 @@ def audit_launch(plan: LaunchPlan, options: argparse.Namespace, settings: RunSet
         with translated(
             OSError, RuntimeFailure, f"--audit-report {options.audit_report}: cannot be written: "
         ):
-            options.audit_report.write_text(audit_json(report), encoding="utf-8")
+            write_text(options.audit_report, audit_json(report))
     return status or report.exit_status

@@ -23,6 +23,7 @@ from enclave_common.command_line import (
     guarded,
     verb_head,
 )
+from enclave_common.new_file import write_text
 from enclave_common.terminal import printable, safe_output
 from nodl.errors import NoDLError
 
@@ -94,5 +95,5 @@ def write_documents(folder: Path, documents: Mapping[str, str]) -> None:
     """Write each text into a file of that name, and say which."""
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in documents.items():
-        (folder / name).write_text(encodable(text), encoding="utf-8")
+        write_text(folder / name, text)
         print(printable(str(folder / name)))

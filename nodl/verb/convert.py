@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from enclave_common.command_line import PATH, Option
+from enclave_common.new_file import write_text
 from nodl.ament_index import search_prefixes
 from nodl.document import read_document
 from nodl.document.write import Written, v1_xml, v2_yaml
@@ -66,7 +67,7 @@ def _emit(document: Written, path: Path | None) -> None:
     if path is None:
         sys.stdout.write(document.text)
     else:
-        path.write_text(document.text, encoding="utf-8")
+        write_text(path, document.text)
         print(path)
     for note in document.notes:
         print(f"note: {note}", file=sys.stderr)

@@ -23,6 +23,7 @@ from typing import Any
 
 from enclave_common.command_line import FLAG, PATH, TEXT, TIME, Option, add_options, one_of
 from enclave_common.environment import domain_id
+from enclave_common.new_file import write_text
 from enclave_common.terminal import json_text, printable
 from enclave_common.words import counted
 from nodl.errors import NoDLError
@@ -98,7 +99,7 @@ def run(arguments: argparse.Namespace) -> int:
     if not arguments.merge_only:
         now = _observe(arguments, _starts(arguments.launch))
         if arguments.save is not None:
-            arguments.save.write_text(observed_text(now), encoding="utf-8")
+            write_text(arguments.save, observed_text(now))
         runs.append(now)
     chosen = arguments.format or ("v2" if arguments.output else "text")
     documents = _documents(chosen, runs, arguments.output)

@@ -13,6 +13,7 @@ import sys
 from pathlib import Path
 
 from enclave_common.command_line import PATH, Option
+from enclave_common.new_file import write_text
 from enclave_common.terminal import json_text
 from enclave_launch.deployment.placement import place
 from enclave_launch.deployment.processes import deployed_processes
@@ -42,7 +43,7 @@ def run(options: argparse.Namespace) -> int:
     graph = flow_graph(plan_from_document(document))
     if options.write_enclaves is not None:
         with translated(OSError, UsageError, f"{options.write_enclaves}: "):
-            options.write_enclaves.write_text(enclaves_yaml(placement), encoding="utf-8")
+            write_text(options.write_enclaves, enclaves_yaml(placement))
     if options.format == "json":
         sys.stdout.write(json_text(hosts_document(placement, graph), indent=2) + "\n")
     else:
