@@ -8,7 +8,7 @@ from collections.abc import Callable
 from nodl.infer.interpreter.conditions import truth
 from nodl.infer.interpreter.define import expect_methods, is_constant, new_instance, program_classes
 from nodl.infer.interpreter.elements import copy_dictionary, elements, keys_of, store_attribute
-from nodl.infer.interpreter.formatting import as_texts, text_value
+from nodl.infer.interpreter.formatting import as_texts, is_whole_number, text_value
 from nodl.infer.interpreter.imports import import_module
 from nodl.infer.interpreter.run import Arguments, Call, Model, Run
 from nodl.infer.models import options
@@ -57,6 +57,13 @@ def _str(run: Run, call: Call) -> Value:
 
 def _bool(run: Run, call: Call) -> Value:
     return boolean(truth(call.args.at(0) or (False,)))
+
+
+def _int(run: Run, call: Call) -> Value:
+    atom = sole(call.args.at(0))
+    if type(atom) is int or is_whole_number(atom):
+        return (atom,)
+    return ANY
 
 
 def _len(run: Run, call: Call) -> Value:
@@ -108,6 +115,16 @@ def _enumerate(run: Run, call: Call) -> Value:
         return run.sequence(call.node, LAZY, Items(pairs))
     pair = run.tuple_of((unknown("a number of a loop"), items.any_element() or ANY))
     return run.sequence(call.node, LAZY, Items(None, pair))
+
+
+def _zip(run: Run, call: Call) -> Value:
+    """Return the rows of lists that are all known; unknown otherwise, since nobody knows what goes with what."""
+    columns = [elements(run, value, call.node, call.frame) for value in call.args.positional]
+    known = [column.exact for column in columns if column.exact is not None]
+    if call.args.more or len(known) < len(columns):
+        return ANY
+    rows = tuple(run.tuple_of(row) for row in zip(*known, strict=False))
+    return run.sequence(call.node, LAZY, Items(rows))
 
 
 def _sorted(run: Run, call: Call) -> Value:
@@ -313,6 +330,7 @@ _BUILT_IN: dict[str, Callable[[Run, Call], Value]] = {
     for name, model in {
         "str": _str,
         "bool": _bool,
+        "int": _int,
         "len": _len,
         "range": _range,
         "list": _made("list"),
@@ -324,6 +342,7 @@ _BUILT_IN: dict[str, Callable[[Run, Call], Value]] = {
         ),
         "sorted": _sorted,
         "enumerate": _enumerate,
+        "zip": _zip,
         "map": _map,
         "filter": _filter,
         "dict": _dict,
