@@ -1,6 +1,6 @@
 """Read a file that somebody else wrote, in bounded time and memory.
 
-A path may name anything: a pipe that nobody writes to, a device that never ends. Each is refused with an ``OSError``.
+A path can name a pipe without a writer or an endless device. Both raise ``OSError``.
 """
 
 from __future__ import annotations

@@ -85,7 +85,10 @@ def provision_policies(
 def provision_plan(
     settings: SecuritySettings, plan: LaunchPlan, options: ProvisionOptions
 ) -> tuple[ProvisionOptions, ProvisionReport, LaunchRouter | None]:
-    """Provision all enclaves of ``plan``, and the router of those on Zenoh; return the options used, too."""
+    """Provision all enclaves of ``plan``, and the router of those on Zenoh; return the options used, too.
+
+    Raises ``ProvisionError`` as ``provision_policies``.
+    """
     enclaves = on_zenoh(plan, os.environ)
     if not enclaves:
         return options, provision_policies(settings, plan, options), None
@@ -102,7 +105,10 @@ def launch_owner(plan: LaunchPlan) -> str:
 
 
 def with_shares_reported(plan: LaunchPlan, keystore: str) -> LaunchPlan:
-    """Return the plan with a warning for each enclave that other launches on ``keystore`` share."""
+    """Return the plan with a warning for each enclave that other launches on ``keystore`` share.
+
+    Raises ``ProvisionError`` if shares cannot be read.
+    """
     with keystore_errors():
         found = list(shared_enclaves(keystore, launch_owner(plan), plan.derived.policy.enclaves))
     return plan._replace(warnings=(*plan.warnings, *(enclave_of_several_launches(*one) for one in found)))
@@ -194,7 +200,7 @@ class PlanProvider:
         return StartAdditions(("--enclave", launcher.enclave), variables)
 
     def _check(self, policy: EnclavePolicy) -> None:
-        """Refuse an enclave that changed since it was signed; somebody else changed it, nothing is repaired."""
+        """Refuse an enclave whose files changed since they were signed. Nothing is repaired."""
         enclave, keystore = policy.path, self._launch.settings.keystore
         try:
             wrong = differences(keystore, policy, options=self._options)

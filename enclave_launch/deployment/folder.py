@@ -15,7 +15,7 @@ _HEAD = 400  # bytes in which the mark stands
 
 
 def write_folder(folder: Path, files: Mapping[str, File]) -> tuple[str, ...]:
-    """Write ``files`` and remove generated ones that are no longer among them; return the names that changed.
+    """Write ``files``, remove generated files that are no longer among them, and return the names that changed.
 
     Raises UsageError, before anything is changed, for a file that was not generated or cannot be written.
     """

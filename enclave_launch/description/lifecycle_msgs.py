@@ -1,4 +1,4 @@
-"""``lifecycle_msgs.msg`` as far as launch files use it, put in place where the real package is not installed."""
+"""The part of ``lifecycle_msgs.msg`` that launch files use. It is used if the real package is not installed."""
 
 from __future__ import annotations
 

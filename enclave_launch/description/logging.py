@@ -1,4 +1,4 @@
-"""``launch.logging``: named loggers of the standard library, below ``launch``, and where the log files go."""
+"""``launch.logging``: loggers of the standard library below ``launch``, and the directory of the log files."""
 
 from __future__ import annotations
 

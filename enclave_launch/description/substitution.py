@@ -80,7 +80,10 @@ def perform_substitutions(context: LaunchContext, subs: Iterable[Substitution], 
 
 
 def normalize_to_list_of_substitutions(subs: SomeSubstitutionsType | pathlib.Path) -> list[Substitution]:
-    """Return text as a ``TextSubstitution``, one substitution as a list, an iterable item by item."""
+    """Return text as a ``TextSubstitution``, one substitution as a list, an iterable item by item.
+
+    Raises ``TypeError`` for anything else.
+    """
     if isinstance(subs, str):
         return [TextSubstitution(text=subs)]
     if type(subs) is list:

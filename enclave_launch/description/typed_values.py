@@ -79,7 +79,11 @@ def is_instance_of(value: Any, data_type: Any = None, *, can_be_str: bool = Fals
 
 
 def coerce_to_type(value: str, data_type: Any = None, *, can_be_str: bool = False) -> Any:
-    """Convert text to ``data_type``, None for YAML 1.1's; ``can_be_str``: what does not convert stays text."""
+    """Convert text to ``data_type``, for ``None`` to the type that YAML 1.1 gives it.
+
+    With ``can_be_str`` text that does not convert is returned unchanged; otherwise it raises ``ValueError``, as an
+    invalid ``data_type`` does. Raises ``TypeError`` for a ``value`` that is not text.
+    """
     ensure_argument_type(value, str, "value", "coerce_to_type")
     if data_type is str:
         return value

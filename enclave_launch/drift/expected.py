@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 from enclave_launch.admission.middleware import ZENOH
 from enclave_launch.diagnostics import Code
-from enclave_launch.process import UNSPECIFIED_NODE_NAME, UNSPECIFIED_NODE_NAMESPACE
-from enclave_launch.review.document import GrantedName
+from enclave_launch.process import UNSPECIFIED_NODE_NAME
+from enclave_launch.review.document import GrantedName, fqn_of, program_of
 from keystore.formats.permissions_patterns import has_wildcard
 
 _STATED = ("--nodl", "manifest of the package")
@@ -76,9 +76,9 @@ def expected_in(documents: Iterable[Mapping[str, Any]], domain: int) -> Expected
         if node.enclave in enclaves or node.enclave not in elsewhere
     }
     known = {(node.program, node.enclave) for node in nodes.values()}
-    for fqn, count in Counter(_fqn(each) for each in started if each["fqn"]).items():
-        starter = next(each for each in started if each["fqn"] and _fqn(each) == fqn)
-        program = f"{starter['package']}/{starter.get('executable') or starter.get('plugin')}"
+    for fqn, count in Counter(fqn_of(each) for each in started if each["fqn"]).items():
+        starter = next(each for each in started if each["fqn"] and fqn_of(each) == fqn)
+        program = program_of(starter)
         # Nodes of a known program have the names that rcl gives them, by the user's own ROS arguments, too.
         described = (program, _enclave(starter)) in known
         if fqn not in nodes and not described and UNSPECIFIED_NODE_NAME not in fqn:
@@ -88,16 +88,12 @@ def expected_in(documents: Iterable[Mapping[str, Any]], domain: int) -> Expected
         if fqn in nodes:
             nodes[fqn] = nodes[fqn]._replace(times=count)
     unnamed = frozenset(
-        _fqn(each).rpartition("/")[0] or "/"
+        fqn_of(each).rpartition("/")[0] or "/"
         for each in started
         if each["fqn"] and UNSPECIFIED_NODE_NAME in each["fqn"]
     )
     opaque = frozenset(_enclave(each) for each in here if not each["fqn"])
     return Expected(nodes, opaque, unnamed, frozenset(path for path in enclaves if path))
-
-
-def _fqn(started: Mapping[str, Any]) -> str:
-    return str(started["fqn"]).replace(UNSPECIFIED_NODE_NAMESPACE, "")
 
 
 def _enclave(started: Mapping[str, Any]) -> str:
@@ -116,7 +112,7 @@ def _described(
     origins: dict[str, str] = {}
     on_event: dict[str, bool] = {}
     for each in started:
-        program = f"{each['package']}/{each.get('executable') or each.get('plugin')}"
+        program = program_of(each)
         origins[program] = each["interfaces"] or ""
         on_event[program] = on_event.get(program, True) and each["on_event"] is not None
     for node in nodes:

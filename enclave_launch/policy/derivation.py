@@ -105,7 +105,10 @@ def derive_policy(
     options: PolicyOptions | None = None,
     also: Iterable[str] = (),
 ) -> DerivedPolicy:
-    """Derive the policy of all ``nodes``; ``also``: enclaves that must exist though no node in them is known."""
+    """Derive the policy of all ``nodes``; ``also``: enclaves that must exist though no node in them is known.
+
+    Raises ``ValueError`` for an unknown distribution.
+    """
     chosen = options or PolicyOptions()
     collection = _Collection({path: {} for path in also}, {}, [], [])
     for node in nodes:

@@ -111,7 +111,10 @@ class NodePermissions(NamedTuple):
 
 
 def node_permissions(node: RunningNode, *, distro: str, options: PolicyOptions) -> NodePermissions:
-    """Return everything that ``node`` needs under its final name, with what ``options`` add."""
+    """Return everything that ``node`` needs under its final name, with what ``options`` add.
+
+    Raises ``ValueError`` for an unknown distribution.
+    """
     return _Collector(node, distro, options).collect()
 
 

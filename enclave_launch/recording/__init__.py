@@ -1,1 +1,1 @@
-"""What processes ask of librcl, recorded while they run: one recorder, used to learn, to audit and to explain."""
+"""Records the calls of processes to librcl while they run. Learning, audit and explanations use the same recorder."""

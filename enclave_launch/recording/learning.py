@@ -1,4 +1,4 @@
-"""``--learn``: a launch is run to see what its nodes ask for. Writes DIR/records/RUN.record, and manifests.
+"""``--learn``: runs a launch and records what its nodes request. Writes DIR/records/RUN.record and manifests.
 
 Manifests are made again from all records each time and united with what stands in them: nothing goes away because it
 was not seen this time.

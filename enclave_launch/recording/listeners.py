@@ -1,4 +1,4 @@
-"""Who hears of a recording while it grows; and the listener of every one, which publishes recorded endpoints."""
+"""Listeners of a recording while it grows. One of them, used by every launch, publishes recorded endpoints."""
 
 from __future__ import annotations
 

@@ -135,7 +135,7 @@ def grants_of(lists: Mapping[str, Sequence[str]]) -> frozenset[GrantedName]:
 
 
 def _nodes(document: Mapping[str, Any]) -> Iterator[NodeView]:
-    launched = {_fqn(item) for item in (*document.get("processes", ()), *document.get("components", ()))}
+    launched = {fqn_of(item) for item in (*document.get("processes", ()), *document.get("components", ()))}
     mains: dict[tuple[str, str], list[str]] = {}
     for node in document.get("nodes", ()):
         if node["fqn"] in launched:
@@ -146,8 +146,14 @@ def _nodes(document: Mapping[str, Any]) -> Iterator[NodeView]:
         yield _node(node, started_with[0] if is_helper else node["fqn"])
 
 
-def _fqn(item: Mapping[str, Any]) -> str:
+def fqn_of(item: Mapping[str, Any]) -> str:
+    """Return the final name of a process or component; empty if it has none."""
     return (item["fqn"] or "").replace(UNSPECIFIED_NODE_NAMESPACE, "")
+
+
+def program_of(item: Mapping[str, Any]) -> str:
+    """Return ``package/executable`` of a process, ``package/plugin`` of a component."""
+    return f"{item.get('package')}/{item.get('executable') or item.get('plugin')}"
 
 
 def _node(node: Mapping[str, Any], unit: str) -> NodeView:

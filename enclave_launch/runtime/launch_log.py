@@ -211,7 +211,7 @@ def make_log_directory(base: Path, now: datetime, host: str, pid: int) -> Path:
 
 
 def _renew_latest(link: Path, directory: Path) -> None:
-    """Replace the link atomically, since other launches do the same; leave alone what is no link."""
+    """Replace the link atomically, because other launches do the same; keep a file that is not a link."""
     if link.exists() and not link.is_symlink():
         return
     fresh = link.with_name(f".latest-{os.getpid()}")

@@ -86,7 +86,11 @@ def printed(name: str, text: str = "") -> Condition:
 
 
 def endpoint_seen(name: str, endpoint: str, *, kind: EndpointKind | None = None, node: str = "") -> Condition:
-    """Return a condition that holds while a node of the process ``name`` has the endpoint of this final name."""
+    """Return a condition that holds while a node of the process ``name`` has ``endpoint``, a final name.
+
+    ``kind`` and ``node`` (a fully qualified name) narrow it. The condition raises ``RuntimeFailure`` if the launch is
+    not recorded.
+    """
 
     def holds(launch: RunningLaunch) -> bool:
         if not launch.is_recorded:

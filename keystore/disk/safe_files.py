@@ -130,7 +130,7 @@ def refuse_unsafe_private(root: Path, relative: str) -> None:
 
 
 def refuse_unsafe_private_directories(root: Path) -> None:
-    """Refuse ``private/`` if somebody else may add to it: what waits there becomes a CA."""
+    """Refuse ``private/`` if another user can write to it: a key placed there would become a CA."""
     for relative in (layout.PRIVATE, *layout.PRIVATE_FOLDERS):
         path = root / relative
         if not os.path.lexists(path):

@@ -60,7 +60,7 @@ class LaunchHold:
         self._descriptor = descriptor
 
     def take(self) -> None:
-        """Take the lock, repeatedly if need be; do nothing where there is no keystore, or one that others own."""
+        """Take the lock unless it is held. Do nothing without a keystore, or if another user owns it."""
         if self._descriptor is None:
             self._descriptor = _open(self.root, self.owner, os.O_RDWR | os.O_CREAT)
             if self._descriptor is not None:

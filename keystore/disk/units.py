@@ -1,4 +1,4 @@
-"""What a generated systemd unit says of itself (settings ``X-...``, which systemd ignores), and how it is read back."""
+"""Reads the settings ``X-...`` of generated systemd units, which systemd itself ignores."""
 
 from __future__ import annotations
 

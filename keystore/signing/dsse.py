@@ -15,7 +15,10 @@ from keystore.signing.signer import Signer, spki
 
 
 def envelope(payload: bytes, payload_type: str, signer: Signer) -> dict[str, Any]:
-    """Make the envelope with one signature; ``keyid`` is the SHA-256 of the public key in DER, in hex."""
+    """Make the envelope with one signature; ``keyid`` is the SHA-256 of the public key in DER, in hex.
+
+    Raises ``SigningUnavailableError`` as ``signer``.
+    """
     signature = signer.sign(signed_bytes(payload, payload_type))
     key = {"keyid": fingerprint(spki(signer.public_key())), "sig": base64.b64encode(signature).decode()}
     return {"payload": base64.b64encode(payload).decode(), "payloadType": payload_type, "signatures": [key]}

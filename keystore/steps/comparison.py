@@ -91,7 +91,10 @@ def _first_end(view: KeystoreView, enclaves: Iterable[Validity | None]) -> datet
 def differences(
     keystore: Path | str, policy: EnclavePolicy, *, options: ProvisionOptions | None = None
 ) -> tuple[str, ...]:
-    """Return why an enclave is not what ``provision`` with the same options left; empty if it is. Reads only."""
+    """Return why an enclave is not what ``provision`` with the same options left; empty if it is. Reads only.
+
+    Raises ``KeystoreError`` for a keystore that cannot be read.
+    """
     root = resolve_root(keystore)
     # What ends soon is renewed by a start, and good until then.
     chosen = with_domains(root, options or ProvisionOptions())._replace(renew_within=timedelta(0))

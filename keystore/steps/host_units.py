@@ -66,7 +66,10 @@ def installed_units(options: UnitOptions | None = None) -> list[Unit]:
 
 
 def chosen_units(units: Sequence[Unit], names: Iterable[str]) -> list[Unit]:
-    """Return the services of these units, targets, nodes or enclaves, in restart order; all without names."""
+    """Return the services of these units, targets, nodes or enclaves, in restart order; all without names.
+
+    Raises ``InvalidInputError`` for a name that matches none.
+    """
     processes = in_restart_order(units)
     wanted = list(names)
     for name in wanted:

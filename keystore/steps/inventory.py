@@ -41,7 +41,10 @@ class KeyEntry(NamedTuple):
 
 
 def inventory(keystore: Path | str) -> tuple[KeyEntry, ...]:
-    """List CAs first, those that are only still trusted after the one in use; then enclaves by name."""
+    """List CAs first, those that are only still trusted after the one in use; then enclaves by name.
+
+    Raises ``NotAKeystoreError`` and ``DamagedKeystoreError``.
+    """
     view = keystore_at(keystore)
     return (*_authorities(view), *_enclaves(view))
 
@@ -135,7 +138,10 @@ class Granted(NamedTuple):
 
 
 def granted(keystore: Path | str) -> dict[str, Granted]:
-    """Map enclaves to what their permissions say; an enclave without permissions is left out."""
+    """Map enclaves to what their permissions say; an enclave without permissions is left out.
+
+    Raises ``NotAKeystoreError``, ``DamagedKeystoreError``, and ``InvalidInputError`` for files that cannot be read.
+    """
     view = keystore_at(keystore)
     found = {}
     for enclave in view.enclaves():

@@ -216,7 +216,10 @@ class LifecycleTransition(Action):
         self.__handlers: dict[str, list[EventHandler]] = {}
 
     def execute(self, context: LaunchContext) -> list[LaunchDescriptionEntity]:
-        """Register handlers for every reached goal state, then send the first request to every node."""
+        """Register handlers for every reached goal state, then send the first request to every node.
+
+        Raises ``ValueError`` for an id that is not a number, ``KeyError`` for one without a goal state.
+        """
         names = [perform_substitutions(context, name) for name in self.__names]
         ids = [_transition_id(perform_substitutions(context, item)) for item in self.__ids]
         requests = {name: [_request(name, transition) for transition in ids] for name in names}

@@ -1,4 +1,4 @@
-"""``executable``: the actions that start a process, and the handlers of its start, its output and its exit."""
+"""``executable``: actions that start a process, and event handlers for process start, output and exit."""
 
 from __future__ import annotations
 

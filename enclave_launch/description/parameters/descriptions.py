@@ -132,7 +132,10 @@ class ParameterFile:
         )
 
     def evaluate(self, context: LaunchContext) -> Path:
-        """Return the path to pass on: the file, or a copy with the substitutions performed."""
+        """Return the path to pass on: the file, or a copy with the substitutions performed.
+
+        Raises ``FileNotFoundError`` for a missing file, ``SubstitutionFailure`` if the copy is not YAML.
+        """
         if self.__evaluated is None:
             given = self.__param_file
             path = Path(

@@ -44,7 +44,8 @@ def to_parameters_list(
 ) -> list[ParameterAssignment]:
     """Return dicts as they are, files as far as they apply to this node, in order.
 
-    A file of which no section applies contributes the preceding set once more, as upstream does."""
+    A file of which no section applies contributes the preceding set once more, as upstream does. Raises
+    ``FileNotFoundError`` for a missing file, ``RuntimeError`` for a ``Parameter`` description."""
     section = (node_name or "").lstrip("/")
     if namespace and namespace != "/":
         section = f"{namespace.strip('/')}/{section}"

@@ -31,7 +31,10 @@ class YamlConstant(TextSubstitution):
 
 @lru_cache(maxsize=16)
 def load_parameter_file(text: str) -> Any:
-    """Load as ``yaml.safe_load``, once for all nodes with the same file; do not modify the values."""
+    """Load as ``yaml.safe_load``, once for all nodes with the same file; do not modify the values.
+
+    Raises ``yaml.YAMLError``, ``ValueError``.
+    """
     return load_yaml(text, MAX_BYTES)
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from enclave_launch.process import UNSPECIFIED_NODE_NAMESPACE
 from enclave_launch.review.checks.rules import finding
-from enclave_launch.review.document import PlanDocument, PlanFinding
+from enclave_launch.review.document import PlanDocument, PlanFinding, program_of
 
 Document = Mapping[str, Any]
 Item = Mapping[str, Any]
@@ -111,7 +111,7 @@ def launched(document: Document) -> tuple[Item, ...]:
 
 
 def _key(item: Item) -> tuple[str, str | None]:
-    return f"{item.get('package')}/{item.get('executable') or item.get('plugin')}", item.get("enclave")
+    return program_of(item), item.get("enclave")
 
 
 def _subject(item: Item) -> str:

@@ -98,7 +98,11 @@ def condition_of(run: Run, test: ast.expr, frame: Frame) -> Guard | None:
 
 def opposite(condition: Guard | None) -> Guard | None:
     """Return the condition that holds where ``condition`` does not."""
-    return condition and condition._replace(edit=OPPOSITE[condition.edit])
+    return condition and _negated(condition)
+
+
+def _negated(condition: Guard) -> Guard:
+    return condition._replace(edit=OPPOSITE[condition.edit])
 
 
 def under(run: Run, condition: Guard | None, action: Callable[[], T]) -> T:
@@ -113,7 +117,7 @@ def under(run: Run, condition: Guard | None, action: Callable[[], T]) -> T:
 
 def either(condition: Guard, first: Value, second: Value) -> Value:
     """Return what a variable holds: ``first`` where the condition holds, else ``second``."""
-    sides = ((condition, first, second), (condition._replace(edit=OPPOSITE[condition.edit]), second, first))
+    sides = ((condition, first, second), (_negated(condition), second, first))
     return join_all(
         tuple(
             only_if(held, atom) if isinstance(atom, str | Text) and not contains(other, atom) else atom

@@ -305,7 +305,7 @@ def _conditional(run: Run, node: ast.IfExp, frame: Frame) -> Value:
         held = condition if holds else opposite(condition)
         return under(run, held, lambda: run.evaluate(expression, frame))
 
-    body, orelse = run.state.each((lambda: side(node.body, True), lambda: side(node.orelse, False)))
+    body, orelse = run.state.each((partial(side, node.body, True), partial(side, node.orelse, False)))
     return either(condition, body, orelse) if condition else join(body, orelse)
 
 

@@ -96,7 +96,7 @@ def _if(run: Run, node: ast.If, frame: Frame) -> bool:
             passing.append(held)
         return passes
 
-    sides = (lambda: side(node.body, True), lambda: side(node.orelse, False))
+    sides = (partial(side, node.body, True), partial(side, node.orelse, False))
     passes = run.state.branches(sides, partial(either, condition) if condition else None)
     if condition and len(passing) == 1 and passing[0] is not None:
         run.guards = (*run.guards, passing[0])  # to the end of this block
