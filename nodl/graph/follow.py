@@ -14,7 +14,7 @@ from pathlib import Path
 
 from nodl.errors import NoDLError
 from nodl.graph.json_form import graph_document
-from nodl.graph.observing import SOURCES, Observer, Where, observer
+from nodl.graph.observing import SOURCES, Where, in_own_process, observer
 
 _BETWEEN = 1.0  # seconds between two lines at least; looks come oftener
 _LOOK = 0.2
@@ -27,26 +27,28 @@ def main() -> int:
     parser.add_argument("--with", dest="source", choices=SOURCES, default="auto")
     parser.add_argument("--enclave-directory", type=Path)
     given = parser.parse_args()
+    reader = os.dup(sys.stdin.fileno())  # multiprocessing closes standard input in the processes it starts
+    where = Where(given.domain, given.source, given.enclave_directory)
     try:
-        with observer(Where(given.domain, given.source, given.enclave_directory), os.environ) as up:
-            return _follow(up)
+        return in_own_process(lambda: _follow(where, reader))
     except (NoDLError, ImportError) as error:
         print(error, file=sys.stderr)
         return 1
 
 
-def _follow(up: Observer) -> int:
+def _follow(where: Where, reader: int) -> int:
     told, last = -1, 0.0
-    while not select.select([sys.stdin], [], [], _LOOK)[0]:
-        changes = up.look()
-        if changes != told and time.monotonic() - last >= _BETWEEN:
-            told, last = changes, time.monotonic()
-            line = {"graph": graph_document(up.graph()), "forged": up.forged}
-            try:
-                print(json.dumps(line), flush=True)
-            except BrokenPipeError:
-                os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-                return 0
+    with observer(where, os.environ) as up:
+        while not select.select([reader], [], [], _LOOK)[0]:
+            changes = up.look()
+            if changes != told and time.monotonic() - last >= _BETWEEN:
+                told, last = changes, time.monotonic()
+                line = {"graph": graph_document(up.graph()), "forged": up.forged}
+                try:
+                    print(json.dumps(line), flush=True)
+                except BrokenPipeError:
+                    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+                    return 0
     return 0
 
 

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import importlib.util
+import multiprocessing
+import signal
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
+from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 from enclave_common.dependencies import ros_import_failure
 from enclave_common.environment import environment_with
@@ -17,6 +20,13 @@ from nodl.graph.rclpy_graph import RclpyObserver
 
 INTERVAL = 0.1  # seconds between two looks: clients that call once and leave are there for about that long
 SOURCES = ("auto", "cyclonedds", "rclpy")  # all but the first are packages
+_MOST_CRASHES = 10
+_AFTER_CRASH = 1.0  # seconds: the nodes whose start made DDS crash are then known to each other
+_CRASHED = (
+    f"DDS crashed {_MOST_CRASHES} times while it observed. Cyclone DDS 0.10 does when nodes with Fast DDS 3 (ROS 2 "
+    "kilted and later) start: observe again when they have started, or with rclpy (--with rclpy)"
+)
+_Result = TypeVar("_Result")
 
 
 _OF_RCLPY = (
@@ -79,6 +89,45 @@ def observer(where: Where, environment: Mapping[str, str]) -> Iterator[Observer]
         yield up
     finally:
         up.close()
+
+
+def in_own_process(observe: Callable[[], _Result]) -> _Result:
+    """Call ``observe`` in a process of its own, and again if DDS crashes that.
+
+    Cyclone DDS 0.10 does not survive the type descriptions with 8-bit integers that nodes with Fast DDS 3 send each
+    other while they start, and every participant of the domain receives.
+
+    Returns what ``observe`` returns and raises what it raises; both must be picklable. Raises ``ObserverError`` if it
+    crashes again and again.
+    """
+    forked = multiprocessing.get_context("fork")
+    for _ in range(_MOST_CRASHES):
+        answers, answer = forked.Pipe(duplex=False)
+        process = forked.Process(target=_answered, args=(observe, answer))
+        process.start()
+        answer.close()
+        try:
+            value = answers.recv()
+        except EOFError:
+            time.sleep(_AFTER_CRASH)
+            continue
+        finally:
+            process.terminate()
+            process.join()
+        if isinstance(value, Exception):
+            raise value
+        result: _Result = value
+        return result
+    raise ObserverError(_CRASHED)
+
+
+def _answered(observe: Callable[[], Any], answer: Connection) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends this process
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    try:
+        answer.send(observe())
+    except Exception as error:
+        answer.send(error)
 
 
 def look_until(up: Observer, done: Callable[[], bool]) -> None:

@@ -30,7 +30,7 @@ from nodl.errors import NoDLError
 from nodl.graph.json_form import graph_document
 from nodl.graph.model import Graph
 from nodl.graph.observation import Observed, command_lines, observed_text, read_observed
-from nodl.graph.observing import Quiet, Where, look_until, observer
+from nodl.graph.observing import Quiet, Where, in_own_process, look_until, observer
 from nodl.graph.policy import observed_policy
 from nodl.graph.sources import learn_observed
 from nodl.graph.starts import StartedNode, starts_of_plan
@@ -97,7 +97,8 @@ def run(arguments: argparse.Namespace) -> int:
         return 2
     runs = [read_observed(path) for path in arguments.runs]
     if not arguments.merge_only:
-        now = _observe(arguments, _starts(arguments.launch))
+        starts = _starts(arguments.launch)
+        now = in_own_process(lambda: _observe(arguments, starts))
         if arguments.save is not None:
             write_text(arguments.save, observed_text(now))
         runs.append(now)
@@ -114,7 +115,6 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _observe(arguments: argparse.Namespace, starts: tuple[StartedNode, ...]) -> Observed:
-
     directory = _enclave_directory(arguments)
     where = Where(_domain_id(arguments), arguments.source, directory)
     commands: dict[str, tuple[str, ...]] = {}

@@ -32,7 +32,7 @@ from nodl.errors import NoDLError
 from nodl.graph.cyclone import RANGE_VARIABLES
 from nodl.graph.model import Graph
 from nodl.graph.observation import read_observed
-from nodl.graph.observing import Observer, Quiet, Where, look_until, observer
+from nodl.graph.observing import Observer, Quiet, Where, in_own_process, look_until, observer
 
 CANNOT_TELL = 4
 """Exit status."""
@@ -96,7 +96,7 @@ def _looked(options: argparse.Namespace, domain: int, findings: Findings) -> tup
             graph = read_observed(options.graph).graph
             return graph, findings(graph)
         where = Where(domain, options.observer, _enclave_directory(options))
-        return _observed(options, where, findings)
+        return in_own_process(lambda: _observed(options, where, findings))
     except (NoDLError, OSError) as error:
         raise CannotObserve(str(error)) from error
 
