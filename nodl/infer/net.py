@@ -394,7 +394,7 @@ class _Net:
     def _entered(self, scope: FunctionText, entry: ast.AST | None, places: list[CallPlace]) -> None:
         for place in places:
             if (place.node, entry) in self._run.evaluated:
-                if place.name in CREATING_NAMES and place.node not in self._run.understood:
+                if place.node not in self._run.understood:
                     self._gap(
                         scope, place.node, f"{place.name}() is called on something that is not understood"
                     )

@@ -32,6 +32,7 @@ from nodl.infer.values import (
     external,
     join,
     join_all,
+    present,
     unknown,
 )
 
@@ -41,7 +42,7 @@ MAX_DOTS = 8
 def _of_instance(run: Run, obj: Instance, name: str, node: ast.AST, frame: Frame) -> Value:
     held = obj.cells.get(name)
     if isinstance(obj.cls, External):
-        return held if held is not None else foreign.instance_attribute(run, obj, obj.cls.path, name)
+        return present(foreign.instance_attribute(run, obj, obj.cls.path, name) if held is None else held)
     if held is not None:
         if not obj.summary and ABSENT[0] not in held:
             return held
@@ -67,15 +68,21 @@ def _class_attribute(
     run: Run, obj: Instance, order: tuple[object, ...], name: str, node: ast.AST, frame: Frame
 ) -> Value | None:
     """Return what the classes in ``order`` hold under ``name``, bound to ``obj``; ``None``: nothing."""
-    for base in order:
+    for index, base in enumerate(order):
         if isinstance(base, ClassValue):
             value = base.cells.get(name)
             if value:
                 return _bound(run, obj, value, node, frame)
         elif isinstance(base, External):
             found = foreign.inherited(obj, base.path, name)
-            if found is not None:
+            if found is None:
+                continue
+            behind = (each.cells.get(name) for each in order[index + 1 :] if isinstance(each, ClassValue))
+            mixed_in = next(filter(None, behind), BOTTOM)
+            if not mixed_in or name in foreign.NODE_METHODS:
                 return found
+            bound = _bound(run, obj, mixed_in, node, frame)  # which names a library's class has is not known
+            return bound if foreign.is_node_class(base.path) else join(bound, found)
         else:
             return (ForeignMethod("", obj, name),)
     return None
@@ -165,12 +172,12 @@ def _of_super(run: Run, proxy: SuperProxy, name: str, node: ast.AST, frame: Fram
     position = order.index(proxy.owner) + 1 if proxy.owner in order else 1
     rest = order[position:]
     if isinstance(receiver, Instance):
-        for base in rest:
+        for index, base in enumerate(rest):
             if isinstance(base, External) and name == "__init__" and base.path != "builtins.object":
                 return (ForeignMethod(base.path, receiver, name),)
             if isinstance(base, ClassValue) and base.fields is not None and name == "__init__":
                 break
-            found = _class_attribute(run, receiver, (base,), name, node, frame)
+            found = _class_attribute(run, receiver, rest[index:], name, node, frame)
             if found is not None:
                 return found
         return (ForeignMethod("builtins.object", receiver, name),)

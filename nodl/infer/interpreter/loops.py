@@ -49,10 +49,18 @@ class _Turns(NamedTuple):
 def _looped(run: Run, node: Loop, frame: Frame, turns: Callable[[], _Turns]) -> bool:
     """Run the ``turns`` of a loop, then its ``else``, which a ``break`` skips."""
     before, loop_forks = frame.unsettled, frame.loop_forks
+    loop_mark, breaks = frame.loop_mark, frame.breaks
     frame.unsettled = False
     frame.loop_forks = run.state.forks
+    frame.loop_mark = run.state.mark()
+    frame.breaks = None if _cleans_up(node) else []
     outcome = turns()
+    if frame.breaks:
+        end = [run.state.written(frame.loop_mark)] if outcome.finished else []
+        run.state.settle(frame.loop_mark, [*frame.breaks, *end])
+        outcome = outcome._replace(passes=True, left=True)
     frame.unsettled, frame.loop_forks = before, loop_forks
+    frame.loop_mark, frame.breaks = loop_mark, breaks
     frame.jump = ""
     if outcome.passes and outcome.finished and node.orelse:
         if not outcome.left:
@@ -64,6 +72,20 @@ def _looped(run: Run, node: Loop, frame: Frame, turns: Callable[[], _Turns]) -> 
 @functools.lru_cache(maxsize=4096)
 def _breaks(node: Loop) -> bool:
     return any(isinstance(inner, ast.Break) for inner in ast.walk(node))
+
+
+@functools.lru_cache(maxsize=4096)
+def _cleans_up(node: Loop) -> bool:
+    """Return True if a ``break`` of the loop leaves a ``try`` or ``with``, which may do something before it does."""
+    return any(map(_leaves, node.body))
+
+
+def _leaves(node: ast.AST, cleaning: bool = False) -> bool:
+    cleaning = cleaning or hasattr(node, "finalbody") or isinstance(node, ast.With | ast.AsyncWith)
+    if isinstance(node, ast.Break):
+        return cleaning
+    inner = node.orelse if isinstance(node, Loop) else ast.iter_child_nodes(node)
+    return any(_leaves(each, cleaning) for each in inner if not isinstance(each, ast.expr))
 
 
 def _for(run: Run, node: For, iterated: Value, frame: Frame) -> _Turns:
@@ -90,7 +112,7 @@ def _for(run: Run, node: For, iterated: Value, frame: Frame) -> _Turns:
 
 def _unrolled(run: Run, node: For, exact: tuple[Value, ...], frame: Frame) -> _Turns:
     """Run one turn after the other."""
-    start = run.state.mark()
+    start, guards = run.state.mark(), run.guards
     broken, passes = False, True
     run.state.depth += 1
     for index, element in enumerate(exact):
@@ -100,8 +122,10 @@ def _unrolled(run: Run, node: For, exact: tuple[Value, ...], frame: Frame) -> _T
             break
     run.state.depth -= 1
     left = broken or (not passes and frame.jump == "break")
-    if broken:
+    if broken and frame.breaks is None:
         run.state.join_seen(start)
+    if left or frame.breaks:
+        run.guards = guards
     return _Turns(passes or left, passes or broken, left)
 
 
@@ -117,6 +141,8 @@ def _followed(run: Run, node: For, index: int, element: Value, frame: Frame) -> 
         run.state.join_seen(mark)
         frame.unsettled = False
         return True, True
+    if passes:
+        run.guards = run.guards_at_end  # what a test of a parameter let through comes to the next turn
     return passes or frame.jump == "continue", False
 
 
@@ -129,7 +155,7 @@ def _while(run: Run, node: ast.While, frame: Frame) -> _Turns:
         nonlocal broken
         narrowed(run, node.test, True, frame)
         passes = run.execute(node.body, frame)
-        broken = broken or frame.unsettled
+        broken = broken or (frame.unsettled and frame.breaks is None)
         run.evaluate(node.test, frame)
         return passes
 
@@ -162,7 +188,7 @@ def fixpoint(run: Run, frame: Frame, turn: Callable[[], bool]) -> None:
     run.state.depth -= 1
     run.state.forks -= 1
     run.repeated -= 1
-    if jumped:
+    if jumped and frame.breaks is None:
         run.state.join_seen(start)
 
 

@@ -47,9 +47,9 @@ class Frame:
     """The variables of a running function, class body or module."""
 
     __slots__ = (
-        "again", "cells", "closure", "depth", "early", "entry", "exits", "forks", "function", "globals", "guards",
-        "is_class", "is_comprehension", "jump", "loop_forks", "mark", "module", "nonlocals", "returned", "runs_more",
-        "trying", "unsettled", "yielded",
+        "again", "breaks", "cells", "closure", "depth", "early", "entry", "exits", "forks", "function", "globals",
+        "guards", "is_class", "is_comprehension", "jump", "loop_forks", "loop_mark", "mark", "module", "nonlocals",
+        "returned", "runs_more", "trying", "unsettled", "yielded",
     )  # fmt: skip
 
     def __init__(self, module: ModuleValue, cells: dict[object, Value], closure: Frame | None, depth: int):
@@ -72,6 +72,8 @@ class Frame:
         self.jump = ""  # the break or continue that certainly ended the latest statement
         self.forks = 0  # undecided branches when the frame was entered, and when its innermost loop was
         self.loop_forks = 0
+        self.loop_mark = 0  # of the state, when the innermost loop was entered
+        self.breaks: list[Written] | None = None  # what was written since, at each ``break``
         self.guards = 0  # how many conditions held when the frame was entered
         self.again = False  # the cells also hold an earlier call, whose inner functions live on
         self.is_class = False
@@ -220,6 +222,7 @@ class Run(Allocations):
         self.options = OptionDefaults()
         self.settle: Callable[[Run], None] = lambda run: None  # runs the callbacks; set by who drives the run
         self.guards: tuple[Guard, ...] = ()  # of parameters, that hold at the current point
+        self.guards_at_end: tuple[Guard, ...] = ()  # of the latest block
         self.environment = FieldCells()  # variables that the program sets itself
         self.unrolled = 1  # turns of the unrolled loops around, multiplied
         self.repeated = 0  # inside a loop or callback: one allocation may stand for many objects
@@ -246,7 +249,7 @@ class Run(Allocations):
             if handler is not None and not handler(self, statement, frame):
                 passes = False
                 break
-        self.guards = guards
+        self.guards_at_end, self.guards = self.guards, guards
         return passes
 
     def spend(self, count: int) -> None:

@@ -132,9 +132,12 @@ def _raise(run: Run, node: ast.Raise, frame: Frame) -> bool:
 
 
 def _jump(run: Run, node: ast.Break | ast.Continue, frame: Frame) -> bool:
+    breaks = frame.breaks if isinstance(node, ast.Break) else None
+    if breaks is not None:
+        breaks.append(run.state.written(frame.loop_mark))
     if run.state.forks == frame.loop_forks:
         frame.jump = "break" if isinstance(node, ast.Break) else "continue"
-    else:
+    elif breaks is None:
         frame.unsettled = True
     return False
 

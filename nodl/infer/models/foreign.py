@@ -197,6 +197,8 @@ def call_foreign_method(run: Run, method: ForeignMethod, call: Call) -> Value:
     """Call a method of a library's class: as its model says, else unknown, and the arguments escape."""
     receiver, path, name = method.receiver, method.path, method.name
     assert isinstance(receiver, Instance)
+    if name not in NODE_ENDPOINTS:
+        run.understood.add(call.node)
     if is_node_class(path):
         return _call_node_method(run, receiver, path, name, call)
     model = stdlib.METHODS.get((path, name))

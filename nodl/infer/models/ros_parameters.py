@@ -131,7 +131,7 @@ def _get_parameters_by_prefix(run: Run, record: NodeRecord, call: Call) -> Value
 def _get_parameter_or(run: Run, record: NodeRecord, call: Call) -> Value:
     names = _names(call)
     others = (a for a in call.args.at(1, "alternative_value") or BOTTOM if isinstance(a, Instance))
-    default = join_all(other.cells.get("value", BOTTOM) for other in others)
+    default = join_all(present(other.cells.get("value", BOTTOM)) for other in others)
     for name in names:
         record.declare(name, _default_value(default or None))
     return parameter_object(run, call, _inputs(run, record, names))
@@ -148,7 +148,7 @@ def assign_parameters(run: Run, record: NodeRecord, listed: Value, call: Call) -
         for atom in entry:
             if isinstance(atom, Instance):
                 for name in constant_strings(atom.cells.get("name", BOTTOM)):
-                    value = atom.cells.get("value", ANY)
+                    value = present(atom.cells.get("value", ANY))
                     record.assigned[name] = join(record.assigned.get(name, BOTTOM), value)
                     run.state.write(record.cells, name, value)
             elif isinstance(atom, Unknown):
