@@ -81,7 +81,7 @@ class InterfaceFinder:
         self._prefixes = prefixes
         self._distro = distro
         self._lookup = ManifestLookup(prefixes, self._options.manifests)
-        self._library = LibraryAccess(prefixes, self._options, distro, launch, self._controller)
+        self._library = LibraryAccess(prefixes, self._options, distro, launch, self._plugin)
         self._known: dict[_Subject, _Known] = {}
         self._infers = self._options.infer and installed("nodl.infer")
 
@@ -187,12 +187,12 @@ class InterfaceFinder:
             compiled_only=compiled_only,
         )
 
-    def _controller(self, plugin_class: str, start: Start) -> tuple[NodeInterface, ...]:
+    def _plugin(self, plugin_class: str, instance: str, start: Start) -> tuple[NodeInterface, ...]:
         if not self._infers:
             return ()
-        from nodl.infer.executable import infer_controller  # an add-on: inference
+        from nodl.infer.executable import infer_plugin  # an add-on: inference
 
-        return infer_controller(plugin_class, self._sources, start)
+        return infer_plugin(plugin_class, instance, self._sources, start)
 
     @cached_property
     def _sources(self) -> SourcesInReach:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from enclave_launch.errors import UsageError
 from enclave_launch.interfaces.launch_contents import launched
-from enclave_launch.interfaces.situation import StartedController, situation_of
+from enclave_launch.interfaces.situation import StartedPlugin, StartedProgram, situation_of
 from enclave_launch.options import ResolveOptions
 from enclave_launch.policy.program_inputs import own_words
 from enclave_launch.process import Evaluation, ResolvedComponent, ResolvedProcess
@@ -61,8 +61,8 @@ class LibraryAccess:
         distro: str,
         launch: Evaluation | None = None,
         of_source: Callable[
-            [str, StartedController], tuple[NodeInterface, ...]
-        ] = lambda plugin_class, start: (),
+            [str, str, StartedPlugin], tuple[NodeInterface, ...]
+        ] = lambda plugin_class, instance, start: (),
     ):
         """Open nothing yet; ``launch`` is all that starts, for nodes that must know others. ``of_source`` describes
         plugins that no document describes, with the nodes that they make.
@@ -131,15 +131,15 @@ class LibraryAccess:
     ) -> Iterator[NodeInterface]:
         named = self._named(interface, started)
         situation = self._situation(named, started, container)
-        process = started if isinstance(started, ResolvedProcess) else container
-
+        program = StartedProgram(started, container, self._distro)
         made: list[NodeInterface] = []
 
         def of_source(plugin_class: str, instance: str) -> NodeInterface | None:
-            start = StartedController(process, situation, instance)
-            found = self._of_source(plugin_class, start)
-            made.extend(found[1:])
-            return _filled(found[0], start.parameters(instance)) if found else None
+            start = StartedPlugin(program, situation, instance)
+            found = self._of_source(plugin_class, instance, start)
+            filled = [_filled(each, start.parameters(each.name)) for each in found]
+            made.extend(filled[1:])
+            return filled[0] if filled else None
 
         documents = _Documents(LibraryDocuments(self._library, self._distro), of_source)
         done = applied(named, situation, documents)

@@ -13,7 +13,7 @@ from enclave_launch.policy.running_node import RunningNode, node_of_component, n
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
 from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.ros_rules.rcl_parameters import parameters_of_text, resolve_parameters
-from nodl.dependence import Situation
+from nodl.dependence import CONTROLLER, HOST, Situation
 from nodl.node_interface import NodeInterface
 from nodl.remap import NodeNames
 from nodl.ros_arguments import parse_ros_arguments
@@ -79,6 +79,7 @@ class StartedProgram:
         self._started = started
         self._container = container
         self._distro = distro
+        self.process = started if isinstance(started, ResolvedProcess) else container
 
     def parameters(self, node: str | None) -> Mapping[str, object]:
         """Return what launch sets for the node that the source calls ``node``."""
@@ -103,19 +104,27 @@ class StartedProgram:
         return situation_of(started, self._container, interface, self._distro)
 
 
-class StartedController:
-    """A controller that the controller manager in ``situation`` loads under a name."""
+class StartedPlugin:
+    """A plugin that a node in ``situation``, one of ``program``, loads under a name."""
 
-    def __init__(self, process: ResolvedProcess | None, situation: Situation, name: str) -> None:
-        self._process, self._situation, self._name = process, situation, name
+    def __init__(self, program: StartedProgram, situation: Situation, name: str) -> None:
+        self._program, self._situation, self._name = program, situation, name
 
     def parameters(self, node: str | None) -> Mapping[str, object]:
-        """Return what the manager's command line and the spawners set."""
-        namespace = self._situation.namespace
-        given = parameters_of_node(self._process, namespace, self._name) if self._process else {}
+        """Return what launch sets for the node: for a controller its manager's command line and the spawners."""
+        if node == HOST:
+            return self._situation.parameters
+        if node != CONTROLLER:
+            return self._program.parameters(node)
+        process = self._program.process
+        given = parameters_of_node(process, self._situation.namespace, self._name) if process else {}
         spawned = (each for each in self._situation.launched.spawned if each.controller == self._name)
         return {**given, **next((each.parameters for each in spawned), {})}
 
     def final_name(self, node: str | None) -> tuple[str | None, str | None]:
-        """Return the name under which it is loaded, in the namespace of its manager."""
-        return self._name, self._situation.namespace
+        """Return the node's name and namespace: those of the host, or of a controller beside its manager."""
+        if node == HOST:
+            return self._situation.node, self._situation.namespace
+        if node == CONTROLLER:
+            return self._name, self._situation.namespace
+        return self._program.final_name(node)

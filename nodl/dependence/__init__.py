@@ -14,6 +14,12 @@ from typing import NamedTuple
 
 from nodl.node_interface import EndpointKind
 
+CONTROLLER = "controller"
+"""The name in sources of a controller of ros2_control, until somebody loads it."""
+
+HOST = "host"
+"""The name in sources of the node that loads a plugin and hands itself to it."""
+
 
 class Test(NamedTuple):
     """One demand on a parameter (or an option ``--name``); ``parameter`` is a template.

@@ -82,7 +82,7 @@ class _Application:
         self._situation = situation
         self._documents = documents
         self.endpoints: list[Endpoint] = []
-        self.gaps: list[Gap] = [*interface.gaps]
+        self.gaps: list[Gap] = []
         self.further: list[NodeInterface] = []
 
     def describe(
@@ -97,6 +97,7 @@ class _Application:
         depends = interface.depends or _NOTHING
         situation = self._situation._replace(parameters={**self._situation.parameters, **properties})
         scope = Scope(situation, depends.defaults, depends.options, plugin)
+        self.gaps.extend(gap._replace(why="; ".join((gap.why, *notes))) for gap in interface.gaps)
         for endpoint in interface.endpoints:
             if depends.tf_listener is not None and _is_of_tf_listener(endpoint):
                 continue

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from enclave_common.files import check_regular
 from nodl.ament_index import ExecutableNotInstalledError, PackageNotFoundError, executable_path
-from nodl.dependence import Dependence
+from nodl.dependence import CONTROLLER, HOST, Dependence
 from nodl.node_interface import NodeInterface
 
 if TYPE_CHECKING:
@@ -61,18 +61,23 @@ def infer_executable(
     return InferredExecutable(*infer_python(path, package, executable, prefixes))
 
 
-def infer_controller(name: str, sources: SourcesInReach, start_of: Start) -> tuple[NodeInterface, ...]:
-    """Return a controller of ros2_control whose sources are in reach, a plugin that is a node of its own, and the nodes
-    that it makes; nothing if there is none."""
-    from nodl.infer.cpp.entry import CONTROLLER, CppSupportMissing
+def infer_plugin(
+    name: str, instance: str, sources: SourcesInReach, start_of: Start
+) -> tuple[NodeInterface, ...]:
+    """Return a plugin whose sources are in reach, which a host loads as ``instance``, and the nodes that it makes.
+
+    A controller of ros2_control is a node of its own; what another plugin makes on its host is named ``HOST``. Nothing
+    if there is no such plugin.
+    """
+    from nodl.infer.cpp.entry import CppSupportMissing
 
     try:
-        interfaces = sources.infer_controller(name, start_of).interfaces
+        interfaces = sources.infer_plugin(name, instance, start_of).interfaces
     except CppSupportMissing:
         return ()
-    if not interfaces or interfaces[0].name != CONTROLLER:
-        return ()
-    return (interfaces[0]._replace(depends=Dependence(own_node=True)), *interfaces[1:])
+    if interfaces and interfaces[0].name == CONTROLLER:
+        return (interfaces[0]._replace(depends=Dependence(own_node=True)), *interfaces[1:])
+    return interfaces if interfaces and interfaces[0].name == HOST else ()
 
 
 def _compiled(

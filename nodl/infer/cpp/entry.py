@@ -8,12 +8,10 @@ from typing import Any, NamedTuple
 
 from nodl.node_interface import Gap, NodeInterface
 
-CONTROLLER = "controller"
-"""The name of a controller of ros2_control until somebody loads it."""
-
 
 class Entry(NamedTuple):
-    """Where a program starts: ``main`` of its files, or the constructor of a class."""
+    """Where a program starts: ``main`` of its files, or the constructor of a class. ``instance``: the name under which
+    a host loads this class and gives it its node."""
 
     files: tuple[str, ...]
     cls: str = ""
@@ -21,6 +19,7 @@ class Entry(NamedTuple):
     symbols: tuple[tuple[str, str], ...] = ()
     complete: bool = False
     place: str = ""  # the package's folder, for what has no file
+    instance: str = ""
 
 
 class Solved(NamedTuple):

@@ -12,6 +12,7 @@ from nodl.infer.cpp.cache.folder import digest_of, digest_of_content
 from nodl.infer.cpp.entry import CppSupportMissing, Entry, failure
 from nodl.infer.cpp.findings import AllocatedNode
 from nodl.infer.cpp.ledger import CREATES, SiteAnswer, account, leads_to_interfaces
+from nodl.infer.cpp.models.loaded import host_of, load
 from nodl.infer.cpp.models.nodes import ARGUMENT
 from nodl.infer.cpp.reading.cmake import Target
 from nodl.infer.cpp.reading.collect import index_file
@@ -257,8 +258,11 @@ def _construct_entry(run: Machine, entry: Entry) -> None:
         why = f"the class {entry.cls} was not found in the sources of its library"
         run.gap_at(SourceRef(index.file), why)
         return
-    arguments = _entry_arguments(run, cls)
-    construct(run, Type(cls.qualified), arguments, cls.node, Frame(cls.file, ()), heap=True)
+    frame = Frame(cls.file, ())
+    host = host_of(run, cls, frame) if entry.instance else None
+    made = construct(run, Type(cls.qualified), _entry_arguments(run, cls), cls.node, frame, heap=True)
+    if host is not None:
+        load(run, made, host, entry.instance)
 
 
 def _entry_arguments(run: Machine, cls: Class) -> list[Value]:

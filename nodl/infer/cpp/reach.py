@@ -44,11 +44,11 @@ class SourcesInReach:
             return Answer((), f"the sources of package '{package}' are not in reach ({self._searched()})")
         return self._answering.of_program(found, executable, plugin, start)
 
-    def infer_controller(self, name: str, start: Start | None = None) -> Answer:
-        """Infer a controller of ros2_control by the name of its plugin; raises ``CppSupportMissing``."""
+    def infer_plugin(self, name: str, instance: str, start: Start | None = None) -> Answer:
+        """Infer a plugin that a host loads as ``instance``, by the name of its class; raises ``CppSupportMissing``."""
         if not (self._folders or self._workspaces):
             return Answer((), self._searched())
-        return self._answering.of_controller(name, start)
+        return self._answering.of_plugin(name, instance, start)
 
     @cached_property
     def _answering(self) -> Answering:

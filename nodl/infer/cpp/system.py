@@ -11,6 +11,7 @@ from functools import cached_property
 from pathlib import Path
 
 from enclave_common.files import text_or_nothing
+from nodl.dependence import HOST
 from nodl.infer.cpp.cache.answers import Answers, Made, WatchedStart
 from nodl.infer.cpp.entry import Answer, CppSupportMissing, Entry, Solved, failure
 from nodl.infer.cpp.libraries import NODE_BASES
@@ -284,13 +285,27 @@ class Answering:
         what = f"executable '{executable}'" if executable else f"component {plugin}"
         return Answer((), f"the CMakeLists.txt of {package.folder} builds no {what}")
 
-    def of_controller(self, name: str, start: Start | None) -> Answer:
-        """Infer the controller of ros2_control that plugin descriptions call ``name``; raises ``CppSupportMissing``."""
-        for plugin, package in self._workspace.plugin_classes.get(name, ()):
-            if plugin.base in CONTROLLERS:
-                key = LaunchKey(package.name, None, plugin.type)
-                return _answer(self._solved(key, _plugin_entry(plugin.type, package, self._workspace), start))
-        return Answer((), f"no plugin description in reach has a controller '{name}'")
+    def of_plugin(self, name: str, instance: str, start: Start | None) -> Answer:
+        """Infer what the plugin that descriptions call ``name`` makes when a host loads it as ``instance``.
+
+        Returns:
+            First the controller of ros2_control, or what other plugins make on their ``HOST``; then their own nodes.
+
+        Raises:
+            CppSupportMissing: tree-sitter is not installed.
+        """
+        try:
+            listed = self._workspace.plugin_classes.get(name, ())
+        except Exception as error:
+            return Answer((), failure("reading the plugin descriptions in reach", error))
+        if not listed:
+            return Answer((), f"no plugin description in reach has a class '{name}'")
+        plugin, package = listed[0]
+        entry = _plugin_entry(plugin.type, package, self._workspace)
+        if plugin.base not in CONTROLLERS and not plugin.base.startswith("hardware_interface::"):
+            entry = entry._replace(instance=instance)
+        solved = self._solved(LaunchKey(package.name, None, plugin.type), entry, start)
+        return _answer(solved) if plugin.base in CONTROLLERS else _on_host(solved, package, plugin.type)
 
     @cached_property
     def _sources(self) -> Sources:
@@ -336,6 +351,24 @@ def _plugin_entry(name: str, package: SourcePackage, workspace: Workspace) -> En
 def _exports(file: str, name: str) -> bool:
     text = text_or_nothing(file)
     return "PLUGINLIB_EXPORT_CLASS" in text and re.search(rf"\b{re.escape(name)}\b", text) is not None
+
+
+def _on_host(solved: Solved, package: SourcePackage, name: str) -> Answer:
+    """Return what a plugin makes on the node that loads it, if anything, before the nodes that it makes."""
+    host = next((node for node in solved.nodes if node.name == HOST), None)
+    others = tuple(node for node in solved.nodes if node is not host)
+    if host is None:
+        host = NodeInterface(
+            package=package.name,
+            executable=None,
+            plugin=name,
+            name=HOST,
+            namespace=None,
+            endpoints=(),
+            source=SourceRef(package.folder),
+            gaps=() if others else solved.gaps,  # the first of them has those of the program
+        )
+    return Answer((host, *others), consulted=solved.consulted)
 
 
 def _answer(solved: Solved) -> Answer:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from nodl.infer.cpp.entry import CONTROLLER
+from nodl.dependence import CONTROLLER
 from nodl.infer.cpp.libraries import Call, library_function, node_class, node_method
 from nodl.infer.cpp.models.nodes import become_node
 from nodl.infer.cpp.running.machine import Machine

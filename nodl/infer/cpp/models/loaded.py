@@ -1,0 +1,93 @@
+"""Plugins of nav2 and hardware components of ros2_control: what their host calls on them, and with what.
+
+A host hands its node and the name of the instance to the first method that it calls. Bases without a row make no
+interface of their own.
+
+Source: ros-navigation/navigation2 jazzy, main: nav2_core/include/nav2_core, nav2_costmap_2d layer.hpp, layer.cpp,
+footprint_collision_checker.hpp; ros-controls/ros2_control jazzy: hardware_interface/system_interface.hpp and its
+neighbours.
+"""
+
+from __future__ import annotations
+
+from nodl.dependence import HOST
+from nodl.infer.cpp.libraries import Call, library_class, library_method
+from nodl.infer.cpp.models.nodes import become_node
+from nodl.infer.cpp.reading.declarations import Class, FunctionParameter
+from nodl.infer.cpp.reading.type_names import Type
+from nodl.infer.cpp.running.invocation import HOOKS
+from nodl.infer.cpp.running.machine import Frame, Machine
+from nodl.infer.cpp.running.values import Bound, Obj, Value, literal, unknown
+
+_LAYER = "nav2_costmap_2d::Layer"
+_LIFECYCLE = "rclcpp_lifecycle::LifecycleNode"
+_FIRST = ("configure", "initialize")
+
+
+@library_class(
+    *(
+        f"nav2_core::{name}"
+        for name in (
+            *("Controller", "GlobalPlanner", "Smoother", "Behavior", "GoalChecker", "ProgressChecker"),
+            *("WaypointTaskExecutor", "PathHandler"),
+        )
+    ),
+    *(f"nav2_costmap_2d::{name}" for name in ("Costmap2D", "MapLocation", "FootprintCollisionChecker")),
+    _LAYER,
+)
+def _silent_in_nav2(run: Machine, call: Call) -> None:
+    """Make nothing: plugins' bases are abstract, a layer keeps what it is given, the others know no node."""
+
+
+@library_method(_LAYER, "joinWithParentNamespace")
+def _joined(run: Machine, call: Call) -> Value:
+    """Return the topic if it is absolute; another one follows the namespace above that of the costmap."""
+    given = call.value(0)
+    absolute = given and all(str(getattr(atom, "parts", ("",))[0]).startswith("/") for atom in given)
+    return given if absolute else unknown("a topic beside the costmap's namespace")
+
+
+@library_method(_LAYER, "getFullName")
+def _parameter_of_layer(run: Machine, call: Call) -> Value:
+    return unknown("the name of a layer's parameter")
+
+
+def _base_of_hardware(run: Machine, call: Call) -> Value:
+    return unknown("what the base of a hardware component answers")
+
+
+for _hardware in ("System", "Actuator", "Sensor"):
+    library_method(f"hardware_interface::{_hardware}Interface", "on_init", *HOOKS)(_base_of_hardware)
+
+
+def host_of(run: Machine, cls: Class, frame: Frame) -> Obj:
+    """Make the node that loads an object of ``cls``."""
+    host = run.obj((HOST, cls), Type(_LIFECYCLE))
+    become_node(run, Call(cls.node, frame, [literal(HOST)], receiver=host), lifecycle=True)
+    return host
+
+
+def load(run: Machine, made: Value, host: Obj, instance: str) -> None:
+    """Let ``host`` call what it calls first on the plugin ``made``, which it loads as ``instance``."""
+    for plugin in made:
+        if not isinstance(plugin, Obj) or plugin.cls is None:
+            continue
+        if plugin.foreign_base == _LAYER:
+            run.store.set((plugin, "node_"), (host,))
+            run.store.set((plugin, "name_"), literal(instance))
+        for name in _FIRST:
+            for method in run.names.find_methods(plugin.cls, name):
+                if any(map(_takes_node, method.parameters)):
+                    given = tuple(_given(each, host, instance) for each in method.parameters)
+                    frame = Frame(method.file, method.scope, None, plugin)
+                    run.callbacks[method, (plugin, ())] = (Bound(method, plugin, given), frame)
+
+
+def _given(parameter: FunctionParameter, host: Obj, instance: str) -> Value:
+    if _takes_node(parameter):
+        return (host,)
+    return literal(instance) if "string" in parameter.type else unknown(f"the argument {parameter.name}")
+
+
+def _takes_node(parameter: FunctionParameter) -> bool:
+    return "LifecycleNode" in parameter.type
