@@ -6,6 +6,7 @@ Run until nothing changes. A callback that makes no interface runs too when it m
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import partial
 
 from nodl.infer.cpp.ledger import Reach
 from nodl.infer.cpp.reading.declarations import Class, Function
@@ -31,7 +32,7 @@ from nodl.infer.cpp.running.values import (
 from nodl.infer.cpp.syntax import words_in
 from nodl.source_ref import SourceRef
 
-PATIENCE = 5
+PATIENCE = 3
 """Rounds after which a variable that callbacks still change counts as not known."""
 MAX_ROUNDS = 32
 Key = tuple[object, object]
@@ -99,22 +100,23 @@ def _call(rounds: _Rounds, key: Key, atom: object, frame: Frame, certainly: bool
         and run.store.holds(last.reads, in_any_order=True)
     ):
         return False
-    reads = run.store.watched(lambda: _run(run, atom, frame, certainly))
-    rounds.last[key] = _Ran(reads, len(run.nodes))
-    rounds.names_read.update(name for _, name in reads.cells)
-    return True
 
-
-def _run(run: Machine, atom: object, frame: Frame, certainly: bool) -> None:
     def go() -> int:
-        if isinstance(atom, Lambda):
-            call_lambda(run, atom, [], atom.node, atom.frame)
-        elif isinstance(atom, Bound):
-            given = atom.fixed or [unknown(f"the argument {p.name}") for p in atom.function.parameters]
-            invoke(run, atom.function, atom.this, given, atom.function.node, frame, ())
+        reads = run.store.watched(partial(_run, run, atom, frame))
+        rounds.last[key] = _Ran(reads, len(run.nodes))
+        rounds.names_read.update(name for _, name in reads.cells)
         return NEXT
 
     run.branches([go] if certainly else [go, lambda: NEXT])
+    return True
+
+
+def _run(run: Machine, atom: object, frame: Frame) -> None:
+    if isinstance(atom, Lambda):
+        call_lambda(run, atom, [], atom.node, atom.frame)
+    elif isinstance(atom, Bound):
+        given = atom.fixed or [unknown(f"the argument {p.name}") for p in atom.function.parameters]
+        invoke(run, atom.function, atom.this, given, atom.function.node, frame, ())
 
 
 def _matters(rounds: _Rounds, atom: object) -> bool:

@@ -32,6 +32,7 @@ from nodl.infer.cpp.running.static_types import (
     GIVES_INNER,
     class_around,
     class_of_member,
+    class_of_method,
     current_object,
     declared_type,
 )
@@ -107,7 +108,9 @@ def _own_method(run: Machine, name: str, site: CallSite) -> Value | None:
     if separator:
         return _of_named_class(run, this, head, last, site)
     if this.cls is not None:
-        methods = of_this(run, this, name) or run.names.find_methods(class_around(run, frame), name)
+        methods = of_this(run, this, name, site.node, frame) or run.names.find_methods(
+            class_around(run, frame), name
+        )
         if methods:
             return site.call_methods(methods, this)
         field = member(run, this, name)
@@ -301,7 +304,11 @@ def on_object(run: Machine, atom: Obj, name: str, site: CallSite) -> Value:
         argument = field_of(callee, "argument")
         own = argument is not None and argument.type == "this" and "::" not in text(field_of(callee, "field"))
         seen = None if own else class_of_member(run, atom, callee, frame)
-        methods = run.names.find_methods(seen, name) if seen is not None else of_this(run, atom, name)
+        if seen is atom.cls and argument is not None:
+            seen = class_of_method(run, seen, name, argument, site.node, frame)
+        methods = (
+            of_this(run, atom, name, site.node, frame) if seen is None else run.names.find_methods(seen, name)
+        )
         if methods:
             return site.call_methods(methods, atom)
         field = member(run, atom, name, seen)
@@ -330,10 +337,15 @@ def only_declared(
     return without_source(run, f"{cls.name}::{name}", site.values, site.node, site.frame, receiver)
 
 
-def of_this(run: Machine, this: Obj, name: str) -> list[Function]:
+def of_this(run: Machine, this: Obj, name: str, node: Node, frame: Frame) -> list[Function]:
     """Return what ``name()`` calls inside of a class: its own while it is made as a base."""
-    methods = run.names.find_methods(this.cls, name)
-    return run.names.find_methods(this.building, name) or methods if this.building is not None else methods
+    cls = this.building or this.cls
+    methods = (
+        run.names.find_methods(class_of_method(run, cls, name, None, node, frame), name)
+        if cls is not None
+        else []
+    )
+    return methods or run.names.find_methods(this.cls, name)
 
 
 def model_of(this: Obj, name: str) -> FunctionModel | None:

@@ -10,6 +10,7 @@ from functools import partial
 from nodl.infer.cpp.libraries import IN_PLACE_OF_SOURCE, Call
 from nodl.infer.cpp.reading.declarations import Function, FunctionParameter, parameters_of, type_text
 from nodl.infer.cpp.reading.type_names import Type
+from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.constructors import as_parameter, bind_parameters
 from nodl.infer.cpp.running.contents import copied, handed_over
@@ -155,7 +156,9 @@ def call_functions(
     known = _in_place(run, functions[0], None, values, node, frame, types)
     if known is not None:
         return known
-    _check_special(run, functions, node, frame)
+    special = _one_of_special(run, functions, node, frame)
+    if special is not None:
+        return special
     fitting = candidates(functions, values, run.makes_interfaces, partial(written_as, run, node, frame))
     if not fitting:
         return unknown_call(run, functions[0].name, values, node, [], frame)
@@ -178,10 +181,20 @@ def _in_place(
     return found
 
 
-def _check_special(run: Machine, functions: Sequence[Function], node: Node, frame: Frame) -> None:
-    """Add a gap if a template has explicit specialisations: which is meant is not followed."""
-    if any(each.specialises is not None for each in functions):
-        run.gap(node, frame, f"which specialisation of {functions[0].name} is called is not known")
+def _one_of_special(run: Machine, functions: Sequence[Function], node: Node, frame: Frame) -> Value | None:
+    """Return an unknown for a template with explicit specialisations: which is meant is not followed.
+
+    ``None`` for any other, also behind a gap: where one of them changes something or may make interfaces.
+    """
+    if all(each.specialises is None for each in functions):
+        return None
+    name = functions[0].name
+    if any(run.makes_interfaces(each) or writes_of(each.node) for each in functions):
+        run.gap(node, frame, f"which specialisation of {name} is called is not known")
+        return None
+    run.handle(node, frame)
+    run.called.update(functions)
+    return unknown(f"the result of a specialisation of {name}()")
 
 
 def _any_of(run: Machine, calls: Sequence[Callable[[], Value]]) -> Value:
@@ -214,7 +227,9 @@ def call_methods(
     known = _in_place(run, methods[0], this_object, values, node, frame, types)
     if known is not None:
         return known
-    _check_special(run, methods, node, frame)
+    special = _one_of_special(run, methods, node, frame)
+    if special is not None:
+        return special
     fitting = candidates(methods, values, run.makes_interfaces, partial(written_as, run, node, frame))
     if not fitting:
         return unknown_call(run, f"{methods[0].owner}::{methods[0].name}", values, node, [], frame)

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import NamedTuple, TypeVar
 
-from nodl.infer.cpp.running.values import BOTTOM, Noted, NoteLog, Value, bounded, hold, join
+from nodl.infer.cpp.running.values import BOTTOM, Noted, NoteLog, Obj, Value, bounded, hold, join
 
 MEMORY_DEPTH = 20
 """Paths of calls are whole up to this depth (``Frame.path``): then the same path means the same callers."""
@@ -31,41 +31,49 @@ class AbstractStore:
         """``spend`` is told the steps that long looks at the trail count for; what it raises ends the run."""
         self._spend = spend
         self._cells: dict[Cell, Value] = {}
-        self._trail: list[tuple[Cell, Value]] = []
+        self._trail: list[tuple[Cell, Value, int]] = []  # what was there before, and since when
+        self._since: dict[Cell, int] = {}  # the place in the trail where a cell was written last
         self._reads: set[Cell] | None = None
+        self._watched_from = 0
         self._history: Changes | None = None
         self._held: dict[Cell, Value | None] | None = None
         self.log = NoteLog()
 
     def get(self, cell: Cell) -> Value | None:
-        if self._reads is not None:
-            self._reads.add(cell)
+        self._read(cell, self._since.get(cell, -1))
         return self._cells.get(cell)
+
+    def _read(self, cell: Cell, since: int) -> None:
+        """Note that the value is read which the cell has since then, unless who watches wrote it."""
+        if self._reads is not None and since < self._watched_from:
+            self._reads.add(cell)
 
     def watched(self, action: Callable[[], None]) -> Reads:
         """Run ``action``; what it read and did not write itself before. Who watches the caller learns of it, too."""
-        outer, outer_noted = self._reads, self.log.noted
-        self._reads, self.log.noted = set(), {}
+        outer, outer_noted, outer_from = self._reads, self.log.noted, self._watched_from
         mark = len(self._trail)
+        self._reads, self.log.noted, self._watched_from = set(), {}, mark
         try:
             action()
         finally:
             read, noted = self._reads, self.log.noted
-            self._reads, self.log.noted = outer, outer_noted
-            before = {}
-            for cell, old in reversed(self._trail[mark:]):
-                before[cell] = old
-            cells = self._cells
-            found = {cell: before[cell] if cell in before else cells.get(cell, _ABSENT) for cell in read}
-            kept = {c: value for c, value in found.items() if value is not _ABSENT or not _is_local(c)}
-            reads = Reads(kept, noted)
-            self.saw(reads)
-        return reads
+            self._reads, self.log.noted, self._watched_from = outer, outer_noted, outer_from
+            before = {cell: (old, since) for cell, old, since in reversed(self._trail[mark:])}
+            kept = {}
+            for cell in read:
+                value, since = before.get(cell) or (self._cells.get(cell, _ABSENT), self._since.get(cell, -1))
+                self._read(cell, since)
+                if value is not _ABSENT or not _is_new(cell):
+                    kept[cell] = value
+            if self.log.noted is not None:
+                self.log.noted.update({key: said for key, said in noted.items() if key not in self.log.noted})
+        return Reads(kept, noted)
 
     def saw(self, reads: Reads) -> None:
         """Tell who watches that all this was read."""
         if self._reads is not None and self.log.noted is not None:
-            self._reads.update(reads.cells)
+            for cell in reads.cells:
+                self._read(cell, self._since.get(cell, -1))
             for key, said in reads.noted.items():
                 self.log.noted.setdefault(key, said)
 
@@ -84,7 +92,8 @@ class AbstractStore:
         old = self._cells.get(cell, _ABSENT)
         if old is not value:
             value = bounded(value)
-            self._trail.append((cell, old))
+            self._trail.append((cell, old, self._since.get(cell, -1)))
+            self._since[cell] = len(self._trail) - 1
             self._cells[cell] = value
             if self._history is not None:
                 self._remember(cell, value)
@@ -134,18 +143,20 @@ class AbstractStore:
         """Return what was written since ``mark``, as it is now."""
         self._spend((len(self._trail) - mark) // _LOOKED_AT_IN_A_STEP)
         cells = self._cells
-        return {cell: cells[cell] for cell, _ in self._trail[mark:] if cell in cells and not _is_over(cell)}
+        return {
+            cell: cells[cell] for cell, _, _ in self._trail[mark:] if cell in cells and not _is_over(cell)
+        }
 
     def before(self, mark: int) -> Changes:
         """Return the values at ``mark`` of all cells that were written since."""
         found: Changes = {}
-        for cell, old in self._trail[mark:]:
+        for cell, old, _ in self._trail[mark:]:
             found.setdefault(cell, BOTTOM if old is _ABSENT else old)
         return found
 
     def undo(self, mark: int) -> None:
         while len(self._trail) > mark:
-            cell, old = self._trail.pop()
+            cell, old, self._since[cell] = self._trail.pop()
             if old is _ABSENT:
                 self._cells.pop(cell, None)
             else:
@@ -157,6 +168,8 @@ class AbstractStore:
         """Continue with any of ``alternatives``, each made from the present state."""
         for cell in dict.fromkeys(cell for changes in alternatives for cell in changes):
             present = self._cells.get(cell, BOTTOM)
+            if any(cell not in changes for changes in alternatives):
+                self._read(cell, self._since.get(cell, -1))
             self.set(cell, join(*(changes.get(cell, present) for changes in alternatives)))
 
 
@@ -165,9 +178,12 @@ def _is_over(cell: Cell) -> bool:
     return bool(getattr(cell[0], "finished", False))
 
 
-def _is_local(cell: Cell) -> bool:
-    """Return whether it is a variable of a call, which nobody sees before it is set."""
-    return hasattr(cell[0], "finished")
+def _is_new(cell: Cell) -> bool:
+    """Return whether nobody sees a cell before it is set: a variable of a call, a member of an object.
+
+    Who reads a member of an object that was not there before has read before who holds it.
+    """
+    return isinstance(cell[0], Obj) or hasattr(cell[0], "finished")
 
 
 class CallOutcome(NamedTuple):

@@ -17,17 +17,43 @@ from nodl.infer.cpp.syntax import Node, callee_name, children, field_of, templat
 
 
 def check_hidden(run: Machine, cls: Class, node: Node, frame: Frame) -> None:
-    """Add a gap if ``cls`` has two plain members, or methods that matter, of one name: they are not told apart."""
+    """Add a gap if ``cls`` has two plain members, or operators that matter, of one name: they are not told apart."""
     ancestry = run.names.ancestry(cls)
-    kept = {name for each in ancestry for name in each.fields}
     for name in hidden(run.names, cls):
         plain = any(_PLAIN.search(each.fields[name].type) for each in ancestry if name in each.fields)
-        methods = [method for each in ancestry for method in run.names.methods[each].get(name, ())]
-        if plain or any(
-            run.makes_interfaces(each) or "string" in type_text(each.node) or writes_of(each.node) & kept
-            for each in methods
-        ):
+        if plain or (name.startswith("operator") and _methods_matter(run, cls, name)):
             run.gap(node, frame, f"{cls.name} hides {name} of a base: which of them is meant is not followed")
+
+
+def _methods_matter(run: Machine, cls: Class, name: str) -> bool:
+    ancestry = run.names.ancestry(cls)
+    kept = {field for each in ancestry for field in each.fields}
+    return any(
+        run.makes_interfaces(each) or "string" in type_text(each.node) or writes_of(each.node) & kept
+        for owner in ancestry
+        for each in run.names.methods[owner].get(name, ())
+    )
+
+
+def class_of_method(
+    run: Machine, cls: Class, name: str, receiver: Node | None, call: Node, frame: Frame
+) -> Class:
+    """Return the class in which ``name()`` is looked up for an object of ``cls``.
+
+    Of a method that hides a base's the class that the receiver has at compile time; a gap if that is not known.
+    ``receiver``: ``None`` inside of a class.
+    """
+    if name not in hidden(run.names, cls):
+        return cls
+    is_own = receiver is None or receiver.type == "this"
+    seen = class_around(run, frame) if is_own else seen_class(run, receiver, frame)
+    ancestry = run.names.ancestry(cls)
+    virtual = any(each.virtual for owner in ancestry for each in run.names.methods[owner].get(name, ()))
+    if seen in ancestry and seen is not None and not virtual:
+        return seen
+    if _methods_matter(run, cls, name):
+        run.gap(call, frame, f"{cls.name} hides {name} of a base: which of them is called is not known")
+    return cls
 
 
 def class_around(run: Machine, frame: Frame) -> Class | None:

@@ -101,3 +101,13 @@ def test_a_helper_is_followed_again_for_each_value_that_callbacks_give_to_what_i
 def test_and_only_once_where_nobody_changes_it(tmp_path: Path) -> None:
     timers = "t1_ = create_wall_timer(s, [this]() { make(); make(); });"
     assert names(infer(tmp_path, in_class(timers, HELPED))) == ["a1"]
+
+
+def test_a_method_that_may_write_a_name_leaves_each_that_callbacks_gave_it(tmp_path: Path) -> None:
+    """What it leaves depends on what was there, though it reads nothing."""
+    made = (
+        "create_wall_timer(1s, [this]() { may(now()); create_publisher<std_msgs::msg::String>(name, 1); });"
+    )
+    other = 'create_wall_timer(2s, [this]() { name = "c"; });'
+    members = 'bool now(); void may(bool is) { if (is) { name = "a"; } } std::string name = "b";'
+    assert names(infer(tmp_path, in_class(made + other, members))) == ["a", "b", "c"]

@@ -143,11 +143,12 @@ GAPS = {
     ),
     "a specialisation of a template": (
         in_class(
-            "create_publisher<std_msgs::msg::String>(P<int>().text(), 1);",
-            before="template <typename T> struct P { std::string text(); };\n"
-            'template <> std::string P<int>::text() { return "of_int"; }\n',
+            "P<int>().set(text); create_publisher<std_msgs::msg::String>(text, 1);",
+            "std::string text;",
+            before="template <typename T> struct P { void set(std::string & t); };\n"
+            'template <> void P<int>::set(std::string & t) { t = "of_int"; }\n',
         ),
-        "which specialisation of text is called is not known",
+        "which specialisation of set is called is not known",
     ),
     "a template with a specialisation": (
         in_class(
@@ -612,6 +613,13 @@ def test_the_size_of_a_map_is_not_known(tmp_path: Path) -> None:
     assert names(infer(tmp_path / "asked", in_class(use.format("m[get()];"), member))) == ["?"]
 
 
+def test_what_a_specialisation_gives_is_not_known(tmp_path: Path) -> None:
+    before = "template <typename T> struct P { std::string text(); };\n"
+    before += 'template <> std::string P<int>::text() { return "of_int"; }\n'
+    source = in_class(f"create_publisher<{S}>(P<int>().text(), 1);", before=before)
+    assert names(infer(tmp_path, source)) == ["?"]
+
+
 def test_a_text_that_a_derived_class_hides_is_told_and_a_pointer_that_it_hides_is_not(tmp_path: Path) -> None:
     def hiding(member: str) -> list[str]:
         before = f"struct B {{ {member} }};\nstruct D : B {{ {member} }};\n"
@@ -619,11 +627,40 @@ def test_a_text_that_a_derived_class_hides_is_told_and_a_pointer_that_it_hides_i
 
     assert hiding("std::string name;") == ["D hides name of a base: which of them is meant is not followed"]
     assert hiding("rclcpp::Node * node;") == []
-    assert hiding("void count() {}") == []
-    assert hiding('std::string text() { return "a"; }') == [
-        "D hides text of a base: which of them is meant is not followed"
-    ]
-    assert hiding('virtual std::string text() { return "a"; }') == []
+
+
+HIDING = """
+struct B { std::string text() { return "base"; } std::string twice() { return text(); } };
+struct D : B { std::string text() { return "derived"; } std::string own() { return text(); } };
+struct V { virtual std::string text() { return "base"; } std::string twice() { return text(); } };
+struct W : V { std::string text() override { return "derived"; } };
+"""
+CALLED = {
+    "the object itself": ("D d; auto t = d.text();", "derived"),
+    "a reference to its base": ("D d; B & b = d; auto t = b.text();", "base"),
+    "a pointer to its base": ("std::shared_ptr<B> b = std::make_shared<D>(); auto t = b->text();", "base"),
+    "a method of the base": ("D d; auto t = d.twice();", "base"),
+    "a method of its own": ("D d; auto t = d.own();", "derived"),
+    "a virtual one": ("std::shared_ptr<V> b = std::make_shared<W>(); auto t = b->text();", "derived"),
+    "a virtual one, by a method of the base": ("W w; auto t = w.twice();", "derived"),
+}
+
+
+@pytest.mark.parametrize(("body", "expected"), CALLED.values(), ids=CALLED)
+def test_a_method_that_hides_another_is_called_by_the_class_that_is_seen(
+    body: str, expected: str, tmp_path: Path
+) -> None:
+    found = infer(tmp_path, in_class(f"{body} create_publisher<{S}>(t, 1);", before=HIDING))
+    assert names(found) == [expected]
+    assert gaps(found) == []
+
+
+def test_which_hidden_method_is_called_is_told_where_the_class_that_is_seen_is_not_known(
+    tmp_path: Path,
+) -> None:
+    body = f"D d; auto f = [](auto & b) {{ return b.text(); }}; create_publisher<{S}>(f(d), 1);"
+    found = infer(tmp_path, in_class(body, before=HIDING))
+    assert gaps(found) == ["D hides text of a base: which of them is called is not known"]
 
 
 COPIED = {
