@@ -8,6 +8,7 @@ from enclave_common.words import counted, some_of
 from enclave_launch.review.document import OPERATIONS, GrantedName, PlanDocument, PlanFinding
 from enclave_launch.review.information_flow import FlowGraph, FlowStep, opened_by_sharing, reached_from
 from enclave_launch.review.similarity import Merge, Split
+from nodl.ament_index import MISSING_PREFIX
 
 Judged = Sequence[tuple[PlanFinding, "str | None"]]
 
@@ -34,10 +35,15 @@ def _enclave(plan: PlanDocument, path: str) -> Iterator[str]:
 def findings_text(judged: Judged, *, verbose: bool = False) -> str:
     """Return a paragraph for each finding, open ones first, and a last line that counts them.
 
-    Unless ``verbose``, open findings of a code in ``_FOLDED`` are one paragraph, those of ``_SUMMED_UP`` are counted.
+    Unless ``verbose``, open findings of a code in ``_FOLDED`` are one paragraph, those of ``_SUMMED_UP`` are counted,
+    and what this machine lacks is one paragraph before the others.
     """
     ordered = sorted(judged, key=lambda item: (item[1] is not None, item[0].severity))
+    absent = [] if verbose else [item for item in judged if item[1] is None and _kind_of_absent(item[0])]
     lines: list[str] = []
+    if any(finding.code not in _SUMMED_UP for finding, _ in absent):
+        lines += _absent_text([finding for finding, _ in absent])
+        ordered = [item for item in ordered if item not in absent]
     summed_up: list[str] = []
     for diagnostic, accepted, others in _folded(ordered, verbose):
         if diagnostic.code in _SUMMED_UP and accepted is None and not verbose:
@@ -56,6 +62,36 @@ def findings_text(judged: Judged, *, verbose: bool = False) -> str:
     return "\n".join(lines) + "\n"
 
 
+def _kind_of_absent(finding: PlanFinding) -> str:
+    """Return what the finding reports to be absent from this machine; empty if it is about the launch itself."""
+    if finding.code == "parameter-file-missing" and not finding.subject.startswith(f"{MISSING_PREFIX}/"):
+        return ""
+    if finding.code == "program-not-executable" and "/" in finding.subject:
+        return ""
+    return _ABSENT.get(finding.code, "")
+
+
+def _absent_text(findings: Sequence[PlanFinding]) -> Iterator[str]:
+    """Yield the paragraph about all that this machine lacks of a launch."""
+    subjects: dict[str, dict[str, None]] = {}
+    for finding in findings:
+        subjects.setdefault(_kind_of_absent(finding), {})[finding.subject] = None
+    kinds = (
+        f"{kind if len(names) == 1 else f'{kind}s'} {some_of(names, _NAMED)}"
+        for kind, names in subjects.items()
+    )
+    codes = ", ".join(dict.fromkeys(finding.code for finding in findings))
+    yield f"warning: not on this machine, and not in the plan: {'; '.join(kinds)} [{codes}]"
+    yield "  install or build them, and check again; -v lists each with its place"
+
+
+_ABSENT = {
+    "package-not-installed": "package",
+    "program-not-installed": "program",
+    "program-not-executable": "program",
+    "include-left-out": "launch file",
+    "parameter-file-missing": "parameter file",
+}
 _NAMED = 5
 _FOLDED = frozenset({
     "container-elsewhere", "enclave-shared", "executable-not-built", "executable-without-enclave", "include-left-out",

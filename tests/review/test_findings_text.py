@@ -35,14 +35,35 @@ def test_shared_enclaves_are_counted_and_listed_when_asked_for() -> None:
     assert findings_text(shared, verbose=True).count("[enclave-shared]") == 2
 
 
-def test_what_the_user_allowed_to_be_missing_is_counted() -> None:
+def test_packages_that_the_user_allowed_to_be_missing_are_counted() -> None:
+    missing = [told("package-not-installed", name) for name in ("a", "b")]
+    assert findings_text(missing) == "0 errors, 2 warnings (2 package-not-installed; -v lists them)\n"
+
+
+def test_what_this_machine_lacks_of_a_launch_is_one_paragraph() -> None:
     missing = [
-        told("package-not-installed", "/missing/a"),
+        told("package-not-installed", "a"),
+        told("package-not-installed", "b"),
         told("include-left-out", "/missing/a/b.launch.py"),
+        told("parameter-file-missing", "/missing/a/c.yaml"),
+        told("program-not-executable", "xterm"),
     ]
-    text = findings_text(missing)
-    assert "[include-left-out]" in text
-    assert text.endswith("0 errors, 2 warnings (1 package-not-installed; -v lists them)\n")
+    assert findings_text(missing) == (
+        "warning: not on this machine, and not in the plan: packages a, b; launch file /missing/a/b.launch.py; "
+        "parameter file /missing/a/c.yaml; program xterm "
+        "[package-not-installed, include-left-out, parameter-file-missing, program-not-executable]\n"
+        "  install or build them, and check again; -v lists each with its place\n"
+        "0 errors, 5 warnings\n"
+    )
+    assert findings_text(missing, verbose=True).count("mend it") == 5
+
+
+def test_files_of_the_launch_itself_that_are_not_there_are_findings_of_their_own() -> None:
+    text = findings_text([
+        told("parameter-file-missing", "/home/me/typo.yaml"), told("program-not-executable", "/home/me/typo"),
+    ])  # fmt: skip
+    assert "this machine" not in text
+    assert "[parameter-file-missing]" in text and "[program-not-executable]" in text
 
 
 def test_an_accepted_finding_is_never_summed_up() -> None:
