@@ -18,12 +18,13 @@ import time
 from collections.abc import Callable, Iterator, Mapping
 from datetime import datetime, timezone
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from enclave_launch.drift.compare import Circumstances, Security, compare
 from enclave_launch.drift.expected import expected_in
 from enclave_launch.drift.finding import DriftFinding, Level, finding_document, finding_text
 from enclave_launch.drift.steady import SettlingTimes, Steady
+from enclave_launch.dry_run import DryRun
 from enclave_launch.errors import RuntimeFailure
 from enclave_launch.runtime.companion import LaunchCompanion, LaunchControl
 from enclave_launch.runtime.run_events import ProcessStarted, RunEvent
@@ -51,10 +52,10 @@ class WatchOptions(NamedTuple):
 class DriftWatch(LaunchCompanion):
     """``alarms``: how many there were; ``blind``: what was planned could not be seen at some time."""
 
-    def __init__(self, document: Mapping[str, Any], options: WatchOptions) -> None:
+    def __init__(self, plan: DryRun, options: WatchOptions) -> None:
         self._options = options
-        self._domains = sorted({each["domain_id"] for each in document["processes"]})
-        self._expected = {domain: expected_in([document], domain) for domain in self._domains}
+        self._domains = sorted({each.domain_id for each in plan.processes})
+        self._expected = {domain: expected_in([plan], domain) for domain in self._domains}
         self._observers: dict[int, _Observer] = {}
         self._steady = {domain: Steady(options.patience) for domain in self._domains}
         self._launch: LaunchControl | None = None

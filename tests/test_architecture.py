@@ -34,6 +34,7 @@ FLOORS: dict[str, tuple[set[str], ...]] = {
         {"diagnostics"},
         {"ros_rules"},
         {"errors", "process"},
+        {"dry_run"},
         {"frontend", "host"},
         {"description"},
         {"evaluation"},
@@ -297,7 +298,7 @@ AS_UPSTREAM_HAS_IT = {  # launch, launch_ros and the NoDL v1 API name both so, a
     "Action", "Entity", "IncludeLaunchDescription", "Node", "Parameter", "Parser", "PushRosEnclave", "Shutdown",
     "ProcessExited", "ProcessStarted",  # the events of launch, and what a library user hears of them
 }  # fmt: skip
-# report/contract.py: their JSON
+# dry_run.py: their JSON
 AS_THE_PLAN_HAS_IT = {"Diagnostic", "LauncherCall", "Node", "Reaction", "Respawn"}
 # of Python in nodl/infer/, of C++ in nodl/infer/cpp/
 IN_BOTH_KINDS_OF_INFERENCE = {"Call", "Frame", "Text", "Unknown"}

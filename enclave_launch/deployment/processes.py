@@ -1,4 +1,4 @@
-"""The processes of a plan as an engine runs them, from the dry run's JSON: a saved plan gives the same."""
+"""The processes of a plan as an engine runs them."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
+from enclave_launch.dry_run import DryRun, Process
 from enclave_launch.process import UNSPECIFIED_NODE_NAME, UNSPECIFIED_NODE_NAMESPACE, Respawn
 from enclave_launch.security_environment import ENABLE, KEYSTORE, NO_KEYSTORE, OVERRIDE, STRATEGY
 from keystore.formats.hosts import Needs
@@ -80,66 +81,65 @@ class DeployedProcess(NamedTuple):
         return {f"{self.name}-{number}.yaml": text for number, text in enumerate(texts, 1)}
 
 
-def deployed_processes(document: Mapping[str, Any]) -> tuple[DeployedProcess, ...]:
+def deployed_processes(document: DryRun) -> tuple[DeployedProcess, ...]:
     """Return the processes that the launch starts; those that only events or timers start are in ``semantics``."""
-    listed = [entry for entry in document["processes"] if entry["on_event"] is None]
+    listed = [entry for entry in document.processes if entry.on_event is None]
     names = engine_names([_final_name(entry) or _stem(entry) for entry in listed])
     nodes = _nodes_of(document)
     return tuple(_process(entry, name, nodes) for entry, name in zip(listed, names, strict=True))
 
 
-def _nodes_of(document: Mapping[str, Any]) -> Mapping[str, tuple[str, ...]]:
+def _nodes_of(document: DryRun) -> Mapping[str, tuple[str, ...]]:
     found: dict[str, tuple[str, ...]] = {}
-    for entry in document["components"]:
-        container = "/" + entry["container"].lstrip("/")
-        found[container] = (*found.get(container, ()), entry["fqn"])
+    for entry in document.components:
+        container = "/" + entry.container.lstrip("/")
+        found[container] = (*found.get(container, ()), entry.fqn)
     return found
 
 
-def _process(entry: Mapping[str, Any], name: str, nodes: Mapping[str, tuple[str, ...]]) -> DeployedProcess:
+def _process(entry: Process, name: str, nodes: Mapping[str, tuple[str, ...]]) -> DeployedProcess:
     fqn = _final_name(entry)
-    environment = {key: text for key, text in entry["environment"].items() if key not in _SECURITY}
+    environment = {key: text for key, text in entry.environment.items() if key not in _SECURITY}
     return DeployedProcess(
         name=name,
-        process=entry.get("process") or name,
+        process=entry.process or name,
         fqn=fqn,
         command=_secured(entry),
-        shell=entry.get("shell", False),
-        cwd=entry.get("cwd"),
+        shell=entry.shell,
+        cwd=entry.cwd,
         environment=MappingProxyType(environment),
-        enclave=entry["enclave"],
-        domain=entry["domain_id"],
-        middleware=entry["middleware"],
-        machine=entry.get("machine"),
-        respawn=Respawn(**entry["respawn"]) if entry.get("respawn") else None,
-        parameter_files=MappingProxyType(entry.get("parameter_files", {})),
-        place=f"{entry['launch_file']}:{entry['line']}",
+        enclave=entry.enclave,
+        domain=entry.domain_id,
+        middleware=entry.middleware,
+        machine=entry.machine,
+        respawn=Respawn(**dict(entry.respawn)) if entry.respawn else None,
+        parameter_files=MappingProxyType(entry.parameter_files),
+        place=f"{entry.launch_file}:{entry.line}",
         nodes=(*([fqn] if fqn else ()), *nodes.get(fqn or "", ())),
     )
 
 
-def _final_name(entry: Mapping[str, Any]) -> str | None:
+def _final_name(entry: Process) -> str | None:
     # As rcl resolves it: without a name it has the program's own, assumed to be the executable's.
-    fqn: str | None = entry["fqn"]
-    if fqn is None:
+    if entry.fqn is None:
         return None
-    named = fqn.replace(UNSPECIFIED_NODE_NAMESPACE, "").replace(UNSPECIFIED_NODE_NAME, entry["executable"])
+    named = entry.fqn.replace(UNSPECIFIED_NODE_NAMESPACE, "").replace(UNSPECIFIED_NODE_NAME, entry.executable)
     return "/" + named.lstrip("/")
 
 
-def _secured(entry: Mapping[str, Any]) -> tuple[str, ...]:
+def _secured(entry: Process) -> tuple[str, ...]:
     """Append ``--enclave`` to the command of a node, which ends inside its ``--ros-args``, unless it is there."""
-    command = tuple(entry["cmd"])
-    if entry["fqn"] is None or entry["enclave"] is None:
+    command = tuple(entry.cmd)
+    if entry.fqn is None or entry.enclave is None:
         return command
-    words = words_after_program(command, len(entry["prefix"]), shell=entry.get("shell", False))
+    words = words_after_program(command, len(entry.prefix), shell=entry.shell)
     if parse_ros_arguments(words).enclave is not None:
         return command
-    return (*command, "--enclave", entry["enclave"])
+    return (*command, "--enclave", entry.enclave)
 
 
-def _stem(entry: Mapping[str, Any]) -> str:
-    return str(entry.get("process") or entry["executable"]).rpartition("/")[2].rpartition("-")[0] or "process"
+def _stem(entry: Process) -> str:
+    return (entry.process or entry.executable).rpartition("/")[2].rpartition("-")[0] or "process"
 
 
 def engine_names(subjects: Iterable[str]) -> list[str]:

@@ -6,12 +6,13 @@ components, changing states) has nobody to do it there.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from enum import Enum
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from enclave_launch.deployment.processes import DeployedProcess
 from enclave_launch.diagnostics import Code
+from enclave_launch.dry_run import Component, DryRun, LauncherCall, Process, Reaction
 
 
 class Engine(str, Enum):
@@ -32,7 +33,7 @@ class Unexpressed(NamedTuple):
         return f"{self.place}: {self.what}"
 
 
-def unexpressed(document: Mapping[str, Any], engine: Engine) -> tuple[Unexpressed, ...]:
+def unexpressed(document: DryRun, engine: Engine) -> tuple[Unexpressed, ...]:
     """Return everything that would be lost, in the order of the launch file's processes, components and reactions."""
     found = (
         *_late_processes(document),
@@ -59,63 +60,59 @@ def unexpressed_needs(processes: Iterable[DeployedProcess], engine: Engine) -> t
     )
 
 
-def ends_launch(document: Mapping[str, Any]) -> frozenset[str]:
+def ends_launch(document: DryRun) -> frozenset[str]:
     """Return the processes whose exit ends the whole launch."""
-    return frozenset(one["ends_with"] for one in document.get("reactions", ()) if one["ends_with"])
+    return frozenset(one.ends_with for one in document.reactions if one.ends_with)
 
 
-def differences(document: Mapping[str, Any], engine: Engine) -> tuple[str, ...]:
+def differences(document: DryRun, engine: Engine) -> tuple[str, ...]:
     """Return what works, but not as in launch: to be reported, not refused."""
-    started = [one for one in document["processes"] if one["on_event"] is None]
-    respawned = [one for one in started if one.get("respawn")]
-    told = []
-    if engine is Engine.KUBERNETES and len(respawned) < len(started):
-        told.append("Kubernetes starts every process again when it ends, also those without respawn")
-    if engine is Engine.COMPOSE and any(one["respawn"]["delay"] for one in respawned):
-        told.append("Docker waits longer before each new start; respawn_delay is not followed")
-    if engine is not Engine.SYSTEMD and any(one["respawn"]["retries"] >= 0 for one in respawned):
-        told.append("respawn_max_retries is not followed: restarts are not limited")
-    return tuple(told)
+    started = [one for one in document.processes if one.on_event is None]
+    respawns = [one.respawn for one in started if one.respawn]
+    found = []
+    if engine is Engine.KUBERNETES and len(respawns) < len(started):
+        found.append("Kubernetes starts every process again when it ends, also those without respawn")
+    if engine is Engine.COMPOSE and any(one.delay for one in respawns):
+        found.append("Docker waits longer before each new start; respawn_delay is not followed")
+    if engine is not Engine.SYSTEMD and any(one.retries >= 0 for one in respawns):
+        found.append("respawn_max_retries is not followed: restarts are not limited")
+    return tuple(found)
 
 
-def _late_processes(document: Mapping[str, Any]) -> Iterator[Unexpressed]:
-    for one in document["processes"]:
-        if one["on_event"] is not None:
-            what = one.get("process") or one["executable"]
-            yield Unexpressed(f"{what} is started by an event ({one['on_event']})", _place(one))
+def _late_processes(document: DryRun) -> Iterator[Unexpressed]:
+    for one in document.processes:
+        if one.on_event is not None:
+            what = one.process or one.executable
+            yield Unexpressed(f"{what} is started by an event ({one.on_event})", _place(one))
 
 
-def _components(document: Mapping[str, Any]) -> Iterator[Unexpressed]:
-    for one in document["components"]:
-        what = f"component {one['fqn']} is loaded into {one['container']} by the launcher"
+def _components(document: DryRun) -> Iterator[Unexpressed]:
+    for one in document.components:
+        what = f"component {one.fqn} is loaded into {one.container} by the launcher"
         yield Unexpressed(what, _place(one))
 
 
-def _calls(document: Mapping[str, Any]) -> Iterator[Unexpressed]:
-    for one in document.get("launcher_calls", ()):
-        if not one["service"].endswith("/_container/load_node"):
-            yield Unexpressed(f"the launcher calls {one['service']}", _place(one))
+def _calls(document: DryRun) -> Iterator[Unexpressed]:
+    for one in document.launcher_calls:
+        if not one.service.endswith("/_container/load_node"):
+            yield Unexpressed(f"the launcher calls {one.service}", _place(one))
 
 
-def _reactions(document: Mapping[str, Any], engine: Engine) -> Iterator[Unexpressed]:
+def _reactions(document: DryRun, engine: Engine) -> Iterator[Unexpressed]:
     """Yield reactions to exits. systemd can express that an exit ends the launch, unless the process is respawned."""
-    respawned = {one.get("process") for one in document["processes"] if one.get("respawn")}
-    for one in document.get("reactions", ()):
-        if one["ends_with"] and engine is Engine.SYSTEMD and one["ends_with"] not in respawned:
+    respawned = {one.process for one in document.processes if one.respawn}
+    for one in document.reactions:
+        if one.ends_with and engine is Engine.SYSTEMD and one.ends_with not in respawned:
             continue
-        what = (
-            f"{one['what']}: the end of {one['ends_with']} ends the launch"
-            if one["ends_with"]
-            else one["what"]
-        )
+        what = f"{one.what}: the end of {one.ends_with} ends the launch" if one.ends_with else one.what
         yield Unexpressed(what, _place(one))
 
 
-def _unforeseen(document: Mapping[str, Any]) -> Iterator[Unexpressed]:
-    for one in document.get("diagnostics", ()):
-        if one["code"] == Code.NOT_FORESEEABLE.value:
-            yield Unexpressed(one["text"], f"{one['file']}:{one['line']}")
+def _unforeseen(document: DryRun) -> Iterator[Unexpressed]:
+    for one in document.diagnostics:
+        if one.code == Code.NOT_FORESEEABLE.value:
+            yield Unexpressed(one.text, f"{one.file}:{one.line}")
 
 
-def _place(one: Mapping[str, Any]) -> str:
-    return f"{one['launch_file']}:{one['line']}"
+def _place(one: Process | Component | LauncherCall | Reaction) -> str:
+    return f"{one.launch_file}:{one.line}"

@@ -1,16 +1,17 @@
-"""The dry run's JSON → what the plan expects to run in one DDS domain. Performs no I/O."""
+"""The dry run → what the plan expects to run in one DDS domain. Performs no I/O."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from enclave_launch.admission.middleware import ZENOH
 from enclave_launch.diagnostics import Code
+from enclave_launch.dry_run import Component, DryRun, Interface, Node, Process
 from enclave_launch.process import UNSPECIFIED_NODE_NAME
-from enclave_launch.review.document import GrantedName, fqn_of, program_of
+from enclave_launch.review.document import GrantedName, fqn_of, grant_of, program_of
 from keystore.formats.permissions_patterns import has_wildcard
 
 _STATED = ("--nodl", "manifest of the package")
@@ -51,86 +52,80 @@ class Expected(NamedTuple):
     enclaves: frozenset[str]
 
 
-def out_of_sight(documents: Iterable[Mapping[str, Any]]) -> tuple[str, ...]:
+def out_of_sight(plans: Iterable[DryRun]) -> tuple[str, ...]:
     """Return the processes on Zenoh: an observer takes part in DDS, and would miss them."""
-    processes = (process for document in documents for process in document["processes"])
-    return tuple(process["process"] for process in processes if process["middleware"] == ZENOH)
+    processes = (process for plan in plans for process in plan.processes)
+    return tuple(process.process or "" for process in processes if process.middleware == ZENOH)
 
 
-def expected_in(documents: Iterable[Mapping[str, Any]], domain: int) -> Expected:
-    """Return what all launches in the domain expect, from the documents of their dry runs."""
-    plans = tuple(documents)
-    document = {
-        part: [each for plan in plans for each in plan[part]] for part in ("processes", "components", "nodes")
-    }
-    here = [each for each in document["processes"] if each["domain_id"] == domain]
-    elsewhere = {_enclave(each) for each in document["processes"] if each["domain_id"] != domain}
+def expected_in(plans: Sequence[DryRun], domain: int) -> Expected:
+    """Return what all launches in the domain expect, from their dry runs."""
+    processes = [each for plan in plans for each in plan.processes]
+    here = [each for each in processes if each.domain_id == domain]
+    elsewhere = {_enclave(each) for each in processes if each.domain_id != domain}
     enclaves = {_enclave(each) for each in here}
-    components = [
-        each for each in document["components"] if (each["enclave"] or "") not in elsewhere - enclaves
-    ]
-    started = [*here, *components]
+    started: list[Process | Component] = [*here]
+    for plan in plans:
+        started += [each for each in plan.components if _enclave(each) not in elsewhere - enclaves]
+    described = (each for plan in plans for each in plan.nodes)
     nodes = {
         node.fqn: node
-        for node in _described(document["nodes"], started, _open(plans))
+        for node in _described(described, started, _open(plans))
         if node.enclave in enclaves or node.enclave not in elsewhere
     }
     known = {(node.program, node.enclave) for node in nodes.values()}
-    for fqn, count in Counter(fqn_of(each) for each in started if each["fqn"]).items():
-        starter = next(each for each in started if each["fqn"] and fqn_of(each) == fqn)
+    for fqn, count in Counter(fqn_of(each) for each in started if each.fqn).items():
+        starter = next(each for each in started if each.fqn and fqn_of(each) == fqn)
         program = program_of(starter)
         # Nodes of a known program have the names that rcl gives them, by the user's own ROS arguments, too.
-        described = (program, _enclave(starter)) in known
-        if fqn not in nodes and not described and UNSPECIFIED_NODE_NAME not in fqn:
+        is_described = (program, _enclave(starter)) in known
+        if fqn not in nodes and not is_described and UNSPECIFIED_NODE_NAME not in fqn:
             nodes[fqn] = ExpectedNode(
-                fqn, _enclave(starter), program, described=False, always=starter["on_event"] is None
+                fqn, _enclave(starter), program, described=False, always=starter.on_event is None
             )
         if fqn in nodes:
             nodes[fqn] = nodes[fqn]._replace(times=count)
     unnamed = frozenset(
         fqn_of(each).rpartition("/")[0] or "/"
         for each in started
-        if each["fqn"] and UNSPECIFIED_NODE_NAME in each["fqn"]
+        if each.fqn and UNSPECIFIED_NODE_NAME in each.fqn
     )
-    opaque = frozenset(_enclave(each) for each in here if not each["fqn"])
+    opaque = frozenset(_enclave(each) for each in here if not each.fqn)
     return Expected(nodes, opaque, unnamed, frozenset(path for path in enclaves if path))
 
 
-def _enclave(started: Mapping[str, Any]) -> str:
-    return started["enclave"] or ""
+def _enclave(started: Process | Component) -> str:
+    return started.enclave or ""
 
 
-def _open(plans: Iterable[Mapping[str, Any]]) -> frozenset[str]:
-    unknown = Code.INTERFACE_UNKNOWN.value
-    diagnostics = (each for plan in plans for each in plan["diagnostics"])
-    return frozenset(each["subject"] for each in diagnostics if each["code"] == unknown)
+def _open(plans: Iterable[DryRun]) -> frozenset[str]:
+    diagnostics = (each for plan in plans for each in plan.diagnostics)
+    return frozenset(each.subject for each in diagnostics if each.code == Code.INTERFACE_UNKNOWN.value)
 
 
 def _described(
-    nodes: Iterable[Mapping[str, Any]], started: Iterable[Mapping[str, Any]], unknown: frozenset[str]
+    nodes: Iterable[Node], started: Iterable[Process | Component], unknown: frozenset[str]
 ) -> Iterable[ExpectedNode]:
     origins: dict[str, str] = {}
     on_event: dict[str, bool] = {}
     for each in started:
         program = program_of(each)
-        origins[program] = each["interfaces"] or ""
-        on_event[program] = on_event.get(program, True) and each["on_event"] is not None
+        origins[program] = each.interfaces or ""
+        on_event[program] = on_event.get(program, True) and each.on_event is not None
     for node in nodes:
-        program = node["program"]
-        lifecycle = any(each["built_in"] and each["name"].endswith(_LIFECYCLE) for each in node["interfaces"])
-        stated = origins.get(program, "") in _STATED and not lifecycle
+        lifecycle = any(each.built_in and each.name.endswith(_LIFECYCLE) for each in node.interfaces)
+        stated = origins.get(node.program, "") in _STATED and not lifecycle
         yield ExpectedNode(
-            node["fqn"],
-            node["enclave"],
-            program,
-            tuple(_interface(each, stated) for each in node["interfaces"]),
-            always=not on_event.get(program, False),
-            open=node["fqn"] in unknown,
+            node.fqn,
+            node.enclave,
+            node.program,
+            tuple(_interface(each, stated) for each in node.interfaces),
+            always=not on_event.get(node.program, False),
+            open=node.fqn in unknown,
         )
 
 
-def _interface(fields: Mapping[str, Any], stated: bool) -> ExpectedInterface:
-    wildcard = has_wildcard(fields["name"])
-    certain = stated and not fields["built_in"] and not fields["note"] and not wildcard
-    grant = GrantedName(fields["operation"], fields["name"])
-    return ExpectedInterface(grant, fields["type"], certain, fields.get("qos", {}))
+def _interface(planned: Interface, stated: bool) -> ExpectedInterface:
+    wildcard = has_wildcard(planned.name)
+    certain = stated and not planned.built_in and not planned.note and not wildcard
+    return ExpectedInterface(grant_of(planned), planned.type, certain, planned.qos)

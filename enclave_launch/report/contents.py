@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
-from typing import Any, NamedTuple
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
 
 from enclave_common.words import counted
+from enclave_launch.dry_run import DryRun
 from enclave_launch.report.graph import ChannelUse, EnclaveGraph, plan_graph, short_path
 from enclave_launch.report.review_text import Judged
 from enclave_launch.review.checks.keystore import Ending
@@ -50,14 +51,14 @@ class ReportContents(NamedTuple):
 
 
 def report_contents(
-    document: Mapping[str, Any],
+    document: DryRun,
     judged: Judged,
     *,
     title: str,
     root: str = "",
     endings: Iterable[Ending] | None = None,
 ) -> ReportContents:
-    """Collect what a report shows from the dry run's JSON and its findings; ``root``: prefix to strip from paths."""
+    """Collect what a report shows from a dry run and its findings; ``root``: prefix to strip from paths."""
     plan = plan_from_document(document)
     return ReportContents(
         title,

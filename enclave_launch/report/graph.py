@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from enclave_launch.admission.middleware import ZENOH
-from enclave_launch.process import UNSPECIFIED_NODE_NAMESPACE
-from enclave_launch.review.document import KIND_OF, OPERATIONS, Kind, Operation
+from enclave_launch.dry_run import Component, DryRun, Interface, Operation, Process
+from enclave_launch.review.document import KIND_OF, OPERATIONS, Kind, fqn_of
 from keystore.formats.permissions_patterns import has_wildcard
 
 OUTWARD: frozenset[str] = frozenset({"publish", "call_services", "call_actions"})
@@ -93,29 +93,31 @@ class EnclaveGraph(NamedTuple):
 _Key = tuple[str, "int | None", Operation, str]
 
 
-def plan_graph(document: Mapping[str, Any], root: str = "") -> EnclaveGraph:
-    """Build the graph of enclaves, members and channels from the dry run's JSON; ``root``: prefix to strip."""
+def plan_graph(document: DryRun, root: str = "") -> EnclaveGraph:
+    """Build the graph of enclaves, members and channels of a dry run; ``root``: prefix to strip from paths."""
     members = tuple(sorted(_members(document, root)))
     reasons: dict[_Key, list[UseReason]] = dict(_reasons(document, members, root))
     requested = {(enclave, operation, name) for enclave, _, operation, name in reasons}
-    for enclave, operation, name in _granted(document):
-        if (enclave, operation, name) not in requested:
-            reasons[enclave, None, operation, name] = []
+    for enclave, lists in document.enclaves.items():
+        for operation in OPERATIONS:
+            for name in getattr(lists, operation):
+                if (enclave, operation, name) not in requested:
+                    reasons[enclave, None, operation, name] = []
     channels = _channels(reasons)
     number_of = {(channel.kind, channel.name): number for number, channel in enumerate(channels)}
     uses = tuple(
         ChannelUse(member, enclave, number_of[KIND_OF[operation], name], operation, tuple(why))
         for (enclave, member, operation, name), why in sorted(reasons.items(), key=_order)
     )
-    enclaves = tuple(sorted(document["enclaves"]))
+    enclaves = tuple(sorted(document.enclaves))
     return EnclaveGraph(
         enclaves, members, channels, uses, {path: _middlewares(document, path) for path in enclaves}
     )
 
 
-def _middlewares(document: Mapping[str, Any], enclave: str) -> str:
-    own = (process for process in document["processes"] if process.get("enclave") == enclave)
-    found = {"Zenoh" if process.get("middleware") == ZENOH else "DDS" for process in own}
+def _middlewares(document: DryRun, enclave: str) -> str:
+    own = (process for process in document.processes if process.enclave == enclave)
+    found = {"Zenoh" if process.middleware == ZENOH else "DDS" for process in own}
     return " and ".join(sorted(found)) or "DDS"
 
 
@@ -129,65 +131,48 @@ def short_path(path: str, root: str) -> str:
     return path.removeprefix(os.path.join(root, "")) if root.strip("/") else path
 
 
-def _members(document: Mapping[str, Any], root: str) -> Iterator[NodeMember]:
-    launched = (*document["processes"], *document["components"])
-    places = {
-        item["fqn"].replace(UNSPECIFIED_NODE_NAMESPACE, ""): _place(item, root)
-        for item in launched
-        if item["fqn"]
-    }
-    for node in document["nodes"]:
-        yield NodeMember(node["fqn"], node["enclave"], node["program"], places.get(node["fqn"], ""))
-    for path, enclave in document["enclaves"].items():
-        for name in enclave.get("permissions_unknown", ()):
+def _members(document: DryRun, root: str) -> Iterator[NodeMember]:
+    places = {fqn_of(item): _place(item, root) for item in document.launched if item.fqn}
+    for node in document.nodes:
+        yield NodeMember(node.fqn, node.enclave, node.program, places.get(node.fqn, ""))
+    for path, enclave in document.enclaves.items():
+        for name in enclave.permissions_unknown:
             yield NodeMember(name, path, "interfaces unknown", places.get(name, ""), known=False)
-    for process in document["processes"]:
-        if process["enclave"] is None:
-            yield NodeMember(
-                process["fqn"] or process["executable"],
-                NO_ENCLAVE,
-                "runs unsecured",
-                _place(process, root),
-                False,
-            )
+    for process in document.processes:
+        if process.enclave is None:
+            name = process.fqn or process.executable
+            yield NodeMember(name, NO_ENCLAVE, "runs unsecured", _place(process, root), known=False)
 
 
-def _place(item: Mapping[str, Any], root: str) -> str:
-    file = short_path(item["launch_file"], root)
-    return f"{file}:{item['line']}" if item["line"] else file
+def _place(item: Process | Component, root: str) -> str:
+    file = short_path(item.launch_file, root)
+    return f"{file}:{item.line}" if item.line else file
 
 
 def _reasons(
-    document: Mapping[str, Any], members: tuple[NodeMember, ...], root: str
+    document: DryRun, members: tuple[NodeMember, ...], root: str
 ) -> Iterator[tuple[_Key, list[UseReason]]]:
     number_of = {
         (member.enclave, member.name): number for number, member in enumerate(members) if member.known
     }
-    for node in document["nodes"]:
+    for node in document.nodes:
         found: dict[_Key, list[UseReason]] = {}
-        for item in node["interfaces"]:
-            key = (node["enclave"], number_of[node["enclave"], node["fqn"]], item["operation"], item["name"])
+        for item in node.interfaces:
+            key = (node.enclave, number_of[node.enclave, node.fqn], item.operation, item.name)
             found.setdefault(key, []).append(_reason(item, root))
         yield from found.items()
 
 
-def _reason(item: Mapping[str, Any], root: str) -> UseReason:
-    rules = (rule.rpartition(" at ") for rule in item["remapped_by"])
+def _reason(item: Interface, root: str) -> UseReason:
+    rules = (rule.rpartition(" at ") for rule in item.remapped_by)
     return UseReason(
-        short_path(item["place"], root),
-        item["written"],
+        short_path(item.place, root),
+        item.written,
         tuple(f"{rule}{at}{short_path(origin, root)}" for rule, at, origin in rules),
-        item["note"],
-        item["type"],
-        item["built_in"],
+        item.note,
+        item.type,
+        item.built_in,
     )
-
-
-def _granted(document: Mapping[str, Any]) -> Iterator[tuple[str, Operation, str]]:
-    for path, lists in document["enclaves"].items():
-        for operation in OPERATIONS:
-            for name in lists[operation]:
-                yield path, operation, name
 
 
 def _channels(reasons: Mapping[_Key, list[UseReason]]) -> tuple[Channel, ...]:

@@ -1,8 +1,9 @@
-"""A ``LaunchPlan`` as the JSON document of ``report.contract`` (its pydantic models say what each field means)."""
+"""A ``LaunchPlan`` as JSON; the pydantic models of ``enclave_launch.dry_run`` say what each field means."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from typing import Any
 
 from enclave_common.terminal import json_text
 from enclave_launch.diagnostics import Diagnostic
@@ -19,7 +20,7 @@ from nodl.node_interface import NodeInterface
 VERSION = 1
 
 
-def plan_document(plan: LaunchPlan, security: SecuritySettings | None = None) -> dict[str, object]:
+def plan_document(plan: LaunchPlan, security: SecuritySettings | None = None) -> dict[str, Any]:
     """Return the plan as plain values; ``security``: how ``--secure`` would start the processes."""
     return {
         "version": VERSION,

@@ -1,25 +1,16 @@
-"""A plan as a review sees it: enclaves with their permissions, nodes with theirs, and the diagnostics of planning.
-
-Made from the dry run's JSON, so that a plan that was saved (or comes from another machine or revision) and one that was
-just resolved are the same thing.
-"""
+"""A plan as a review sees it: enclaves with their permissions, nodes with theirs, and the diagnostics of planning."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+from collections.abc import Iterator, Mapping
+from typing import Literal, NamedTuple
 
 from enclave_launch.admission.middleware import ZENOH
+from enclave_launch.dry_run import Component, DryRun, Interface, Node, Operation, Process
 from enclave_launch.policy.derivation import LIST_NAMES
 from enclave_launch.process import UNSPECIFIED_NODE_NAMESPACE
 
 OPERATIONS = tuple(LIST_NAMES.values())
-if TYPE_CHECKING:
-    from enclave_launch.policy.derivation import ListName
-
-    Operation = ListName
-else:
-    Operation = Literal[OPERATIONS]  # pydantic looks into it
 Kind = Literal["topic", "service", "action"]
 KIND_OF: Mapping[str, Kind] = {
     "publish": "topic",
@@ -113,63 +104,56 @@ class PlanDocument(NamedTuple):
         return units
 
 
-def plan_from_document(document: Mapping[str, Any]) -> PlanDocument:
-    """Read a document that ``report.contract.DryRun`` accepts."""
+def plan_from_document(document: DryRun) -> PlanDocument:
+    """Return what a review sees of a dry run."""
     return PlanDocument(
-        {path: grants_of(lists) for path, lists in document["enclaves"].items()},
+        {
+            path: frozenset(GrantedName(each, name) for each in OPERATIONS for name in getattr(enclave, each))
+            for path, enclave in document.enclaves.items()
+        },
         tuple(_nodes(document)),
-        tuple(PlanFinding(**diagnostic) for diagnostic in document.get("diagnostics", ())),
+        tuple(PlanFinding(**dict(diagnostic)) for diagnostic in document.diagnostics),
         frozenset(
-            process["enclave"]
-            for process in document.get("processes", ())
-            if process.get("enclave") and process.get("middleware") == ZENOH
+            process.enclave
+            for process in document.processes
+            if process.enclave and process.middleware == ZENOH
         ),
     )
 
 
-def grants_of(lists: Mapping[str, Sequence[str]]) -> frozenset[GrantedName]:
-    """Read the contract's six lists of names; other keys of the mapping are ignored."""
-    return frozenset(
-        GrantedName(operation, name) for operation in OPERATIONS for name in lists.get(operation, ())
-    )
-
-
-def _nodes(document: Mapping[str, Any]) -> Iterator[NodeView]:
-    launched = {fqn_of(item) for item in (*document.get("processes", ()), *document.get("components", ()))}
+def _nodes(document: DryRun) -> Iterator[NodeView]:
+    launched = {fqn_of(item) for item in document.launched}
     mains: dict[tuple[str, str], list[str]] = {}
-    for node in document.get("nodes", ()):
-        if node["fqn"] in launched:
-            mains.setdefault((node["enclave"], node["program"]), []).append(node["fqn"])
-    for node in document.get("nodes", ()):
-        started_with = mains.get((node["enclave"], node["program"]), [])
-        is_helper = node["fqn"] not in launched and bool(started_with)
-        yield _node(node, started_with[0] if is_helper else node["fqn"])
+    for node in document.nodes:
+        if node.fqn in launched:
+            mains.setdefault((node.enclave, node.program), []).append(node.fqn)
+    for node in document.nodes:
+        started_with = mains.get((node.enclave, node.program), [])
+        is_helper = node.fqn not in launched and bool(started_with)
+        yield NodeView(
+            node.fqn,
+            node.enclave,
+            node.program,
+            _grants(node, built_in=False),
+            _grants(node, built_in=True),
+            started_with[0] if is_helper else node.fqn,
+        )
 
 
-def fqn_of(item: Mapping[str, Any]) -> str:
+def fqn_of(item: Process | Component) -> str:
     """Return the final name of a process or component; empty if it has none."""
-    return (item["fqn"] or "").replace(UNSPECIFIED_NODE_NAMESPACE, "")
+    return (item.fqn or "").replace(UNSPECIFIED_NODE_NAMESPACE, "")
 
 
-def program_of(item: Mapping[str, Any]) -> str:
+def program_of(item: Process | Component) -> str:
     """Return ``package/executable`` of a process, ``package/plugin`` of a component."""
-    return f"{item.get('package')}/{item.get('executable') or item.get('plugin')}"
+    return f"{item.package}/{item.executable if isinstance(item, Process) else item.plugin}"
 
 
-def _node(node: Mapping[str, Any], unit: str) -> NodeView:
-    return NodeView(
-        node["fqn"],
-        node["enclave"],
-        node["program"],
-        _grants(node["interfaces"], built_in=False),
-        _grants(node["interfaces"], built_in=True),
-        unit,
-    )
+def grant_of(interface: Interface) -> GrantedName:
+    """Return the permission that an interface of a node needs."""
+    return GrantedName(interface.operation, interface.name)
 
 
-def _grants(interfaces: Iterable[Mapping[str, Any]], *, built_in: bool) -> frozenset[GrantedName]:
-    return frozenset(
-        GrantedName(interface["operation"], interface["name"])
-        for interface in interfaces
-        if interface["built_in"] is built_in
-    )
+def _grants(node: Node, *, built_in: bool) -> frozenset[GrantedName]:
+    return frozenset(grant_of(each) for each in node.interfaces if each.built_in is built_in)

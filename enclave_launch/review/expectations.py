@@ -18,6 +18,7 @@ from collections.abc import Iterable, Mapping
 from fnmatch import fnmatchcase
 from typing import Any, NamedTuple
 
+from enclave_launch.dry_run import DryRun
 from enclave_launch.errors import UsageError
 from enclave_launch.review.checks.rules import finding
 from enclave_launch.review.document import PlanDocument, PlanFinding, plan_from_document
@@ -84,7 +85,7 @@ def read_expectations(content: Any, place: str) -> Expectations:
     )
 
 
-def rule_findings(document: Mapping[str, Any], rules: Iterable[Never]) -> list[PlanFinding]:
+def rule_findings(document: DryRun, rules: Iterable[Never]) -> list[PlanFinding]:
     """Return an error for each forbidden flow and a warning for each rule that names nothing in this plan."""
     broken, idle = broken_rules(plan_from_document(document), rules)
     forbidden = [finding("flow-forbidden", found.source, _broken_text(found)) for found in broken]

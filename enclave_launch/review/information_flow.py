@@ -16,7 +16,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from itertools import pairwise
 from typing import NamedTuple
 
-from enclave_launch.review.document import GrantedName, Operation, PlanDocument
+from enclave_launch.dry_run import Operation
+from enclave_launch.review.document import GrantedName, PlanDocument
 from keystore.formats.permissions_patterns import can_meet, has_wildcard
 from nodl.remap import ACTION_SERVICES, ACTION_TOPICS
 

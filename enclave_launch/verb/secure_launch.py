@@ -120,10 +120,12 @@ def _plan_text(plan: LaunchPlan, options: argparse.Namespace, keystore: str | No
     if options.format == "policy":
         return _policy_text(plan)
 
+    from enclave_launch.dry_run import DryRun  # pydantic
     from enclave_launch.verb.secure_plan.report import report_text  # cryptography
 
     there = keystore if keystore is not None and os.path.isdir(keystore) else None
-    return report_text(plan_document(plan), options.format, " ".join(options.words), keystore=there)
+    dry_run = DryRun(**plan_document(plan))
+    return report_text(dry_run, options.format, " ".join(options.words), keystore=there)
 
 
 def _policy_text(plan: LaunchPlan) -> str:

@@ -10,6 +10,7 @@ from pathlib import Path
 from enclave_launch.drift.compare import Security
 from enclave_launch.drift.expected import out_of_sight
 from enclave_launch.drift_watch import DriftWatch, WatchOptions
+from enclave_launch.dry_run import DryRun
 from enclave_launch.errors import ProvisionError, UsageError, translated
 from enclave_launch.flow import run
 from enclave_launch.options import RunSettings
@@ -24,20 +25,20 @@ from nodl.graph.observing import chosen_source
 
 def watch_plain_launch(plan: LaunchPlan, options: argparse.Namespace, settings: RunSettings) -> int:
     """Run and watch an unsecured launch; return its status, 1 if there were alarms. Raises UsageError."""
-    watch = DriftWatch(_seen_document(plan), _options(options))
+    watch = DriftWatch(_dry_run(plan), _options(options))
     return watch.status(run(plan, options=settings._replace(watch=watch)))
 
 
 def check_watch(plan: LaunchPlan) -> None:
     """Raise UsageError unless the launch can be watched, before its keystore is touched."""
-    _seen_document(plan)
+    _dry_run(plan)
     with translated(NoDLError, UsageError, "--watch: "):
         chosen_source("auto")
 
 
 def watch_of_secured_launch(launch: ProvisionedLaunch, options: argparse.Namespace) -> DriftWatch:
     """Return a watch with an enclave of its own, for the observer in use; raises ProvisionError, UsageError."""
-    document = _seen_document(launch.plan)
+    dry_run = _dry_run(launch.plan)
     root = launch.settings.keystore
     with (
         translated(KeystoreError, ProvisionError, "--watch: "),
@@ -48,7 +49,7 @@ def watch_of_secured_launch(launch: ProvisionedLaunch, options: argparse.Namespa
         security = Security(enclaves_by_guid(root))
     directory = Path(root) / "enclaves" / enclave.lstrip("/")
     watched = _options(options, security, directory)
-    return DriftWatch(document, watched._replace(enclaves_now=partial(_enclaves_now, root, security)))
+    return DriftWatch(dry_run, watched._replace(enclaves_now=partial(_enclaves_now, root, security)))
 
 
 def _enclaves_now(root: str, security: Security) -> Mapping[int, str]:
@@ -59,15 +60,15 @@ def _enclaves_now(root: str, security: Security) -> Mapping[int, str]:
         return security.enclaves
 
 
-def _seen_document(plan: LaunchPlan) -> dict[str, object]:
-    """Return the plan's document; raises UsageError if no observer sees a process of it."""
-    document = plan_document(plan)
-    zenoh = out_of_sight([document])
+def _dry_run(plan: LaunchPlan) -> DryRun:
+    """Return the plan as drift reads it; raises UsageError if no observer sees a process of it."""
+    dry_run = DryRun(**plan_document(plan))
+    zenoh = out_of_sight([dry_run])
     if zenoh:
         raise UsageError(
             f"--watch looks at DDS only, and {', '.join(zenoh)} on Zenoh: start this without --watch"
         )
-    return document
+    return dry_run
 
 
 def _options(

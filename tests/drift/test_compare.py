@@ -11,6 +11,7 @@ import pytest
 from enclave_launch.drift.compare import Circumstances, Security, compare
 from enclave_launch.drift.expected import expected_in
 from enclave_launch.drift.finding import DriftFinding, FindingCertainty, Kind, Level
+from enclave_launch.dry_run import DryRun
 from nodl.graph.model import Graph
 from nodl.graph.quality import Quality
 from tests.drift.planned import commands, plan, running
@@ -26,7 +27,7 @@ TALKER = plan(*LAUNCHES[0])
 
 
 def found(document: Any, graph: Graph, **circumstances: Any) -> list[DriftFinding]:
-    return compare(expected_in([document], 0), graph, Circumstances(**circumstances))
+    return compare(expected_in([DryRun(**document)], 0), graph, Circumstances(**circumstances))
 
 
 def kinds(findings: list[DriftFinding]) -> list[tuple[Kind, str]]:
@@ -172,7 +173,8 @@ def test_what_a_plan_does_not_know_is_not_compared() -> None:
     talker["interfaces"] = [each for each in talker["interfaces"] if each["name"] != "/chatter"]
     (alarm,) = found(document, made.graph())
     assert (alarm.kind, alarm.level) == (Kind.UNPLANNED_ENDPOINT, Level.ALARM)
-    gap = {"code": "interface-unknown", "subject": "/talker"}
+    gap = {"severity": "warning", "code": "interface-unknown", "subject": "/talker", "file": None, "line": 0}
+    gap |= {"text": "", "remedy": ""}
     (note,) = found({**document, "diagnostics": [gap]}, made.graph())
     assert (note.kind, note.level) == (Kind.UNPLANNED_ENDPOINT, Level.NOTE)
 
@@ -446,7 +448,7 @@ def test_an_enclave_that_is_made_while_somebody_watches_is_not_of_another_ca() -
     made.participant(9, prefix=f"{HASH + 7:012x}")
     before = [each.kind for each in found(TALKER, made.graph(), security=SECURITY)]
     assert Kind.OTHER_CA in before
-    expected, graph = expected_in([TALKER], 0), made.graph()
+    expected, graph = expected_in([DryRun(**TALKER)], 0), made.graph()
     now = {**SECURITY.enclaves, HASH + 7: "/tools/observe"}
     after = compare(expected, graph, Circumstances(SECURITY), lambda: now)
     assert Kind.OTHER_CA not in {each.kind for each in after}

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import itertools
 import os
-from collections.abc import Iterator
-from typing import Any
+from collections.abc import Iterator, Sequence
 
 import pytest
 
+from enclave_launch.dry_run import DryRun
 from enclave_launch.report.contents import ReportContents, report_contents
 from enclave_launch.review.checks import check_plan
 from tests.report.browser import Page, browser, chromium
-from tests.review.conftest import ROBOT, Asked, document, interface
+from tests.review.conftest import ROBOT, Asked, document, interface, process
 
 HOSTILE = (
     "</script><script>window.broken=1</script>",
@@ -26,7 +27,7 @@ HOSTILE = (
 """What a launch file may write in the place of a name."""
 
 
-def robot() -> dict[str, Any]:
+def robot() -> DryRun:
     """The camera, the planner and the base; the planner has a wildcard and a name from a remap rule."""
     plan = document(ROBOT)
     node = next(node for node in plan["nodes"] if node["fqn"] == "/planner")
@@ -34,26 +35,18 @@ def robot() -> dict[str, Any]:
     node["interfaces"].append({**interface("subscribe", "/map/*"), "note": "--accept-patterns"})
     plan["enclaves"]["/planner"]["subscribe"].append("/map/*")
     plan["enclaves"]["/logger"]["publish"].append("/of_policy")
-    plan["processes"] = [process("/camera/driver", "/camera", 3), process("/tool", None, 12)]
+    plan["processes"] = [
+        process(fqn="/camera/driver", enclave="/camera", launch_file="bringup.launch.xml"),
+        process(fqn="/tool", launch_file="bringup.launch.xml", line=12),
+    ]
     plan["enclaves"]["/camera"]["permissions_unknown"] = ["/camera/helper"]
-    return plan
+    return DryRun(**plan)
 
 
-def process(fqn: str, enclave: str | None, line: int) -> dict[str, Any]:
-    return {
-        "fqn": fqn,
-        "executable": "e",
-        "enclave": enclave,
-        "environment": {},
-        "parameters": {},
-        "remaps": [],
-        "launch_file": "bringup.launch.xml",
-        "line": line,
-    }
+def hostile(places: Sequence[str] = (HOSTILE[1],)) -> DryRun:
+    """Every kind of name is each of ``HOSTILE``; each node is alone in its enclave.
 
-
-def hostile() -> dict[str, Any]:
-    """Every kind of name is each of ``HOSTILE``; each node is alone in its enclave."""
+    ``places``: those of its interfaces, in turn."""
     enclaves: dict[str, dict[str, Asked]] = {}
     for number, name in enumerate(HOSTILE):
         asked = {"publish": [name], "subscribe": [name], "call_services": [name], "serve_actions": [name]}
@@ -61,12 +54,12 @@ def hostile() -> dict[str, Any]:
     plan = document(enclaves)
     for node in plan["nodes"]:
         node["program"] = HOSTILE[0]
-        for item in node["interfaces"]:
-            item.update(place=HOSTILE[1], written=HOSTILE[2], note=HOSTILE[3], type=HOSTILE[0])
-    return plan
+        for item, place in zip(node["interfaces"], itertools.cycle(places)):
+            item.update(place=place, written=HOSTILE[2], note=HOSTILE[3], type=HOSTILE[0])
+    return DryRun(**plan)
 
 
-def large(nodes: int = 500) -> dict[str, Any]:
+def large(nodes: int = 500) -> DryRun:
     """Nodes in chains, three to an enclave, with a service for every fifth."""
     enclaves: dict[str, dict[str, Asked]] = {}
     for number in range(nodes):
@@ -82,10 +75,10 @@ def large(nodes: int = 500) -> dict[str, Any]:
         if number % 5 == 0:
             asked["serve_services"] = [f"{area}/reset_{number}"]
         enclaves.setdefault(f"{area}/e{number // 3}", {})[f"{area}/node_{number}"] = asked
-    return document(enclaves)
+    return DryRun(**document(enclaves))
 
 
-def contents(plan: dict[str, Any], title: str = "robot.launch.xml") -> ReportContents:
+def contents(plan: DryRun, title: str = "robot.launch.xml") -> ReportContents:
     return report_contents(plan, [(told, None) for told in check_plan(plan)], title=title)
 
 

@@ -84,10 +84,7 @@ def test_the_matrix_has_each_permission_with_its_reason(evidence: Path) -> None:
 
 
 def test_no_cell_of_the_matrix_is_a_formula() -> None:
-    plan = hostile()
-    for node in plan["nodes"]:
-        for item, start in zip(node["interfaces"], "=+-@", strict=False):
-            item["place"] = f"{start}cmd|'/C calc'!A0"
+    plan = hostile([f"{start}cmd|'/C calc'!A0" for start in "=+-@"])
     cells = [cell for row in csv.reader(io.StringIO(csv_text(rows(plan_graph(plan))))) for cell in row]
     assert not [cell for cell in cells if cell.startswith(("=", "+", "-", "@"))]
 

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import pytest
 
+from enclave_launch.dry_run import DryRun
 from enclave_launch.report.html.page import html_report
 from tests.report.browser import Page
 from tests.report.conftest import HOSTILE, contents, hostile, large, robot
@@ -14,7 +14,7 @@ from tests.report.conftest import HOSTILE, contents, hostile, large, robot
 GRAPH = "document.getElementById('canvas')._cyreg.cy"
 
 
-def opened(page: Page, folder: Path, plan: dict[str, Any], title: str = "robot.launch.xml") -> Page:
+def opened(page: Page, folder: Path, plan: DryRun, title: str = "robot.launch.xml") -> Page:
     file = folder / "report.html"
     file.write_text(html_report(contents(plan, title)), encoding="utf-8")
     page.told.clear()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from enclave_launch.dry_run import DryRun
 from enclave_launch.review.document import PlanDocument, plan_from_document
 
 EVERYWHERE = {"publish": ["/rosout"], "subscribe": ["/parameter_events"]}
@@ -40,7 +41,11 @@ def document(enclaves: dict[str, dict[str, Asked]]) -> dict[str, Any]:
                     lists[path][operation].add(name)
             nodes.append({"fqn": fqn, "enclave": path, "program": "p/e", "interfaces": interfaces})
     named = {
-        path: {"nodes": sorted(enclaves[path]), **{name: sorted(names) for name, names in of.items()}}
+        path: {
+            "nodes": sorted(enclaves[path]),
+            "permissions_unknown": [],
+            **{name: sorted(names) for name, names in of.items()},
+        }
         for path, of in lists.items()
     }
     return {
@@ -54,8 +59,31 @@ def document(enclaves: dict[str, dict[str, Asked]]) -> dict[str, Any]:
     }
 
 
+def process(**values: Any) -> dict[str, Any]:
+    """A process of the dry run's JSON."""
+    return {
+        "package": "p",
+        "executable": "e",
+        "namespace": "/",
+        "name": "n",
+        "fqn": "/n",
+        "cmd": ["e"],
+        "remaps": [],
+        "parameters": {},
+        "enclave": None,
+        "prefix": [],
+        "domain_id": 0,
+        "middleware": "rmw_cyclonedds_cpp",
+        "environment": {},
+        "launch_file": "f.launch.xml",
+        "line": 3,
+        "on_event": None,
+        **values,
+    }
+
+
 def plan(enclaves: dict[str, dict[str, Asked]]) -> PlanDocument:
-    return plan_from_document(document(enclaves))
+    return plan_from_document(DryRun(**document(enclaves)))
 
 
 ROBOT: dict[str, dict[str, Asked]] = {

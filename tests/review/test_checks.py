@@ -6,19 +6,24 @@ from typing import Any
 
 import pytest
 
+from enclave_launch.dry_run import DryRun
 from enclave_launch.errors import UsageError
 from enclave_launch.review.checks import RULES, check_plan
 from enclave_launch.review.document import PlanFinding
 from enclave_launch.review.expectations import read_expectations, rule_findings
-from tests.review.conftest import ROBOT, Asked, document
+from tests.review.conftest import ROBOT, Asked, document, process
 
 
 def two(one: Asked, other: Asked) -> dict[str, Any]:
     return document({"/one": {"/n1": one}, "/two": {"/n2": other}})
 
 
+def checks(checked: dict[str, Any]) -> list[PlanFinding]:
+    return check_plan(DryRun(**checked))
+
+
 def codes(checked: dict[str, Any]) -> set[str]:
-    found = {told.code for told in check_plan(checked)}
+    found = {told.code for told in checks(checked)}
     assert found <= RULES.keys()
     return found
 
@@ -100,7 +105,7 @@ def test_a_permission_that_no_node_asks_for() -> None:
     checked = document({"/a": {"/n": {"publish": ["/x"]}}})
     assert "permission-unasked" not in codes(checked)
     checked["enclaves"]["/a"]["publish"].append("/of_policy")
-    (told,) = [told for told in check_plan(checked) if told.code == "permission-unasked"]
+    (told,) = [told for told in checks(checked) if told.code == "permission-unasked"]
     assert told.text == "enclave /a may publish /of_policy, and none of its nodes requests that"
     checked["enclaves"]["/a"]["permissions_unknown"] = ["/helper"]
     assert "permission-unasked" not in codes(checked), "the policy speaks for a program that nobody describes"
@@ -122,13 +127,11 @@ def test_missing_ends_are_one_finding_where_not_all_is_known() -> None:
     checked = two({"subscribe": ["/x"], "publish": ["/y"]}, {})
     assert {"no-publisher", "no-subscriber"} <= codes(checked)
     checked["diagnostics"] = [told("no-manifest", "demo/driver")]
-    (found,) = [each for each in check_plan(checked) if each.code in RULES]
+    (found,) = [each for each in checks(checked) if each.code in RULES]
     assert found.code == "ends-not-judged"
     assert found.text == "/x, /y have one end only among what is known, but not all is known of demo/driver"
     checked["diagnostics"] = [told("pattern-accepted", "/n")]
-    assert "no-publisher" in {each.code for each in check_plan(checked)}, (
-        "no gap: the name is a known pattern"
-    )
+    assert "no-publisher" in {each.code for each in checks(checked)}, "no gap: the name is a known pattern"
 
 
 def test_the_other_end_of_rviz_and_of_a_default_of_the_library_is_optional() -> None:
@@ -138,7 +141,7 @@ def test_the_other_end_of_rviz_and_of_a_default_of_the_library_is_optional() -> 
             node["program"] = program
             for each in node["interfaces"]:
                 each.update({"place": place, "remapped_by": [], "note": "", **more})
-        (found,) = [each.code for each in check_plan(checked) if each.subject == "/x"]
+        (found,) = [each.code for each in checks(checked) if each.subject == "/x"]
         return found
 
     document = "/opt/nodl/library/documents/slam_toolbox/sync.nodl.yaml:12"
@@ -150,7 +153,7 @@ def test_the_other_end_of_rviz_and_of_a_default_of_the_library_is_optional() -> 
 
 def test_of_two_topics_of_transforms_one_may_have_no_publisher() -> None:
     def found(published: str) -> dict[str, str]:
-        given = check_plan(two({"subscribe": ["/r/tf", "/r/tf_static"]}, {"publish": [published]}))
+        given = checks(two({"subscribe": ["/r/tf", "/r/tf_static"]}, {"publish": [published]}))
         return {each.subject: each.code for each in given if "publishes" in each.text}
 
     assert found("/r/tf") == {"/r/tf_static": "other-end-optional"}
@@ -160,7 +163,7 @@ def test_of_two_topics_of_transforms_one_may_have_no_publisher() -> None:
 def test_a_wildcard_that_planning_told_of_is_not_told_again() -> None:
     checked = document({"/a": {"/n": {"publish": ["/x*", "/y*"]}}})
     checked["diagnostics"] = [told("pattern-accepted", "/n", "node /n may publish /x*: a pattern")]
-    assert [each.subject for each in check_plan(checked) if each.code == "wildcard"] == ["/y*"]
+    assert [each.subject for each in checks(checked) if each.code == "wildcard"] == ["/y*"]
 
 
 def test_an_enclave_is_shared_by_processes_not_by_the_nodes_in_one() -> None:
@@ -169,19 +172,6 @@ def test_an_enclave_is_shared_by_processes_not_by_the_nodes_in_one() -> None:
     assert "enclave-shared" not in codes(checked)
     checked["processes"] = [process(fqn="/n"), process(fqn="/helper_of_n")]
     assert "enclave-shared" in codes(checked)
-
-
-def process(**values: Any) -> dict[str, Any]:
-    return {
-        "fqn": "/n",
-        "executable": "e",
-        "environment": {},
-        "parameters": {},
-        "remaps": [],
-        "launch_file": "f.launch.xml",
-        "line": 3,
-        **values,
-    }
 
 
 @pytest.mark.parametrize(
@@ -201,9 +191,9 @@ def process(**values: Any) -> dict[str, Any]:
     ],
 )
 def test_what_a_process_is_given(code: str, triggers: dict[str, Any], does_not: dict[str, Any]) -> None:
-    found = check_plan({**document({}), "processes": [process(**triggers)]})
+    found = checks({**document({}), "processes": [process(**triggers)]})
     assert [(told.code, told.file, told.line) for told in found] == [(code, "f.launch.xml", 3)]
-    assert check_plan({**document({}), "processes": [process(**does_not)]}) == []
+    assert checks({**document({}), "processes": [process(**does_not)]}) == []
 
 
 def rules(**entry: str) -> Any:
@@ -214,7 +204,9 @@ def rules(**entry: str) -> Any:
 
 @pytest.mark.parametrize("target", ["/base", "/drive", "/ba*"])
 def test_a_forbidden_flow_is_an_error_that_shows_the_way(target: str) -> None:
-    (told,) = rule_findings(document(ROBOT), rules(from_="/camera", to=target, why="vendor's binary"))
+    (told,) = rule_findings(
+        DryRun(**document(ROBOT)), rules(from_="/camera", to=target, why="vendor's binary")
+    )
     assert (told.severity, told.code) == ("error", "flow-forbidden")
     assert told.text == (
         f"/camera must never reach {target} (vendor's binary): "
@@ -223,11 +215,11 @@ def test_a_forbidden_flow_is_an_error_that_shows_the_way(target: str) -> None:
 
 
 def test_a_flow_that_does_not_exist_is_not_told() -> None:
-    assert rule_findings(document(ROBOT), rules(from_="/logger", to="/base")) == []
+    assert rule_findings(DryRun(**document(ROBOT)), rules(from_="/logger", to="/base")) == []
 
 
 def test_a_rule_that_names_nothing_is_told_since_it_protects_nothing() -> None:
-    (told,) = rule_findings(document(ROBOT), rules(from_="/camra", to="/base"))
+    (told,) = rule_findings(DryRun(**document(ROBOT)), rules(from_="/camra", to="/base"))
     assert (told.severity, told.code) == ("warning", "rule-idle")
 
 

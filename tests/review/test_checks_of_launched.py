@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from enclave_launch.dry_run import DryRun
 from enclave_launch.flow import resolve
 from enclave_launch.options import ResolveOptions
 from enclave_launch.report.plan_json import plan_document
@@ -67,7 +68,9 @@ def check(tmp_path: Path) -> Check:
         options = ResolveOptions(
             prefixes=(tmp_path / "ws",), manifests=tuple(manifests), enclave_scope=_node_scope()
         )
-        return check_plan(plan_document(resolve(launch_file, tuple(given.items()), options=options)))
+        return check_plan(
+            DryRun(**plan_document(resolve(launch_file, tuple(given.items()), options=options)))
+        )
 
     return run
 

@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from enclave_launch.dry_run import DryRun
 from enclave_launch.review.document import plan_from_document
 from enclave_launch.review.information_flow import (
     flow_graph,
@@ -15,7 +16,7 @@ from enclave_launch.review.information_flow import (
     reached_from,
     shortest_paths,
 )
-from tests.review.conftest import ROBOT, Asked, document, plan
+from tests.review.conftest import ROBOT, Asked, document, plan, process
 
 
 @pytest.mark.parametrize(
@@ -91,11 +92,11 @@ def test_nodes_of_a_shared_enclave_that_talk_anyway_open_nothing_in_that_directi
 def test_nodes_of_one_process_open_nothing_for_each_other() -> None:
     """``/tf_listener`` is a helper in the process that the launch file starts as ``/one``."""
     box = document({"/box": {"/one": {"publish": ["/x"]}, "/tf_listener": {"subscribe": ["/tf"]}}})
-    assert opened_by_sharing(plan_from_document(box)) != []
-    box["processes"] = [{"fqn": "/one"}]
-    assert opened_by_sharing(plan_from_document(box)) == []
+    assert opened_by_sharing(plan_from_document(DryRun(**box))) != []
+    box["processes"] = [process(fqn="/one")]
+    assert opened_by_sharing(plan_from_document(DryRun(**box))) == []
     box["nodes"][1]["program"] = "p/another"
-    assert opened_by_sharing(plan_from_document(box)) != []
+    assert opened_by_sharing(plan_from_document(DryRun(**box))) != []
 
 
 names = st.sampled_from(["/a", "/b", "/c", "/d", "/a/*", "*"])

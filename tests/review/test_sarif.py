@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from jsonschema import Draft4Validator
 
 from enclave_common.terminal import json_text
+from enclave_launch.dry_run import DryRun
 from enclave_launch.report.sarif import sarif_document
 from enclave_launch.review.checks import RULES, check_plan
 from enclave_launch.review.document import PlanFinding
@@ -29,7 +30,7 @@ def errors(findings: list[tuple[PlanFinding, str | None]]) -> list[str]:
 
 
 @pytest.mark.parametrize("plan", [robot(), hostile()], ids=["robot", "hostile names"])
-def test_findings_of_plans_are_valid(plan: dict[str, Any]) -> None:
+def test_findings_of_plans_are_valid(plan: DryRun) -> None:
     found = check_plan(plan)
     assert found
     assert errors([(told, None if number % 2 else "accepted") for number, told in enumerate(found)]) == []

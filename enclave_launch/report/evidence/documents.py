@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 from enclave_common.terminal import json_text
 from enclave_launch import __version__
+from enclave_launch.dry_run import DryRun
 from enclave_launch.report.contents import ReportContents
 from enclave_launch.report.evidence import matrix
 from enclave_launch.report.evidence.requirements import DISCLAIMER, PARTS
@@ -28,9 +29,10 @@ PREDICATE = "https://in-toto.io/attestation/test-result/v0.1"
 
 class Examined(NamedTuple):
     """The subject of the evidence. ``keys``, ``defaults`` and ``components`` are ``None`` where nothing was given to
-    look at; ``rules``: every code that the checks can give, with its meaning."""
+    look at; ``document``: the dry run's JSON; ``rules``: every code that the checks can give, with its meaning."""
 
     document: Mapping[str, Any]
+    plan: DryRun
     contents: ReportContents
     rules: Mapping[str, str]
     at: str
@@ -47,7 +49,7 @@ def evidence_files(examined: Examined) -> dict[str, bytes]:
     documents: dict[str, Any] = {
         "plan.json": examined.document,
         "access-control.json": {"version": 1, "permissions": [row._asdict() for row in rows]},
-        "attack-surface.json": surface_document(examined.document),
+        "attack-surface.json": surface_document(examined.plan),
         "keys.json": _or_not_given(examined.keys, "keys", "no keystore was given (--keystore)"),
         "secure-defaults.json": _or_not_given(
             examined.defaults, "defaults", "no keystore was given (--keystore)"

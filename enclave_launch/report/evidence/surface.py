@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from enclave_launch.dry_run import DryRun
 from enclave_launch.report.graph import NO_ENCLAVE, OUTWARD, ChannelUse, EnclaveGraph, plan_graph
 from enclave_launch.review.document import plan_from_document
 from enclave_launch.review.information_flow import flow_graph, opened_by_sharing, reached_from
 from keystore.formats.permissions_patterns import can_meet
 
 
-def surface_document(document: Mapping[str, Any]) -> dict[str, Any]:
-    """Describe what each enclave exposes, from the dry run's JSON; interfaces that every node has are left out."""
+def surface_document(document: DryRun) -> dict[str, Any]:
+    """Describe what each enclave exposes, from a dry run; interfaces that every node has are left out."""
     graph, plan = plan_graph(document), plan_from_document(document)
     flows = flow_graph(plan)
     return {
@@ -32,9 +33,7 @@ def surface_document(document: Mapping[str, Any]) -> dict[str, Any]:
             for member in graph.members
             if not member.known and member.enclave != NO_ENCLAVE
         ],
-        "domains": sorted(
-            {process["domain_id"] for process in document["processes"] if "domain_id" in process}
-        ),
+        "domains": sorted({process.domain_id for process in document.processes}),
     }
 
 

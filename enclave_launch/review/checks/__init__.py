@@ -11,9 +11,7 @@ A finding has a stable code, a place where there is one, and what to do next.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
+from enclave_launch.dry_run import DryRun
 from enclave_launch.review.checks import enclaves, launched, meetings
 from enclave_launch.review.checks.rules import MEANINGS, RULES
 from enclave_launch.review.document import PlanFinding, plan_from_document
@@ -21,8 +19,8 @@ from enclave_launch.review.document import PlanFinding, plan_from_document
 __all__ = ["MEANINGS", "RULES", "check_plan"]
 
 
-def check_plan(document: Mapping[str, Any]) -> list[PlanFinding]:
-    """Return all findings of the dry run's JSON: those of planning first, then those of each check, sorted."""
+def check_plan(document: DryRun) -> list[PlanFinding]:
+    """Return all findings of a dry run: those of planning first, then those of each check, sorted."""
     plan = plan_from_document(document)
     own = (
         diagnostic

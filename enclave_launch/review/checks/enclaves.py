@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Iterator
 
 from enclave_common.words import some_of
+from enclave_launch.dry_run import DryRun
 from enclave_launch.review.checks.rules import finding
 from enclave_launch.review.document import GrantedName, PlanDocument, PlanFinding
 from enclave_launch.review.similarity import splits
@@ -15,14 +15,14 @@ from keystore.formats.permissions_patterns import has_wildcard
 _NAMED = 3  # permissions that a node gains, by name; the rest is counted
 
 
-def names_twice(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[PlanFinding]:
+def names_twice(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
     """Yield nodes with the same fully qualified name, which ROS cannot distinguish."""
     for name, count in sorted(Counter(node.fqn for node in plan.nodes).items()):
         if count > 1:
             yield finding("node-name-twice", name, f"{count} nodes are called {name}")
 
 
-def wildcards(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[PlanFinding]:
+def wildcards(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
     """Yield permissions whose name is a pattern, except those that planning reported already, and those of names that
     a program makes up at each start, which nobody could list."""
     explained = " ".join(each.text for each in plan.diagnostics if each.code == "pattern-accepted")
@@ -32,7 +32,7 @@ def wildcards(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[PlanF
                 yield finding("wildcard", grant.name, f"enclave {enclave} may {grant}")
 
 
-def shared(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[PlanFinding]:
+def shared(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
     """Find enclaves in which nodes gain permissions of others."""
     for split in splits(plan):
         gains = "; ".join(f"{node} gains {some_of(grants, _NAMED)}" for node, grants in split.saved)
@@ -42,13 +42,13 @@ def shared(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[PlanFind
         )
 
 
-def unasked(plan: PlanDocument, document: Mapping[str, Any]) -> Iterator[PlanFinding]:
+def unasked(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
     """Yield permissions that no node of an enclave requests.
 
     Only of enclaves whose every program is known: a policy file may list what nothing else describes."""
     for enclave, grants in sorted(plan.enclaves.items()):
         nodes = plan.nodes_of(enclave)
-        if not nodes or document["enclaves"][enclave].get("permissions_unknown"):
+        if not nodes or document.enclaves[enclave].permissions_unknown:
             continue
         for grant in sorted(grants - frozenset[GrantedName]().union(*(node.grants for node in nodes))):
             text = f"enclave {enclave} may {grant}, and none of its nodes requests that"

@@ -7,12 +7,11 @@ from itertools import combinations, product
 from typing import Any, NamedTuple
 
 from enclave_common.words import some_of
+from enclave_launch.dry_run import DryRun, Interface, Operation
 from enclave_launch.review.checks.rules import finding
-from enclave_launch.review.document import KIND_OF, GrantedName, Operation, PlanDocument, PlanFinding
+from enclave_launch.review.document import KIND_OF, GrantedName, PlanDocument, PlanFinding
 from keystore.formats.permissions_patterns import can_meet, has_wildcard
 from nodl.graph.quality import INFINITE, Quality, unmet
-
-Document = Mapping[str, Any]
 
 _ENDS: tuple[tuple[Operation, Operation, str, str], ...] = (
     ("subscribe", "publish", "no-publisher", "publishes"),
@@ -33,13 +32,13 @@ class _User(NamedTuple):
 
     node: str
     program: str
-    interface: Mapping[str, Any]
+    interface: Interface
 
 
 _Users = Mapping[tuple[str, str], list[_User]]
 
 
-def missing_ends(plan: PlanDocument, document: Document) -> Iterator[PlanFinding]:
+def missing_ends(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
     """Find ends that are missing, of what nodes request themselves; what runs outside this launch is not known here.
 
     If something of the launch itself is not known, the other end may be there: then one finding says so.
@@ -58,7 +57,7 @@ def missing_ends(plan: PlanDocument, document: Document) -> Iterator[PlanFinding
 _NAMED = 5
 
 
-def _missing_ends(plan: PlanDocument, document: Document) -> Iterator[PlanFinding]:
+def _missing_ends(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
     asked, users = _asked_for(plan), _users(document)
     everywhere: dict[Operation, set[str]] = {}
     for grant in frozenset[GrantedName]().union(*plan.enclaves.values()):
@@ -83,7 +82,7 @@ def _is_optional(user: _User) -> bool:
     """Return True for rviz2, which shows what there is, and for a name that a node of the library has by default: it
     has inputs for every robot."""
     interface = user.interface
-    by_default = _LIBRARY in interface["place"] and not interface["remapped_by"] and not interface["note"]
+    by_default = _LIBRARY in interface.place and not interface.remapped_by and not interface.note
     return user.program == "rviz2/rviz2" or by_default
 
 
@@ -98,7 +97,7 @@ def _other_transforms(topic: str) -> str | None:
     return other and namespace + slash + other
 
 
-def near_names(plan: PlanDocument, document: Document) -> Iterator[PlanFinding]:
+def near_names(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
     """Yield pairs of names with opposite ends that never meet and differ by a typing error."""
     asked, users = _asked_for(plan), _users(document)
     for here, there in _PAIRS:
@@ -143,7 +142,7 @@ def _one_edit(one: str, two: str) -> bool:
     return len(long) - len(short) <= 1
 
 
-def types(plan: PlanDocument, document: Document) -> Iterator[PlanFinding]:
+def types(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
     """Yield names with different interface types: those endpoints never match.
 
     Several types at one place of a program are alternatives (a table of types, a parameter that decides): such an
@@ -153,7 +152,7 @@ def types(plan: PlanDocument, document: Document) -> Iterator[PlanFinding]:
         if "*" in name:
             continue
         for alternatives in _by_place(users).values():
-            written = " or ".join(sorted({user.interface["type"] for user in alternatives}))
+            written = " or ".join(sorted({user.interface.type for user in alternatives}))
             found.setdefault((KIND_OF[operation], name), {}).setdefault(written, []).extend(alternatives)
     for (kind, name), by_type in sorted(found.items()):
         for one, two in combinations(sorted(by_type), 2):
@@ -167,23 +166,23 @@ def _by_place(users: list[_User]) -> dict[tuple[str, str], list[_User]]:
     """Users with a known type, by node and place."""
     found: dict[tuple[str, str], list[_User]] = {}
     for user in users:
-        if user.interface["type"]:
-            found.setdefault((user.node, user.interface["place"]), []).append(user)
+        if user.interface.type:
+            found.setdefault((user.node, user.interface.place), []).append(user)
     return found
 
 
-def qos(plan: PlanDocument, document: Document) -> Iterator[PlanFinding]:
+def qos(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
     """Yield pairs of incompatible QoS, if both descriptions give theirs; what they leave open is not judged."""
     users = _users(document)
     for (operation, name), publishers in sorted(users.items(), key=lambda item: item[0]):
         if operation != "publish":
             continue
         for publisher, subscriber in product(publishers, users.get(("subscribe", name), ())):
-            offered, requested = publisher.interface.get("qos", {}), subscriber.interface.get("qos", {})
+            offered, requested = publisher.interface.qos, subscriber.interface.qos
             why = unmet(_quality(offered, requested), _quality(requested, offered))
             if why:
                 text = f"{subscriber.node} gets nothing of {name} from {publisher.node}: {'; '.join(why)}"
-                yield finding("qos-differs", name, text, _place(subscriber.interface["place"]))
+                yield finding("qos-differs", name, text, _place(subscriber.interface.place))
 
 
 def _quality(qos: Mapping[str, Any], other: Mapping[str, Any]) -> Quality:
@@ -209,12 +208,12 @@ def _asked_for(plan: PlanDocument) -> dict[str, set[str]]:
     return asked
 
 
-def _users(document: Document) -> _Users:
+def _users(document: DryRun) -> _Users:
     found: dict[tuple[str, str], list[_User]] = {}
-    for node in document.get("nodes", ()):
-        for interface in node["interfaces"]:
-            found.setdefault((interface["operation"], interface["name"]), []).append(
-                _User(node["fqn"], node["program"], interface)
+    for node in document.nodes:
+        for interface in node.interfaces:
+            found.setdefault((interface.operation, interface.name), []).append(
+                _User(node.fqn, node.program, interface)
             )
     return found
 
@@ -224,7 +223,7 @@ def _nodes(users: list[_User]) -> str:
 
 
 def _first_place(users: Any) -> tuple[str | None, int]:
-    return next((_place(user.interface["place"]) for user in users), (None, 0))
+    return next((_place(user.interface.place) for user in users), (None, 0))
 
 
 def _place(text: str) -> tuple[str | None, int]:

@@ -15,7 +15,6 @@ import sys
 import time
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from enclave_common.command_line import PATH, PATHS, TEXT, TEXTS, TIME, one_of
 from enclave_common.environment import environment_with
@@ -24,6 +23,7 @@ from enclave_launch.admission.variables import domain_of
 from enclave_launch.drift.compare import Circumstances, Security, compare
 from enclave_launch.drift.expected import Expected, expected_in, out_of_sight
 from enclave_launch.drift.finding import DriftFinding, FindingCertainty, Level, drift_document, drift_text
+from enclave_launch.dry_run import DryRun
 from enclave_launch.errors import EnclaveLaunchError, UsageError, translated
 from enclave_launch.verb.secure_plan.plans import FORM, read_plan, read_saved
 from keystore.errors import KeystoreError
@@ -65,12 +65,12 @@ OPTIONS = {
 
 def run(options: argparse.Namespace) -> int:
     """Print how the domain differs from the plan. Returns 1 for an alarm, 4 if the observer does not see enough."""
-    documents = [read_plan(options.words, options), *map(read_saved, options.also_planned)]
-    if zenoh := out_of_sight(documents):
+    plans = [read_plan(options.words, options), *map(read_saved, options.also_planned)]
+    if zenoh := out_of_sight(plans):
         raise UsageError(f"drift: only DDS is observed, and {', '.join(zenoh)} of the plan on Zenoh")
-    domain = _domain(options, documents[0])
+    domain = _domain(options, plans[0])
     security = _security(options)
-    expected: Expected = expected_in(documents, domain)
+    expected: Expected = expected_in(plans, domain)
 
     def findings(graph: Graph, forged: tuple[str, ...] = ()) -> list[DriftFinding]:
         circumstances = Circumstances(security, tuple(options.accept), forged=forged)
@@ -142,10 +142,10 @@ def _settled(
         time.sleep(_BETWEEN)
 
 
-def _domain(options: argparse.Namespace, document: Any) -> int:
+def _domain(options: argparse.Namespace, plan: DryRun) -> int:
     if options.domain_id is not None:
         return int(options.domain_id)
-    domains = sorted({each["domain_id"] for each in document["processes"]})
+    domains = sorted({each.domain_id for each in plan.processes})
     if len(domains) > 1:
         listed = ", ".join(map(str, domains))
         raise UsageError(

@@ -21,13 +21,14 @@ from typing import Any
 from enclave_common.command_line import PATH, TEXT
 from enclave_common.files import read_bytes
 from enclave_common.new_file import write_bytes
+from enclave_launch.dry_run import DryRun
 from enclave_launch.errors import UsageError, keystore_errors, translated
 from enclave_launch.report.contents import report_contents
 from enclave_launch.report.evidence.documents import PAYLOAD_TYPE, Examined, evidence_files, statement
 from enclave_launch.review.checks import MEANINGS
 from enclave_launch.verb.secure_plan.judging import EXPECT, WITHIN, judged
 from enclave_launch.verb.secure_plan.keystores import endings
-from enclave_launch.verb.secure_plan.plans import is_saved_plan, read_plan
+from enclave_launch.verb.secure_plan.plans import is_saved_plan, read_document
 from keystore.errors import InvalidInputError
 from keystore.formats.validity import iso, parse_moment, utc_now
 from keystore.signing.ca_access import CaAccess, Secret
@@ -84,13 +85,14 @@ def _new_folder(folder: Path) -> Path:
 
 def _examine(options: argparse.Namespace) -> Examined:
     now, keystore = _time(options.at), options.keystore
-    document = read_plan(options.words, options)
+    document = read_document(options.words, options)
+    plan = DryRun(**document)
     components = _bill_of_materials(options.sbom) if options.sbom is not None else None
-    found = judged(document, options.expect, keystore, options.within, now)
+    found = judged(plan, options.expect, keystore, options.within, now)
     ends = endings(keystore, now=now) if keystore is not None else None
     root = os.getcwd()
-    contents = report_contents(document, found, title=" ".join(options.words), root=root, endings=ends)
-    examined = Examined(document, contents, MEANINGS, iso(now), root, components=components)
+    contents = report_contents(plan, found, title=" ".join(options.words), root=root, endings=ends)
+    examined = Examined(document, plan, contents, MEANINGS, iso(now), root, components=components)
     if keystore is None:
         return examined
     return examined._replace(keys=_keys(keystore), defaults=_defaults(keystore, now))

@@ -13,9 +13,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from enclave_common.command_line import FLAG, PATH, TEXT, TEXTS
 from enclave_common.terminal import message, printable
@@ -36,6 +34,7 @@ from enclave_launch.deployment.semantics import (
     unexpressed_needs,
 )
 from enclave_launch.deployment.systemd import home_paths, systemd_files
+from enclave_launch.dry_run import DryRun
 from enclave_launch.errors import ManifestError, UsageError
 from enclave_launch.review.document import plan_from_document
 from enclave_launch.review.information_flow import flow_graph
@@ -105,11 +104,11 @@ def _check(options: argparse.Namespace) -> None:
             )
 
 
-def _refuse_problems(document: Mapping[str, Any]) -> None:
-    problems = [one["text"] for one in document.get("diagnostics", ()) if one["severity"] == "error"]
+def _refuse_problems(document: DryRun) -> None:
+    problems = [one.text for one in document.diagnostics if one.severity == "error"]
     if problems:
         raise ManifestError("\n".join((*problems, "the plan is not complete, so nothing was written")))
-    zenoh = sorted(one["process"] for one in document["processes"] if one.get("middleware") == ZENOH)
+    zenoh = sorted(one.process or "" for one in document.processes if one.middleware == ZENOH)
     if zenoh:
         raise ManifestError(
             f"{', '.join(zenoh)} on Zenoh ({ZENOH}): without a router and its files they would run unprotected, and "
@@ -167,7 +166,7 @@ def _report(processes: list[DeployedProcess], engine: Engine, setup: list[str]) 
 
 
 def _deployment(
-    document: Mapping[str, Any],
+    document: DryRun,
     placement: Placement,
     lost: tuple[Unexpressed, ...],
     options: argparse.Namespace,

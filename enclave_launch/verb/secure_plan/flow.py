@@ -15,9 +15,10 @@ import sys
 from collections.abc import Collection
 
 from enclave_common.command_line import FLAG
+from enclave_launch.dry_run import Operation
 from enclave_launch.errors import UsageError
 from enclave_launch.report.review_text import paths_text, reach_text
-from enclave_launch.review.document import Operation, PlanDocument, plan_from_document
+from enclave_launch.review.document import PlanDocument, plan_from_document
 from enclave_launch.review.information_flow import FlowGraph, flow_graph, shortest_paths
 from enclave_launch.verb.secure_plan.plans import read_plan
 

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
 from datetime import datetime
 from pathlib import Path
-from typing import Any
 
 import yaml
 
 from enclave_common.command_line import PATH, Option
 from enclave_common.files import read_text
 from enclave_common.yaml_reader import load_yaml
+from enclave_launch.dry_run import DryRun
 from enclave_launch.errors import UsageError, translated
 from enclave_launch.review.checks import check_plan
 from enclave_launch.review.checks.keystore import against_keystore, against_router
@@ -32,13 +31,13 @@ WITHIN: Option = ("--within TIME", {"default": DEFAULT_MARGIN}, "what expires so
 
 
 def judged(
-    document: Mapping[str, Any],
+    document: DryRun,
     expect: Path | None,
     keystore: Path | str | None = None,
     within: str = DEFAULT_MARGIN,
     now: datetime | None = None,
 ) -> list[tuple[PlanFinding, str | None]]:
-    """Return findings of the dry run's JSON, of the rules in ``expect``, and of ``keystore``, if one is given.
+    """Return findings of a dry run, of the rules in ``expect``, and of ``keystore``, if one is given.
 
     Raises ``UsageError`` for rules that are missing or not understood, ``ProvisionError`` for the keystore.
     """
@@ -50,7 +49,7 @@ def judged(
 
 
 def _of_keystore(
-    document: Mapping[str, Any], keystore: Path | str, within: str, now: datetime | None
+    document: DryRun, keystore: Path | str, within: str, now: datetime | None
 ) -> list[PlanFinding]:
     plan = plan_from_document(document)
     found = against_keystore(plan, signed_grants(keystore), endings(keystore, within, now))

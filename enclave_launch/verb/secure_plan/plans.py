@@ -6,11 +6,14 @@ import argparse
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+from pydantic import ValidationError
 
 from enclave_common.command_line import Option, one_of
 from enclave_common.files import read_text
 from enclave_common.terminal import stdout_is_for_the_plan
+from enclave_launch.dry_run import DryRun
 from enclave_launch.errors import UsageError
 from enclave_launch.flow import resolve
 from enclave_launch.report.plan_json import plan_document
@@ -18,19 +21,19 @@ from enclave_launch.verb.options import resolve_options
 from enclave_launch.verb.target import find_target
 from nodl.ament_index import search_prefixes
 
-if TYPE_CHECKING:
-    from enclave_launch.report.contract import DryRun
-
 LARGEST_PLAN = 256 << 20  # bytes
 WORDS = "PLAN.json | PACKAGE LAUNCH_FILE | PATH [name:=value ...]"
 FORM: Option = ("--format", one_of("text", "json"), "how to print (text)")
 
 
-def read_plan(words: Sequence[str], options: argparse.Namespace) -> Mapping[str, Any]:
-    """Return the dry run's JSON document of the plan that ``words`` name; raises UsageError."""
-    if is_saved_plan(words):
-        return read_saved(Path(words[0]))
-    return plan_of(words, options)
+def read_plan(words: Sequence[str], options: argparse.Namespace) -> DryRun:
+    """Return the plan that ``words`` name; raises UsageError."""
+    return read_saved(Path(words[0])) if is_saved_plan(words) else plan_of(words, options)
+
+
+def read_document(words: Sequence[str], options: argparse.Namespace) -> Mapping[str, Any]:
+    """Return the dry run's JSON of the plan that ``words`` name, as it was saved or would be; raises UsageError."""
+    return _saved(Path(words[0]))[0] if is_saved_plan(words) else _planned(words, options)
 
 
 def is_saved_plan(words: Sequence[str]) -> bool:
@@ -38,20 +41,24 @@ def is_saved_plan(words: Sequence[str]) -> bool:
     return len(words) == 1 and words[0].endswith(".json")
 
 
-def plan_of(words: Sequence[str], options: argparse.Namespace) -> Mapping[str, Any]:
-    """Return the dry run's JSON document of a launch file; raises UsageError."""
+def plan_of(words: Sequence[str], options: argparse.Namespace) -> DryRun:
+    """Return the plan of a launch file; raises UsageError."""
+    return DryRun(**_planned(words, options))
+
+
+def read_saved(file: Path) -> DryRun:
+    """Raises ``UsageError`` for a file that cannot be read or is not the JSON of a dry run of this version."""
+    return _saved(file)[1]
+
+
+def _planned(words: Sequence[str], options: argparse.Namespace) -> Mapping[str, Any]:
     target = find_target(words, search_prefixes(options.prefix))
     with stdout_is_for_the_plan():
         plan = resolve(target.launch_file, target.arguments, options=resolve_options(options))
     return plan_document(plan)
 
 
-def read_saved(file: Path) -> Mapping[str, Any]:
-    """Raises ``UsageError`` for a file that cannot be read or is not the JSON of a dry run of this version."""
-    from pydantic import ValidationError
-
-    from enclave_launch.report.contract import DryRun
-
+def _saved(file: Path) -> tuple[Mapping[str, Any], DryRun]:
     try:
         document: Mapping[str, Any] = json.loads(read_text(file, limit=LARGEST_PLAN))
         plan = DryRun(**document)
@@ -66,7 +73,7 @@ def read_saved(file: Path) -> Mapping[str, Any]:
     except (TypeError, ValueError, RecursionError) as error:
         raise UsageError(f"{file} is not the JSON of secure-launch --dry-run: {error}") from error
     _refuse_misfits(plan, file)
-    return document
+    return document, plan
 
 
 def _refuse_misfits(plan: DryRun, file: Path) -> None:

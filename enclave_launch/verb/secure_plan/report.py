@@ -12,12 +12,11 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
 
 from enclave_common.command_line import PATH, one_of
 from enclave_common.new_file import write_text
+from enclave_launch.dry_run import DryRun
 from enclave_launch.errors import UsageError, translated
 from enclave_launch.report.contents import report_contents
 from enclave_launch.report.diagrams import dot, mermaid
@@ -52,14 +51,14 @@ def run(options: argparse.Namespace) -> int:
 
 
 def report_text(
-    document: Mapping[str, Any],
+    document: DryRun,
     form: str,
     title: str,
     *,
     keystore: Path | str | None = None,
     expect: Path | None = None,
 ) -> str:
-    """Return the report on the dry run's JSON in the given form; raises UsageError and ProvisionError."""
+    """Return the report on a dry run in the given form; raises UsageError and ProvisionError."""
     if form in ("dot", "mermaid"):
         return (dot if form == "dot" else mermaid)(plan_graph(document))
 

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from enclave_common.environment import environment_with
+from enclave_launch.dry_run import DryRun
 from enclave_launch.errors import EnclaveLaunchError, UsageError
 from enclave_launch.verb.secure_plan.plans import is_saved_plan, plan_of, read_plan, read_saved
 from enclave_launch.verb.secure_plan.source_prefix import install_sources, source_packages
@@ -31,10 +32,10 @@ _OPTIONS_WITH_PATHS = ("prefix", "nodl", "library", "source", "policy")
 
 
 class Revised(NamedTuple):
-    """Two plans as JSON documents; ``as_installed``: packages that both took as they are installed now."""
+    """``as_installed``: packages that both took as they are installed now."""
 
-    before: Mapping[str, Any]
-    after: Mapping[str, Any]
+    before: DryRun
+    after: DryRun
     as_installed: tuple[str, ...] = ()
 
 
@@ -92,7 +93,7 @@ def plans_of(word: str, words: Sequence[str], options: argparse.Namespace) -> Re
 
 def _planned_before(
     launch: _Launch, options: argparse.Namespace, old: Checkout, prefixes: Sequence[Path], revision: str
-) -> Mapping[str, Any]:
+) -> DryRun:
     try:
         return _plan(launch.words(old), options, old, prefixes)
     except EnclaveLaunchError as error:
@@ -106,7 +107,7 @@ def _planned_before(
 
 def _planned_now(
     words: Sequence[str], launch: _Launch | None, options: argparse.Namespace, old: Checkout, scratch: Path
-) -> Mapping[str, Any]:
+) -> DryRun:
     if launch is None or options.build:
         return read_plan(words, options)
     now = Checkout(old.top, old.top)
@@ -115,7 +116,7 @@ def _planned_now(
 
 def _plan(
     words: Sequence[str], options: argparse.Namespace, old: Checkout, prefixes: Sequence[Path]
-) -> Mapping[str, Any]:
+) -> DryRun:
     moved = {name: _moved(getattr(options, name), old) for name in _OPTIONS_WITH_PATHS}
     if prefixes:
         moved["prefix"] = [*prefixes, *moved["prefix"]]
@@ -152,11 +153,11 @@ def _then_prefixes(old: Checkout, scratch: Path, options: argparse.Namespace) ->
 
 
 def _outside(
-    plans: Sequence[Mapping[str, Any]], old: Checkout, prefixes: Sequence[Path], options: argparse.Namespace
+    plans: Sequence[DryRun], old: Checkout, prefixes: Sequence[Path], options: argparse.Namespace
 ) -> Iterator[str]:
-    started = (one for plan in plans for one in (*plan["processes"], *plan["components"]))
+    started = (one for plan in plans for one in plan.launched)
     searched = search_prefixes([*map(str, prefixes), *(str(old.then(each)) for each in options.prefix)])
-    for package in {one["package"] for one in started} - {None}:
+    for package in {one.package for one in started if one.package is not None}:
         try:
             prefix = Path(package_prefix(package, searched))
         except PackageNotFoundError:

@@ -1,4 +1,5 @@
-"""The dry run's JSON as pydantic models: the versioned contract with other programs.
+"""The dry run's JSON as pydantic models: the versioned contract with other programs, and the one form in which reports,
+checks, exports and drift read a plan, saved or just made.
 
 ``secure-launch --dry-run --format json`` prints a document that ``DryRun`` validates; ``report.plan_json``
 writes it without importing this module (pydantic costs more start-up time than the whole dry run), and the
@@ -174,3 +175,8 @@ class DryRun(_Strict, frozen=True):
     launcher_calls: list[LauncherCall] = Field(default_factory=list)
     warnings: list[str] = _described("every diagnostic as one message for a person, errors first")
     diagnostics: list[Diagnostic]
+
+    @property
+    def launched(self) -> tuple[Union[Process, Component], ...]:
+        """Return processes and components."""
+        return (*self.processes, *self.components)
