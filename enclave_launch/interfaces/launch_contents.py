@@ -12,8 +12,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from enclave_common.shell_words import split_words
-from enclave_launch.interfaces.situation import parameters_of_node
 from enclave_launch.policy.program_inputs import own_words
+from enclave_launch.policy.running_node import parameters_of_node
 from enclave_launch.process import Evaluation, ResolvedProcess
 from enclave_launch.ros_rules.rcl_parameters import resolve_parameters
 from nodl.dependence import Launched, Spawned

@@ -1,7 +1,7 @@
 """The start of a node, as descriptions that depend on it need it: final names, parameters, words, packages.
 
 Takes a process or component of the evaluation, gives ``nodl.dependence.Situation``; next is the interface that a
-description has there. Reads the parameter files on the command line.
+description has there.
 """
 
 from __future__ import annotations
@@ -9,14 +9,16 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from enclave_launch.policy.program_inputs import own_words
-from enclave_launch.policy.running_node import RunningNode, node_of_component, node_of_process
+from enclave_launch.policy.running_node import (
+    RunningNode,
+    node_of_component,
+    node_of_process,
+    parameters_of_node,
+)
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
-from enclave_launch.ros_rules.parameter_value import ParameterValue
-from enclave_launch.ros_rules.rcl_parameters import parameters_of_text, resolve_parameters
 from nodl.dependence import CONTROLLER, HOST, Situation
 from nodl.node_interface import NodeInterface
 from nodl.remap import NodeNames
-from nodl.ros_arguments import parse_ros_arguments
 from nodl.source_ref import SourceRef
 
 
@@ -32,36 +34,21 @@ def situation_of(
     A component's main node gets what the load request says, a further one what the container's command line says.
     Raises ``LaunchFileError`` for a remap rule at which the process would end.
     """
-    parameters: Mapping[str, object] = started.parameters
     words: tuple[str, ...] = ()
     if isinstance(started, ResolvedProcess):
         node = node_of_process(started, interface, "/", "node")
-        parameters, words = parameters_of_node(started, node.namespace, node.name), tuple(own_words(started))
+        words = tuple(own_words(started))
     else:
         node = node_of_component(started, container, interface, "/")
-        if interface.own_rules:
-            parameters = parameters_of_node(container, node.namespace, node.name) if container else {}
     return Situation(
         distro=distro,
         node=node.name,
         namespace=node.namespace,
-        parameters={**parameters, **dict(interface.own_parameters)},
+        parameters={**node.parameters, **dict(interface.own_parameters)},
         words=words,
         installed=installed,
         remap=_remap(node),
     )
-
-
-def parameters_of_node(process: ResolvedProcess, namespace: str, name: str) -> Mapping[str, ParameterValue]:
-    """Return what the command line of ``process`` gives the node of this final name."""
-    tokens = [token for token in (*namespace.split("/"), name) if token]
-    written = process.parameter_files
-    return resolve_parameters(
-        tokens,
-        parse_ros_arguments(process.cmd).parameters,
-        lambda path: parameters_of_text(written[path], path) if path in written else None,
-        process.cwd,
-    ).values
 
 
 def _remap(node: RunningNode) -> Callable[[str], str]:

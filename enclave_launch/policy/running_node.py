@@ -1,7 +1,7 @@
 """A node as it will run: its interface under the final name, in its enclave.
 
 Takes a ``NodeInterface`` and the process or component that launch starts; gives a ``RunningNode``; next is the
-derivation of the policy. Performs no I/O.
+derivation of the policy. Reads the parameter files on the command line.
 
 Final names follow rcl (``rcl/src/rcl/remap.c``, ``node.c``): the program's own name and namespace, then the first
 ``__node`` and ``__ns`` rule that applies. A component has its own rule list from the load request and does not see
@@ -17,6 +17,7 @@ from enclave_launch.errors import LaunchFileError
 from enclave_launch.policy.program_inputs import ProgramInputs, environment_inputs, program_inputs
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
 from enclave_launch.ros_rules.parameter_value import ParameterValue
+from enclave_launch.ros_rules.rcl_parameters import parameters_of_text, resolve_parameters
 from enclave_launch.source_location import SourceLocation
 from nodl.names import join
 from nodl.node_interface import RANDOM_ENDING, Gap, NodeInterface
@@ -65,12 +66,27 @@ def node_of_process(
     inputs = program_inputs(process)
     if interface.global_arguments is False:  # rcl_node_options_t.use_global_arguments
         rules = RemapRules(local=_own_rules(interface), process=())
-        return _named(interface, rules, {}, enclave, process.location, role, inputs)
+        return _named(interface, rules, enclave, process.location, role, inputs)
     if interface.global_arguments is None and (given or process.parameters):
         interface = interface._replace(gaps=(*interface.gaps, Gap(interface.source, _UNDECIDED)))
     rules = RemapRules(local=_own_rules(interface), process=given)
-    node = _named(interface, rules, process.parameters, enclave, process.location, role, inputs)
-    return node._replace(process_namespace=_namespace(process))
+    node = _named(interface, rules, enclave, process.location, role, inputs)
+    parameters = {**process.parameters, **parameters_of_node(process, node.namespace, node.name)}
+    return node._replace(parameters=parameters, process_namespace=_namespace(process))
+
+
+def parameters_of_node(process: ResolvedProcess, namespace: str, name: str) -> Mapping[str, ParameterValue]:
+    """Return what the command line of ``process`` gives the node of this final name.
+
+    ``process.parameters`` has less where launch does not know the name: no section of a file that names the node."""
+    tokens = [token for token in (*namespace.split("/"), name) if token]
+    written = process.parameter_files
+    return resolve_parameters(
+        tokens,
+        parse_ros_arguments(process.cmd).parameters,
+        lambda path: parameters_of_text(written[path], path) if path in written else None,
+        process.cwd,
+    ).values
 
 
 def node_of_component(
@@ -87,7 +103,11 @@ def node_of_component(
     local = _own_rules(interface) or _rules_of_load_request(component)
     rules = RemapRules(local=local, process=forwarded)
     inputs = environment_inputs(container) if container is not None else ProgramInputs()
-    node = _named(interface, rules, component.parameters, enclave, component.location, "component", inputs)
+    node = _named(interface, rules, enclave, component.location, "component", inputs)
+    if not interface.own_rules:
+        node = node._replace(parameters=component.parameters)
+    elif container is not None:
+        node = node._replace(parameters=parameters_of_node(container, node.namespace, node.name))
     return node._replace(process_namespace=_namespace(container)) if container is not None else node
 
 
@@ -109,7 +129,6 @@ def _own_rules(interface: NodeInterface) -> tuple[ParsedRule, ...]:
 def _named(
     interface: NodeInterface,
     rules: RemapRules,
-    parameters: Mapping[str, ParameterValue],
     enclave: str,
     location: SourceLocation,
     role: Role,
@@ -125,7 +144,7 @@ def _named(
         )
     namespace = rules.namespace(interface.namespace or "/", name).name
     return RunningNode(
-        interface, original or name, name, namespace, rules, parameters, enclave, location, role, inputs
+        interface, original or name, name, namespace, rules, {}, enclave, location, role, inputs
     )
 
 

@@ -28,12 +28,13 @@ def params_yaml(plan: LaunchPlan) -> str:
 def _named(plan: LaunchPlan) -> Iterator[tuple[str, Mapping[str, ParameterValue]]]:
     for process in plan.processes:
         if process.process.kind != "executable":
-            yield (
-                (process.nodes[0].fqn if process.nodes else process.fqn or "/**"),
-                process.process.parameters,
-            )
+            if not process.nodes:
+                yield process.fqn or "/**", process.process.parameters
+            yield from ((node.fqn, node.parameters) for node in process.nodes)
     for component in plan.components:
-        yield (component.nodes[0].fqn if component.nodes else component.fqn), component.component.parameters
+        if not component.nodes:
+            yield component.fqn, component.component.parameters
+        yield from ((node.fqn, node.parameters) for node in component.nodes)
 
 
 def _plain(value: ParameterValue) -> object:

@@ -54,7 +54,7 @@ def _process(item: PlannedProcess, security: SecuritySettings | None) -> dict[st
         "fqn": item.fqn,
         "cmd": list(secured_command(item, security)),
         "remaps": _remaps(process.remaps),
-        "parameters": _parameters(process.parameters),
+        "parameters": _parameters(item.nodes[0].parameters if item.nodes else process.parameters),
         "enclave": item.enclave.path if item.enclave else None,
         "interfaces": item.origin.value if item.origin else None,
         "prefix": list(process.prefix),

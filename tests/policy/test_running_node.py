@@ -65,6 +65,26 @@ def test_a_node_that_listens_to_its_command_line_obeys_it(tmp_path: Path) -> Non
     assert not node.interface.gaps
 
 
+def test_a_section_of_a_parameter_file_that_names_the_node_is_its_own_also_where_launch_names_none(
+    tmp_path: Path,
+) -> None:
+    """Of two nodes of one program each has the sections that match its final name, as rcl reads the file."""
+    file = tmp_path / "parameters.yaml"
+    file.write_text(
+        "talker: {ros__parameters: {topic: mine}}\n/**: {ros__parameters: {rate: 2}}\n"
+        "listener: {ros__parameters: {topic: other}}\n"
+    )
+    given = f'<param from="{file}"/>'
+    node = process_node(tmp_path, interface(global_arguments=True), "", given)
+    assert (node.fqn, node.parameters) == ("/talker", {"topic": "mine", "rate": 2})
+    other = process_node(tmp_path, interface("listener", global_arguments=True), "", given)
+    assert (other.fqn, other.parameters) == ("/listener", {"topic": "other", "rate": 2})
+    moved = process_node(tmp_path, interface(global_arguments=True), 'namespace="/left"', given)
+    assert (moved.fqn, moved.parameters) == ("/left/talker", {"rate": 2})
+    renamed = process_node(tmp_path, interface(global_arguments=True), 'name="listener"', given)
+    assert (renamed.fqn, renamed.parameters) == ("/listener", {"topic": "other", "rate": 2})
+
+
 def test_a_node_without_use_global_arguments_obeys_its_own_rules_alone(tmp_path: Path) -> None:
     deaf = interface(global_arguments=False, own_rules=("image:=mine", "__ns:=/own"))
     node = process_node(tmp_path, deaf, ARGUMENTS, REMAP)

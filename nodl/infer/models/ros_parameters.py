@@ -37,6 +37,7 @@ PARAMETER_CLASS = "rclpy.parameter.Parameter"
 def parameter_object(run: Run, call: Call, value: Value, key: str = "parameter") -> tuple[Instance]:
     """Return an rclpy ``Parameter`` that holds ``value``; ``key`` tells those made by one call apart."""
     instance = run.library_object(call, PARAMETER_CLASS, key)
+    instance.cells.setdefault("value", BOTTOM)  # never without one, unlike a field that the program assigns
     run.state.store(instance, "value", value)
     return (instance,)
 

@@ -18,6 +18,7 @@ from enclave_launch.flow import provision, resolve
 from enclave_launch.options import ResolveOptions
 from enclave_launch.plan import LaunchPlan
 from enclave_launch.report.explained import explain
+from enclave_launch.report.params import params_yaml
 
 REPEATER = Path(__file__).parents[3] / "fixtures" / "programs" / "repeater.py"
 SITE = f"lib/python{sys.version_info.major}.{sys.version_info.minor}/site-packages"
@@ -142,6 +143,25 @@ def test_the_permission_has_the_launch_files_value(
     )
     assert f"    node /robot1/echo: {source}:{line}: 'param:input_again'" in explained
     assert any("remapped by speech_again:=/loud/speech" in each for each in explained)
+
+
+def test_a_parameter_file_that_names_the_node_as_its_source_does_decides_its_topics(
+    launch: Launch, prefix: Path, tmp_path: Path
+) -> None:
+    """The launch file gives no name: that of the source selects the section, and ``--dump-params`` shows it."""
+    as_console_script(prefix, tmp_path / "build/demo")
+    own, others = tmp_path / "own.yaml", tmp_path / "others.yaml"
+    own.write_text("repeater: {ros__parameters: {input: speech}}\n")
+    others.write_text("somebody: {ros__parameters: {input: speech}}\n")
+    text = '<launch><node pkg="demo" exec="repeater"><param from="{}"/></node></launch>'
+    plan = launch(text.format(own))
+    assert ("subscribe", "/speech") in permissions(plan)
+    assert ("subscribe", "/chatter") not in permissions(plan)
+    assert "input: speech" in params_yaml(plan)
+    plan = launch(text.format(others))
+    assert ("subscribe", "/chatter") in permissions(plan)
+    assert ("subscribe", "/speech") not in permissions(plan)
+    assert params_yaml(plan) == ""
 
 
 def permissions(plan: LaunchPlan) -> set[tuple[str, str]]:

@@ -210,6 +210,37 @@ def test_names_from_parameters(body: str, infer: Infer) -> None:
     assert endpoint.name.fill({name: "given"}).text == "given/x"
 
 
+READ_LATER = {
+    "a timer": ("Node", "self.create_timer(1, self.make)", "make(self)"),
+    "a transition": ("LifecycleNode", "pass", "on_configure(self, state)"),
+}
+
+
+@pytest.mark.parametrize("case", READ_LATER)
+def test_a_parameter_that_is_read_in_a_callback_is_as_well_known(case: str, infer: Infer) -> None:
+    base, register, callback = READ_LATER[case]
+    system = infer(
+        f"""
+        import rclpy
+        from rclpy.node import Node
+        from rclpy.lifecycle import LifecycleNode
+        from std_msgs.msg import String
+        class N({base}):
+            def __init__(self):
+                super().__init__('n')
+                self.declare_parameter('frame', 'base')
+                {register}
+            def {callback}:
+                frame = self.get_parameter('frame').value
+                self.pub = self.create_publisher(String, f'{{frame}}/range', 1)
+        rclpy.spin(N())
+        """
+    )
+    (endpoint,) = system.nodes[0].endpoints
+    assert str(endpoint.name) == "param:frame/range"
+    assert not system.gaps
+
+
 def test_a_list_parameter_gives_one_name_per_element(infer: Infer) -> None:
     system = infer(
         """
