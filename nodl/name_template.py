@@ -23,6 +23,8 @@ CONDITIONS: dict[str, Callable[..., bool]] = {
     "only if false": lambda text: text.lower() != "true",
     "only if among": lambda text, *others: text in others,
     "only if not among": lambda text, *others: text not in others,
+    "only if above": lambda text, bound: is_whole_number(text) and int(text) > int(bound),
+    "only if not above": lambda text, bound: not is_whole_number(text) or int(text) <= int(bound),
 }
 """Edits that keep a name where they hold and drop it elsewhere."""
 
@@ -57,7 +59,7 @@ class ParameterPart(NamedTuple):
             return () if given else ("",)
         if given:
             values = [value for each in given for value in self._items(each)]
-        if not values and self.is_condition:
+        if not values and not given and self.is_condition:
             return ("",)  # what is not known may hold
         return tuple(dict.fromkeys(text for value in values for text in self._edited(str(value))))
 
@@ -107,8 +109,9 @@ def _edit(text: str, method: str, arguments: tuple[str, ...]) -> Sequence[str]:
         return text.split(arguments[0] if arguments else None)
     if method == "range":
         first = int(arguments[0]) if arguments else 0
-        is_number = text.removeprefix("-").isdigit() and len(text) < 6
-        return [str(number) for number in range(first, int(text))] if is_number else ()
+        return [str(number) for number in range(first, int(text))] if is_whole_number(text) else ()
+    if method == "plus":
+        return (str(int(text) + int(arguments[0])),) if is_whole_number(text) else ()
     if method == "unless empty":
         return (text,) if text else ()  # the default is an empty list
     if method == "key":
@@ -116,6 +119,11 @@ def _edit(text: str, method: str, arguments: tuple[str, ...]) -> Sequence[str]:
     if method in CONDITIONS:
         return ("",) if CONDITIONS[method](text, *arguments) else ()
     return (_remapped(text, *arguments),) if method == "remapped" else (text,)
+
+
+def is_whole_number(text: str) -> bool:
+    """Return True for a number of at most five digits: so many names are made of it at most."""
+    return re.fullmatch(r"-?[0-9]{1,5}", text) is not None
 
 
 def _remapped(text: str, namespace: str, node: str, *pairs: str) -> str:

@@ -36,7 +36,7 @@ class Guard(NamedTuple):
     @property
     def piece(self) -> Input:
         """The piece of a text that is empty where the condition holds; elsewhere there is no such text."""
-        return Input(self.asked.name, self.asked.owner, None, ((self.edit, self.given),))
+        return self.asked._replace(edits=(*self.asked.edits, (self.edit, self.given)))
 
 
 class NodePart(NamedTuple):
@@ -125,7 +125,8 @@ def text_of(pieces: Iterable[Piece]) -> TextAtom:
 
 def _is_one_of_several(piece: Input) -> bool:
     """Return True if it stands for several texts: an element of a list, a part of a text that is split, a number."""
-    return piece.item == "each" or any(method in ("split", "range", "key") for method, _ in piece.edits)
+    several = any(method in ("split", "range", "key") for method, _ in piece.edits)
+    return (piece.item == "each" or several) and not is_condition(piece)
 
 
 def pieces_of(text: TextAtom) -> tuple[Piece, ...]:
@@ -238,9 +239,8 @@ def is_of_inputs(text: Text) -> bool:
 
 def is_condition(piece: Input) -> bool:
     """Return True if the input is not part of the text, but decides whether it is meant."""
-    return (
-        bool(piece.edits) and piece.edits[0][0].startswith("only if ") and piece.edits[0][0] != "only if set"
-    )
+    last = piece.edits[-1][0] if piece.edits else ""
+    return last.startswith("only if ") and last != "only if set"
 
 
 def input_of(text: object) -> Input | None:

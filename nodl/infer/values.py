@@ -360,7 +360,10 @@ def mixed_with_unknown(value: Value) -> Value:
         mixed = mixed_with_unknown(items.any_element())
         return value if mixed == items.any_element() else (Items(None, mixed),)
     several = sum(atom is not None and type(atom) not in (bool, Absent, Unknown) for atom in value) > 1
-    return join(value, unknown("a variable that changes while other code runs")) if several else value
+    if not several:
+        return value
+    others = tuple(atom for atom in value if not isinstance(atom, str | Text))
+    return join(others, unknown("a variable that changes while other code runs"))
 
 
 def widen(old: Value, new: Value, texts_too: bool) -> Value:

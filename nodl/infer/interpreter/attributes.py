@@ -47,8 +47,10 @@ def _of_instance(run: Run, obj: Instance, name: str, node: ast.AST, frame: Frame
         if not obj.summary and ABSENT[0] not in held:
             return held
         held = tuple(atom for atom in held if atom is not ABSENT[0])
-        in_class = _class_attribute(run, obj, linearized(obj.cls), name, node, frame)
-        return join(held, in_class or BOTTOM) or ANY
+        in_class = _class_attribute(run, obj, linearized(obj.cls), name, node, frame) or BOTTOM
+        if held and any(map(_is_of_a_node, in_class)) and name not in foreign.NODE_METHODS:
+            return held  # rclpy's node has no attribute of this name: read too early, it is an error
+        return join(held, in_class) or ANY
     if name == "__class__":
         return (obj.cls,)
     if name == "__dict__":
@@ -62,6 +64,10 @@ def _of_instance(run: Run, obj: Instance, name: str, node: ast.AST, frame: Frame
     if getter:
         return run.call(getter, Arguments([(obj,), (name,)]), node, frame)
     return unknown(f"attribute {name}, which nothing analysed sets")
+
+
+def _is_of_a_node(atom: object) -> bool:
+    return isinstance(atom, ForeignMethod) and foreign.is_node_class(atom.path)
 
 
 def _class_attribute(

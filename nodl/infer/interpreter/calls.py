@@ -168,7 +168,7 @@ def _settle(run: Run, frame: Frame, passes: bool) -> None:
     if ends and not frame.runs_more:
         run.state.settle(frame.mark, ends)
     else:
-        run.state.join_seen(frame.mark, None if frame.captured else frame.cells)
+        run.state.join_seen(frame.mark, None if frame.captured else frame.cells, mixed=frame.runs_more)
 
 
 def call_bound(run: Run, method: BoundMethod, call: Call) -> Value:

@@ -29,6 +29,7 @@ from nodl.infer.values import (
     join_all,
     sole,
 )
+from nodl.name_template import EDITS
 
 T = TypeVar("T")
 
@@ -36,6 +37,7 @@ OPPOSITE = {
     "only if true": "only if false", "only if false": "only if true",
     "only if equal": "only if different", "only if different": "only if equal",
     "only if among": "only if not among", "only if not among": "only if among",
+    "only if above": "only if not above", "only if not above": "only if above",
 }  # fmt: skip
 
 
@@ -97,19 +99,28 @@ def condition_of(run: Run, test: ast.expr, frame: Frame) -> Guard | None:
 
 
 def opposite(condition: Guard | None) -> Guard | None:
-    """Return the condition that holds where ``condition`` does not."""
-    return condition and _negated(condition)
-
-
-def _negated(condition: Guard) -> Guard:
+    """Return the condition that holds where ``condition`` does not; ``None``: what no element of a list is."""
+    if condition is None or condition.asked.item is not None:
+        return None
     return condition._replace(edit=OPPOSITE[condition.edit])
 
 
-def under(run: Run, condition: Guard | None, action: Callable[[], T]) -> T:
-    """Run ``action`` where the condition holds: the interfaces that it makes depend on it."""
+def conditions_of(run: Run, test: ast.expr, holds: bool, frame: Frame) -> tuple[Guard, ...]:
+    """Return what is certain of parameters where ``test`` holds, or where it does not."""
+    if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not):
+        return conditions_of(run, test.operand, not holds, frame)
+    if isinstance(test, ast.BoolOp):
+        parts = test.values if isinstance(test.op, ast.And) == holds else ()
+        return tuple(each for part in parts for each in conditions_of(run, part, holds, frame))
+    condition = condition_of(run, test, frame)
+    found = condition if holds else opposite(condition)
+    return () if found is None else (found,)
+
+
+def under(run: Run, conditions: tuple[Guard, ...], action: Callable[[], T]) -> T:
+    """Run ``action`` where the conditions hold: the interfaces that it makes depend on them."""
     before = run.guards
-    if condition is not None and condition not in before:
-        run.guards = (*before, condition)
+    run.guards = (*before, *(each for each in conditions if each not in before))
     result = action()
     run.guards = before
     return result
@@ -117,10 +128,12 @@ def under(run: Run, condition: Guard | None, action: Callable[[], T]) -> T:
 
 def either(condition: Guard, first: Value, second: Value) -> Value:
     """Return what a variable holds: ``first`` where the condition holds, else ``second``."""
-    sides = ((condition, first, second), (_negated(condition), second, first))
+    sides = ((condition, first, second), (opposite(condition), second, first))
     return join_all(
         tuple(
-            only_if(held, atom) if isinstance(atom, str | Text) and not contains(other, atom) else atom
+            only_if(held, atom)
+            if held and isinstance(atom, str | Text) and not contains(other, atom)
+            else atom
             for atom in value
         )
         for held, value, other in sides
@@ -129,25 +142,42 @@ def either(condition: Guard, first: Value, second: Value) -> Value:
 
 def _comparison(run: Run, test: ast.Compare, frame: Frame) -> Guard | None:
     asked, defaults = _asked(run, test.left, frame)
-    other = test.comparators[0]
+    other, op = test.comparators[0], type(test.ops[0])
     if asked is None:
         asked, defaults = _asked(run, other, frame)
         other = test.left
-        if isinstance(test.ops[0], ast.In | ast.NotIn):
+        if (
+            asked is not None
+            and issubclass(op, ast.In)
+            and all(isinstance(each, Sequence) for each in defaults)
+        ):
+            asked, defaults, op = asked._replace(item="each"), ("",), ast.Eq
+        op = _MIRRORED.get(op, op)
+        if issubclass(op, ast.In | ast.NotIn):
             return None
     if asked is None or not (all(type(each) is str for each in defaults) or _whole_numbers(defaults)):
         return None
     value = run.evaluate(other, frame)
-    if isinstance(test.ops[0], ast.In | ast.NotIn):
+    if issubclass(op, ast.In | ast.NotIn):
         among = _texts_in(value)
-        edit = "only if among" if isinstance(test.ops[0], ast.In) else "only if not among"
+        edit = "only if among" if issubclass(op, ast.In) else "only if not among"
         return None if among is None else Guard(asked, edit, among)
-    if not isinstance(test.ops[0], ast.Eq | ast.NotEq) or len(value) != 1 or type(value[0]) not in (str, int):
+    bound = value[0] if len(value) == 1 else None
+    if type(bound) is not type(defaults[0]):
         return None
-    if type(value[0]) is not type(defaults[0]):
+    if isinstance(bound, int) and op in _BOUNDS:
+        edit, less = _BOUNDS[op]
+        return Guard(asked, edit, (str(bound - less),))
+    if not isinstance(bound, str | int) or not issubclass(op, ast.Eq | ast.NotEq):
         return None
-    edit = "only if equal" if isinstance(test.ops[0], ast.Eq) else "only if different"
-    return Guard(asked, edit, (str(value[0]),))
+    return Guard(asked, "only if equal" if issubclass(op, ast.Eq) else "only if different", (str(bound),))
+
+
+_MIRRORED: dict[type, type] = {ast.Lt: ast.Gt, ast.Gt: ast.Lt, ast.LtE: ast.GtE, ast.GtE: ast.LtE}
+_BOUNDS: dict[type, tuple[str, int]] = {
+    ast.Gt: ("only if above", 0), ast.GtE: ("only if above", 1),
+    ast.LtE: ("only if not above", 0), ast.Lt: ("only if not above", 1),
+}  # fmt: skip
 
 
 def _whole_numbers(defaults: Value) -> bool:
@@ -173,8 +203,9 @@ def _asked(run: Run, node: ast.expr, frame: Frame) -> tuple[Input | None, Value]
 
 
 def is_plain_parameter(asked: Input) -> bool:
-    """Return True if it is the whole value of a ROS parameter, as launch gives it."""
-    return not asked.edits and asked.item is None and not asked.name.startswith(("-", "<", "$"))
+    """Return True if it is a ROS parameter as a whole, at most with methods of ``str`` applied to it."""
+    edited = all(method in EDITS for method, _ in asked.edits)
+    return edited and asked.item is None and not asked.name.startswith(("-", "<", "$"))
 
 
 _READS = frozenset({"get_parameter", "get_parameter_value", "declare_parameter"})

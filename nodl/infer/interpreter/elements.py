@@ -6,6 +6,7 @@ import ast
 
 from nodl.infer.interpreter.conditions import is_plain_parameter, only_if
 from nodl.infer.interpreter.define import enumeration_members, is_constant, is_enumeration
+from nodl.infer.interpreter.formatting import is_whole_number
 from nodl.infer.interpreter.run import Arguments, Frame, Run
 from nodl.infer.text import Guard, Input, Text, constant_text, input_of, make_text
 from nodl.infer.values import (
@@ -76,27 +77,40 @@ def _element(run: Run, atom: object, key: Value, node: ast.Subscript, frame: Fra
     return (atom,) if isinstance(atom, Unknown) else ANY
 
 
-def chosen_by_parameter(obj: Dictionary, key: Value, default: Value | None = None) -> Value | None:
-    """Return the texts of a dictionary, each if the parameter that is the ``key`` says so.
+def chosen_by_parameter(obj: Dictionary | Sequence, key: Value, default: Value | None = None) -> Value | None:
+    """Return the texts of a dictionary or list, each if the parameter that is the ``key`` says so.
 
     ``default``: what is taken for any other value. ``None``: not such a look-up.
     """
     asked = input_of(key[0]) if len(key) == 1 else None
-    if asked is None or not is_plain_parameter(asked) or obj.is_open or obj.default:
+    if asked is None or not is_plain_parameter(asked):
         return None
     found: list[object] = []
     keys: list[str] = []
-    for cell, value, certain in obj.entries():
+    kind = int if is_whole_number(key[0]) else str
+    for constant, value in _certain_entries(obj) or ():
         text = value[0] if len(value) == 1 else None
-        if not certain or type(cell.constant) is not str or not isinstance(text, str | Text):
+        if type(constant) is not kind or not isinstance(text, str | Text):
             return None
-        keys.append(cell.constant)
-        found.append(only_if(Guard(asked, "only if equal", (cell.constant,)), text))
+        keys.append(str(constant))
+        found.append(only_if(Guard(asked, "only if equal", (str(constant),)), text))
     for other in default or ():
         if not isinstance(other, str | Text):
             return None
         found.append(only_if(Guard(asked, "only if not among", tuple(keys)), other))
     return tuple(found) or None
+
+
+def _certain_entries(obj: Dictionary | Sequence) -> list[tuple[object, Value]] | None:
+    """Return each key or index with what is there, if all are known."""
+    if isinstance(obj, Sequence):
+        exact = obj.items.exact
+        if exact is None or obj.escaped:
+            return None
+        return [pair for start in (0, -len(exact)) for pair in enumerate(exact, start)]
+    if obj.is_open or obj.default or not all(certain for _, _, certain in obj.entries()):
+        return None
+    return [(cell.constant, value) for cell, value, _ in obj.entries()]
 
 
 def dictionary_item(run: Run, obj: Dictionary, key: Value, node: ast.AST, frame: Frame) -> Value:
@@ -140,6 +154,9 @@ def with_other_entries(obj: Dictionary, found: Value) -> Value:
 
 def _sequence_item(run: Run, sequence: Sequence, key: Value) -> Value:
     items = sequence.items
+    chosen = chosen_by_parameter(sequence, key)
+    if chosen is not None:
+        return chosen
     if items.exact is None or sequence.escaped:
         found = items.any_element()
         one_of_several = len(found) > 1 and all(type(index) is int for index in key)
@@ -157,7 +174,7 @@ def _sequence_item(run: Run, sequence: Sequence, key: Value) -> Value:
 def _sliced(run: Run, sequence: Sequence, node: ast.AST) -> Value:
     """Return some of the elements; nobody knows which."""
     found = sequence.items.any_element()
-    return run.sequence(node, sequence.kind, Items(None, join(found, ANY) if len(found) > 1 else found))
+    return run.sequence(node, sequence.kind, Items(None, _any_of(found)))
 
 
 def _character(text: str, key: Value) -> Value:
@@ -375,8 +392,8 @@ def _unpack(run: Run, targets: list[ast.expr], value: Value, frame: Frame) -> No
             assign(run, target, element, frame)
         return
     element = items.any_element() or ANY
-    if exact is not None and len(element) > 1:
-        element = join(element, ANY)  # which of them is not known
+    if exact is not None:
+        element = _any_of(element)
     for target in targets:
         if isinstance(target, ast.Starred):
             assign(run, target, run.sequence(target, "list", Items(None, element)), frame)
@@ -417,4 +434,13 @@ def _delete_item(run: Run, owner: object, key: Value, certain: bool) -> None:
 
 def _edited(run: Run, owner: Sequence, added: Value) -> None:
     """Let some elements go and ``added`` come: each may be any."""
-    run.state.store(owner, ITEMS, (Items(None, join_all((owner.items.any_element(), added, EDITED))),))
+    run.state.store(
+        owner, ITEMS, (Items(None, join(_any_of(join(owner.items.any_element(), added)), EDITED)),)
+    )
+
+
+def _any_of(found: Value) -> Value:
+    """Return one of several elements, nobody knows which: of texts nothing is known then."""
+    if len(found) < 2:
+        return found
+    return join(tuple(atom for atom in found if not isinstance(atom, str | Text)), ANY)

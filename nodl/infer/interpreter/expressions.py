@@ -11,18 +11,18 @@ from functools import partial
 from nodl.infer.interpreter.conditions import (
     compare,
     condition_of,
+    conditions_of,
     decide,
     either,
     narrowed,
     only_if,
-    opposite,
     truth,
     truth_of,
     under,
 )
 from nodl.infer.interpreter.define import make_function
 from nodl.infer.interpreter.elements import assign, copy_dictionary, elements, store_item, subscript
-from nodl.infer.interpreter.formatting import as_texts, f_string, percent
+from nodl.infer.interpreter.formatting import as_texts, f_string, is_whole_number, percent
 from nodl.infer.interpreter.loops import comprehension, dict_comprehension
 from nodl.infer.interpreter.run import Arguments, Evaluator, Frame, Run
 from nodl.infer.text import (
@@ -114,7 +114,16 @@ def _arithmetic_atoms(run: Run, node: ast.AST, a: object, op: ast.operator, b: o
     if isinstance(a, _NUMBERS) and isinstance(b, _NUMBERS) and max(abs(a), abs(b)) < _LARGE:
         result = _ARITHMETIC[type(op)](a, b)
         return (result,) if isinstance(result, _NUMBERS) else ANY
+    if isinstance(op, ast.Add | ast.Sub) and type(b) is int and is_whole_number(a):
+        return _plus(a, -b if isinstance(op, ast.Sub) else b)
+    if isinstance(op, ast.Add) and type(a) is int and is_whole_number(b):
+        return _plus(b, a)
     return (b,) if isinstance(b, Unknown) else (a,) if isinstance(a, Unknown) else ANY
+
+
+def _plus(number: Text, added: int) -> Value:
+    asked = input_of(number)
+    return ANY if asked is None else (with_edit(asked, "plus", (str(added),)),)
 
 
 def _add(run: Run, node: ast.AST, left: Value, right: Value) -> Value:
@@ -127,6 +136,8 @@ def _add(run: Run, node: ast.AST, left: Value, right: Value) -> Value:
         return _added_sequences(run, node, left, right, sequences)
     if not texts_left and not texts_right:
         return _arithmetic(run, node, left, ast.Add(), right) if len(left) * len(right) <= 16 else ANY
+    if any(type(atom) in _NUMBERS for atom in (*left, *right)):
+        return _arithmetic(run, node, left, ast.Add(), right)
     # One side is a text, so the sum is only defined where the other one is too.
     return tuple(
         concatenations([texts_left or as_texts(left), texts_right or as_texts(right)])
@@ -301,8 +312,8 @@ def _conditional(run: Run, node: ast.IfExp, frame: Frame) -> Value:
     condition = condition_of(run, node.test, frame)
 
     def side(expression: ast.expr, holds: bool) -> Value:
+        held = conditions_of(run, node.test, holds, frame)
         narrowed(run, node.test, holds, frame)
-        held = condition if holds else opposite(condition)
         return under(run, held, lambda: run.evaluate(expression, frame))
 
     body, orelse = run.state.each((partial(side, node.body, True), partial(side, node.orelse, False)))

@@ -8,7 +8,15 @@ from functools import partial
 from typing import Any
 
 from nodl.infer.interpreter import imports, loops
-from nodl.infer.interpreter.conditions import condition_of, decide, either, narrowed, only_if, opposite, under
+from nodl.infer.interpreter.conditions import (
+    condition_of,
+    conditions_of,
+    decide,
+    either,
+    narrowed,
+    only_if,
+    under,
+)
 from nodl.infer.interpreter.define import define_class, define_function, program_classes
 from nodl.infer.interpreter.elements import assign, delete
 from nodl.infer.interpreter.expressions import binary_operation
@@ -86,10 +94,10 @@ def _if(run: Run, node: ast.If, frame: Frame) -> bool:
     if outcome is not None:
         return run.execute(node.body if outcome else node.orelse, frame)
     condition = condition_of(run, node.test, frame)
-    passing: list[Guard | None] = []
+    passing: list[tuple[Guard, ...]] = []
 
     def side(body: list[ast.stmt], holds: bool) -> bool:
-        held = condition if holds else opposite(condition)
+        held = conditions_of(run, node.test, holds, frame)
         narrowed(run, node.test, holds, frame)
         passes = under(run, held, lambda: run.execute(body, frame))
         if passes:
@@ -98,8 +106,8 @@ def _if(run: Run, node: ast.If, frame: Frame) -> bool:
 
     sides = (partial(side, node.body, True), partial(side, node.orelse, False))
     passes = run.state.branches(sides, partial(either, condition) if condition else None)
-    if condition and len(passing) == 1 and passing[0] is not None:
-        run.guards = (*run.guards, passing[0])  # to the end of this block
+    if len(passing) == 1:
+        run.guards = (*run.guards, *passing[0])  # to the end of this block
     return passes
 
 

@@ -209,7 +209,10 @@ def call_foreign_method(run: Run, method: ForeignMethod, call: Call) -> Value:
     if path == ros_parameters.PARAMETER_CLASS:
         return (receiver,) if name == "get_parameter_value" else ANY
     if name == "__init__":
-        _initialise_other_bases(run, receiver, path, call)
+        if ros.makes_interfaces(path):
+            ros.call_library(run, path, call)
+        else:
+            _initialise_other_bases(run, receiver, path, call)
         return ANY
     if path == "builtins.object" or name in ("__setattr__", "__getattribute__", "__delattr__"):
         run.gap(call.node, call.frame, f"{name} is called by the program, which is not analysed")

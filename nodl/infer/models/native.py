@@ -130,7 +130,7 @@ def _changed(run: Run, owner: Sequence, added: Value, edited: bool = False) -> V
     """
     others = join(owner.items.any_element(), added)
     if edited and any(isinstance(atom, str | Text) for atom in others):
-        others = join(others, unknown(EDITED))
+        others = join(tuple(atom for atom in others if not isinstance(atom, str | Text)), unknown(EDITED))
     run.state.store(owner, ITEMS, (Items(None, others),))
     return NONE
 

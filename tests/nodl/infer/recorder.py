@@ -248,13 +248,13 @@ def stand_in(recorder: Recorder) -> dict[str, types.ModuleType]:
         def spin(self) -> None:
             recorder.spin()
 
-    def action(kind: str) -> Callable[..., Any]:
-        def make(node: Any, action_type: object, action_name: str, *callbacks: Any, **named: Any) -> Any:
-            full = expand_name(action_name, namespace=node.get_namespace(), node=node.get_name())
-            recorder.facts.add((kind, full))
-            return Anything()
+    def action(kind: str) -> type:
+        class Action(Anything):
+            def __init__(self, node: Any, action_type: object, action_name: str, *_: Any, **__: Any) -> None:
+                full = expand_name(action_name, namespace=node.get_namespace(), node=node.get_name())
+                recorder.facts.add((kind, full))
 
-        return make
+        return Action
 
     contents: dict[str, dict[str, object]] = {
         "rclpy": {
