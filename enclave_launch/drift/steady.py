@@ -53,11 +53,6 @@ class Steady:
         self._went: dict[str, float] = {}
         """Kind → when one of it was last over."""
 
-    @property
-    def standing(self) -> tuple[DriftFinding, ...]:
-        """Return what was reported and still holds."""
-        return tuple(self._reported.values())
-
     def at(self, now: float, findings: Iterable[DriftFinding]) -> Change:
         """Return what is to be reported at ``now``."""
         found = {each.key: each for each in findings}

@@ -110,14 +110,6 @@ def called_names(template: Template) -> Iterator[str]:
                 yield from called_names(argument)
 
 
-def print_template(template: Template) -> str:
-    """Return a text that parses to ``template``. Raises ``ValueError`` for one that no text parses to."""
-    text = "".join(_print_part(part, _TOP) for part in template)
-    if parse_template(text) != template:
-        raise ValueError(f"no text stands for the template {template!r}")
-    return text
-
-
 class _Context(NamedTuple):
     rule: str
     text: re.Pattern[str]  # a whole run of text
@@ -221,28 +213,3 @@ class _Scanner:
         if self.position == len(self.text):
             return UnexpectedEOF(self.text, expected)
         return UnexpectedCharacters(self.text, self.position, expected)
-
-
-def _print_part(part: TemplatePart, context: _Context) -> str:
-    if isinstance(part, SubstitutionCall):
-        return _print_call(part, context)
-    escaped = part.replace("\\", "\\\\").replace("$(", "\\$(")
-    return escaped.replace(context.quote, "\\" + context.quote) if context.quote else escaped
-
-
-def _print_call(call: SubstitutionCall, context: _Context) -> str:
-    return "$(" + " ".join([call.name, *(_print_argument(arg, context) for arg in call.args)]) + ")"
-
-
-def _print_argument(argument: Template, context: _Context) -> str:
-    spaced = any(isinstance(part, str) and " " in part for part in argument)
-    if context.may_quote and (spaced or not argument):
-        quoted = _QUOTED["'"]
-        return "'" + "".join(_print_part(part, quoted) for part in argument) + "'"
-    special = "\\()" + (context.quote or "\"'")
-    return "".join(
-        _print_call(part, context)
-        if isinstance(part, SubstitutionCall)
-        else "".join("\\" + character if character in special else character for character in part)
-        for part in argument
-    )

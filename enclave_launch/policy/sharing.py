@@ -22,10 +22,8 @@ class Gain(NamedTuple):
         return f"node {self.node} {how} and may thereby also {names}"
 
 
-def gains_by_sharing(
-    derived: DerivedPolicy, *, composed_only: bool = False, declared_only: bool = True
-) -> tuple[Gain, ...]:
-    """Return each node that gains permissions by sharing its enclave; ``declared_only``: beyond what all have."""
+def gains_by_sharing(derived: DerivedPolicy, *, composed_only: bool = False) -> tuple[Gain, ...]:
+    """Return each node that gains permissions by sharing its enclave, beyond what every node has."""
     found: list[Gain] = []
     for enclave, nodes in sorted(derived.nodes.items()):
         if len(nodes) < 2:
@@ -34,8 +32,7 @@ def gains_by_sharing(
         needed = {
             rule: {reason.node for reason in why}
             for rule, why in reasons.items()
-            if rule.qualifier is Qualifier.ALLOW
-            and not (declared_only and all(reason.origin == "built-in" for reason in why))
+            if rule.qualifier is Qualifier.ALLOW and not all(reason.origin == "built-in" for reason in why)
         }
         for node in sorted({(node.fqn, node.role in ("container", "component")) for node in nodes}):
             fqn, composed = node

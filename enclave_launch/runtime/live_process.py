@@ -30,8 +30,6 @@ from enclave_launch.runtime.routing import DEFAULT_FORMAT, OutputRouter
 from enclave_launch.runtime.run_events import Observer
 from enclave_launch.runtime.supervision import LifeRules, Patience, ProcessEnd, SupervisedProcess
 
-Prepare = Callable[[ResolvedProcess], Awaitable[ProcessSpec]]
-
 
 class LiveProcess:
     """:raises ValueError: an output setting, ``emulate_tty`` value or ``output_format`` that launch cannot use."""

@@ -27,7 +27,6 @@ def test_what_discovery_may_take_back_has_to_stand() -> None:
         assert not steady.at(0, [late])
         assert not steady.at(seconds - 1, [late])
         assert steady.at(seconds, [late]).new == (late,)
-        assert steady.standing == (late,)
 
 
 def test_what_comes_in_time_is_never_told() -> None:
