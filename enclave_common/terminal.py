@@ -167,6 +167,6 @@ def progress(doing: str, *, quiet: bool) -> Progress | None:
 
 
 def counted_progress(doing: str, *, quiet: bool) -> Callable[[int, int], None] | None:
-    """As ``progress``, called with how many of how many are done."""
+    """Return a progress display as ``progress`` does, called with how many of how many are done."""
     shown = progress(doing, quiet=quiet)
     return None if shown is None else lambda done, total: shown(f"{done} of {total}")

@@ -21,7 +21,7 @@ class LaunchRouter(Protocol):
 
     @property
     def gaps(self) -> tuple[str, ...]:
-        """What it cannot grant, and which enclaves are shut out."""
+        """Report what it cannot grant, and which enclaves are shut out."""
 
     def differences(self, enclave: str) -> tuple[str, ...]:
         """Return why the session file of ``enclave`` is not what was written; empty if it is."""

@@ -124,7 +124,7 @@ class PlannedProcess(NamedTuple):
 
     @property
     def cmd(self) -> tuple[str, ...]:
-        """Without what ``--secure`` appends."""
+        """Return the command without what ``--secure`` appends."""
         return self.process.cmd
 
     @property

@@ -83,9 +83,7 @@ class StorageError(KeystoreError):
         """Return the error of the keystore for ``error``; ``doing`` is a phrase such as ``writing the keystore``."""
         place = f" {printable(str(error.filename))}" if error.filename else ""
         reason = error.strerror or error
-        return cls(
-            f"{doing}{place}: {reason}; nothing visible was left half-written: mend this and run it again"
-        )
+        return cls(f"{doing}{place}: {reason}; no file was left half-written: fix this and run it again")
 
 
 def printable(text: str | PathLike[str]) -> str:

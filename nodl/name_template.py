@@ -65,7 +65,7 @@ class ParameterPart(NamedTuple):
 
     @property
     def is_condition(self) -> bool:
-        """It adds nothing to the name, which only exists where the parameter has a certain value."""
+        """Return True if it adds nothing to the name, which only exists if the parameter has a certain value."""
         return bool(self.edits) and (self.edits[-1][0] in CONDITIONS or self.edits[-1] == ONLY_IF_UNSET)
 
     def may_be_none(self, parameters: Mapping[str, object]) -> bool:
@@ -173,7 +173,7 @@ class NameTemplate(NamedTuple):
 
     @property
     def unconditional(self) -> NameTemplate:
-        """The same name whether or not the conditions on it hold."""
+        """Return the same name without its conditions."""
         kept = tuple(p for p in self.parts if not (isinstance(p, ParameterPart) and p.is_condition))
         return self if len(kept) == len(self.parts) else NameTemplate(kept)
 
@@ -198,7 +198,7 @@ class NameTemplate(NamedTuple):
 
     @property
     def text(self) -> str:
-        """The literal text, with ``*`` for every part that is not known."""
+        """Return the literal text, with ``*`` for every part that is not known."""
         return "".join(part if isinstance(part, str) else "*" for part in self.parts)
 
     def __str__(self) -> str:

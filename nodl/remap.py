@@ -86,7 +86,7 @@ class RemapRules(NamedTuple):
 
     @property
     def names(self) -> tuple[ParsedRule, ...]:
-        """The rules for names of topics and services, in their order."""
+        """Return the rules for names of topics and services, in their order."""
         return tuple([rule for rule in (*self.local, *self.process) if rule.kind not in _OF_THE_NODE])
 
     def node_name(self, original: str) -> Resolved:
@@ -187,12 +187,12 @@ class ActionParts(NamedTuple):
 
     @property
     def rules(self) -> tuple[ParsedRule, ...]:
-        """The rules of all parts, services first."""
+        """Return the rules of all parts, services first."""
         return tuple(rule for part in (*self.services.values(), *self.topics.values()) for rule in part.rules)
 
     @property
     def moved_together(self) -> str | None:
-        """The name of the action that all five parts now belong to; ``None`` if they went apart."""
+        """Return the action that all five parts belong to after remapping; None if they no longer belong together."""
         found = {**self.services, **self.topics}
         action = self.services["send_goal"].name.removesuffix("/_action/send_goal")
         together = all(resolved.name == f"{action}/_action/{part}" for part, resolved in found.items())

@@ -45,7 +45,7 @@ class LaunchService:
         self.__description.add_action(EmitEvent(event=event))
 
     def run(self, *, shutdown_when_idle: bool = True) -> int:
-        """Block until all is over; SIGINT shuts down in order. Gives 0, or 1 when something failed."""
+        """Block until all is over; SIGINT shuts down in order. Returns 0, or 1 if something failed."""
         import asyncio
 
         return asyncio.run(self.__run(shutdown_when_idle, handle_interrupt=True))

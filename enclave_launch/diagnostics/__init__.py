@@ -51,7 +51,7 @@ class Code(str, Enum):
         "descriptions-differ",
         "The source of a program and the library differ",
     )
-    INTERFACE_UNKNOWN = "interface-unknown", "The name of an interface is not (wholly) known"
+    INTERFACE_UNKNOWN = "interface-unknown", "The name of an interface is not or only partly known"
     LIBRARY_VERSION = "library-version", "A document of the library was written for another version"
     MANIFEST_LACKS = (
         "manifest-lacks",

@@ -195,7 +195,7 @@ def names_apart(what: str, name: str, on_dds: str, on_zenoh: str) -> Diagnostic:
 def launcher_apart(
     service: str, launcher: str, process: str, middleware: str, place: SourceLocation
 ) -> Diagnostic:
-    """Launch loads components and changes states by service calls of its own."""
+    """Report that launch loads components and changes states by service calls of its own."""
     text = (
         f"launch itself runs on {launcher} and must call {service} of {process}, which runs on {middleware}"
     )

@@ -106,7 +106,7 @@ class Host(Protocol):
 
     @property
     def loads(self) -> LoadedDescriptions:
-        """Launch files parsed so far."""
+        """Return the launch files parsed so far."""
 
     def prefixes(self) -> tuple[str, ...]:
         """Return ament prefixes to search, first wins, from the environment of this moment."""

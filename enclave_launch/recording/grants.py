@@ -59,7 +59,7 @@ class Description(NamedTuple):
     def text(self) -> str:
         """Return where the interface of the node comes from, for a person."""
         if self.missing is not None:
-            return f"nobody: {self.missing.why}"
+            return f"nothing: {self.missing.why}"
         if self.node is None:
             return "none: the plan has no node of this name"
         origin = f"{self.origin}: " if self.origin else ""

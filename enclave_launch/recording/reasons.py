@@ -73,7 +73,7 @@ _CAUSES: tuple[tuple[str, str, str], ...] = (
     ),
     (
         r"security_attributes mismatch",
-        "its governance asks for other protection than its peer's",
+        "its governance requires another protection than its peer's",
         "give all processes the governance of one keystore",
     ),
     (

@@ -57,7 +57,7 @@ def _not_compared(changed: Changes) -> Iterator[str]:
     if changed.as_installed:
         yield f"Not compared, taken as installed now on both sides: {', '.join(changed.as_installed)}"
     if changed.unknown:
-        yield f"Not compared, interfaces not wholly known: {', '.join(changed.unknown)}"
+        yield f"Not compared, interfaces not completely known: {', '.join(changed.unknown)}"
 
 
 def _lines(changed: Changes) -> Iterator[str]:

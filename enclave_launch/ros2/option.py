@@ -111,7 +111,7 @@ def _launched(description: Any, args: argparse.Namespace) -> int:
 
     if args.keystore is None:
         raise UsageError(
-            "--secure needs a keystore: give --keystore DIR or set ROS_SECURITY_KEYSTORE; for one that nobody keeps, "
+            "--secure needs a keystore: give --keystore DIR or set ROS_SECURITY_KEYSTORE; for a temporary one, "
             'as ros2launch_security makes it: --keystore "$(mktemp -d)/ks"'
         )
     _check_nothing_was_added(description)
@@ -134,7 +134,7 @@ def _check_nothing_was_added(description: Any) -> None:
 
 
 def target_of(args: argparse.Namespace) -> tuple[str, tuple[tuple[str, str], ...]]:
-    """Launch file and arguments as ros2launch's command takes them from its own command line."""
+    """Return launch file and arguments as ros2launch's command takes them from its own command line."""
     from ros2launch.api import get_share_file_path_from_package
     from ros2launch.api.api import parse_launch_arguments
 

@@ -114,4 +114,4 @@ Observer = Callable[[RunEvent], None]
 
 
 def unobserved(event: RunEvent) -> None:
-    """Ignore the event: the observer of a run that nobody watches."""
+    """Ignore the event; the observer of a run without an observer."""

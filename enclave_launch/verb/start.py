@@ -48,7 +48,7 @@ def start(
     keystore: str | None,
     companion: LaunchCompanion | None = None,
 ) -> int:
-    """Launch ``target``, secured where there is a ``keystore``, and stay until it is over. Gives the exit status."""
+    """Launch ``target``, secured if ``keystore`` is given, wait until it is over, and return the exit status."""
     if keystore is None:
         if options.watch:
             from enclave_launch.verb.watch import watch_plain_launch  # an add-on: observation

@@ -100,7 +100,7 @@ def unsecured_notice(environment: Mapping[str, str]) -> str:
 
 PERMISSIVE_NOTICE = (
     "--strategy Permissive: a process whose enclave is missing or incomplete "
-    "then runs unsecured instead of ending"
+    "then runs unsecured instead of exiting"
 )
 
 

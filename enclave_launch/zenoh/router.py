@@ -200,7 +200,7 @@ class ZenohRouter:
                     return
                 if wrong != refused:
                     refused = wrong
-                    self._say(f"the rules of the Zenoh router stay as they are: {wrong}")
+                    self._say(f"the rules of the Zenoh router remain unchanged: {wrong}")
 
     def _read(self, process: subprocess.Popen[bytes]) -> None:
         assert process.stdout is not None, "it is a pipe"

@@ -51,7 +51,7 @@ class LaunchHold:
 
     @property
     def descriptor(self) -> int | None:
-        """What holds the lock, to be given to a process that acts for this launch; None without one."""
+        """Return the descriptor that holds the lock, for a process that acts for this launch; None without one."""
         return self._descriptor
 
     def adopt(self, descriptor: int) -> None:

@@ -49,13 +49,13 @@ class KeystoreView:
 
     @property
     def is_complete(self) -> bool:
-        """Trust anchors and governance are there; a deployed copy without ``private/`` is complete too."""
+        """Return True if trust anchors and governance exist; a deployed copy without ``private/`` is complete too."""
         needed = (*(layout.ca_cert(role) for role in Role), layout.GOVERNANCE)
         return all(os.path.isfile(self.root / name) for name in needed)
 
     @property
     def can_be_completed(self) -> bool:
-        """The directory is empty, or holds nothing but the beginnings of a keystore."""
+        """Return True if the directory is empty, or holds nothing but the beginnings of a keystore."""
         try:
             return set(os.listdir(self.root)) <= _OWN_ENTRIES
         except (FileNotFoundError, NotADirectoryError):
@@ -139,7 +139,7 @@ class KeystoreView:
 
     @property
     def has_zenoh_router(self) -> bool:
-        """True if the keystore holds a configuration for a Zenoh router."""
+        """Return True if the keystore holds a configuration for a Zenoh router."""
         return os.path.lexists(self.root / layout.ZENOH_ROUTER)
 
     def zenoh_enclaves(self) -> list[str]:

@@ -42,7 +42,7 @@ class CertificateFacts:
 
     @property
     def pem(self) -> bytes:
-        """The file's form."""
+        """Return the certificate in PEM."""
         return self.certificate.public_bytes(Encoding.PEM)
 
     @property
@@ -51,17 +51,17 @@ class CertificateFacts:
 
     @cached_property
     def issuer(self) -> bytes:
-        """The issuer's name in DER."""
+        """Return the issuer's name in DER."""
         return self.certificate.issuer.public_bytes()
 
     @cached_property
     def subject(self) -> bytes:
-        """The subject's name in DER."""
+        """Return the subject's name in DER."""
         return self.certificate.subject.public_bytes()
 
     @cached_property
     def common_name(self) -> str | None:
-        """The common name; None unless there is exactly one."""
+        """Return the common name; None unless there is exactly one."""
         found = self.certificate.subject.get_attributes_for_oid(x509.NameOID.COMMON_NAME)
         return str(found[0].value) if len(found) == 1 else None
 
@@ -77,7 +77,7 @@ class CertificateFacts:
 
     @cached_property
     def public_key(self) -> bytes:
-        """The SubjectPublicKeyInfo in DER."""
+        """Return the SubjectPublicKeyInfo in DER."""
         return self.certificate.public_key().public_bytes(Encoding.DER, PublicFormat.SubjectPublicKeyInfo)
 
     def extension(self, kind: type[_Extension]) -> _Extension | None:
@@ -89,7 +89,7 @@ class CertificateFacts:
 
     @property
     def can_sign_mail(self) -> bool:
-        """Whether OpenSSL's S/MIME purpose accepts it: then, below a shared CA, its key can sign permissions."""
+        """Return True if OpenSSL's S/MIME purpose accepts it: then, below a shared CA, its key can sign permissions."""
         extended, usage = self.extension(x509.ExtendedKeyUsage), self.extension(x509.KeyUsage)
         signs_mail = {ExtendedKeyUsageOID.EMAIL_PROTECTION, ExtendedKeyUsageOID.ANY_EXTENDED_KEY_USAGE}
         if extended is not None and not signs_mail & set(extended):
@@ -98,7 +98,7 @@ class CertificateFacts:
 
     @property
     def names_hosts(self) -> bool:
-        """Whether it has alternative names: a TLS client accepts its holder as a server of these hosts."""
+        """Return True if it has alternative names: a TLS client accepts its holder as a server of these hosts."""
         return self.extension(x509.SubjectAlternativeName) is not None
 
 

@@ -46,7 +46,7 @@ class Grant:
 
     @property
     def ros_rules(self) -> tuple[tuple[Rule, ...], tuple[str, ...]]:
-        """The grant in terms of a policy, and the DDS topics that no policy rule can express."""
+        """Return the grant in terms of a policy, and the DDS topics that no policy rule can express."""
         found: list[Rule] = []
         unknown: list[str] = []
         for qualifier in (Qualifier.DENY, Qualifier.ALLOW):

@@ -29,7 +29,7 @@ class Operation(str, Enum):
 
     @property
     def verb(self) -> str:
-        """Of ``node /a may VERB /name``."""
+        """Return the verb of ``node /a may VERB /name``."""
         return _VERBS.get(self, str(self.value))
 
 

@@ -13,5 +13,5 @@ class Role(str, Enum):
 
     @property
     def label(self) -> str:
-        """For a person: ``identity CA``."""
+        """Return the words for a message: ``identity CA``."""
         return self.value.replace("_ca", " CA")

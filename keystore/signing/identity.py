@@ -34,7 +34,7 @@ class Identity:
 
     @property
     def cert(self) -> bytes:
-        """The file ``cert.pem``."""
+        """Return the content of ``cert.pem``."""
         return self.facts.pem
 
 

@@ -40,7 +40,7 @@ class FileSigner:
 
     @property
     def private_key(self) -> PrivateKey:
-        """The key itself, for the builders of ``cryptography``."""
+        """Return the key itself, for the builders of ``cryptography``."""
         return self._key
 
     def public_key(self) -> PublicKey:

@@ -244,7 +244,7 @@ def _check_files(found: _Bundle) -> None:
     for name in sorted(set(manifest.files) ^ expected):
         raise DamagedKeystoreError(f"{place}: its list of files does not fit its enclaves: {printable(name)}")
     for name in sorted(set(found.files) - expected):
-        raise UnsafeKeystoreError(f"{place} holds a file that nobody signed: {printable(name)}")
+        raise UnsafeKeystoreError(f"{place} holds an unsigned file: {printable(name)}")
     for name, digest in sorted(manifest.files.items()):
         if name not in found.files:
             raise DamagedKeystoreError(f"{place} lacks {name}; copy it again")

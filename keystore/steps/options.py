@@ -90,5 +90,5 @@ class ProvisionReport(NamedTuple):
 
     @property
     def validities(self) -> Mapping[str, Validity]:
-        """Of the enclaves that are as wanted."""
+        """Return the validities of the enclaves that are as wanted."""
         return {report.enclave: report.validity for report in self.enclaves if report.validity is not None}

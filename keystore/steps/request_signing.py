@@ -167,7 +167,7 @@ def _refuse_taken_key(register: Register, one: Request) -> None:
     for issued in register.certificates.values():
         if issued.key == one.key and issued.enclave != one.enclave:
             raise InvalidInputError(
-                f"the key that {one.enclave} asks with is that of {issued.enclave}; each enclave needs its own"
+                f"the key in the request of {one.enclave} is that of {issued.enclave}; each enclave needs its own"
             )
         if issued.key == one.key and issued.revoked is not None:
-            raise InvalidInputError(f"the key that {one.enclave} asks with was revoked; make a new one")
+            raise InvalidInputError(f"the key in the request of {one.enclave} was revoked; make a new one")

@@ -53,7 +53,7 @@ class EnclaveShare:
 
     @cached_property
     def shares(self) -> tuple[Share, ...]:
-        """All shares as they are to be: ours replaced, or only extended while others run on the enclave."""
+        """Return all shares as they are to be: ours replaced, or only extended while others run on the enclave."""
         others = tuple(share for share in self.present if share.owner != self.owner)
         if self.mine is None:
             return others

@@ -72,7 +72,7 @@ class SigningProcess:
         )
 
     def request(self, action: str, content: dict[str, Any], options: ProvisionOptions) -> Any:
-        """Have ``action`` done in the other process. Raises what that raises."""
+        """Request ``action`` from the other process and return its result. Raises what that raises."""
         return self._ask({"do": action, **content, **_decided(options)}, None)
 
     def _ask(self, request: dict[str, Any], hold: LaunchHold | None) -> Any:

@@ -1,7 +1,7 @@
 """Explain what a Zenoh router refused, from its log: who, what, why, and the policy that allows it.
 
-Zenoh tells neither side. Start the router with RUST_LOG=zenoh::net::routing::interceptor=trace (a router that
-secure-launch starts inherits it, and secure-launch explains what it says), and give its log here, or pipe it:
+Zenoh reports a denial to neither side. Start the router with RUST_LOG=zenoh::net::routing::interceptor=trace (a router
+that secure-launch starts inherits it, and secure-launch explains its log), and give its log here, or pipe it:
 
   RUST_LOG=zenoh::net::routing::interceptor=trace ros2 run rmw_zenoh_cpp rmw_zenohd 2>&1 | secure-keystore denials ks
 

@@ -36,7 +36,7 @@ class VerifyReport:
 
     @property
     def is_good(self) -> bool:
-        """Neither errors nor exposures."""
+        """Return True if there are neither errors nor exposures."""
         return not any(finding.severity.fails for finding in self.findings)
 
 

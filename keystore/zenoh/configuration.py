@@ -183,20 +183,20 @@ class RouterAddress(NamedTuple):
 
     @property
     def endpoint(self) -> str:
-        """What sessions connect to."""
+        """Return the endpoint that sessions connect to."""
         return f"tls/{self}"
 
     @property
     def is_here(self) -> bool:
-        """Whether only processes of the router's own host can reach it."""
+        """Return True if only processes of the router's own host can reach it."""
         return self.host in _LOOPBACK
 
     @property
     def listens(self) -> str:
-        """On loopback alone, or on every address of its host."""
+        """Return the endpoint at which it listens: on loopback alone, or on every address of its host."""
         return self.endpoint if self.is_here else f"tls/[::]:{self.port}"
 
     @property
     def hosts(self) -> tuple[str, ...]:
-        """For its certificate."""
+        """Return the hosts that its certificate names."""
         return _LOOPBACK if self.is_here else (self.host,)

@@ -44,7 +44,7 @@ class Explanation(NamedTuple):
 
     @property
     def lines(self) -> list[str]:
-        """For a terminal."""
+        """Format the explanation for a terminal."""
         found = [f"refused: {self.who} may not {self.what}" if self.what else f"refused: {self.who}"]
         found += [f"  {text}" for text in (self.why, self.remedy) if text]
         return [*found, *(f"    {line}" for line in self.policy.splitlines())]
@@ -154,7 +154,7 @@ def _stranger(found: Dropped, what: str, former: str) -> Explanation:
 
 
 def _policy(enclave: str, about: Meaning) -> str:
-    assert about.use is not None, "asked before"
+    assert about.use is not None, "checked by the caller"
     operation, name = operation_of(about.use, about.name)
     namespace, _, node = about.node.rpartition("/")
     profile = Profile(namespace or "/", node or enclave.rpartition("/")[2] or "root", (

@@ -52,7 +52,7 @@ def _router(view: KeystoreView, address: RouterAddress, now: datetime) -> Iterat
     if found != wanted.content:
         yield Finding(
             Severity.ERROR, "zenoh-rules", layout.ZENOH_ROUTER,
-            "does not enforce what is signed: it was changed, or is of before a change", _again(view),
+            "does not enforce what is signed: it was edited, or is older than the last change", _again(view),
         )  # fmt: skip
         yield from _told(view, layout.ZENOH_ROUTER, wanted.content, found or b"")
     for gap in wanted.gaps:

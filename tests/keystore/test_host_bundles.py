@@ -208,8 +208,8 @@ def test_a_bundle_with_an_added_ca_is_refused(ca: Path, host: Path, tmp_path: Pa
 
 
 CHANGES: Mapping[str, tuple[Callable[[dict[str, bytes]], object], str]] = {
-    "a file more": (lambda files: files.update({"enclaves/x/key.pem": b"x"}), "a file that nobody signed"),
-    "a path out": (lambda files: files.update({"../../etc/passwd": b"x"}), "a file that nobody signed"),
+    "a file more": (lambda files: files.update({"enclaves/x/key.pem": b"x"}), "an unsigned file"),
+    "a path out": (lambda files: files.update({"../../etc/passwd": b"x"}), "an unsigned file"),
     "a file less": (lambda files: files.pop("enclaves/base/cert.pem"), "lacks enclaves/base/cert.pem"),
     "another key": (lambda files: files.update({"enclaves/base/key.pem": b"x"}), "not the file that was signed"),
     "no manifest": (lambda files: files.pop(layout.BUNDLE), "has no bundle.p7s"),

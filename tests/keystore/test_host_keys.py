@@ -172,7 +172,7 @@ def test_a_request_for_what_does_not_exist_or_is_anothers_is_refused(ca: Path, t
     key = tmp_path / "ks.d/pending/e.arm/key.pem"
     openssl("req", "-new", "-key", key, "-subj", "/CN=ros.base", "-out", csr)
     stolen = parse_requests(b"enclave: /base\n" + csr.read_bytes(), "requests")
-    with pytest.raises(InvalidInputError, match=r"the key that /base asks with is that of /arm"):
+    with pytest.raises(InvalidInputError, match=r"the key in the request of /base is that of /arm"):
         sign_requests(ca, stolen, options=SIGNING)
     assert private_keys(ca).keys() == {"enclaves/base/key.pem"}
 

@@ -253,4 +253,4 @@ def test_a_program_whose_interfaces_nobody_knows_is_named_as_not_compared(
 ) -> None:
     assert main(["diff", "main:", "--missing-nodl", "library", *NAMED]) == 0
     out = capsys.readouterr().out
-    assert "Not compared, interfaces not wholly known: " in out and "robot_cpp/driver" in out
+    assert "Not compared, interfaces not completely known: " in out and "robot_cpp/driver" in out

@@ -84,7 +84,7 @@ def test_what_is_newly_granted_can_be_done_at_once(running: Running) -> None:
 def test_rules_that_somebody_else_wrote_are_not_taken(running: Running) -> None:
     file = running.keystore / "zenoh/router.json5"
     file.write_text(file.read_text().replace('"default_permission": "deny"', '"default_permission": "allow"'))
-    assert wait_for(lambda: any("stay as they are" in text for text in running.said))
+    assert wait_for(lambda: any("remain unchanged" in text for text in running.said))
     with pytest.raises(RuntimeFailure, match="not what follows from the permissions"):
         _started(running)
 
