@@ -12,7 +12,7 @@ import ast
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, NamedTuple, TypeAlias
 
-from nodl.infer.text import Text, common_text, constant_text
+from nodl.infer.text import Guard, Text, common_text, constant_text
 
 if TYPE_CHECKING:
     from nodl.infer.findings import NodeRecord
@@ -251,14 +251,17 @@ class ClassValue(HeapObject):
 
 
 class Instance(HeapObject):
-    """An object of an analysed class, or of a modelled foreign class (``cls`` is then its ``External``)."""
+    """An object of an analysed class, or of a modelled foreign class (``cls`` is then its ``External``).
 
-    __slots__ = ("cls", "node")
+    ``guards``: what held of parameters wherever it was made, so wherever it is used."""
+
+    __slots__ = ("cls", "guards", "node")
 
     def __init__(self, cls: ClassValue | External):
         super().__init__()
         self.cells = FieldCells()
         self.cls = cls
+        self.guards: tuple[Guard, ...] = ()
         self.node: NodeRecord | None = None
 
 

@@ -173,8 +173,13 @@ def _settle(run: Run, frame: Frame, passes: bool) -> None:
 
 def call_bound(run: Run, method: BoundMethod, call: Call) -> Value:
     """Call the method's function with the receiver as its first argument."""
-    shifted = Call(call.args.preceded((method.receiver,)), call.node, call.frame)
-    return call_function(run, method.function, shifted)
+    receiver, before = method.receiver, run.guards
+    if isinstance(receiver, Instance):
+        run.guards = (*before, *(each for each in receiver.guards if each not in before))
+    shifted = Call(call.args.preceded((receiver,)), call.node, call.frame)
+    result = call_function(run, method.function, shifted)
+    run.guards = before
+    return result
 
 
 # --- arguments ----------------------------------------------------------------------------------------------

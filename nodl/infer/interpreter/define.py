@@ -301,7 +301,9 @@ _HARMLESS_BASES = frozenset({"builtins.object", "typing.Generic", "abc.ABC", "ty
 
 def new_instance(run: Run, cls: ClassValue, call: Call) -> Instance:
     """Run ``object.__new__(cls)``."""
-    return run.allocate(call.node, f"instance {id(cls)}", lambda: Instance(cls))
+    made = run.allocate(call.node, f"instance {id(cls)}", lambda: Instance(cls))
+    made.guards = tuple(each for each in run.guards if not made.summary or each in made.guards)
+    return made
 
 
 def is_constant(atom: object) -> bool:

@@ -95,6 +95,32 @@ def test_a_document_grants_what_live_inference_grants(case: str, tmp_path: Path)
         assert _names(described, {}) == _names(node, parameters), parameters
 
 
+DRIVERS = """
+class Usb:
+    def start(self, node): node.P('usb/status')
+class Serial:
+    def start(self, node): node.P('serial/status')
+"""
+
+
+def test_what_an_object_makes_depends_on_what_decided_that_it_is_there(tmp_path: Path) -> None:
+    body = DRIVERS + "d = p('driver', 'usb')\ndriver = Usb() if d == 'usb' else Serial()\ndriver.start(self)"
+    node = _inferred(tmp_path, body)
+    assert not node.gaps
+    assert _names(node, {}) == {"usb/status"}
+    assert _names(node, {"driver": "serial"}) == {"serial/status"}
+
+
+def test_an_object_that_is_made_in_any_case_has_no_condition(tmp_path: Path) -> None:
+    """One place that makes it in both turns: what holds in the first does not count."""
+    loop = (
+        "for wanted in (p('debug', False), True):\n    if wanted:\n        driver = Usb()\ndriver.start(self)"
+    )
+    body = DRIVERS + loop
+    node = _inferred(tmp_path, body)
+    assert _names(node, {}) == _names(node, {"debug": True}) == {"usb/status"}
+
+
 def test_two_parameters_with_one_default_are_a_question(tmp_path: Path) -> None:
     node = _inferred(tmp_path, "self.P(p('a', 'chatter'))\nself.P(p('b', 'chatter'))")
     (question,) = open_questions(node)
