@@ -18,10 +18,11 @@ from nodl.infer.cpp.libraries import (
 from nodl.infer.cpp.models.interfaces import CLI, SUB, node_of, owner_in
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.contents import handed_over, nodes_in
-from nodl.infer.cpp.running.launch_values import text_of
+from nodl.infer.cpp.running.launch_values import settled_text, text_of
 from nodl.infer.cpp.running.machine import Machine, registered
 from nodl.infer.cpp.running.values import (
     BOTTOM,
+    Atom,
     Map,
     NodeNamePart,
     Obj,
@@ -53,9 +54,15 @@ def read(run: Machine, record: AllocatedNode, name: Value, default: Value = BOTT
             found.append(Unknown("a parameter whose name is not known"))
             continue
         if default:
-            record.declare(filled, default)
+            record.declare(filled, tuple(_with_defaults(run, atom) for atom in default))
         found.append(Param(record, filled))
     return tuple(dict.fromkeys(found))
+
+
+def _with_defaults(run: Machine, atom: Atom) -> Atom:
+    """Return a default that is made of other parameters as a launch makes it."""
+    written = settled_text(run, atom) if isinstance(atom, Text) else None
+    return atom if written is None else literal(written)[0]
 
 
 @node_method("declare_parameter", "declare_or_get_parameter", "auto_declare")

@@ -11,6 +11,7 @@ from typing import Any
 from nodl.infer.cpp.running.values import (
     END,
     Const,
+    Group,
     Param,
     Text,
     Unknown,
@@ -48,8 +49,10 @@ def computed(sign: str, left: object, right: object) -> Value:
 def _same(left: object, right: object) -> bool | None:
     if isinstance(left, int | float) and isinstance(right, int | float):
         return left == right
-    if isinstance(left, Const) and isinstance(right, Const) and END not in (left, right):
+    if isinstance(left, Const) and isinstance(right, Const):
         return left == right
+    if END in (left, right) and isinstance(left, Group) != isinstance(right, Group):  # what find() gives
+        return False
     first, second = plain(left), plain(right)
     return None if first is None or second is None else first == second
 

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 
 from nodl.infer.cpp.libraries import LIBRARY_METHODS, Call
-from nodl.infer.cpp.reading.declarations import Class
+from nodl.infer.cpp.reading.declarations import Class, Field
 from nodl.infer.cpp.running.arithmetic import added, as_type, computed
 from nodl.infer.cpp.running.constructors import in_braces
 from nodl.infer.cpp.running.contents import copied, elements_copied, overwrite
@@ -75,7 +75,7 @@ def assignment(run: Machine, node: Node, frame: Frame) -> Value:
             value = _combined("+", before, value)
     else:
         value = _combined(operator[:-1], run.evaluate(left, frame), value)
-    value_held = _as_declared(run, left, value, frame)
+    value_held = as_declared(run, left, value, frame)
     if operator == "=" and left.type == "identifier" and is_pointer(run, left, frame):
         _points_elsewhere(run, left, value_held, frame)
     else:
@@ -126,7 +126,7 @@ def _combined(operator: str, before: Value, value: Value) -> Value:
     return unknown("a computed value")
 
 
-def _as_declared(run: Machine, left: Node, value: Value, frame: Frame) -> Value:
+def as_declared(run: Machine, left: Node, value: Value, frame: Frame) -> Value:
     """Return a number as the type of the variable holds it."""
     if not any(isinstance(atom, int | float) for atom in value):
         return value
@@ -190,6 +190,14 @@ def _gives_reference(run: Machine, callee: Node | None) -> bool:
 def _through_pointer(run: Machine, pointer: Node, value: Value, frame: Frame) -> None:
     """Run ``*p = x`` where ``p`` is an iterator, or a pointer of which nobody knows to what."""
     kind, owner = declared_type(run, pointer, frame)[0], frame.owner_of(text(pointer))
+    if (
+        owner is None
+        and is_plain(value)
+        and kind.name
+        and not kind.pointer
+        and is_pointer(run, pointer, frame)
+    ):
+        through(run, pointer, frame)  # a member
     if owner is None or kind.pointer or text(pointer) in owner.aliases:
         return
     if owner.function is not None and any(p.name == text(pointer) for p in owner.function.parameters):
@@ -216,6 +224,8 @@ def _assign_name(run: Machine, target: Node, value: Value, frame: Frame) -> None
     around = this_object.cls if this_object is not None and "::" not in name else None
     declaring = next((each for each in run.names.ancestry(around) if name in each.fields), None)
     if this_object is not None and declaring is not None and not declaring.fields[name].static:
+        if _writes_through(declaring.fields[name], value):
+            through(run, target, frame)
         cell = (this_object, name)
         run.store.set(cell, join(run.store.get(cell) or BOTTOM, value) if this_object.several else value)
         return
@@ -231,6 +241,12 @@ def _assign_name(run: Machine, target: Node, value: Value, frame: Frame) -> None
         run.store.set((this_object, name), value)
 
 
+def _writes_through(field: Field, value: Value) -> bool:
+    """Return whether a plain value is written to what a member refers to."""
+    declared = text(field.node).partition("=")[0].partition("{")[0]
+    return "&" in declared and any(not isinstance(atom, Obj) for atom in value)
+
+
 def _assign_field(run: Machine, node: Node, value: Value, frame: Frame) -> None:
     owners = run.evaluate(field_of(node, "argument"), frame)
     name = text(field_of(node, "field")).rpartition("::")[2]
@@ -242,6 +258,9 @@ def _assign_field(run: Machine, node: Node, value: Value, frame: Frame) -> None:
     if any(not isinstance(atom, Obj) or atom.cls is None for atom in owners) or not owners:
         run.later([value], frame)  # a library keeps it and may call it
     for each in objects:
+        declaring = next((cls for cls in run.names.ancestry(each.cls) if name in cls.fields), None)
+        if declaring is not None and _writes_through(declaring.fields[name], value):
+            through(run, node, frame)
         strong = len(owners) == 1 and not each.several
         cell = (each, name)
         before = run.store.get(cell) or BOTTOM

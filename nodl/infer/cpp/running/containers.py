@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 
 from nodl.infer.cpp.running.arithmetic import added
 from nodl.infer.cpp.running.assignments import assign, with_entry
@@ -17,6 +18,7 @@ from nodl.infer.cpp.running.static_types import declared_type
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     END,
+    NPOS,
     Group,
     Map,
     Obj,
@@ -109,9 +111,12 @@ def _added(run: Machine, atom: object, name: str, site: CallSite) -> Value:
     if not isinstance(atom, Seq):
         assign(run, receiver, (open_sequence((value, (atom,))),), frame)
         return value
-    keeps_order = not atom.open and kind.name not in ORDERED and name in ("push_back", "emplace_back", "push")
-    longer = (*atom.items, value)
-    assign(run, receiver, (Seq(longer) if keeps_order else open_sequence(longer),), frame)
+    place = site.values[0] if name == "insert" and len(given) == 2 else BOTTOM
+    first = name in ("push_front", "emplace_front") or place == (atom,)
+    keeps_order = first or place == (END,) or name in ("push_back", "emplace_back", "push")
+    longer = (value, *atom.items) if first else (*atom.items, value)
+    is_exact = keeps_order and not atom.open and kind.name not in ORDERED
+    assign(run, receiver, (Seq(longer) if is_exact else open_sequence(longer),), frame)
     return value
 
 
@@ -155,14 +160,24 @@ def _map_call(run: Machine, atom: Map, name: str, site: CallSite) -> Value:
         )
         left = tuple(entry for entry in atom.entries if entry[0] != first)
         return becomes(atom._replace(entries=left) if certain else atom._replace(open=True))
-    if name in ("at", "find") and values:
-        found = element(run, atom, first)
-        return found if name == "at" else (END, Group((first, found)))
+    if name in ("at", "find", "count", "contains") and values:
+        found, has = element(run, atom, first), _has(atom, first)
+        if name == "find":
+            return (*(() if has else (END,)), *(() if has is False else (Group((first, found)),)))
+        return found if name == "at" else unknown("a condition") if has is None else (has,)
     if name in ("end", "cend"):
         return (END,)
     if name in ("begin", "cbegin"):
         return (atom,)
     return unknown(f"the result of {name}()")
+
+
+def _has(atom: Map, key: Value) -> bool | None:
+    """Return whether a map certainly has a key, or has it not."""
+    keys = (key, *(known for known, _ in atom.entries))
+    if atom.open or any(len(each) != 1 or plain(each[0]) is None for each in keys):
+        return None
+    return key in keys[1:]
 
 
 def _new_entry(run: Machine, site: CallSite) -> tuple[Value, Value]:
@@ -180,8 +195,10 @@ def _new_entry(run: Machine, site: CallSite) -> tuple[Value, Value]:
 
 
 def _entered(atom: Map, key: Value, value: Value) -> Map:
-    """Enter a pair; a key that the map already has may keep its value."""
+    """Enter a pair; a key that the map already has keeps its value."""
     definite = len(key) == 1 and plain(key[0]) is not None
+    if definite and not atom.open and any(known == key for known, _ in atom.entries):
+        return atom
     return as_one_map((*atom.entries, (key, value)), atom.open or not definite)
 
 
@@ -225,7 +242,23 @@ def _rearranged(atom: Seq | Group, name: str, values: Sequence[Value]) -> Seq | 
         return Seq(())
     if isinstance(atom, Group) or name not in _REARRANGES:
         return None
-    return open_sequence((*atom.items, *values[:1], unknown("an element of a list")))
+    if name == "pop_back" and not atom.open:
+        return Seq(atom.items[:-1])
+    if not atom.open and (name == "pop_front" or (name == "erase" and list(values) == [(atom,)])):
+        return Seq(atom.items[1:])  # erase(x.begin())
+    items = (
+        (tuple(a for a in item if isinstance(a, Obj)) for item in atom.items)
+        if name in _REMOVES
+        else atom.items
+    )
+    added = values[-1:] if name in ("assign", "fill", "resize") else ()
+    return open_sequence((*filter(None, items), *added, unknown("an element of a list")))
+
+
+_REMOVES = frozenset(
+    {"erase", "resize", "pop_front", "pop", "remove", "unique", "remove_if", "extract", "pop_back"}
+)
+"""Which plain elements they leave is not known."""
 
 
 _SAME_TEXT = frozenset({
@@ -242,14 +275,45 @@ def _text_call(run: Machine, atom: Text | Param, name: str, site: CallSite) -> V
         return (atom,)
     if name in _CHANGES_TEXT:
         adds = name in ("append", "push_back") and len(values) == 1
-        changed = literal("") if name == "clear" else unknown(f"what {name}() makes of a text")
+        changed = literal("") if name == "clear" else computed_text(run, atom, name, values)
         found = added((atom,), values[0]) if adds else changed
         assign(run, _changed(site.receiver), found, site.frame)
         return found
-    known = settled_text(run, atom)
-    if known is None or name not in ("empty", "size", "length"):
-        return unknown(f"the result of {name}()")
-    return (not known if name == "empty" else len(known.encode()),)
+    return computed_text(run, atom, name, values)
+
+
+def computed_text(run: Machine, atom: Text | Param, name: str, values: Sequence[Value]) -> Value:
+    """Return what a method gives, or leaves, of a text that is known in this run ([string.classes])."""
+    written = settled_text(run, atom) if run.start is not None else plain(atom)
+    given = [settled_text(run, v[0]) if len(v) == 1 and isinstance(v[0], Text | Param) else v for v in values]
+    arguments = [
+        each if isinstance(each, str) else each[0] if each is not None and len(each) == 1 else None
+        for each in given
+    ]
+    method = _OF_TEXT.get(name)
+    with suppress(TypeError, IndexError):
+        if written is not None and written.isascii() and method is not None:
+            found = method(written, *arguments)
+            return literal(found) if isinstance(found, str) else (found if found != -1 else NPOS,)
+    return unknown(f"the result of {name}()")
+
+
+def _erased(written: str, start: int = 0, count: int = NPOS) -> str:
+    return written[:start] + written[start:][count:]
+
+
+_OF_TEXT: dict[str, Callable[..., str | int]] = {
+    "empty": lambda t: not t, "size": len, "length": len,
+    "front": lambda t: t[0], "back": lambda t: t[-1], "at": lambda t, i: t[i],
+    "substr": lambda t, i=0, n=NPOS: t[i:][:n],
+    "find": str.find, "rfind": lambda t, part: t.rfind(part), "contains": str.__contains__,
+    "find_first_of": lambda t, letter: t.find(letter) if len(letter) == 1 else t[None],
+    "find_last_of": lambda t, letter: t.rfind(letter) if len(letter) == 1 else t[None],
+    "starts_with": str.startswith, "ends_with": str.endswith,
+    "erase": _erased, "pop_back": lambda t: t[:-1], "assign": lambda t, other: other + "",
+    "insert": lambda t, i, part: t[:i] + part + t[i:],
+    "replace": lambda t, i, n, part: t[:i] + part + t[i:][n:],
+}  # fmt: skip
 
 
 def _changed(receiver: Node) -> Node:

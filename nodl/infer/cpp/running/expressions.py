@@ -8,9 +8,9 @@ from dataclasses import replace
 
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.arithmetic import added, computed
-from nodl.infer.cpp.running.assignments import assign
+from nodl.infer.cpp.running.assignments import as_declared, assign
 from nodl.infer.cpp.running.constructors import as_map, cast, construct, default_value, made
-from nodl.infer.cpp.running.contents import items_of
+from nodl.infer.cpp.running.contents import copied, elements_copied, items_of
 from nodl.infer.cpp.running.invocation import by_operator, pointed_to
 from nodl.infer.cpp.running.launch_values import decided, settled, settled_text
 from nodl.infer.cpp.running.machine import NEXT, Frame, Machine, expression
@@ -241,7 +241,8 @@ def lambda_(run: Machine, node: Node, frame: Frame) -> Value:
     for child in captures:
         if child.type == "lambda_capture_initializer" and len(children(child)) >= 2:
             named = children(child)
-            run.local(inner, text(named[0]).lstrip("&"), run.evaluate(named[-1], frame))
+            name, value = text(named[0]), run.evaluate(named[-1], frame)
+            run.local(inner, name.lstrip("&"), value if name[:1] == "&" else copied(run, value, child, frame))
     if frame.blocks or frame.kept:
         owners = {name: frame.owner_of(name) for name in words_of(node)}
         inner.kept = {name: owner for name, owner in owners.items() if owner is not None}
@@ -251,8 +252,19 @@ def lambda_(run: Machine, node: Node, frame: Frame) -> Value:
     for name in sorted(names):
         owner = frame.owner_of(name)
         if owner is not None and name not in inner.names:
-            run.local(inner, name, run.store.get((owner, name)) or BOTTOM, owner.types.get(name, ""))
+            held, written = run.store.get((owner, name)) or BOTTOM, owner.types.get(name, "")
+            run.local(inner, name, _captured(run, held, written, node, owner), written)
     return (Lambda(node, inner),)
+
+
+def _captured(run: Machine, value: Value, written: str, node: Node, owner: Frame) -> Value:
+    """Return what a closure keeps of a variable: an object, or the objects in a list, are copied."""
+    kind = run.type_of(written, owner)
+    if kind.pointer or "*" in written:
+        return value
+    if any(isinstance(atom, Seq | Map) for atom in value):
+        return elements_copied(run, kind, value, node, owner)
+    return copied(run, value, node, owner)
 
 
 def _is_by_reference(capture: Node) -> bool:
@@ -436,6 +448,7 @@ def update(run: Machine, node: Node, frame: Frame) -> Value:
     step = 1 if "++" in text(node) else -1
     after = (before[0] + step,) if len(before) == 1 and isinstance(before[0], int) else unknown("a counter")
     if argument is not None:
+        after = as_declared(run, argument, after, frame)
         assign(run, argument, after, frame)
     return before if not text(node).startswith(("++", "--")) else after
 

@@ -35,9 +35,7 @@ def bind_reference(run: Machine, name: str, kind: str, initial: Node | None, fra
     ):
         return
     if kind.endswith("*"):
-        if target.type != "pointer_expression":
-            return
-        target = unwrapped(field_of(target, "argument"))
+        target = unwrapped(field_of(target, "argument")) if target.type == "pointer_expression" else None
     if target is not None and _is_fixed(target):
         frame.aliases[name] = target
     elif (

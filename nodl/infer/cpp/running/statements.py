@@ -381,6 +381,7 @@ def _bound_part(run: Machine, atom: object, index: int) -> list[Value]:
 
 
 MAX_UNROLLED = 64
+MAX_ENDLESS = 8
 MAX_ROUNDS = 3
 
 
@@ -476,10 +477,10 @@ def for_statement(run: Machine, node: Node, frame: Frame) -> int:
     return _counted(run, node, frame)
 
 
-@statement("while_statement")
+@statement("while_statement", "do_statement")
 @in_a_block
 def while_statement(run: Machine, node: Node, frame: Frame) -> int:
-    """Turn by turn while its condition is decided; else, as for ``while (true)``, to a fixpoint."""
+    """Run turn by turn while its condition is decided, else to a fixpoint; the first turn of ``do`` has none."""
     return _counted(run, node, frame)
 
 
@@ -489,18 +490,19 @@ def _counted(run: Machine, node: Node, frame: Frame) -> int:
     loop = Loop(run.store.mark())
     returns, outer_path = 0, frame.path
     for index in range(MAX_UNROLLED):
-        holds = condition_value(run, condition, frame)
+        is_certain = condition is None or (index == 0 and node.type == "do_statement")
+        holds = is_certain or condition_value(run, condition, frame)
         if holds is False:
             if index == 0:
                 run.kill(body, frame, "the condition of the loop is never true")
             break
-        if holds is None or text(condition) in ("true", "1", "(true)", "(1)"):
+        if holds is None or loop.breaks or (index == MAX_ENDLESS and _is_endless(condition)):
             returns |= _repeated(run, body, update, condition, frame, loop)
             break
-        frame.path = (*outer_path, index)
+        mark, frame.path = run.store.mark(), (*outer_path, index)
         outcome = _iteration(run, body, frame, loop)
         returns |= outcome & RETURN
-        if not outcome & NEXT:
+        if not outcome & NEXT or (_is_endless(condition) and not run.store.changes(mark)):
             frame.path = outer_path
             return returns | _after(run, loop, 0)
         run.evaluate(update, frame)
@@ -508,6 +510,10 @@ def _counted(run: Machine, node: Node, frame: Frame) -> int:
         returns |= _repeated(run, body, update, condition, frame, loop)
     frame.path = outer_path
     return returns | _after(run, loop, NEXT)
+
+
+def _is_endless(condition: Node | None) -> bool:
+    return text(condition).strip("()") in ("true", "1", "")
 
 
 def _repeated(
@@ -535,14 +541,3 @@ def _repeated(
             for cell, value in moved.items():
                 run.store.set(cell, join(before[cell], unknown("a value that changes in a loop")) or value)
     return returns
-
-
-@statement("do_statement")
-def do_statement(run: Machine, node: Node, frame: Frame) -> int:
-    """Run the body once, then any number of times unless it left or the condition is certainly false."""
-    body, condition = field_of(node, "body"), unwrapped(field_of(node, "condition"))
-    loop = Loop(run.store.mark())
-    outcome = _iteration(run, body, frame, loop)
-    if outcome & NEXT and condition_value(run, condition, frame) is not False:
-        outcome |= _repeated(run, body, None, condition, frame, loop)
-    return (outcome & RETURN) | _after(run, loop, outcome)

@@ -11,7 +11,7 @@ from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.constructors import is_plain_type
 from nodl.infer.cpp.running.contents import handed_over, nodes_in
 from nodl.infer.cpp.running.machine import Frame, Machine
-from nodl.infer.cpp.running.references import through
+from nodl.infer.cpp.running.references import is_plain, through
 from nodl.infer.cpp.running.standard import INTO_FIRST, called_now
 from nodl.infer.cpp.running.static_types import declared_type, element_type, seen_type
 from nodl.infer.cpp.running.values import (
@@ -19,9 +19,7 @@ from nodl.infer.cpp.running.values import (
     Group,
     Map,
     Obj,
-    Param,
     Seq,
-    Text,
     Value,
     as_one_map,
     join,
@@ -95,7 +93,7 @@ def _may_be_written(run: Machine, name: str, given: Sequence[Node], frame: Frame
             target = field_of(target, "argument")
         if target is None or target.type not in ("identifier", "field_expression"):
             continue
-        if declared_type(run, target, frame)[0].name in ("std::string", "string", "std::vector"):
+        if is_plain_type(declared_type(run, target, frame)[0].name):
             _changed(run, name, target, frame)
 
 
@@ -149,7 +147,7 @@ def _changed(run: Machine, name: str, target: Node, frame: Frame) -> None:
     if owner is not None and "const" in owner.types.get(text(target), "").split():
         return
     before = run.evaluate(target, frame)
-    if any(isinstance(atom, Text | Seq | Map | Param | Group) for atom in before):
+    if is_plain(before):
         if _is_iterator(run, target, frame) or element_type(seen_type(run, target, frame)).pointer:
             through(run, target, frame)
         assign(run, target, join(*(_after(atom, name) for atom in before)), frame)

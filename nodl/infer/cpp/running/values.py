@@ -101,6 +101,8 @@ class Const(NamedTuple):
 
 
 END = Const("the end of a container")
+NPOS = 2**64 - 1
+"""``std::string::npos``."""
 
 
 class Param(NamedTuple):

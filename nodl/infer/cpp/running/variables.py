@@ -6,7 +6,7 @@ from nodl.infer.cpp.reading.declarations import Class
 from nodl.infer.cpp.running.constructors import default_value, made
 from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.static_types import current_object, static_by_name
-from nodl.infer.cpp.running.values import BOTTOM, Bound, Const, Obj, Value, unknown
+from nodl.infer.cpp.running.values import BOTTOM, NPOS, Bound, Const, Obj, Value, unknown
 from nodl.infer.cpp.syntax import Node, children
 
 
@@ -17,7 +17,8 @@ def variable(run: Machine, name: str, frame: Frame) -> Value:
         target = owner.aliases.get(name)
         return run.evaluate(target, owner) if target is not None else run.store.get((owner, name)) or BOTTOM
     if name in frame.bindings:
-        return unknown(f"the argument {name} of a template")
+        given = frame.bindings[name].name
+        return (int(given),) if given.isdigit() else unknown(f"the argument {name} of a template")
     this_object = current_object(frame)
     if this_object is not None and "::" not in name:
         found = member(run, this_object, name)
@@ -78,6 +79,8 @@ def _initial(run: Machine, value: Node | None, written: str, frame: Frame) -> Va
 
 def constant(run: Machine, name: str, frame: Frame) -> Value | None:
     """Return the global, static member, enumerator or functions of that name; ``None`` if none is found."""
+    if name.endswith("string::npos"):
+        return (NPOS,)
     static = static_by_name(run, name, frame)
     if static is not None:
         return static_member(run, *static)

@@ -81,8 +81,42 @@ FOUND = {
     "a word from a stream": (
         f'std::string w = "old"; std::istringstream s("a b"); s >> w; {PUB}(w, 1);', "", ["?"]
     ),
-    "a text that is edited": (f'std::string s = "ab"; s.erase(0, 1); {PUB}(s, 1);', "", ["?"]),
-    "a part of a text": (f'{PUB}(std::string("ab").substr(1), 1);', "", ["?"]),
+    "a text that is edited": (f'std::string s = "ab"; s.erase(0, 1); {PUB}(s, 1);', "", ["b"]),
+    "a part of a text": (f'{PUB}(std::string("ab").substr(1), 1);', "", ["b"]),
+    "a part behind a letter": (
+        f'std::string s = "a/b"; auto at = s.rfind("/"); '
+        f"if (at != std::string::npos) {{ {PUB}(s.substr(at + 1), 1); }}",
+        "", ["b"],
+    ),
+    "a letter that is there": (
+        f"std::string s = \"/a\"; if (s.front() == '/') {{ {PUB}(s.substr(1), 1); }}", "", ["a"]
+    ),
+    "a letter that is not there": (
+        f'std::string s = "a"; if (s.find(":") != std::string::npos) {{ s = "b"; }} {PUB}(s, 1);', "", ["a"]
+    ),
+    "an entry that is not there": (
+        f'std::map<std::string, int> m{{{{"a", 1}}}}; if (m.find("b") != m.end() || m.count("b")) {{ {PUB}("b", 1); }}',
+        "", [],
+    ),
+    "a list that loses its last": (
+        f'std::vector<std::string> v{{"a", "b"}}; v.pop_back(); for (auto & e : v) {{ {PUB}(e, 1); }}', "", ["a"]
+    ),
+    "a loop that is left": (
+        f'int i = 0; while (true) {{ if (i == 2) break; i++; }} {PUB}("t" + std::to_string(i), 1);', "", ["t2"]
+    ),
+    "a loop that tests at its end": (
+        f'int i = 2; do {{ {PUB}("t" + std::to_string(i), 1); }} while (--i > 0);', "", ["t1", "t2"]
+    ),
+    "the number of a template": (
+        f"{PUB}(name<3>(), 1);",
+        'template <int I> std::string name() { if constexpr (I > 2) return "t" + std::to_string(I); return "small"; }',
+        ["t3"],
+    ),
+    "objects in closures": (
+        'C a; a.t = "a"; auto copy = [a]() { return a.t; }; auto same = [&a]() { return a.t; }; a.t = "b"; '
+        f'{PUB}("copy_" + copy(), 1); {PUB}("same_" + same(), 1);',
+        "struct C { std::string t; };", ["copy_a", "same_b"],
+    ),
 }  # fmt: skip
 
 

@@ -629,6 +629,38 @@ def test_a_text_that_a_derived_class_hides_is_told_and_a_pointer_that_it_hides_i
     assert hiding("rclcpp::Node * node;") == []
 
 
+BEHIND = {
+    "through a reference that a member of another object is": (
+        'h.r = "b";',
+        "struct H { std::string & r; }; H h{t};",
+        "what h.r refers to is written",
+    ),
+    "through a pointer that is a member": (
+        'p = &t; *p = "b";',
+        "std::string * p = nullptr;",
+        "what p refers to is written",
+    ),
+    "through a pointer into an array": (
+        'std::string * p = l; p[0] = "b"; t = l[0];',
+        'std::string l[1] = {"a"};',
+        "what p refers to is written",
+    ),
+}
+
+
+@pytest.mark.parametrize(("body", "members", "why"), BEHIND.values(), ids=BEHIND)
+def test_a_text_that_is_written_behind_its_variable_is_told(
+    body: str, members: str, why: str, tmp_path: Path
+) -> None:
+    source = in_class(f"{body} create_publisher<{S}>(t, 1);", f'std::string t = "a"; {members}')
+    assert [gap.partition(":")[0] for gap in gaps(infer(tmp_path, source))] == [why]
+
+
+def test_a_number_that_unknown_code_gets_as_a_variable_may_be_another_one(tmp_path: Path) -> None:
+    body = f'int n = 0; acme::read(n); create_publisher<{S}>("t" + std::to_string(n), 1);'
+    assert names(infer(tmp_path, in_class(body))) == ["t0", "t?"]
+
+
 HIDING = """
 struct B { std::string text() { return "base"; } std::string twice() { return text(); } };
 struct D : B { std::string text() { return "derived"; } std::string own() { return text(); } };
