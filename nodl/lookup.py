@@ -20,6 +20,7 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple
 
+from enclave_common.words import some_of
 from nodl.ament_index import INDEX_FOLDER, PackageNotFoundError, list_resources, package_share_directory
 from nodl.document import RESOURCE_TYPE, V1_SUFFIX, V2_SUFFIXES, read_document, resource_key
 from nodl.errors import ConflictingNoDLError
@@ -96,6 +97,9 @@ class ManifestLookup:
         return self._packages[package]
 
 
+_NAMED = 3  # prefixes in a message: an isolated workspace has one for each package
+
+
 class _Package(NamedTuple):
     nodes: tuple[ManifestNode, ...]
     searched: tuple[str, ...]
@@ -107,7 +111,7 @@ def _read_package(package: str, prefixes: Sequence[str]) -> _Package:
     try:
         share = package_share_directory(package, prefixes)
     except (PackageNotFoundError, ValueError):
-        searched.append(f"package '{package}' in {', '.join(prefixes) or 'no prefix at all'}")
+        searched.append(f"package '{package}' in {some_of(prefixes, _NAMED) or 'no prefix at all'}")
     else:
         searched.append(os.path.join(share, "*" + V1_SUFFIX))
         for file in sorted(_v1_files(share)):

@@ -50,7 +50,10 @@ def infer_executable(
         return _compiled(package, None, plugin, sources, start_of, f"component {plugin} is compiled code")
     try:
         path = executable_path(package, executable, prefixes)
-    except (PackageNotFoundError, ExecutableNotInstalledError, ValueError) as error:
+    except PackageNotFoundError:
+        what = f"package '{package}' is not installed"
+        return _compiled(package, executable, None, sources, start_of, what)
+    except (ExecutableNotInstalledError, ValueError) as error:
         return _compiled(package, executable, None, sources, start_of, str(error))
     if not _is_python(path):
         return _compiled(package, executable, None, sources, start_of, f"{path} is a compiled program")

@@ -123,6 +123,12 @@ def test_nothing_found_says_where_it_looked(prefix: Prefix) -> None:
     assert f"package 'none' in {prefix.root}" in find(prefix, "none", "x").searched
     nowhere = ManifestLookup([]).find("none", executable="x")
     assert nowhere.searched == ("package 'none' in no prefix at all",)
+    isolated = ManifestLookup([f"/ws/install/p{number}" for number in range(150)]).find(
+        "none", executable="x"
+    )
+    assert isolated.searched[0] == (
+        "package 'none' in /ws/install/p0, /ws/install/p1, /ws/install/p2 and 147 more"
+    )
     assert not find(prefix, "../etc", "x")
 
 
