@@ -85,7 +85,7 @@ MAX_SOURCE_BYTES = 1_000_000
 # Libraries whose behaviour the models describe; their sources are never analysed.
 MODELLED = frozenset(
     {
-        "rclpy", "tf2_ros", "tf2_py", "tf2_geometry_msgs", "message_filters", "cv_bridge",
+        "rclpy", "tf2_ros", "tf2_py", "tf2_geometry_msgs", "tf2_sensor_msgs", "message_filters", "cv_bridge",
         "diagnostic_updater", "rosidl_runtime_py", "rosidl_parser", "ament_index_python", "launch",
         "launch_ros", "numpy", "cv2", "yaml", "setuptools", "pkg_resources",
     }

@@ -91,9 +91,10 @@ class Sources:
             return False  # which release this is
         if folder in _CORE:
             return True
-        return folder in KNOWN_HEADERS and self.workspace.package_of(found) is not self.workspace.package_of(
-            file
-        )
+        package = self.workspace.package_of(found)
+        if folder in _MODELLED_IF_INSTALLED:
+            return package is None
+        return folder in KNOWN_HEADERS and package is not self.workspace.package_of(file)
 
     def _read(self, file: str) -> str | None:
         try:
@@ -152,6 +153,10 @@ _CORE = frozenset({
     "rclcpp", "rclcpp_lifecycle", "rclcpp_action", "rclcpp_components", "rcl", "rcutils", "rmw", "rcpputils",
     "pluginlib", "class_loader", "rosidl_runtime_cpp", "rosidl_typesupport_cpp", "tracetools",
 })  # fmt: skip
+
+
+_MODELLED_IF_INSTALLED = frozenset({"nav2_core", "nav2_ros_common", "nav2_util"})
+"""Of whose classes the table has what plugins and nodes of others use; beside its sources nav2 itself is followed."""
 
 
 def library_sources(package: SourcePackage) -> list[str]:

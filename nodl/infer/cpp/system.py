@@ -339,12 +339,18 @@ class Answering:
 
 
 def _plugin_entry(name: str, package: SourcePackage, workspace: Workspace) -> Entry:
-    """Return the class of a plugin with the sources of the library that exports it."""
+    """Return the class of a plugin with the sources of the library that exports it.
+
+    With all sources of the package if CMake's files do not say what the library is made of.
+    """
     last = name.rpartition("::")[2]
     libraries = [each for each in package.build.targets.values() if not each.executable]
     target = next((each for each in libraries if any(_exports(file, last) for file in each.sources)), None)
     if target is None:
-        return Entry((), cls=name, main=False, place=package.folder)
+        sources = _all_sources(package)
+        exporting = next((each for each in sources if _exports(each, last)), None)
+        files = _with_first(exporting, sources) if exporting is not None else ()
+        return Entry(files, cls=name, main=False, place=package.folder)
     return target_entry(target, package, workspace)._replace(cls=name, main=False)
 
 

@@ -43,7 +43,7 @@ NODE_METHODS = frozenset(NODE_ENDPOINTS) | frozenset(COMMON_CALLBACKS)
 # Libraries that create no endpoints on a node they are given, keep their hands off names and off the program's
 # objects. A call of theirs gives something that does so as well.
 _KEEPS_OFF = frozenset({
-    "rclpy", "numpy", "cv2", "cv_bridge", "tf2_ros", "tf2_geometry_msgs", "tf_transformations",
+    "rclpy", "numpy", "cv2", "cv_bridge", "tf2_ros", "tf2_geometry_msgs", "tf2_sensor_msgs", "tf_transformations",
     "tf2_py", "message_filters", "transforms3d", "scipy", "yaml", "ament_index_python", "rosidl_runtime_py",
     "rcl_interfaces", "rosidl_parser", "launch", "launch_ros", "std_msgs", "PIL", "torch", "matplotlib",
     "pandas", "serial", "requests", "setuptools", "pytest", "tqdm", "sensor_msgs_py", "psutil", "colorama",

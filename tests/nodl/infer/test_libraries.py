@@ -46,6 +46,7 @@ def test_what_a_ros_package_makes_that_cannot_be_read_is_a_gap(imports: str, bod
         ("import rosbag2_py", "rosbag2_py.SequentialReader()"),
         ("from ultralytics import YOLO", "YOLO('m.pt')"),
         ("import tf_transformations", "tf_transformations.euler_from_quaternion([0, 0, 0, 1])"),
+        ("from tf2_sensor_msgs.tf2_sensor_msgs import do_transform_cloud", "do_transform_cloud(None, None)"),
         ("from geometry_msgs.msg import Twist", "Twist()"),
     ],
 )

@@ -69,7 +69,7 @@ class BuildReader:
         self.build = build
         self.functions: dict[str, tuple[bool, list[str], list[Command]]] = {}
         self.steps = 0
-        self.included: list[str] = []  # files that are being read
+        self.included: list[str] = []  # files and folders that are being read
         self.definitions: dict[str, str] = {}
 
     def read(self, folder: str, variables: dict[str, str]) -> None:
@@ -77,10 +77,14 @@ class BuildReader:
             source = read_text(Path(folder, "CMakeLists.txt"), errors="replace")
         except OSError:
             return
+        if folder in self.included:  # by itself: the folder's name is made of a variable that is not known
+            return
+        self.included.append(folder)
         variables = {**variables, "CMAKE_CURRENT_SOURCE_DIR": folder, "CMAKE_CURRENT_LIST_DIR": folder}
         variables.setdefault("CMAKE_SOURCE_DIR", folder)
         variables.setdefault("PROJECT_SOURCE_DIR", folder)
         self.run(list(commands(source)), variables)
+        self.included.pop()
 
     def run(self, listed: Sequence[Command], variables: dict[str, str]) -> None:
         index = 0
@@ -389,7 +393,10 @@ def absolute(word: str, variables: dict[str, str]) -> str:
 def near(pattern: str, variables: dict[str, str]) -> bool:
     """Return True if a pattern and the sources have a folder in common; ``/**/*`` is left of ``${UNKNOWN}/**/*``."""
     fixed = re.split(r"[*?\[]", pattern, maxsplit=1)[0]
-    return os.path.commonpath([fixed, os.path.abspath(variables["CMAKE_CURRENT_SOURCE_DIR"])]) != "/"
+    return (
+        os.path.commonpath([os.path.abspath(fixed), os.path.abspath(variables["CMAKE_CURRENT_SOURCE_DIR"])])
+        != "/"
+    )
 
 
 def recursive_pattern(pattern: str) -> str:

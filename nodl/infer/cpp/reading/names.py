@@ -122,7 +122,7 @@ class Names:
         return frozenset(found)
 
     @_once
-    def _used_namespaces(self, file: str) -> tuple[str, ...]:
+    def used_namespaces(self, file: str) -> tuple[str, ...]:
         """Return those that ``using namespace`` brings into a file, its headers included."""
         seen = (self.files[each] for each in sorted(self.visible(file)) if each in self.files)
         return tuple(used for index in seen for used in index.using)
@@ -167,7 +167,7 @@ class Names:
             yield "::".join((*scope[:length], name))
             for base in self._base_names("::".join(scope[:length])) if length else ():
                 yield f"{base}::{name}"
-        for used in self._used_namespaces(file.file):
+        for used in self.used_namespaces(file.file):
             yield f"{used}::{name}"
             for length in range(len(scope), 0, -1):
                 yield "::".join((*scope[:length], used, name))
@@ -366,7 +366,7 @@ class Names:
     def is_standard(self, name: str, scope: Scope, file: FileIndex) -> bool:
         """Return whether a name without a namespace is one of ``std``, which ``using namespace std`` brings in."""
         own = self.find_class(name, scope, file) is not None or self.alias(name, scope, file) is not None
-        return "std" in self._used_namespaces(file.file) and not own
+        return "std" in self.used_namespaces(file.file) and not own
 
     def _qualified(
         self, name: str, arguments: tuple[Type, ...], pointer: bool, scope: Scope, file: FileIndex,
@@ -393,7 +393,7 @@ class Names:
         """Resolve ``msg`` under ``using namespace std_msgs``."""
         if head not in ("msg", "srv", "action"):
             return None
-        used = self._used_namespaces(file.file)
+        used = self.used_namespaces(file.file)
         packages = [u for u in used if u.endswith(("_msgs", "_interfaces"))]
         return f"{packages[0]}::{head}" if len(packages) == 1 else None
 

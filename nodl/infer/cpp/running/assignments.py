@@ -173,11 +173,21 @@ def _assign_result(run: Machine, call: Node, value: Value, frame: Frame) -> None
         for atom, model in zip(holders, models, strict=True):
             if model is not None:
                 model(run, Call(call, frame, [value], receiver=atom))
+    elif _is_of_numbers(run, owner or function, frame):
+        return
     elif any(isinstance(atom, Text | Seq | Map | Param) for atom in value) or _gives_reference(run, function):
         run.gap(call, frame, f"what {text(call)[:60]} = ... writes to is not known")
 
 
 _TEMPORARY = re.compile(r"std::(?:string|vector<[^()]*>)\(")
+
+
+def _is_of_numbers(run: Machine, target: Node | None, frame: Frame) -> bool:
+    """Return whether it is an array of numbers, whose elements are never known: ``matrix(0, 0) = x``."""
+    return target is not None and declared_type(run, target, frame)[0].name.startswith(_ARRAYS)
+
+
+_ARRAYS = ("Eigen::", "cv::Mat", "casadi::", "xt::")
 
 
 def _gives_reference(run: Machine, callee: Node | None) -> bool:

@@ -318,6 +318,8 @@ def construct(
     if cls is None and kind.name in SEQUENCES | MAPS and not arguments:
         run.handle(node, frame)
         return (Seq(()),) if kind.name in SEQUENCES else (Map(()),)
+    if cls is None:
+        kind = _in_used_namespace(run, kind, frame)
     key = ("object", frame.file.file, node.start_byte, node.end_byte, frame.path, kind)
     made_object = run.obj(key, kind, cls=cls, heap=heap)
     run.handle(node, frame)
@@ -340,6 +342,13 @@ def construct(
         _unmodelled(run, kind, node, frame, heap or bool(arguments))
     made_object.data["arguments"] = list(arguments)
     return (made_object,)
+
+
+def _in_used_namespace(run: Machine, kind: Type, frame: Frame) -> Type:
+    """Return the class of the table that ``using namespace`` brings in under a name without one."""
+    found = (f"{each}::{kind.name}" for each in run.names.used_namespaces(frame.file.file))
+    known = [name for name in found if name in LIBRARY_CLASSES] if "::" not in kind.name else []
+    return kind._replace(name=known[0]) if len(known) == 1 else kind
 
 
 def _unmodelled(run: Machine, kind: Type, node: Node, frame: Frame, deliberate: bool) -> None:

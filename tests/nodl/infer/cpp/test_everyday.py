@@ -133,6 +133,19 @@ def test_a_header_may_bring_in_the_names_of_std(tmp_path: Path) -> None:
     assert "a1" not in names(infer(tmp_path / "without", source, src__all_hpp=""))
 
 
+def test_a_class_of_a_known_library_may_be_named_without_its_namespace(tmp_path: Path) -> None:
+    members = (
+        "std::shared_ptr<diagnostic_updater::TopicDiagnostic> rate_; tf2_ros::Buffer buffer_{get_clock()};\n"
+    )
+    body = 'using namespace tf2_ros; using namespace diagnostic_updater; rate_.reset(new TopicDiagnostic("r", 1, 2));'
+    system = infer(tmp_path, in_class(f"{body} new TransformListener(buffer_, this);", members))
+    assert not gaps(system)
+    assert names(system) == ["/tf", "/tf_static"]
+    assert any(
+        "Strange is not in reach" in why for why in gaps(infer(tmp_path, in_class(f"{body} new Strange(1);")))
+    )
+
+
 def test_texts_that_the_build_defines_are_known(tmp_path: Path) -> None:
     cmake = (
         'add_executable(node src/main.cpp)\ntarget_compile_definitions(node PRIVATE A="x" "B=\\"y\\"")\n'
@@ -160,6 +173,11 @@ def test_a_module_of_cmake_is_read_where_it_is_included(include: str, tmp_path: 
     assert [(node.executable, str(e.name)) for node in system.nodes for e in node.endpoints] == [
         ("talker", "a")
     ]
+
+
+def test_a_folder_that_includes_itself_is_read_once(tmp_path: Path) -> None:
+    folder = package(tmp_path / "demo", {}, "add_subdirectory(${UNKNOWN})\nadd_executable(node src/node.cpp)")
+    assert list(read_build(str(folder)).targets) == ["node"]
 
 
 def test_a_source_without_its_suffix_is_found(tmp_path: Path) -> None:

@@ -52,10 +52,16 @@ public:
     const rclcpp_lifecycle::LifecycleNode::WeakPtr & parent, std::string name, std::shared_ptr<tf2_ros::Buffer> tf,
     std::shared_ptr<nav2_costmap_2d::Costmap2DROS> costmap) override {{
     auto node = parent.lock();
+    node_ = parent;
     {body}
   }}
+  void activate() override {{
+    alive_ = node_.lock()->create_publisher<std_msgs::msg::Bool>("alive", 1);
+  }}
 private:
+  rclcpp_lifecycle::LifecycleNode::WeakPtr node_;
   rclcpp_lifecycle::LifecyclePublisher<nav_msgs::msg::Path>::SharedPtr pub_;
+  rclcpp_lifecycle::LifecyclePublisher<std_msgs::msg::Bool>::SharedPtr alive_;
 }};
 }}
 PLUGINLIB_EXPORT_CLASS(own::It, nav2_core::Controller)
@@ -102,10 +108,16 @@ def planned(tmp_path: Path) -> Planned:
     """Plan a launch of a host of the plugin ``own/It``, whose method has ``body``, or of one of another ``name``."""
 
     def plan(
-        source: str, base: str, launch: str, parameters: str, body: str, name: str = "own/It"
+        source: str,
+        base: str,
+        launch: str,
+        parameters: str,
+        body: str,
+        name: str = "own/It",
+        cmake: str = CMAKE,
     ) -> LaunchPlan:
         files = {"src/own.cpp": source.format(body=body), "plugins.xml": PLUGINS.format(base=base)}
-        package(tmp_path / "src/own", files, CMAKE)
+        package(tmp_path / "src/own", files, cmake)
         file = tmp_path / "parameters.yaml"
         file.write_text(parameters.replace("NAME", name))
         written = tmp_path / "demo.launch.xml"
@@ -123,8 +135,8 @@ def names(plan: LaunchPlan) -> set[str]:
 
 @pytest.fixture
 def hardware(planned: Planned) -> Callable[..., LaunchPlan]:
-    def plan(body: str, name: str = "own/It") -> LaunchPlan:
-        return planned(HARDWARE, "hardware_interface::SystemInterface", ARM, OF_ARM, body, name)
+    def plan(body: str, name: str = "own/It", cmake: str = CMAKE) -> LaunchPlan:
+        return planned(HARDWARE, "hardware_interface::SystemInterface", ARM, OF_ARM, body, name, cmake)
 
     return plan
 
@@ -146,10 +158,28 @@ def test_a_hardware_component_brings_the_node_that_it_makes(hardware: Planned) -
     assert "/effort" in names(plan) and "/command" not in names(plan)
 
 
-def test_a_hardware_component_that_cannot_be_followed_is_a_gap_with_the_reason(hardware: Planned) -> None:
-    plan = hardware("auto bus = std::make_shared<FieldBus>();")
-    (problem,) = plan.problems
+def test_a_plugin_is_found_where_macros_of_its_own_list_the_sources(hardware: Planned) -> None:
+    cmake = CMAKE.replace("src/own.cpp", "${LISTED_BY_A_MACRO}")
+    assert not hardware("", cmake=cmake).problems
+    (problem,) = hardware("auto bus = std::make_shared<FieldBus>();", cmake=cmake).problems
     assert "FieldBus is not in reach" in str(problem)
+
+
+@pytest.mark.parametrize(
+    ("body", "why"),
+    [
+        ("auto bus = std::make_shared<FieldBus>();", "FieldBus is not in reach"),
+        (
+            'pub_ = get_node()->create_publisher<std_msgs::msg::Float64>("t", 1);',
+            "makes an interface on is not known",
+        ),
+    ],
+)
+def test_a_hardware_component_that_cannot_be_followed_is_a_gap_with_the_reason(
+    hardware: Planned, body: str, why: str
+) -> None:
+    (problem,) = hardware(body).problems
+    assert why in str(problem)
     assert "hardware component 'arm' of class 'own/It'" in str(problem)
 
 
@@ -166,8 +196,10 @@ def nav2(planned: Planned) -> Callable[..., LaunchPlan]:
     return plan
 
 
-def test_a_plugin_of_nav2_that_makes_nothing_is_known(nav2: Planned) -> None:
-    assert not nav2("").problems
+def test_a_plugin_of_nav2_makes_interfaces_on_the_node_that_it_was_given_before(nav2: Planned) -> None:
+    plan = nav2("")
+    assert not plan.problems
+    assert "/alive" in names(plan) and "/seen" not in names(plan)
 
 
 def test_a_plugin_of_nav2_makes_interfaces_on_its_host_under_the_parameters_of_the_launch(

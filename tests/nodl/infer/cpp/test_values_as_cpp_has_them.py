@@ -280,6 +280,13 @@ def test_what_is_written_through_a_function_is_a_gap(tmp_path: Path) -> None:
     )
 
 
+def test_what_is_written_to_an_array_of_numbers_is_none_and_never_known(tmp_path: Path) -> None:
+    body = 'm_(0, 0) = declare_parameter("w", 1.0); m_(1, 1) = 0.0; if (m_(1, 1) > 0.5) { pub("sometimes"); } pub("b");'
+    system = infer(tmp_path, in_class(body, "Eigen::Matrix3d m_;\n" + PUB))
+    assert not gaps(system)
+    assert {e.name.text for each in system.nodes for e in each.endpoints} == {"sometimes", "b"}
+
+
 def test_an_element_that_is_made_of_pieces_is_a_gap(tmp_path: Path) -> None:
     body = 'm_.emplace(std::piecewise_construct, std::forward_as_tuple("b"), std::forward_as_tuple(this));'
     before = (
