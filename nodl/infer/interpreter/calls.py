@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import functools
 
+from nodl.infer.interpreter.conditions import under
 from nodl.infer.interpreter.define import (
     foreign_bases,
     functions_of,
@@ -173,13 +174,9 @@ def _settle(run: Run, frame: Frame, passes: bool) -> None:
 
 def call_bound(run: Run, method: BoundMethod, call: Call) -> Value:
     """Call the method's function with the receiver as its first argument."""
-    receiver, before = method.receiver, run.guards
-    if isinstance(receiver, Instance):
-        run.guards = (*before, *(each for each in receiver.guards if each not in before))
-    shifted = Call(call.args.preceded((receiver,)), call.node, call.frame)
-    result = call_function(run, method.function, shifted)
-    run.guards = before
-    return result
+    shifted = Call(call.args.preceded((method.receiver,)), call.node, call.frame)
+    guards = method.receiver.guards if isinstance(method.receiver, Instance) else ()
+    return under(run, guards, lambda: call_function(run, method.function, shifted))
 
 
 # --- arguments ----------------------------------------------------------------------------------------------

@@ -77,28 +77,31 @@ def _element(run: Run, atom: object, key: Value, node: ast.Subscript, frame: Fra
     return (atom,) if isinstance(atom, Unknown) else ANY
 
 
+def entries_by_parameter(obj: object, key: Value) -> list[tuple[Guard, Value]] | None:
+    """Return what each value of the parameter that is the ``key`` chooses; ``None``: not such a look-up."""
+    asked = input_of(key[0]) if len(key) == 1 else None
+    if asked is None or not is_plain_parameter(asked) or not isinstance(obj, Dictionary | Sequence):
+        return None
+    kind = int if is_whole_number(key[0]) else str
+    entries = _certain_entries(obj)
+    if entries is None or any(type(constant) is not kind for constant, _ in entries):
+        return None
+    return [(Guard(asked, "only if equal", (str(constant),)), value) for constant, value in entries]
+
+
 def chosen_by_parameter(obj: Dictionary | Sequence, key: Value, default: Value | None = None) -> Value | None:
     """Return the texts of a dictionary or list, each if the parameter that is the ``key`` says so.
 
     ``default``: what is taken for any other value. ``None``: not such a look-up.
     """
-    asked = input_of(key[0]) if len(key) == 1 else None
-    if asked is None or not is_plain_parameter(asked):
+    entries = entries_by_parameter(obj, key)
+    if not entries or any(len(value) != 1 for _, value in entries):
         return None
-    found: list[object] = []
-    keys: list[str] = []
-    kind = int if is_whole_number(key[0]) else str
-    for constant, value in _certain_entries(obj) or ():
-        text = value[0] if len(value) == 1 else None
-        if type(constant) is not kind or not isinstance(text, str | Text):
-            return None
-        keys.append(str(constant))
-        found.append(only_if(Guard(asked, "only if equal", (str(constant),)), text))
-    for other in default or ():
-        if not isinstance(other, str | Text):
-            return None
-        found.append(only_if(Guard(asked, "only if not among", tuple(keys)), other))
-    return tuple(found) or None
+    keys = tuple(guard.given[0] for guard, _ in entries)
+    other = entries[0][0]._replace(edit="only if not among", given=keys)
+    chosen = [(guard, value[0]) for guard, value in entries] + [(other, atom) for atom in default or ()]
+    found = [only_if(guard, atom) for guard, atom in chosen if isinstance(atom, str | Text)]
+    return tuple(found) if len(found) == len(chosen) else None
 
 
 def _certain_entries(obj: Dictionary | Sequence) -> list[tuple[object, Value]] | None:

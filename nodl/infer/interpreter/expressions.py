@@ -21,7 +21,14 @@ from nodl.infer.interpreter.conditions import (
     under,
 )
 from nodl.infer.interpreter.define import make_function
-from nodl.infer.interpreter.elements import assign, copy_dictionary, elements, store_item, subscript
+from nodl.infer.interpreter.elements import (
+    assign,
+    copy_dictionary,
+    elements,
+    entries_by_parameter,
+    store_item,
+    subscript,
+)
 from nodl.infer.interpreter.formatting import as_texts, f_string, is_whole_number, percent
 from nodl.infer.interpreter.loops import comprehension, dict_comprehension
 from nodl.infer.interpreter.run import Arguments, Evaluator, Frame, Run
@@ -54,6 +61,7 @@ from nodl.infer.values import (
     join,
     join_all,
     present,
+    sole,
     unknown,
 )
 
@@ -210,7 +218,23 @@ def _call(run: Run, node: ast.Call, frame: Frame) -> Value:
         run.doubtful.add(node)
     args = arguments_of(run, node, frame)
     run.at = node, frame
+    if len(callee) > 1 and type(function) is ast.Subscript:
+        return _call_of_entry(run, function, callee, args, node, frame)
     return run.call(callee, args, node, frame)
+
+
+def _call_of_entry(
+    run: Run, entry: ast.Subscript, callee: Value, args: Arguments, node: ast.Call, frame: Frame
+) -> Value:
+    """Call what a table has under the value of a parameter: ``DRIVERS[name](self)`` makes one of them."""
+    key = run.evaluate(entry.slice, frame)
+    entries = entries_by_parameter(sole(run.evaluate(entry.value, frame)), key)
+    if not entries:
+        return run.call(callee, args, node, frame)
+    calls = [
+        partial(under, run, (guard,), partial(run.call, value, args, node, frame)) for guard, value in entries
+    ]
+    return join_all(run.state.each(calls))
 
 
 def arguments_of(run: Run, node: ast.Call, frame: Frame) -> Arguments:

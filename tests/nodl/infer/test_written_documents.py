@@ -111,6 +111,15 @@ def test_what_an_object_makes_depends_on_what_decided_that_it_is_there(tmp_path:
     assert _names(node, {"driver": "serial"}) == {"serial/status"}
 
 
+def test_of_a_table_that_a_parameter_indexes_one_entry_is_called(tmp_path: Path) -> None:
+    table = "drivers = {'usb': Usb, 'serial': Serial}\nd = p('driver', 'usb')\n"
+    node = _inferred(tmp_path, DRIVERS + table + "driver = drivers[d]()\ndriver.start(self)")
+    assert not node.gaps
+    assert _names(node, {}) == {"usb/status"}
+    assert _names(node, {"driver": "serial"}) == {"serial/status"}
+    assert _names(node, {"driver": "none"}) == set()  # a KeyError
+
+
 def test_an_object_that_is_made_at_several_places_is_there_if_one_of_them_made_it(tmp_path: Path) -> None:
     loop = "driver = None\nfor each in ('a', 'b'):\n    wanted = p(each, False)\n    if wanted:\n        driver = Usb()"
     node = _inferred(tmp_path, DRIVERS + loop + "\nif driver:\n    driver.start(self)")
