@@ -25,7 +25,7 @@ def read_register(root: Path) -> Register | None:
 
 
 def needs_register(view: KeystoreView) -> bool:
-    """Return whether this keystore issues but has no register: SROS2 made it, or an earlier version."""
+    """Return whether this keystore issues but has no register: SROS2 made it, or the file was lost."""
     return (
         not os.path.lexists(view.root / layout.REGISTER)
         and all(os.path.isfile(view.root / layout.ca_cert(role)) for role in Role)

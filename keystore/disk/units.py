@@ -24,7 +24,7 @@ class Unit(NamedTuple):
         node: Fully qualified name of the node, or the process's name.
         enclave: None if the process has none.
         keystore: Where it looks for its enclave.
-        reads_crl: False if it was exported by a version that listed the CRL only if there was one.
+        reads_crl: It loads the CRL of its enclave.
         wants: Of a target, the units it wants, in order.
     """
 
@@ -60,12 +60,10 @@ def parse_unit(name: str, text: str) -> Unit | None:
     key = sources.get(layout.KEY, "").replace("%%", "%")
     keystore, _, place = key.partition(f"/{layout.ENCLAVES}/")
     enclave = "/" + place.removesuffix(layout.KEY).strip("/") if place else None
-    # Earlier versions say the node in the description only.
-    node = values.get(NODE_KEY) or values.get("Description", "").partition("ROS 2: ")[2].partition(" ")[0]
     return Unit(
         name,
         values.get("PartOf", ""),
-        node or None,
+        values.get(NODE_KEY) or None,
         values.get(ENCLAVE_KEY, enclave),
         keystore or None,
         enclave is None or layout.ENCLAVE_CRL in sources,

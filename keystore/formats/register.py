@@ -30,7 +30,7 @@ _moment = lru_cache(maxsize=1024)(parse_moment)  # what was issued together has 
 REVOKED_MARGIN = timedelta(days=400)
 """How long a revoked certificate stays on the CRL after it has ended; longer than a clock may jump unasked."""
 UNKNOWN = ""
-"""In place of an enclave, subject or key: of certificates that only a CRL of an earlier version tells of."""
+"""In place of an enclave, subject or key: of certificates of which only a CRL tells."""
 
 
 class AuthorityState(str, Enum):
@@ -56,7 +56,7 @@ class IssuedCertificate(NamedTuple):
     replaced: bool = False
     revoked: datetime | None = None
     lifetime: int | None = None
-    """In seconds, as it was granted, which a renewal keeps; None where an earlier version or another CA issued it."""
+    """In seconds, as granted, which a renewal keeps; None if it was found in the files, or another CA issued it."""
 
     @property
     def in_force(self) -> bool:
@@ -256,8 +256,7 @@ def _authorities(rows: list[Any]) -> Iterator[tuple[tuple[Role, bytes], Authorit
 
 
 def _certificate(row: list[Any]) -> IssuedCertificate:
-    serial, enclave, subject, key, issuer, not_before, not_after, replaced, revoked, *more = row
-    lifetime = more[0] if more else None  # of earlier versions without
+    serial, enclave, subject, key, issuer, not_before, not_after, replaced, revoked, lifetime = row
     return IssuedCertificate(
         int(serial, 16),
         validate_enclave_name(enclave) if enclave != UNKNOWN else UNKNOWN,

@@ -189,8 +189,8 @@ def differences(units: Iterable[Unit], manifest: Manifest) -> Iterator[str]:
     for unit in processes:
         if not unit.reads_crl:
             yield (
-                f"{unit.name} was exported by an earlier version and would not read a new CRL: export it again and "
-                "install it with secure-keystore units install"
+                f"{unit.name} does not load crl.pem, so that no revocation reaches it: export it again and install it "
+                "with secure-keystore units install"
             )
         if unit.enclave not in manifest.names:
             yield (

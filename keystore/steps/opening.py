@@ -1,15 +1,14 @@
-"""A keystore opened for a change: under the lock, with its register; one of an earlier layout is taken over first."""
+"""A keystore opened for a change: under the lock, with its register, which is made for a keystore without one."""
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from enclave_common.words import counted
 from keystore.disk import layout, lock, safe_files, store
@@ -20,11 +19,9 @@ from keystore.disk.store import Store
 from keystore.disk.view import KeystoreView
 from keystore.errors import DamagedKeystoreError, KeystoreError, printable
 from keystore.formats.certificate import CertificateFacts, given_certificates, read_certificates
-from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.register import UNKNOWN, AuthorityState, IssuedCertificate, Register, SignedPermissions
 from keystore.formats.role import Role
-from keystore.formats.subject import common_name
-from keystore.formats.validity import iso, parse_moment
+from keystore.formats.validity import iso
 from keystore.signing.ca_access import CaAccess
 from keystore.signing.public_key import fingerprint, issued_by
 from keystore.signing.records import certificate_record, permissions_record
@@ -59,7 +56,7 @@ def opened_for_change(
             _check_clock(opened, now, accepted=options.accept_clock)
             opened.clock = now
         if needs_register(KeystoreView(root)):
-            take_over(opened, now)
+            take_over(opened)
         elif opened.has_register:
             _adopt_newer_crl(opened)
         yield opened
@@ -97,9 +94,9 @@ def _adopt_newer_crl(opened: Store) -> None:
             opened.notes.append("the CRL is newer than the register: what it revokes was recorded")
 
 
-def take_over(opened: Store, now: datetime) -> None:
-    """Record what can be known of a keystore without a register: of what stands in it all that its CAs really
-    signed, and what an earlier version remembered of certificates that were replaced.
+def take_over(opened: Store) -> None:
+    """Record what can be known of a keystore that SROS2 made, or whose register was lost: all that its CAs really
+    signed.
 
     Raises DamagedKeystoreError for a CRL that cannot be trusted: nobody knows then who was revoked.
     """
@@ -107,13 +104,12 @@ def take_over(opened: Store, now: datetime) -> None:
     register = _authorities(view)
     with suppress(KeystoreError):  # signed by somebody else: the next governance is recorded
         register = replace(register, governance=trusted_document(view, layout.GOVERNANCE))
-    register = register.with_certificates(_replaced(view, now)).with_certificates(_issued(view))
+    register = register.with_certificates(_issued(view))
     register = register.with_documents(_documents(view, register))
     register = _with_crl(view, register)
     opened.ensure_directory(layout.PRIVATE)
     with opened.batch() as batch:
         batch.record(register)
-    opened.remove(layout.SUPERSEDED)
     opened.notes.append(
         f"register made from the files in this keystore: {counted(len(register.certificates), 'certificate')}"
     )
@@ -146,32 +142,6 @@ def _certificates_in(view: KeystoreView, directory: str, prefix: str) -> Iterato
         if name.startswith(prefix) and name.endswith(layout.CERT):
             pem = safe_files.read(view.root, f"{directory}/{name}")
             yield from read_certificates(pem, printable(view.root / directory / name))
-
-
-def _replaced(view: KeystoreView, now: datetime) -> Iterator[IssuedCertificate]:
-    """Return certificates that were replaced and had not expired, as an earlier version remembered them.
-
-    Whoever copied one with its key can still use it, so that removing its enclave has to revoke it. Raises
-    DamagedKeystoreError.
-    """
-    if safe_files.read_if_there(view.root, layout.SUPERSEDED) is None:
-        return
-    text = safe_files.read_private(view.root, layout.SUPERSEDED)
-    issuer = fingerprint(view.ca(Role.IDENTITY).der)
-    try:
-        content: Any = json.loads(text)
-        if content["version"] != 1:
-            raise KeyError("version")
-        for entry in content["certificates"]:
-            enclave, serial = validate_enclave_name(entry["enclave"]), int(entry["serial"], 16)
-            end = parse_moment(entry["not_after"])
-            yield IssuedCertificate(
-                serial, enclave, common_name(enclave), UNKNOWN, issuer, now, end, replaced=True
-            )
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError):
-        raise DamagedKeystoreError(
-            f"{printable(view.root / layout.SUPERSEDED)} is not a list of replaced certificates; restore it"
-        ) from None
 
 
 def _issued(view: KeystoreView) -> Iterator[IssuedCertificate]:

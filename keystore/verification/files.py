@@ -24,7 +24,7 @@ from keystore.verification.finding import Finding, Severity
 _TOP = frozenset({layout.PUBLIC, layout.PRIVATE, layout.ENCLAVES, layout.ZENOH, layout.CONTAINERS})
 _KNOWN = frozenset({
     layout.LOCK, layout.GITIGNORE, layout.SETTINGS, layout.CRL, layout.GOVERNANCE_XML, layout.GOVERNANCE,
-    layout.SHARED_CA_CERT, layout.SHARED_CA_KEY, layout.SUPERSEDED, layout.REGISTER, layout.CRL_UNLINKED,
+    layout.SHARED_CA_CERT, layout.SHARED_CA_KEY, layout.REGISTER, layout.CRL_UNLINKED,
     layout.ZENOH_ROUTER, layout.ZENOH_ROUTER_CERT, layout.ZENOH_ROUTER_KEY,
     layout.BUNDLE, layout.HANDOVER, layout.SIGNED_HANDOVER,
     *(layout.ca_cert(role) for role in Role),

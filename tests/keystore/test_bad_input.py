@@ -182,7 +182,7 @@ def test_a_bundle_whose_enclaves_stand_alone_gets_no_other_ca(tmp_path: Path) ->
     bundle = tmp_path / "bundle"
     assert main(["export", str(root), "-o", str(bundle), "--enclave", "/a", "--public", "copy"]) == 0
     assert not provision(bundle, [policy("/a")], options=options()).changed
-    shutil.rmtree(bundle / "public")  # of earlier versions
+    shutil.rmtree(bundle / "public")
     (bundle / "enclaves/governance.p7s").unlink()
     with pytest.raises(DamagedKeystoreError, match="a deployed copy"):
         provision(bundle, [policy("/a")], options=options())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from dataclasses import replace
 from datetime import timedelta
@@ -441,53 +440,42 @@ class TestAuthorities:
 
 
 class TestTakingOver:
-    def earlier(self, root: Path, replaced: list[tuple[str, int]] | None = None) -> Path:
-        """The keystore as the version before the register would have left it."""
+    def without_register(self, root: Path) -> Path:
+        """The keystore as SROS2 would have made it, or after its register was lost."""
         (root / layout.REGISTER).unlink()
-        if replaced:
-            rows = [
-                {"enclave": name, "serial": f"{one:040x}", "not_after": "2036-01-01T00:00:00Z"}
-                for name, one in replaced
-            ]
-            text = json.dumps({"version": 1, "certificates": rows})
-            (root / layout.SUPERSEDED).write_text(text)
-            (root / layout.SUPERSEDED).chmod(0o600)
         return root
 
     def test_everything_that_stands_is_recorded_and_nothing_changes(self, tmp_path: Path) -> None:
         root = filled(tmp_path / "ks")
         before = register(root)
-        report = provision(self.earlier(root), [policy("/a"), policy("/b")], options=options())
+        report = provision(self.without_register(root), [policy("/a"), policy("/b")], options=options())
         assert actions(report) == {}
         assert report.created == ("register made from the files in this keystore: 2 certificates",)
         bare = {serial: one._replace(lifetime=None) for serial, one in before.certificates.items()}
         assert replace(register(root), written=before.written) == replace(before, certificates=bare)
 
-    def test_revocations_and_replaced_certificates_are_kept(self, tmp_path: Path) -> None:
-        root = filled(tmp_path / "ks", ["/a", "/b", "/c"])
-        first = serial(root, "/a")
-        renew(root, ["/a"], options=RenewOptions(provisioning=options()))
+    def test_revocations_are_kept(self, tmp_path: Path) -> None:
+        root = filled(tmp_path / "ks", ["/a", "/c"])
         gone = serial(root, "/c")
         remove(root, ["/c"], options=QUICK)
         last = number(root)
-        self.earlier(root, [("/a", first)])
+        self.without_register(root)
         remove(root, ["/a"], options=QUICK)
-        assert is_revoked(root, first) and is_revoked(root, gone) and number(root) > last
-        assert not (root / layout.SUPERSEDED).exists()
+        assert is_revoked(root, gone) and number(root) > last
 
     def test_a_foreign_ca_is_not_taken_over(self, tmp_path: Path) -> None:
         root, other = filled(tmp_path / "ks", ["/a"]), filled(tmp_path / "other", ["/a"])
         trusted = root / "public/identity_ca.cert.pem"
         trusted.write_bytes(trusted.read_bytes() + (other / "public/identity_ca.cert.pem").read_bytes())
         with pytest.raises(UnsafeKeystoreError, match="did not make"):
-            provision(self.earlier(root), [policy("/a")], options=options())
+            provision(self.without_register(root), [policy("/a")], options=options())
 
     @pytest.mark.parametrize("step", [Step.START, Step.SWITCH])
     def test_a_roll_over_under_way_is_taken_over(self, tmp_path: Path, step: Step) -> None:
         root = filled(tmp_path / "ks", ["/a"])
         for one in list(Step)[: list(Step).index(step) + 1]:
             roll_over(root, one, options=options())
-        self.earlier(root)
+        self.without_register(root)
         for one in list(Step)[list(Step).index(step) + 1 :]:
             roll_over(root, one, options=options())
         assert codes(root) == set()
@@ -496,7 +484,7 @@ class TestTakingOver:
         root, other = filled(tmp_path / "ks", ["/a"]), filled(tmp_path / "other", ["/a"])
         for name in ("key.pem", "cert.pem"):
             shutil.copy(other / "enclaves/a" / name, root / "enclaves/a" / name)
-        provision(self.earlier(root), [policy("/a")], options=options())
+        provision(self.without_register(root), [policy("/a")], options=options())
         assert (root / "enclaves/a/key.pem").read_bytes() != (other / "enclaves/a/key.pem").read_bytes()
         assert codes(root) == set()
 

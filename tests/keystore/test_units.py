@@ -38,7 +38,7 @@ def told(host: Path, capsys: pytest.CaptureFixture[str]) -> str:
 
 
 def write_unit(host: Path, name: str, enclave: str, more: str = CRL, keystore: str = "ks") -> None:
-    text = f"[Unit]\nDescription=ROS 2: {enclave} in enclave {enclave}\nPartOf=robot.target\n[Service]\n"
+    text = f"[Unit]\nX-Node={enclave}\nPartOf=robot.target\n[Service]\n"
     places = {"ks": host / keystore, "enclave": enclave}
     (host / "units" / name).write_text(HEAD + text + CREDENTIALS.format(**places) + more.format(**places))
 
@@ -49,16 +49,11 @@ def test_units_that_fit_are_not_spoken_of(host: Path, capsys: pytest.CaptureFixt
     assert ".service" not in told(host, capsys)
 
 
-def test_a_unit_of_an_earlier_version_would_not_read_a_crl(
-    host: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_unit_that_loads_no_crl_is_named(host: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write_unit(host, "robot-a.service", "/a", more="")
     write_unit(host, "robot-b.service", "/b")
     said = told(host, capsys)
-    assert (
-        "robot-a.service was exported by an earlier version and would not read a new CRL: export it again"
-        in said
-    )
+    assert "robot-a.service does not load crl.pem, so that no revocation reaches it: export it again" in said
     assert "robot-b.service" not in said
 
 
