@@ -20,8 +20,8 @@ JsonScalar = Union[StrictBool, StrictInt, StrictFloat, StrictStr]
 JsonParameter = Union[JsonScalar, list[JsonScalar]]
 
 
-def _described(description: str, default: Any = ...) -> Any:
-    return Field(default, description=description)
+def _described(description: str) -> Any:
+    return Field(..., description=description)
 
 
 _ORIGIN = "where they come from: --nodl, manifest of the package, recorded, inferred, library"
@@ -69,7 +69,7 @@ class Process(_Strict, frozen=True):
     remaps: list[tuple[str, str]] = _described("from, to; global rules before the node's own")
     parameters: dict[str, JsonParameter] = _described("as the node will see them")
     enclave: Optional[str] = Field(...)
-    interfaces: Optional[str] = _described(_ORIGIN, None)
+    interfaces: Optional[str] = _described(_ORIGIN)
     prefix: list[str] = _described("the first words of cmd, which start the program: launch-prefix")
     domain_id: int = _described("of its own environment")
     middleware: str = _described("the RMW implementation it would load")
@@ -77,15 +77,13 @@ class Process(_Strict, frozen=True):
     launch_file: str
     line: int = _described("line of the element, 0 when not known")
     on_event: Optional[str] = _described("the event that would start it; null when the launch itself does")
-    process: Optional[str] = _described("the process name, NAME-N", None)
-    kind: Optional[Literal["node", "lifecycle_node", "container", "executable"]] = Field(default=None)
-    machine: Optional[str] = _described("the host that the launch file means it for", None)
-    cwd: Optional[str] = Field(default=None)
-    shell: bool = _described("cmd is one text for a shell", False)
-    respawn: Optional[Respawn] = _described("null: not started again when it ends", None)
-    parameter_files: dict[str, str] = Field(
-        default_factory=dict, description="YAML that launch would write, by its placeholder in cmd"
-    )
+    process: str = _described("the process name, NAME-N")
+    kind: Literal["node", "lifecycle_node", "container", "executable"]
+    machine: Optional[str] = _described("the host that the launch file means it for")
+    cwd: Optional[str] = Field(...)
+    shell: bool = _described("cmd is one text for a shell")
+    respawn: Optional[Respawn] = _described("null: not started again when it ends")
+    parameter_files: dict[str, str] = _described("YAML that launch would write, by its placeholder in cmd")
 
 
 class Component(_Strict, frozen=True):
@@ -98,7 +96,7 @@ class Component(_Strict, frozen=True):
     remaps: list[tuple[str, str]]
     parameters: dict[str, JsonParameter]
     enclave: Optional[str] = _described("the container's; null when the container is not part of this launch")
-    interfaces: Optional[str] = _described(_ORIGIN, None)
+    interfaces: Optional[str] = _described(_ORIGIN)
     launch_file: str
     line: int
     on_event: Optional[str] = Field(...)
@@ -137,7 +135,7 @@ class Interface(_Strict, frozen=True):
     remapped_by: list[str]
     note: str
     qos: dict[str, Union[StrictInt, StrictStr]] = _described(
-        "policies that the description fixes, by the names of NoDL v2", {}
+        "policies that the description fixes, by the names of NoDL v2"
     )
 
 
@@ -147,7 +145,7 @@ class Node(_Strict, frozen=True):
     fqn: str
     enclave: str
     program: str = _described("package/executable or package/plugin")
-    parameters: Optional[list[str]] = _described("all that it declares; null if that is not known", None)
+    parameters: Optional[list[str]] = _described("all that it declares; null if that is not known")
     interfaces: list[Interface]
 
 
@@ -171,8 +169,8 @@ class DryRun(_Strict, frozen=True):
     components: list[Component]
     enclaves: dict[str, Enclave]
     nodes: list[Node]
-    reactions: list[Reaction] = Field(default_factory=list)
-    launcher_calls: list[LauncherCall] = Field(default_factory=list)
+    reactions: list[Reaction]
+    launcher_calls: list[LauncherCall]
     warnings: list[str] = _described("every diagnostic as one message for a person, errors first")
     diagnostics: list[Diagnostic]
 

@@ -102,7 +102,7 @@ def _process(entry: Process, name: str, nodes: Mapping[str, tuple[str, ...]]) ->
     environment = {key: text for key, text in entry.environment.items() if key not in _SECURITY}
     return DeployedProcess(
         name=name,
-        process=entry.process or name,
+        process=entry.process,
         fqn=fqn,
         command=_secured(entry),
         shell=entry.shell,
@@ -139,7 +139,7 @@ def _secured(entry: Process) -> tuple[str, ...]:
 
 
 def _stem(entry: Process) -> str:
-    return (entry.process or entry.executable).rpartition("/")[2].rpartition("-")[0] or "process"
+    return entry.process.rpartition("/")[2].rpartition("-")[0] or "process"
 
 
 def engine_names(subjects: Iterable[str]) -> list[str]:

@@ -82,8 +82,7 @@ def differences(document: DryRun, engine: Engine) -> tuple[str, ...]:
 def _late_processes(document: DryRun) -> Iterator[Unexpressed]:
     for one in document.processes:
         if one.on_event is not None:
-            what = one.process or one.executable
-            yield Unexpressed(f"{what} is started by an event ({one.on_event})", _place(one))
+            yield Unexpressed(f"{one.process} is started by an event ({one.on_event})", _place(one))
 
 
 def _components(document: DryRun) -> Iterator[Unexpressed]:

@@ -55,7 +55,7 @@ class Expected(NamedTuple):
 def out_of_sight(plans: Iterable[DryRun]) -> tuple[str, ...]:
     """Return the processes on Zenoh: an observer takes part in DDS, and would miss them."""
     processes = (process for plan in plans for process in plan.processes)
-    return tuple(process.process or "" for process in processes if process.middleware == ZENOH)
+    return tuple(process.process for process in processes if process.middleware == ZENOH)
 
 
 def expected_in(plans: Sequence[DryRun], domain: int) -> Expected:

@@ -23,6 +23,7 @@ def interface(operation: str, name: str, *, built_in: bool = False, type: str = 
         "written": name,
         "remapped_by": [],
         "note": "",
+        "qos": {},
     }
 
 
@@ -39,7 +40,9 @@ def document(enclaves: dict[str, dict[str, Asked]]) -> dict[str, Any]:
                     name, _, type_ = written.partition(" ")
                     interfaces.append(interface(operation, name, type=type_))
                     lists[path][operation].add(name)
-            nodes.append({"fqn": fqn, "enclave": path, "program": "p/e", "interfaces": interfaces})
+            nodes.append(
+                {"fqn": fqn, "enclave": path, "program": "p/e", "parameters": None, "interfaces": interfaces}
+            )
     named = {
         path: {
             "nodes": sorted(enclaves[path]),
@@ -54,6 +57,8 @@ def document(enclaves: dict[str, dict[str, Asked]]) -> dict[str, Any]:
         "components": [],
         "enclaves": named,
         "nodes": nodes,
+        "reactions": [],
+        "launcher_calls": [],
         "warnings": [],
         "diagnostics": [],
     }
@@ -78,6 +83,14 @@ def process(**values: Any) -> dict[str, Any]:
         "launch_file": "f.launch.xml",
         "line": 3,
         "on_event": None,
+        "interfaces": None,
+        "process": "e-1",
+        "kind": "node",
+        "machine": None,
+        "cwd": None,
+        "shell": False,
+        "respawn": None,
+        "parameter_files": {},
         **values,
     }
 

@@ -108,7 +108,7 @@ def _refuse_problems(document: DryRun) -> None:
     problems = [one.text for one in document.diagnostics if one.severity == "error"]
     if problems:
         raise ManifestError("\n".join((*problems, "the plan is not complete, so nothing was written")))
-    zenoh = sorted(one.process or "" for one in document.processes if one.middleware == ZENOH)
+    zenoh = sorted(one.process for one in document.processes if one.middleware == ZENOH)
     if zenoh:
         raise ManifestError(
             f"{', '.join(zenoh)} on Zenoh ({ZENOH}): without a router and its files they would run unprotected, and "
