@@ -75,5 +75,5 @@ def translated(caught: type[Exception], raised: type[EnclaveLaunchError], before
 
 
 def keystore_errors() -> AbstractContextManager[None]:
-    """Raises ``ProvisionError`` in the place of a ``KeystoreError``."""
+    """Translate each ``KeystoreError`` to a ``ProvisionError``."""
     return translated(KeystoreError, ProvisionError)

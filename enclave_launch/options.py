@@ -75,7 +75,7 @@ class ResolveOptions(_ResolveOptions):
         return HostOptions(self.distro, self.allow_missing_packages, self.no_python)
 
     def plan_options(self) -> PlanOptions:
-        """Raises ``UsageError`` for a policy file that cannot be used."""
+        """Return the options of planning; raises ``UsageError`` for a policy file that cannot be used."""
         document = _read_policy(self.policy) if self.policy else None
         _check_also(self.also)
         policy = PolicyOptions(self.accept_patterns, document, also=frozenset(self.also))

@@ -37,7 +37,10 @@ class Planner(NamedTuple):
     options: PlanOptions
 
     def plan(self, evaluation: Evaluation) -> LaunchPlan:
-        """Raises ``LaunchFileError`` for an enclave name or remap rule that the started process would refuse."""
+        """Make the plan of an evaluated launch.
+
+        Raises ``LaunchFileError`` for an enclave name or remap rule that the started process would refuse.
+        """
         scope = self.options.enclave_scope
         processes = tuple(
             self._admitted(_plan_process(process, self.lookup, scope), evaluation.distro)

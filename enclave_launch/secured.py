@@ -145,7 +145,7 @@ class PlanProvider:
             return None  # ``ensure`` says why, where it may take its time
 
     def ensure(self, process: ResolvedProcess) -> StartAdditions:
-        """Raises ``ProvisionError`` when its enclave is no longer what was provisioned."""
+        """Check the enclave of a process and return what it needs; raises ``ProvisionError`` if it was changed."""
         planned = self._find(process)
         assert planned is not None, "the gate lets only planned processes come here"
         if planned.enclave is not None:

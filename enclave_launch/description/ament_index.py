@@ -52,12 +52,12 @@ def get_packages_with_prefixes() -> dict[str, str]:
 
 
 def get_package_prefix(package_name: str) -> str:
-    """Raises ``PackageNotFoundError``; ``ValueError`` for what cannot be a package name."""
+    """Return the install prefix of a package; raises ``PackageNotFoundError``, ``ValueError`` for an invalid name."""
     return current_host().find_package_prefix(package_name)
 
 
 def get_package_share_directory(package_name: str, print_warning: bool = True) -> str:
-    """Raises as ``get_package_prefix``; warns when the directory does not exist."""
+    """Return the share directory of a package; raises as ``get_package_prefix``, warns if it does not exist."""
     path = os.path.join(get_package_prefix(package_name), "share", package_name)
     if print_warning and not os.path.exists(path) and not current_host().is_missing(path):
         warnings.warn(f"Share directory for {package_name} ({path}) does not exist.", stacklevel=2)

@@ -212,7 +212,7 @@ class LaunchContext:
         self._event_handlers.register(event_handler, append)
 
     def unregister_event_handler(self, event_handler: Handler) -> None:
-        """Raises ``ValueError`` when it is not registered."""
+        """Unregister the handler; raises ``ValueError`` if it is not registered."""
         self._event_handlers.unregister(event_handler)
 
     def emit_event_sync(self, event: Event) -> None:

@@ -39,7 +39,7 @@ class InvalidNamespaceException(NameValidationException):
 
 
 def validate_node_name(name: str) -> None:
-    """Raises ``InvalidNodeNameException``."""
+    """Check a node name; raises ``InvalidNodeNameException``."""
     try:
         names.validate_node_name(name)
     except names.InvalidNameError as error:
@@ -47,7 +47,7 @@ def validate_node_name(name: str) -> None:
 
 
 def validate_namespace(namespace: str) -> None:
-    """Raises ``InvalidNamespaceException``."""
+    """Check a namespace; raises ``InvalidNamespaceException``."""
     try:
         names.validate_namespace(namespace)
     except names.InvalidNameError as error:

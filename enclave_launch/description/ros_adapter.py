@@ -26,7 +26,7 @@ class ROSAdapter:
             self.start()
 
     def start(self) -> None:
-        """Raises ``RuntimeError`` when already started, ``ImportError`` without rclpy."""
+        """Start the node; raises ``RuntimeError`` if already started, ``ImportError`` without rclpy."""
         if self.ros_node is not None:
             raise RuntimeError("Cannot start a ROS adapter that is already running")
         import rclpy
@@ -41,7 +41,7 @@ class ROSAdapter:
         self.__thread.start()
 
     def shutdown(self) -> None:
-        """Raises ``RuntimeError`` when not started."""
+        """Stop the node and its executor; raises ``RuntimeError`` if not started."""
         if self.ros_node is None:
             raise RuntimeError("Cannot shutdown a ROS adapter that is not running")
         self.__ros_executor.shutdown()

@@ -131,7 +131,10 @@ def _run_python_launch_file(python_launch_file_path: str) -> LaunchDescription:
 def get_launch_description_from_frontend_launch_file(
     frontend_launch_file_path: str, *, parser: type[Parser] = Parser
 ) -> LaunchDescription:
-    """Raises ``InvalidFrontendLaunchFileError``, ``OSError``, and the errors of elements and substitutions."""
+    """Load an XML or YAML launch file.
+
+    Raises ``InvalidFrontendLaunchFileError``, ``OSError``, and the errors of elements and substitutions.
+    """
     root, implementation = parser.load(frontend_launch_file_path)
     return implementation.parse_description(root)
 

@@ -112,7 +112,7 @@ class Host(Protocol):
         """Return ament prefixes to search, first wins, from the environment of this moment."""
 
     def find_package_prefix(self, package: str) -> str:
-        """Raises ``PackageNotFoundError`` (a ``KeyError``), ``ValueError`` for an impossible name."""
+        """Return the prefix; raises ``PackageNotFoundError`` (a ``KeyError``), ``ValueError`` for an invalid name."""
 
     def find_executable(self, package: str, executable: str) -> str:
         """Return the file in the package's libexec directory; raises ExecutableNotInstalledError."""

@@ -185,7 +185,7 @@ class _FileReader:
         return {name: section.read() for name, section in self._sections.items()}
 
     def take(self, kind: str, text: str, style: str, line: int) -> None:
-        """Raises ``RefusedParameters``."""
+        """Take the next event of the YAML parser; raises ``RefusedParameters``."""
         if kind == "scalar":
             if self._key_is_next:
                 self._take_key(text, line)

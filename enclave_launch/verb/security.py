@@ -30,7 +30,7 @@ _NEW_KEYSTORE = "governance signed"
 
 
 def security_options(options: argparse.Namespace) -> SecurityOptions:
-    """Raises ``UsageError`` for a value that is not what its option takes."""
+    """Return the options of provisioning; raises ``UsageError`` for a value that an option does not take."""
     with translated(InvalidInputError, UsageError):
         parse_duration(options.warn_expiry)  # used after provisioning, refused before
         return SecurityOptions(strategy=options.strategy, keystore=_provision_options(options))

@@ -29,7 +29,10 @@ class LaunchTarget(NamedTuple):
 
 
 def find_target(words: Sequence[str], prefixes: Sequence[str]) -> LaunchTarget:
-    """Raises ``UsageError``: nothing given, no such file or package, several files of that name, bad argument."""
+    """Find the launch file and its arguments.
+
+    Raises ``UsageError``: nothing given, no such file or package, several files of that name, bad argument.
+    """
     if not words:
         raise UsageError("give PACKAGE LAUNCH_FILE or the PATH of a launch file (see secure-launch --help)")
     first, *rest = words

@@ -41,7 +41,7 @@ def read_command_line(parser: argparse.ArgumentParser, argv: Sequence[str] | Non
 
 
 def check_options(line: CommandLine, parser: argparse.ArgumentParser) -> None:
-    """Raises ``UsageError`` for options without effect; it names the flag that is missing."""
+    """Refuse options without effect: ``UsageError`` names the flag that is missing."""
     given, options, actions = line.given, line.options, parser._actions
     looks = check_views(line, actions)
     if options.learn is None:
@@ -86,7 +86,7 @@ def check_views(line: CommandLine, actions: Sequence[argparse.Action]) -> bool:
 def check_needs_secure(
     actions: Iterable[argparse.Action], given: Collection[str], flag: str = "--secure"
 ) -> None:
-    """Raises ``UsageError`` when one of ``actions`` was given that has an effect only together with ``flag``."""
+    """Raise ``UsageError`` if one of ``actions`` was given, which have an effect only together with ``flag``."""
     if idle := _flags(actions, given):
         raise UsageError(f"{idle} has no effect without {flag}: nothing was started")
 

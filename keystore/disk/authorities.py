@@ -25,7 +25,10 @@ def foreign_authorities(view: KeystoreView, register: Register | None) -> list[t
 
 
 def refuse_foreign_authorities(view: KeystoreView, register: Register | None) -> None:
-    """Raises UnsafeKeystoreError: whoever holds the key of such a CA can make enclaves that Fast DDS lets in."""
+    """Raise UnsafeKeystoreError for a trusted CA that this keystore did not make.
+
+    Whoever holds the key of such a CA can make enclaves that Fast DDS lets in.
+    """
     for role, ca in foreign_authorities(view, register):
         place = printable(view.root / layout.ca_cert(role))
         raise UnsafeKeystoreError(

@@ -23,7 +23,7 @@ _WRITABLE_BY_OTHERS = 0o022
 
 
 def resolve_root(keystore: Path | str) -> Path:
-    """Raises NotAKeystoreError for what cannot be a path."""
+    """Resolve the path of a keystore; raises NotAKeystoreError for what cannot be a path."""
     try:
         return Path(os.path.realpath(keystore))
     except ValueError:

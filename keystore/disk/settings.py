@@ -38,7 +38,7 @@ class KeystoreSettings:
 
     @classmethod
     def from_json(cls, text: bytes, place: str) -> KeystoreSettings:
-        """Raises DamagedKeystoreError for anything but what ``to_json`` writes."""
+        """Parse what ``to_json`` writes; raises DamagedKeystoreError for anything else."""
         try:
             content: Any = json.loads(text)
             if content["version"] != _VERSION:

@@ -64,7 +64,7 @@ class KeystoreView:
             raise StorageError.of(error, "looking for a keystore at") from None
 
     def refuse_foreign(self) -> None:
-        """Raises NotAKeystoreError for a directory with other things in it, in which no keystore can be made."""
+        """Raise NotAKeystoreError for a directory with other things in it, in which no keystore can be made."""
         if not self.is_complete and not self.can_be_completed:
             raise NotAKeystoreError(
                 f"{printable(self.root)} exists and is not a keystore; choose an empty or new directory"
@@ -105,7 +105,7 @@ class KeystoreView:
         return bundles
 
     def refuse_ended(self, now: datetime, *roles: Role) -> None:
-        """Raises DamagedKeystoreError where one of these CAs is not valid now, so that what it signs would not be."""
+        """Raise DamagedKeystoreError if one of these CAs is not valid now, so that what it signs would not be."""
         if not all(self.ca(role).validity.covers(now) for role in roles):
             raise DamagedKeystoreError(
                 "a CA of this keystore is expired, or not yet valid (is the clock right?); to replace it: "
@@ -157,7 +157,7 @@ class KeystoreView:
         return read_certificate(pem, printable(relative)).common_name if pem else None
 
     def require_enclaves(self, names: Iterable[str]) -> None:
-        """Raises InvalidInputError where one of them is not here."""
+        """Raise InvalidInputError if one of these enclaves does not exist."""
         unknown = sorted(set(names) - set(self.enclaves()))
         if unknown:
             raise InvalidInputError(

@@ -60,7 +60,7 @@ class _Document(StrictDocument):
 
 
 def load_governance_yaml(path: Path) -> Governance:
-    """Raises InvalidInputError naming the file and the line or the entry."""
+    """Read the file; raises InvalidInputError naming the file and the line or the entry."""
     return parse_governance_yaml(read_given(path), str(path))
 
 

@@ -230,7 +230,7 @@ def _certificate_row(one: IssuedCertificate) -> list[Any]:
 
 
 def parse_register(text: bytes, place: str) -> Register:
-    """Raises DamagedKeystoreError for anything but what ``register_json`` writes."""
+    """Parse what ``register_json`` writes; raises DamagedKeystoreError for anything else."""
     try:
         content: Any = json.loads(text)
         if content["version"] != _VERSION:

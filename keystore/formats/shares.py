@@ -100,7 +100,7 @@ def shares_json(shares: Iterable[Share]) -> bytes:
 
 
 def parse_shares(text: bytes, place: str) -> tuple[Share, ...]:
-    """Raises DamagedKeystoreError for anything but what ``shares_json`` writes."""
+    """Parse what ``shares_json`` writes; raises DamagedKeystoreError for anything else."""
     try:
         content: Any = json.loads(text)
         if content["version"] != _VERSION:

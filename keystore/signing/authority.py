@@ -83,7 +83,7 @@ def self_signed_ca(role: Role, name: str, signer: Signer, validity: Validity) ->
 
 
 def refuse_ca_name(name: str) -> None:
-    """Raises InvalidInputError for what X.509 cannot carry, or DDS implementations read as more than one piece."""
+    """Raise InvalidInputError for what X.509 cannot carry, or DDS implementations read as more than one piece."""
     fits = name.strip() and name.isprintable() and len(name.encode()) <= 64
     if not fits or any(char in name for char in ',+"\\=/|<>;#'):
         raise InvalidInputError('a CA name has 1 to 64 bytes of UTF-8 and none of , + " \\ = / | < > ; #')
@@ -195,7 +195,7 @@ def _sign(builder: x509.CertificateBuilder, signer: Signer) -> bytes:
 
 
 def check_can_serve(facts: CertificateFacts, role: Role, now: datetime, place: str) -> None:
-    """Raises InvalidInputError when DDS implementations would refuse what this CA signs."""
+    """Raise InvalidInputError if DDS implementations would refuse what this CA signs."""
     if not facts.validity.covers(now):
         raise InvalidInputError(f"{place} is not valid now")
     constraints, usage = facts.extension(x509.BasicConstraints), facts.extension(x509.KeyUsage)

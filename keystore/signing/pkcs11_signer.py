@@ -55,7 +55,7 @@ class Pkcs11Signer:
 
     @classmethod
     def open(cls, uri: str, pin: Secret | None, environment: Mapping[str, str]) -> Pkcs11Signer:
-        """Raises SigningUnavailableError when module, token, PIN or key is not there."""
+        """Open the token; raises SigningUnavailableError if module, token, PIN or key is missing."""
         attributes = parse_uri(uri)
         try:
             import pkcs11

@@ -29,7 +29,7 @@ def certificate_record(
 
 
 def permissions_record(enclave: str, common_name: str, document: bytes) -> SignedPermissions:
-    """Raises DamagedKeystoreError when no grant is for this subject, InvalidInputError for another kind of document."""
+    """Return the record of a signed document; raises DamagedKeystoreError, InvalidInputError."""
     grant = grant_for(document, subject_name(common_name), f"the permissions of {enclave}")
     if grant is None:
         raise DamagedKeystoreError(

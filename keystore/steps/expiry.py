@@ -57,7 +57,7 @@ class StatusReport(NamedTuple):
 
 
 def status(keystore: Path | str, *, now: datetime | None = None) -> StatusReport:
-    """Raises NotAKeystoreError, DamagedKeystoreError for what cannot be read."""
+    """List what expires when; raises NotAKeystoreError, DamagedKeystoreError for what cannot be read."""
     view = keystore_at(keystore)
     names = view.enclaves()
     ordered = sorted(_expiries(view, names, {}), key=_order)

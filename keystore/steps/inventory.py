@@ -111,7 +111,7 @@ class GovernanceFacts(NamedTuple):
 
 
 def governance_facts(keystore: Path | str) -> GovernanceFacts:
-    """Raises NotAKeystoreError, DamagedKeystoreError and InvalidInputError for what cannot be read."""
+    """Read the governance in force; raises NotAKeystoreError, DamagedKeystoreError and InvalidInputError."""
     view = keystore_at(keystore)
     governance = parse_governance(signed_governance(view).document, layout.GOVERNANCE)
     return GovernanceFacts([_plain(rule) for rule in governance.domain_rules], tuple(weaknesses(governance)))

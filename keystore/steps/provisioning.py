@@ -158,7 +158,7 @@ def _as_long_as_asked(options: ProvisionOptions) -> ProvisionOptions:
 
 
 def list_enclaves(keystore: Path | str) -> list[str]:
-    """Names of all enclaves, sorted; the root is ``/``. Raises NotAKeystoreError."""
+    """Return the names of all enclaves, sorted; the root is ``/``. Raises NotAKeystoreError."""
     view = keystore_at(keystore)
     return view.enclaves()
 

@@ -183,7 +183,7 @@ def left_over(root: Path, owner: str, enclaves: Iterable[str]) -> list[str]:
 
 
 def refuse_running(root: Path, enclaves: Iterable[str]) -> None:
-    """Raises InvalidInputError when a running launch has a share of one of them: it would lose what it is using."""
+    """Raise InvalidInputError if a running launch has a share of one of them: it would lose what it is using."""
     for enclave in enclaves:
         for share in read_shares(root, enclave):
             if is_running(root, share.owner):

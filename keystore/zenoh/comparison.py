@@ -46,7 +46,7 @@ class ZenohDifference(NamedTuple):
 
 
 def read_configuration(text: bytes, place: str) -> ZenohConfiguration:
-    """Raises ``InvalidInputError`` for what is not JSON of such a configuration, as this program writes it."""
+    """Parse a configuration as this program writes it; raises ``InvalidInputError`` for anything else."""
     content: Any = None
     try:
         content = json.loads(text if len(text) <= _LARGEST else b"")

@@ -55,7 +55,7 @@ class Grants(NamedTuple):
 
 
 def grants_of_policy(policy: EnclavePolicy, types: Types = MappingProxyType({})) -> Grants:
-    """Raises ``PolicyError`` for a name that no ROS node can have."""
+    """Return the grants of a policy; raises ``PolicyError`` for a name that no ROS node can have."""
     rules = dds_rules(policy)
     return grants_of_topics(rules.allow, rules.deny, types)
 

@@ -139,7 +139,7 @@ class LoadComposableNodes(Action):
         return cls, kwargs
 
     def execute(self, context: LaunchContext) -> list[LaunchDescriptionEntity] | None:
-        """Raises ``RuntimeError`` when the container object was not executed yet, and as the components do."""
+        """Load the components; raises ``RuntimeError`` if the container was not executed yet, and as components do."""
         container = self.__container_name(context)
         service = f"{container}/_container/load_node"
         context.host.launcher_call(LauncherCall(service, _LOAD_NODE, location_of(self, context)))

@@ -35,7 +35,7 @@ _ITEM_TYPES = (float, int, str, bool, *SomeSubstitutionsType_types_tuple)
 
 
 def normalize_parameters(parameters: SomeParameters) -> Parameters:
-    """Raises ``TypeError`` for a lone string or another non-sequence."""
+    """Bring parameters into one form; raises ``TypeError`` for a lone string or another non-sequence."""
     if isinstance(parameters, str) or not isinstance(parameters, Sequence):
         raise TypeError(f"Expecting list of parameters, got {parameters}")
     return tuple(_normalize(item) for item in parameters)

@@ -28,7 +28,7 @@ Parsed = tuple[type[Substitution], dict[str, Any]]
 
 
 def perform_boolean(context: LaunchContext, value: list[Substitution]) -> bool:
-    """Raises ``SubstitutionFailure`` for what is no YAML boolean."""
+    """Evaluate to a boolean; raises ``SubstitutionFailure`` for what is no YAML boolean."""
     try:
         return bool(perform_typed_substitution(context, value, bool))
     except (TypeError, ValueError) as error:

@@ -149,7 +149,7 @@ class FindPackage(PathOperator, TemplateSubstitution):
     refusal = (AttributeError, "find package substitutions expect 1 argument")
 
     def find(self, package_name: str) -> str:
-        """Raises ``PackageNotFoundError``, ``ValueError`` for what cannot be a package name."""
+        """Return the directory; raises ``PackageNotFoundError``, ``ValueError`` for an invalid name."""
         raise NotImplementedError
 
     def describe(self) -> str:
@@ -190,7 +190,7 @@ class ExecutableInPackage(FindPackagePrefix):
         return f"ExecInPkg(pkg={described(self.package)}, exec={described(self.executable)})"
 
     def perform(self, context: LaunchContext) -> str:
-        """Raises as ``find``, and ``SubstitutionFailure`` when the package lacks the executable."""
+        """Return the path; raises as ``find``, and ``SubstitutionFailure`` if the package lacks the executable."""
         executable = perform_substitutions(context, self.executable)
         package = perform_substitutions(context, self.package)
         try:

@@ -52,7 +52,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def hosts_of(file: Path | None) -> Hosts:
-    """Raises ``UsageError`` for a file that is not understood."""
+    """Read the hosts file; raises ``UsageError`` for a file that is not understood."""
     if file is None:
         return Hosts()
     with translated(InvalidInputError, UsageError):

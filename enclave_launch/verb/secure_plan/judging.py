@@ -59,7 +59,7 @@ def _of_keystore(
 
 
 def expectations(file: Path | None) -> Expectations:
-    """Raises ``UsageError`` for a file that was named and is missing, and for content that is not understood."""
+    """Read the expectations; raises ``UsageError`` for a named file that is missing, and for invalid content."""
 
     if file is None:
         if not os.path.exists(EXPECTATIONS):

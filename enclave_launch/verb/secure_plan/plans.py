@@ -47,7 +47,7 @@ def plan_of(words: Sequence[str], options: argparse.Namespace) -> DryRun:
 
 
 def read_saved(file: Path) -> DryRun:
-    """Raises ``UsageError`` for a file that cannot be read or is not the JSON of a dry run of this version."""
+    """Read a saved plan; raises ``UsageError`` unless it is the JSON of a dry run of this version."""
     return _saved(file)[1]
 
 
