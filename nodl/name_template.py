@@ -116,6 +116,8 @@ def _edit(text: str, method: str, arguments: tuple[str, ...]) -> Sequence[str]:
         return (text,) if text else ()  # the default is an empty list
     if method == "key":
         return (text.removeprefix(arguments[0]),)
+    if method == "where":  # of several texts, those of which a condition holds
+        return (text,) if CONDITIONS[arguments[0]](text, *arguments[1:]) else ()
     if method in CONDITIONS:
         return ("",) if CONDITIONS[method](text, *arguments) else ()
     return (_remapped(text, *arguments),) if method == "remapped" else (text,)

@@ -112,7 +112,7 @@ def text_of(pieces: Iterable[Piece]) -> TextAtom:
             merged.append(piece)
             last = piece
     for index, piece in enumerate(merged):
-        if type(piece) is Input and _is_one_of_several(piece) and piece in merged[:index]:
+        if type(piece) is Input and is_one_of_several(piece) and piece in merged[:index]:
             merged[index] = Hole("which parts go together")
     if not merged:
         return ""
@@ -123,7 +123,7 @@ def text_of(pieces: Iterable[Piece]) -> TextAtom:
     return make_text(tuple(merged))
 
 
-def _is_one_of_several(piece: Input) -> bool:
+def is_one_of_several(piece: Input) -> bool:
     """Return True if it stands for several texts: an element of a list, a part of a text that is split, a number."""
     several = any(method in ("split", "range", "key") for method, _ in piece.edits)
     return (piece.item == "each" or several) and not is_condition(piece)

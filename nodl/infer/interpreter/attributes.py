@@ -41,6 +41,8 @@ MAX_DOTS = 8
 
 def _of_instance(run: Run, obj: Instance, name: str, node: ast.AST, frame: Frame) -> Value:
     held = obj.cells.get(name)
+    if name == "__dict__":
+        return run.variables_of(node, frame)
     if isinstance(obj.cls, External):
         return present(foreign.instance_attribute(run, obj, obj.cls.path, name) if held is None else held)
     if held is not None:
@@ -53,8 +55,6 @@ def _of_instance(run: Run, obj: Instance, name: str, node: ast.AST, frame: Frame
         return join(held, in_class) or ANY
     if name == "__class__":
         return (obj.cls,)
-    if name == "__dict__":
-        return run.variables_of(node, frame)
     found = _class_attribute(run, obj, linearized(obj.cls), name, node, frame)
     if found is not None:
         return found

@@ -13,7 +13,18 @@ from typing import Any, TypeVar
 
 from nodl.infer.interpreter.define import is_enumeration
 from nodl.infer.interpreter.run import Frame, Run
-from nodl.infer.text import Guard, Input, Text, TextAtom, constant_text, input_of, make_text, pieces_of
+from nodl.infer.text import (
+    Guard,
+    Input,
+    Text,
+    TextAtom,
+    constant_text,
+    input_of,
+    is_one_of_several,
+    make_text,
+    pieces_of,
+    with_edit,
+)
 from nodl.infer.values import (
     CONSTANTS,
     ITEMS,
@@ -186,6 +197,10 @@ def _whole_numbers(defaults: Value) -> bool:
 
 def _texts_in(value: Value) -> tuple[str, ...] | None:
     container = value[0] if len(value) == 1 else None
+    if isinstance(container, Dictionary) and not container.is_open and not container.default:
+        keys = [cell.constant for cell, _, certain in container.entries() if certain]
+        texts = tuple(each for each in keys if isinstance(each, str))
+        return texts if len(texts) == len(container.entries()) else None
     if not isinstance(container, Sequence) or container.escaped or container.items.exact is None:
         return None
     known = [item[0] for item in container.items.exact if len(item) == 1 and type(item[0]) is str]
@@ -196,19 +211,22 @@ def _texts_in(value: Value) -> tuple[str, ...] | None:
 def _asked(run: Run, node: ast.expr, frame: Frame) -> tuple[Input | None, Value]:
     value = run.evaluate(node, frame)
     asked = input_of(value[0]) if len(value) == 1 else None
-    if asked is None or not is_plain_parameter(asked):
+    if asked is None or not is_parameter(asked):
         return None, ()
     defaults: Value = getattr(asked.owner, "parameters", {}).get(asked.name, ())
+    if asked.item is not None:
+        lists = [atom.items.any_element() for atom in defaults if isinstance(atom, Sequence)]
+        defaults = join_all(lists) if len(lists) == len(defaults) else ()
     return (asked, defaults) if defaults else (None, ())
 
 
-def is_plain_parameter(asked: Input) -> bool:
-    """Return True if it is a ROS parameter as a whole, at most with methods of ``str`` applied to it."""
-    edited = all(method in EDITS for method, _ in asked.edits)
-    return edited and asked.item is None and not asked.name.startswith(("-", "<", "$"))
+def is_parameter(asked: Input) -> bool:
+    """Return True if it is a ROS parameter or one of its parts, with its default as far as the code gives one."""
+    edited = any(method in ("unless empty", "only if set", "key") for method, _ in asked.edits)
+    return not edited and type(asked.item) is not int and not asked.name.startswith(("-", "<", "$"))
 
 
-_READS = frozenset({"get_parameter", "get_parameter_value", "declare_parameter"})
+_READS = EDITS | {"get_parameter", "get_parameter_value", "declare_parameter"}
 
 
 @functools.lru_cache(maxsize=8192)
@@ -227,11 +245,12 @@ def narrowed(run: Run, test: ast.expr, outcome: bool, frame: Frame) -> None:
     elif isinstance(test, ast.BoolOp) and isinstance(test.op, ast.And) == outcome:
         for part in test.values:
             narrowed(run, part, outcome, frame)
+    whole = test
     cells: dict[object, Value] = {}
     key: object = None
     holds: Callable[[object], bool | None] = truth_of
     if isinstance(test, ast.Compare) and isinstance(
-        test.comparators[0], ast.Constant | ast.Name | ast.Attribute
+        test.comparators[0], ast.Constant | ast.Name | ast.Attribute | ast.Tuple
     ):
         op, other = test.ops[0], run.evaluate(test.comparators[0], frame)
         if len(test.ops) == 1:
@@ -244,7 +263,13 @@ def narrowed(run: Run, test: ast.expr, outcome: bool, frame: Frame) -> None:
             cells, key = owner[0].cells, test.attr
     value = cells.get(key, ())
     kept = tuple(atom for atom in value if holds(atom) in (outcome, None))
-    if kept and len(kept) < len(value):
+    asked = input_of(sole(kept))
+    if asked is not None and is_one_of_several(asked):
+        condition = condition_of(run, whole, frame)
+        if condition is not None and condition.asked == asked:
+            edit = condition.edit if outcome else OPPOSITE[condition.edit]
+            run.state.write(cells, key, (with_edit(asked, "where", (edit, *condition.given)),))
+    elif kept and len(kept) < len(value):
         run.state.write(cells, key, kept)
 
 

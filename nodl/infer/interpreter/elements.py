@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import ast
+import sys
 
-from nodl.infer.interpreter.conditions import is_plain_parameter, only_if
+from nodl.infer.interpreter.conditions import is_parameter, only_if
 from nodl.infer.interpreter.define import enumeration_members, is_constant, is_enumeration
 from nodl.infer.interpreter.formatting import is_whole_number
 from nodl.infer.interpreter.run import Arguments, Frame, Run
-from nodl.infer.text import Guard, Input, Text, constant_text, input_of, make_text
+from nodl.infer.text import Guard, Input, Text, constant_text, input_of, is_one_of_several, make_text
 from nodl.infer.values import (
     ABSENT,
     ANY,
@@ -80,7 +81,7 @@ def _element(run: Run, atom: object, key: Value, node: ast.Subscript, frame: Fra
 def entries_by_parameter(obj: object, key: Value) -> list[tuple[Guard, Value]] | None:
     """Return what each value of the parameter that is the ``key`` chooses; ``None``: not such a look-up."""
     asked = input_of(key[0]) if len(key) == 1 else None
-    if asked is None or not is_plain_parameter(asked) or not isinstance(obj, Dictionary | Sequence):
+    if asked is None or not is_parameter(asked) or not isinstance(obj, Dictionary | Sequence):
         return None
     kind = int if is_whole_number(key[0]) else str
     entries = _certain_entries(obj)
@@ -96,6 +97,8 @@ def chosen_by_parameter(obj: Dictionary | Sequence, key: Value, default: Value |
     """
     entries = entries_by_parameter(obj, key)
     if not entries or any(len(value) != 1 for _, value in entries):
+        return None
+    if default is not None and is_one_of_several(entries[0][0].asked):
         return None
     keys = tuple(guard.given[0] for guard, _ in entries)
     other = entries[0][0]._replace(edit="only if not among", given=keys)
@@ -291,7 +294,9 @@ _UNMODELLED = frozenset({"unittest", "pytest", "tkinter"})  # whose objects hold
 
 def _patched(run: Run, owner: External, name: str, node: ast.AST, frame: Frame) -> None:
     """Add a gap for a replaced attribute of a library's module or class, if its other users are modelled."""
-    if owner.path.partition(".")[0] in _UNMODELLED:
+    root = owner.path.partition(".")[0]
+    modelled = root in sys.stdlib_module_names or run.tables.keeps_off(owner.path)
+    if root in _UNMODELLED or not modelled:
         return
     if "(" not in owner.path and "[" not in owner.path and ".qos" not in owner.path:
         run.gap(node, frame, f"{owner.path}.{name} is replaced; what its users then do is not analysed")

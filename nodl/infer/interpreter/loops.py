@@ -76,12 +76,12 @@ def _breaks(node: Loop) -> bool:
 
 @functools.lru_cache(maxsize=4096)
 def _cleans_up(node: Loop) -> bool:
-    """Return True if a ``break`` of the loop leaves a ``try`` or ``with``, which may do something before it does."""
+    """Return True if a ``break`` of the loop leaves a ``with`` or a ``try`` with ``finally``."""
     return any(map(_leaves, node.body))
 
 
 def _leaves(node: ast.AST, cleaning: bool = False) -> bool:
-    cleaning = cleaning or hasattr(node, "finalbody") or isinstance(node, ast.With | ast.AsyncWith)
+    cleaning = cleaning or bool(getattr(node, "finalbody", ())) or isinstance(node, ast.With | ast.AsyncWith)
     if isinstance(node, ast.Break):
         return cleaning
     inner = node.orelse if isinstance(node, Loop) else ast.iter_child_nodes(node)

@@ -397,9 +397,8 @@ def _init(run: Run, path: str, call: Call) -> Value:
 
 
 def _parameter(run: Run, path: str, call: Call) -> Value:
-    found = ros_parameters.parameter_object(run, call, call.args.at(2, "value") or NONE)
-    run.state.store(found[0], "name", call.args.at(0, "name") or ANY)
-    return found
+    name, value = call.args.at(0, "name") or ANY, call.args.at(2, "value") or NONE
+    return ros_parameters.parameter_object(run, call, name, value)
 
 
 def _parameter_client(run: Run, path: str, call: Call) -> Value:

@@ -34,10 +34,12 @@ from nodl.name_template import ONLY_IF_UNSET
 PARAMETER_CLASS = "rclpy.parameter.Parameter"
 
 
-def parameter_object(run: Run, call: Call, value: Value, key: str = "parameter") -> tuple[Instance]:
+def parameter_object(
+    run: Run, call: Call, name: Value, value: Value, key: str = "parameter"
+) -> tuple[Instance]:
     """Return an rclpy ``Parameter`` that holds ``value``; ``key`` tells those made by one call apart."""
     instance = run.library_object(call, PARAMETER_CLASS, key)
-    instance.cells.setdefault("value", BOTTOM)  # never without one, unlike a field that the program assigns
+    run.state.store(instance, "name", name)
     run.state.store(instance, "value", value)
     return (instance,)
 
@@ -55,7 +57,7 @@ def _declare_parameter(run: Run, record: NodeRecord, call: Call) -> Value:
         if ignored is not False:  # what launch says does not count, or perhaps not
             record.assigned[name] = default
             run.state.write(record.cells, name, join(default or NONE, BOTTOM if ignored else ABSENT))
-    return parameter_object(run, call, _inputs(run, record, names))
+    return parameter_object(run, call, call.args.at(0, "name") or ANY, _inputs(run, record, names))
 
 
 def _default_value(default: Value | None) -> Value:
@@ -99,7 +101,8 @@ def _declare_parameters(run: Run, record: NodeRecord, call: Call) -> Value:
             for prefix in prefixes:
                 full = f"{prefix}.{name}" if prefix else name
                 record.declare(full, _default_value(default))
-                found = join(found, parameter_object(run, call, _inputs(run, record, [full]), full))
+                value = _inputs(run, record, [full])
+                found = join(found, parameter_object(run, call, (full,), value, full))
     return run.sequence(call.node, "list", Items(None, found or ANY))
 
 
@@ -109,7 +112,18 @@ def _each(run: Run, value: Value, call: Call) -> list[Value]:
 
 
 def _get_parameter(run: Run, record: NodeRecord, call: Call) -> Value:
-    return parameter_object(run, call, _inputs(run, record, _names(call)))
+    return parameter_object(run, call, call.args.at(0, "name") or ANY, _inputs(run, record, _names(call)))
+
+
+def _get_parameters(run: Run, record: NodeRecord, call: Call) -> Value:
+    names = elements(run, call.args.at(0, "names") or ANY, call.node, call.frame).exact
+    if names is None:
+        return ANY
+    found = (
+        parameter_object(run, call, each, _inputs(run, record, constant_strings(each)), f"parameter {index}")
+        for index, each in enumerate(names)
+    )
+    return run.sequence(call.node, "list", Items(tuple(found)))
 
 
 def _get_parameters_by_prefix(run: Run, record: NodeRecord, call: Call) -> Value:
@@ -118,13 +132,13 @@ def _get_parameters_by_prefix(run: Run, record: NodeRecord, call: Call) -> Value
     for prefix in constant_strings(call.args.at(0, "prefix") or ANY):
         start = f"{prefix}." if prefix else ""
         everything = Input(f"{start}**", record)
-        value = parameter_object(run, call, (make_text((everything,)),), f"below {prefix}")
+        value = parameter_object(run, call, ANY, (make_text((everything,)),), f"below {prefix}")
         keys: Value = (with_edit(everything, "key", (start,)),)
         run.state.store(found, OTHER, join(found.cells.get(OTHER, BOTTOM), value))
         run.state.store(found, OTHER_KEYS, join(found.cells.get(OTHER_KEYS, BOTTOM), keys))
         for name in record.parameters:
             if name.startswith(start):
-                held = parameter_object(run, call, _inputs(run, record, [name]), name)
+                held = parameter_object(run, call, (name,), _inputs(run, record, [name]), name)
                 run.state.store(found, Key(name.removeprefix(start)), held)
     return (found,) if OTHER in found.cells else unknown("parameters below a prefix that is not known")
 
@@ -135,7 +149,7 @@ def _get_parameter_or(run: Run, record: NodeRecord, call: Call) -> Value:
     default = join_all(present(other.cells.get("value", BOTTOM)) for other in others)
     for name in names:
         record.declare(name, _default_value(default or None))
-    return parameter_object(run, call, _inputs(run, record, names))
+    return parameter_object(run, call, call.args.at(0, "name") or ANY, _inputs(run, record, names))
 
 
 def _set_parameters(run: Run, record: NodeRecord, call: Call) -> Value:
@@ -160,6 +174,7 @@ METHODS: dict[str, Callable[[Run, NodeRecord, Call], Value]] = {
     "declare_parameter": _declare_parameter,
     "declare_parameters": _declare_parameters,
     "get_parameter": _get_parameter,
+    "get_parameters": _get_parameters,
     "get_parameter_or": _get_parameter_or,
     "get_parameters_by_prefix": _get_parameters_by_prefix,
     "set_parameters": _set_parameters,

@@ -459,6 +459,13 @@ def _default_dict(run: Run, call: Call) -> Value:
     return (obj,)
 
 
+def _namespace(run: Run, call: Call) -> Value:
+    made = run.library_object(call, "types.SimpleNamespace")
+    for name, value in call.args.keywords.items():
+        run.state.store(made, name, value)
+    return (made,)
+
+
 def _copy(run: Run, call: Call) -> Value:
     """Model ``copy`` and ``deepcopy``: something unknown; a copy of an object of the program is a gap."""
     given = call.args.at(0) or ANY
@@ -489,6 +496,7 @@ FUNCTIONS: dict[str, Model] = {
     "multiprocessing.Process": _thread,
     "collections.defaultdict": _default_dict,
     "collections.OrderedDict": _BUILT_IN["builtins.dict"],
+    "types.SimpleNamespace": _namespace,
     "collections.deque": _BUILT_IN["builtins.list"],
     **dict.fromkeys(("copy.copy", "copy.deepcopy"), _copy),
     "random.choice": _BUILT_IN["builtins.next"],
