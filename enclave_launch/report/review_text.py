@@ -81,7 +81,7 @@ def _absent_text(findings: Sequence[PlanFinding]) -> Iterator[str]:
         for kind, names in subjects.items()
     )
     codes = ", ".join(dict.fromkeys(finding.code for finding in findings))
-    yield f"warning: not on this machine, and not in the plan: {'; '.join(kinds)} [{codes}]"
+    yield f"warning: not on this machine, so the plan may be incomplete: {'; '.join(kinds)} [{codes}]"
     yield "  install or build them, and check again; -v lists each with its place"
 
 

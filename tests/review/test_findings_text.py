@@ -49,7 +49,8 @@ def test_what_this_machine_lacks_of_a_launch_is_one_paragraph() -> None:
         told("program-not-executable", "xterm"),
     ]
     assert findings_text(missing) == (
-        "warning: not on this machine, and not in the plan: packages a, b; launch file /missing/a/b.launch.py; "
+        "warning: not on this machine, so the plan may be incomplete: packages a, b; "
+        "launch file /missing/a/b.launch.py; "
         "parameter file /missing/a/c.yaml; program xterm "
         "[package-not-installed, include-left-out, parameter-file-missing, program-not-executable]\n"
         "  install or build them, and check again; -v lists each with its place\n"
