@@ -16,7 +16,7 @@ from enclave_launch.policy.running_node import (
     parameters_of_node,
 )
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
-from nodl.dependence import CONTROLLER, HOST, Situation
+from nodl.dependence import COMPONENT, CONTROLLER, HOST, Situation
 from nodl.node_interface import NodeInterface
 from nodl.remap import NodeNames
 from nodl.source_ref import SourceRef
@@ -102,7 +102,7 @@ class StartedPlugin:
         if node == HOST:
             return self._situation.parameters
         if node != CONTROLLER:
-            return self._program.parameters(node)
+            return self._program.parameters(self._name if node == COMPONENT else node)
         process = self._program.process
         given = parameters_of_node(process, self._situation.namespace, self._name) if process else {}
         spawned = (each for each in self._situation.launched.spawned if each.controller == self._name)
@@ -114,4 +114,4 @@ class StartedPlugin:
             return self._situation.node, self._situation.namespace
         if node == CONTROLLER:
             return self._name, self._situation.namespace
-        return self._program.final_name(node)
+        return self._program.final_name(self._name if node == COMPONENT else node)

@@ -20,6 +20,9 @@ CONTROLLER = "controller"
 HOST = "host"
 """The name in sources of the node that loads a plugin and hands itself to it."""
 
+COMPONENT = "component"
+"""The name in sources of the node that ros2_control gives a hardware component."""
+
 
 class Test(NamedTuple):
     """One demand on a parameter (or an option ``--name``); ``parameter`` is a template.

@@ -12,6 +12,7 @@ from types import MappingProxyType
 from typing import NamedTuple, Protocol
 
 from nodl.dependence import (
+    COMPONENT,
     Configuration,
     Dependence,
     FurtherNode,
@@ -22,6 +23,7 @@ from nodl.dependence import (
     Variation,
 )
 from nodl.dependence.configuration import read_configuration
+from nodl.dependence.configuration.configured import ConfiguredPlugin
 from nodl.dependence.scope import Filled, Scope
 from nodl.name_template import NameTemplate
 from nodl.names import join
@@ -245,11 +247,24 @@ class _Application:
             else:
                 self.further.append(described._replace(name=name, own_rules=(f"__node:={name}",)))
         for plugin in found.plugins:
-            described = self._documents.of_class(plugin.plugin_class)
+            described = self._documents.of_class(plugin.plugin_class, plugin.node)
             if described is None:
                 self.gaps.append(Gap(plugin.place, f"what the {plugin.what} needs is not known"))
+            elif described.name == COMPONENT:
+                self._on_own_node(plugin, described)
             else:
                 self.describe(described, "", (f"{plugin.what}, {plugin.place}",), 1, plugin.properties)
+
+    def _on_own_node(self, plugin: ConfiguredPlugin, described: NodeInterface) -> None:
+        """Add what a hardware component makes on the node that ros2_control gives it."""
+        for place, node in enumerate(self.further):
+            if node.name == plugin.node:
+                endpoints = tuple(each._replace(note=plugin.what) for each in described.endpoints)
+                self.further[place] = node._replace(
+                    endpoints=(*node.endpoints, *endpoints), gaps=(*node.gaps, *described.gaps)
+                )
+                return
+        self.gaps.append(Gap(plugin.place, f"the {plugin.what} has no node in this release, but uses one"))
 
 
 _LONE = re.compile(r"\$\(param (?:[^ ()$]|\$\([a-z]+\))+\)\Z")

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from enclave_common.files import check_regular
 from nodl.ament_index import ExecutableNotInstalledError, PackageNotFoundError, executable_path
-from nodl.dependence import CONTROLLER, HOST, Dependence
+from nodl.dependence import COMPONENT, CONTROLLER, HOST, Dependence
 from nodl.node_interface import NodeInterface
 
 if TYPE_CHECKING:
@@ -69,8 +69,8 @@ def infer_plugin(
 ) -> tuple[NodeInterface, ...]:
     """Return a plugin whose sources are in reach, which a host loads as ``instance``, and the nodes that it makes.
 
-    A controller of ros2_control is a node of its own; what another plugin makes on its host is named ``HOST``. Nothing
-    if there is no such plugin.
+    A controller of ros2_control is a node of its own; what another plugin makes on a node that it is given is named
+    ``HOST`` or ``COMPONENT``. Nothing if there is no such plugin.
     """
     from nodl.infer.cpp.entry import CppSupportMissing
 
@@ -80,7 +80,7 @@ def infer_plugin(
         return ()
     if interfaces and interfaces[0].name == CONTROLLER:
         return (interfaces[0]._replace(depends=Dependence(own_node=True)), *interfaces[1:])
-    return interfaces if interfaces and interfaces[0].name == HOST else ()
+    return interfaces if interfaces and interfaces[0].name in (HOST, COMPONENT) else ()
 
 
 def _compiled(

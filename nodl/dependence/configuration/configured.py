@@ -12,12 +12,16 @@ from nodl.source_ref import SourceRef
 
 
 class ConfiguredPlugin(NamedTuple):
-    """A plugin that the file names, such as ``display of class 'a/B'`` (``what``), with its properties."""
+    """A plugin that the file names, such as ``display of class 'a/B'`` (``what``), with its properties.
+
+    ``node``: that of ``Configured.nodes`` which is its own, if it has one.
+    """
 
     what: str
     plugin_class: str
     place: SourceRef
     properties: Mapping[str, object]
+    node: str = ""
 
 
 class Configured(NamedTuple):

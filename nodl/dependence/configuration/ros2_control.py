@@ -30,7 +30,7 @@ def of_robot_description(text: str, place: SourceRef, distro: str) -> Configured
     except InvalidXMLError as error:
         why = f"the robot_description, which names the hardware components, cannot be read: {error}"
         return Configured(gaps=(Gap(place, why),))
-    names = (element.get("name").lower().replace("/", "_") for element in root.iter("ros2_control"))
+    names = map(_node_of, root.iter("ros2_control"))
     return Configured(
         nodes=() if distro in _WITHOUT_NODES else tuple(dict.fromkeys(name for name in names if name)),
         plugins=tuple(_plugins(root, place)),
@@ -44,4 +44,8 @@ def _plugins(root: XmlElement, place: SourceRef) -> Iterator[ConfiguredPlugin]:
             if plugin.tag == "plugin":
                 plugin_class = plugin.text.strip()
                 what = f"hardware component {shown(component.get('name'))} of class {shown(plugin_class)}"
-                yield ConfiguredPlugin(what, plugin_class, place, {})
+                yield ConfiguredPlugin(what, plugin_class, place, {}, _node_of(component))
+
+
+def _node_of(component: XmlElement) -> str:
+    return component.get("name").lower().replace("/", "_")

@@ -11,7 +11,7 @@ from functools import cached_property
 from pathlib import Path
 
 from enclave_common.files import text_or_nothing
-from nodl.dependence import HOST
+from nodl.dependence import COMPONENT, HOST
 from nodl.infer.cpp.cache.answers import Answers, Made, WatchedStart
 from nodl.infer.cpp.entry import Answer, CppSupportMissing, Entry, Solved, failure
 from nodl.infer.cpp.libraries import NODE_BASES
@@ -289,7 +289,8 @@ class Answering:
         """Infer what the plugin that descriptions call ``name`` makes when a host loads it as ``instance``.
 
         Returns:
-            First the controller of ros2_control, or what other plugins make on their ``HOST``; then their own nodes.
+            First the controller of ros2_control, or what another plugin makes on its ``HOST`` or as ``COMPONENT``;
+            then the nodes that it makes.
 
         Raises:
             CppSupportMissing: tree-sitter is not installed.
@@ -361,7 +362,7 @@ def _exports(file: str, name: str) -> bool:
 
 def _on_host(solved: Solved, package: SourcePackage, name: str) -> Answer:
     """Return what a plugin makes on the node that loads it, if anything, before the nodes that it makes."""
-    host = next((node for node in solved.nodes if node.name == HOST), None)
+    host = next((node for node in solved.nodes if node.name in (HOST, COMPONENT)), None)
     others = tuple(node for node in solved.nodes if node is not host)
     if host is None:
         host = NodeInterface(

@@ -10,7 +10,9 @@ neighbours.
 
 from __future__ import annotations
 
-from nodl.dependence import HOST
+from dataclasses import replace
+
+from nodl.dependence import COMPONENT, HOST
 from nodl.infer.cpp.libraries import Call, library_class, library_method
 from nodl.infer.cpp.models.nodes import become_node
 from nodl.infer.cpp.reading.declarations import Class, FunctionParameter
@@ -56,8 +58,18 @@ def _base_of_hardware(run: Machine, call: Call) -> Value:
     return unknown("what the base of a hardware component answers")
 
 
+def _node_of_component(run: Machine, call: Call) -> Value:
+    """Return the node of the component itself, which releases have since jazzy."""
+    node = run.obj((COMPONENT, call.this), Type("rclcpp::Node"))
+    if node not in run.nodes:
+        become_node(run, replace(call, receiver=node, values=[literal(COMPONENT)]))
+    return (node,)
+
+
 for _hardware in ("System", "Actuator", "Sensor"):
-    library_method(f"hardware_interface::{_hardware}Interface", "on_init", *HOOKS)(_base_of_hardware)
+    _base = f"hardware_interface::{_hardware}Interface"
+    library_method(_base, "on_init", *HOOKS)(_base_of_hardware)
+    library_method(_base, "get_node")(_node_of_component)
 
 
 def host_of(run: Machine, cls: Class, frame: Frame) -> Obj:

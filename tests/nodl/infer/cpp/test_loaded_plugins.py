@@ -93,7 +93,7 @@ ARM = """
 </node></launch>
 """
 DRIVE = '<launch><node pkg="nav2_controller" exec="controller_server"><param from="{file}"/></node></launch>'
-OF_ARM = "own_node: {ros__parameters: {topic: effort}}\n"
+OF_ARM = "own_node: {ros__parameters: {topic: effort}}\narm: {ros__parameters: {topic: load}}\n"
 OF_DRIVE = """
 controller_server:
   ros__parameters: {controller_plugins: [Own], Own: {plugin: NAME, topic: seen, loud: true}}
@@ -165,21 +165,19 @@ def test_a_plugin_is_found_where_macros_of_its_own_list_the_sources(hardware: Pl
     assert "FieldBus is not in reach" in str(problem)
 
 
-@pytest.mark.parametrize(
-    ("body", "why"),
-    [
-        ("auto bus = std::make_shared<FieldBus>();", "FieldBus is not in reach"),
-        (
-            'pub_ = get_node()->create_publisher<std_msgs::msg::Float64>("t", 1);',
-            "makes an interface on is not known",
-        ),
-    ],
-)
-def test_a_hardware_component_that_cannot_be_followed_is_a_gap_with_the_reason(
-    hardware: Planned, body: str, why: str
-) -> None:
-    (problem,) = hardware(body).problems
-    assert why in str(problem)
+def test_a_hardware_component_makes_interfaces_on_the_node_that_it_is_given(hardware: Planned) -> None:
+    plan = hardware(
+        'auto topic = get_node()->declare_parameter<std::string>("topic", "command");'
+        'pub_ = get_node()->create_publisher<std_msgs::msg::Float64>("~/" + topic, 1);'
+    )
+    assert not plan.problems
+    assert "/arm/load" in names(plan)
+    assert names(plan).isdisjoint({"/arm/command", "/controller_manager/load", "/arm/effort"})
+
+
+def test_a_hardware_component_that_cannot_be_followed_is_a_gap_with_the_reason(hardware: Planned) -> None:
+    (problem,) = hardware("auto bus = std::make_shared<FieldBus>();").problems
+    assert "FieldBus is not in reach" in str(problem)
     assert "hardware component 'arm' of class 'own/It'" in str(problem)
 
 
