@@ -26,6 +26,7 @@ from nodl.infer.text import (
     with_edit,
 )
 from nodl.infer.values import (
+    BOTTOM,
     CONSTANTS,
     ITEMS,
     ClassValue,
@@ -87,7 +88,8 @@ def truth(value: Value) -> bool | None:
 
 
 def decide(run: Run, test: ast.expr, frame: Frame) -> bool | None:
-    """Evaluate ``test`` once, for its effects and its truth."""
+    """Evaluate ``test`` once, for its effects and its truth; notes what its calls give, for ``conditions_of``."""
+    run.answers.update(dict.fromkeys(_calls_in(test), BOTTOM))
     return truth(run.evaluate(test, frame))
 
 
@@ -168,7 +170,7 @@ def _comparison(run: Run, test: ast.Compare, frame: Frame) -> Guard | None:
             return None
     if asked is None or not (all(type(each) is str for each in defaults) or _whole_numbers(defaults)):
         return None
-    value = run.evaluate(other, frame)
+    value = _answer(run, other, frame)
     if issubclass(op, ast.In | ast.NotIn):
         among = _texts_in(value)
         edit = "only if among" if issubclass(op, ast.In) else "only if not among"
@@ -208,8 +210,13 @@ def _texts_in(value: Value) -> tuple[str, ...] | None:
     return texts if len(texts) == len(container.items.exact) else None
 
 
+def _answer(run: Run, node: ast.expr, frame: Frame) -> Value:
+    """Return the value of a part of a test; a call is not made again."""
+    return run.answers.get(node, BOTTOM) if isinstance(node, ast.Call) else run.evaluate(node, frame)
+
+
 def _asked(run: Run, node: ast.expr, frame: Frame) -> tuple[Input | None, Value]:
-    value = run.evaluate(node, frame)
+    value = _answer(run, node, frame)
     asked = input_of(value[0]) if len(value) == 1 else None
     if asked is None or not is_parameter(asked):
         return None, ()
@@ -230,12 +237,22 @@ _READS = EDITS | {"get_parameter", "get_parameter_value", "declare_parameter"}
 
 
 @functools.lru_cache(maxsize=8192)
+def _calls_in(node: ast.expr) -> tuple[ast.Call, ...]:
+    return tuple(part for part in ast.walk(node) if isinstance(part, ast.Call))
+
+
+@functools.lru_cache(maxsize=8192)
 def _may_ask(node: ast.expr) -> bool:
-    """Return True for a value or a comparison of values, where evaluating it once more changes nothing."""
-    calls = (part for part in ast.walk(node) if isinstance(part, ast.Call))
-    return isinstance(node, ast.Name | ast.Attribute | ast.Subscript | ast.Call | ast.Compare) and all(
-        isinstance(call.func, ast.Attribute) and call.func.attr in _READS for call in calls
+    """Return True for a value or a comparison of values, where evaluating again what is no call changes nothing."""
+    if isinstance(node, ast.Compare):
+        return all(isinstance(each, ast.Call) or _only_reads(each) for each in (node.left, *node.comparators))
+    return isinstance(node, ast.Call) or (
+        isinstance(node, ast.Name | ast.Attribute | ast.Subscript) and _only_reads(node)
     )
+
+
+def _only_reads(node: ast.expr) -> bool:
+    return all(isinstance(call.func, ast.Attribute) and call.func.attr in _READS for call in _calls_in(node))
 
 
 def narrowed(run: Run, test: ast.expr, outcome: bool, frame: Frame) -> None:

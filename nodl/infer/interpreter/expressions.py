@@ -220,7 +220,10 @@ def _call(run: Run, node: ast.Call, frame: Frame) -> Value:
     run.at = node, frame
     if len(callee) > 1 and type(function) is ast.Subscript:
         return _call_of_entry(run, function, callee, args, node, frame)
-    return run.call(callee, args, node, frame)
+    result = run.call(callee, args, node, frame)
+    if node in run.answers:
+        run.answers[node] = result
+    return result
 
 
 def _call_of_entry(
@@ -334,11 +337,11 @@ def _conditional(run: Run, node: ast.IfExp, frame: Frame) -> Value:
     if outcome is not None:
         return run.evaluate(node.body if outcome else node.orelse, frame)
     condition = condition_of(run, node.test, frame)
+    held = {holds: conditions_of(run, node.test, holds, frame) for holds in (True, False)}
 
     def side(expression: ast.expr, holds: bool) -> Value:
-        held = conditions_of(run, node.test, holds, frame)
         narrowed(run, node.test, holds, frame)
-        return under(run, held, lambda: run.evaluate(expression, frame))
+        return under(run, held[holds], lambda: run.evaluate(expression, frame))
 
     body, orelse = run.state.each((partial(side, node.body, True), partial(side, node.orelse, False)))
     return either(condition, body, orelse) if condition else join(body, orelse)

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import NamedTuple
 
-from nodl.infer.interpreter.conditions import decide, narrowed
+from nodl.infer.interpreter.conditions import conditions_of, decide, narrowed, under
 from nodl.infer.interpreter.elements import assign, elements, store_item
 from nodl.infer.interpreter.run import Frame, Run
 from nodl.infer.values import LAZY, Dictionary, Items, LocalCells, Value, join_all
@@ -296,5 +296,6 @@ def _where(
 
     if outcome is True:
         return go_on()
-    run.state.maybe(lambda: go_on() or True)
+    held = conditions_of(run, tests[0], True, frame)
+    run.state.maybe(lambda: under(run, held, go_on) or True)
     return False

@@ -223,6 +223,7 @@ class Run(Allocations):
         self.settle: Callable[[Run], None] = lambda run: None  # runs the callbacks; set by who drives the run
         self.guards: tuple[Guard, ...] = ()  # of parameters, that hold at the current point
         self.guards_at_end: tuple[Guard, ...] = ()  # of the latest block
+        self.answers: dict[ast.expr, Value] = {}  # what the calls in tests gave the last time
         self.environment = FieldCells()  # variables that the program sets itself
         self.unrolled = 1  # turns of the unrolled loops around, multiplied
         self.repeated = 0  # inside a loop or callback: one allocation may stand for many objects

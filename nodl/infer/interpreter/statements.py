@@ -94,14 +94,14 @@ def _if(run: Run, node: ast.If, frame: Frame) -> bool:
     if outcome is not None:
         return run.execute(node.body if outcome else node.orelse, frame)
     condition = condition_of(run, node.test, frame)
+    held = {holds: conditions_of(run, node.test, holds, frame) for holds in (True, False)}
     passing: list[tuple[Guard, ...]] = []
 
     def side(body: list[ast.stmt], holds: bool) -> bool:
-        held = conditions_of(run, node.test, holds, frame)
         narrowed(run, node.test, holds, frame)
-        passes = under(run, held, lambda: run.execute(body, frame))
+        passes = under(run, held[holds], lambda: run.execute(body, frame))
         if passes:
-            passing.append(held)
+            passing.append(held[holds])
         return passes
 
     sides = (partial(side, node.body, True), partial(side, node.orelse, False))

@@ -111,6 +111,23 @@ def test_what_an_object_makes_depends_on_what_decided_that_it_is_there(tmp_path:
     assert _names(node, {"driver": "serial"}) == {"serial/status"}
 
 
+def test_a_parameter_that_a_function_of_the_program_reads_decides(tmp_path: Path) -> None:
+    node = _inferred(
+        tmp_path, "if p('debug', False):\n    self.P('log')\nelif p('mode', 'a') == 'b':\n    self.P('b')"
+    )
+    assert not node.gaps
+    assert _names(node, {}) == set()
+    assert _names(node, {"debug": True, "mode": "b"}) == {"log"}
+    assert _names(node, {"mode": "b"}) == {"b"}
+
+
+def test_a_parameter_decides_in_a_comprehension(tmp_path: Path) -> None:
+    node = _inferred(tmp_path, "[self.P(each) for each in ('left', 'right') if p(each, False)]")
+    assert not node.gaps
+    assert _names(node, {}) == set()
+    assert _names(node, {"right": True}) == {"right"}
+
+
 def test_of_a_table_that_a_parameter_indexes_one_entry_is_called(tmp_path: Path) -> None:
     table = "drivers = {'usb': Usb, 'serial': Serial}\nd = p('driver', 'usb')\n"
     node = _inferred(tmp_path, DRIVERS + table + "driver = drivers[d]()\ndriver.start(self)")
