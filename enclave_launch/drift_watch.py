@@ -93,9 +93,9 @@ class DriftWatch(LaunchCompanion):
         while True:
             await asyncio.sleep(_INTERVAL)
             for domain in list(self._observers):
-                self._look(domain)
+                self._compare(domain)
 
-    def _look(self, domain: int) -> None:
+    def _compare(self, domain: int) -> None:
         observer = self._observers[domain]
         if observer.ended:
             del self._observers[domain]
@@ -112,11 +112,11 @@ class DriftWatch(LaunchCompanion):
         for each in change.new:
             self.alarms += each.level is Level.ALARM
             self.blind = self.blind or each.level is Level.CANNOT_TELL
-            self._tell("new", each)
+            self._report("new", each)
         for each in change.over:
-            self._tell("over", each)
+            self._report("over", each)
 
-    def _tell(self, event: str, finding: DriftFinding) -> None:
+    def _report(self, event: str, finding: DriftFinding) -> None:
         self._say(f"drift{' is over' if event == 'over' else ''}: {finding_text(finding)}")
         if self._options.report is not None:
             row = {"time": f"{datetime.now(timezone.utc):%Y-%m-%dT%H:%M:%SZ}", "event": event}

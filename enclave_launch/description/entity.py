@@ -153,14 +153,14 @@ class Action(LaunchDescriptionEntity):
             return self.execute(context)
         finally:
             if context.awaits_completion():
-                _tell_completion(self, context)
+                _report_completion(self, context)
 
     def execute(self, context: LaunchContext) -> list[LaunchDescriptionEntity] | None:
         """Execute the action and return the entities to visit next. The base does nothing."""
         return None
 
 
-def _tell_completion(action: Action, context: LaunchContext) -> None:
+def _report_completion(action: Action, context: LaunchContext) -> None:
     """Emit ``ExecutionComplete`` once the action is done, only if a handler registered by now would take it."""
     event = ExecutionComplete(action=action)
     if not context.would_handle_event(event):

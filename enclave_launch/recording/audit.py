@@ -69,7 +69,7 @@ class Audit(Listener):
         found = self._grants.need(process, node, line)
         if found is None:
             return
-        need, asked = found
+        need, endpoint = found
         self._checked += 1
         if need not in self._asked:
             granted = self._grants.granted(node, line, need)
@@ -78,7 +78,7 @@ class Audit(Listener):
                 described = self._grants.described(process, node)
                 short = described.text if described.missing is None else "nobody"
                 who, by = _by(described.text, line), _by(short, line)
-                self._refusals[need] = refusal = Refusal(need, asked.written, asked.type, who, by)
+                self._refusals[need] = refusal = Refusal(need, endpoint.written, endpoint.type, who, by)
                 self._launch.say("WARNING", f"audit: {refusal.text}")
 
     def report(self) -> AuditReport:

@@ -36,7 +36,7 @@ class Denial(NamedTuple):
 
     process: str
     need: Need
-    asked: RequestedEndpoint
+    endpoint: RequestedEndpoint
     described: Description
     granted: bool
     patch: Patch | None
@@ -53,13 +53,13 @@ class Denial(NamedTuple):
         return "\n".join(printable(line) for line in self._lines())
 
     def _lines(self) -> list[str]:
-        need, asked = self.need, self.asked
+        need, endpoint = self.need, self.endpoint
         head = (
             f"refused: node {need.node} may not {WORDS[need.operation]} {need.name} (enclave {need.enclave})"
         )
-        lines = [head, f"  requested as '{asked.written}', type {asked.type or 'not known'}"]
+        lines = [head, f"  requested as '{endpoint.written}', type {endpoint.type or 'not known'}"]
         if self.granted:
-            why = "; ".join(asked.error) or "no reason was given"
+            why = "; ".join(endpoint.error) or "no reason was given"
             lines.append(f"  the plan grants it, so that it is refused for another reason: {why}")
             cause = self.cause or NOT_AS_PLANNED
             lines.append(f"  {'' if self.cause else 'it may be that '}{cause.what}; {cause.remedy}")
@@ -135,10 +135,10 @@ class Explainer(Listener):
             kept.extend(event.data.decode(errors="replace").splitlines())
 
     def looked(self) -> None:
-        self._tell_waiting(time.monotonic())
+        self._report_waiting(time.monotonic())
 
     def closed(self) -> None:
-        self._tell_waiting(float("inf"))
+        self._report_waiting(float("inf"))
 
     def _middleware(self, line: Initialised) -> None:
         """Warn once of two middlewares: what they cannot say to each other shows as silence, not as an error."""
@@ -156,27 +156,27 @@ class Explainer(Listener):
         found = self._grants.need(process, node, line)
         if found is None or found[0] in self._told:
             return
-        need, asked = found
+        need, endpoint = found
         granted = bool(self._grants.granted(node, line, need))
         described = self._grants.described(process, node)
         if silent and granted:
             return
         self._told.add(need)
-        patch = None if granted else self._remedies.patch(need, asked, described)
-        cause = cause_of((*asked.error, *self._printed.get(name, ()))) if granted else None
+        patch = None if granted else self._remedies.patch(need, endpoint, described)
+        cause = cause_of((*endpoint.error, *self._printed.get(name, ()))) if granted else None
         unseen = () if granted else self._remedies.unseen(need, described)
         denied = self._grants.denied(need)
-        self._tell(Denial(name, need, asked, described, granted, patch, cause, silent, unseen, denied))
+        self._report(Denial(name, need, endpoint, described, granted, patch, cause, silent, unseen, denied))
 
-    def _tell_waiting(self, now: float) -> None:
+    def _report_waiting(self, now: float) -> None:
         due = [each for each in self._waiting if each[0] <= now]
         self._waiting = [each for each in self._waiting if each[0] > now]
         for _, process, node, error in due:
             name = _name(process)
             cause = cause_of((*error, *reversed(self._printed.get(name, ()))))
-            self._tell(NotJoined(name, node, self._grants.enclave_of(process) or "none", cause, error))
+            self._report(NotJoined(name, node, self._grants.enclave_of(process) or "none", cause, error))
 
-    def _tell(self, what: Denial | NotJoined) -> None:
+    def _report(self, what: Denial | NotJoined) -> None:
         if isinstance(what, Denial):
             self.denials.append(what)
         else:

@@ -91,10 +91,10 @@ class PlannedGrants:
         self, process: RecordedProcess, node: RecordedNode, line: EndpointMade
     ) -> tuple[Need, RequestedEndpoint] | None:
         """Return the permission for what ``line`` asked for, None if nothing is enforced or no name is known."""
-        enclave, asked = self.enclave_of(process), requested_endpoint(process, node, line)
-        if enclave is None or asked is None or not asked.final:
+        enclave, endpoint = self.enclave_of(process), requested_endpoint(process, node, line)
+        if enclave is None or endpoint is None or not endpoint.final:
             return None
-        return Need(enclave, node.fqn, OPERATIONS[asked.kind], asked.final), asked
+        return Need(enclave, node.fqn, OPERATIONS[endpoint.kind], endpoint.final), endpoint
 
     def granted(self, node: RecordedNode, line: EndpointMade, need: Need) -> tuple[Need, ...]:
         """Return what the plan grants of ``need``: itself, or each part of an action moved apart, or nothing."""

@@ -43,18 +43,23 @@ class EndpointEvents(Listener):
         if not isinstance(line, EndpointMade):
             return
         process, node = self._recording.record.node_of(line)
-        asked = requested_endpoint(process, node, line)
-        if asked is None or process.started is None:
+        requested = requested_endpoint(process, node, line)
+        if requested is None or process.started is None:
             return
-        name, pid, endpoint = process.started.process, process.started.pid, _endpoint(asked, node, line)
-        if asked.granted:
+        name, pid, endpoint = process.started.process, process.started.pid, _endpoint(requested, node, line)
+        if requested.granted:
             self._launch.tell(EndpointCreated(name, pid, endpoint))
         else:
-            self._launch.tell(EndpointRefused(name, pid, endpoint, asked.error))
+            self._launch.tell(EndpointRefused(name, pid, endpoint, requested.error))
 
 
-def _endpoint(asked: RequestedEndpoint, node: RecordedNode, line: EndpointMade) -> EndpointRequested:
+def _endpoint(requested: RequestedEndpoint, node: RecordedNode, line: EndpointMade) -> EndpointRequested:
     component = f"{node.component.package}/{node.component.plugin}" if node.component else ""
     return EndpointRequested(
-        node.fqn or line.fqn, asked.kind, asked.final or asked.written, asked.written, asked.type, component
+        node.fqn or line.fqn,
+        requested.kind,
+        requested.final or requested.written,
+        requested.written,
+        requested.type,
+        component,
     )

@@ -50,21 +50,23 @@ def questions(folder: Path) -> Questions:
                 continue
             seen = observation_of(node)
             sources = {source for name in seen.names for source in possible_sources(name, seen)}
-            asked = {name: seen.values[name] for source in sources for name in source.parameters}
-            found.setdefault((node.package, node.executable), {}).update(asked)
+            values = {name: seen.values[name] for source in sources for name in source.parameters}
+            found.setdefault((node.package, node.executable), {}).update(values)
     return Questions(found)
 
 
 class MarkerRun:
     """Hands out markers, each once."""
 
-    def __init__(self, asked: Questions) -> None:
-        self._asked = asked
+    def __init__(self, open_questions: Questions) -> None:
+        self._questions = open_questions
         self._count = 0
 
     def mark(self, process: ResolvedProcess, cmd: tuple[str, ...]) -> Marked:
         """Return ``cmd`` with a marker for each value in question; later ROS arguments win over earlier ones."""
-        wanted = self._asked.inputs.get((process.package or "", process.executable.rpartition("/")[2]), {})
+        wanted = self._questions.inputs.get(
+            (process.package or "", process.executable.rpartition("/")[2]), {}
+        )
         given = {
             name: process.parameters.get(name, value)
             for name, value in sorted(wanted.items())

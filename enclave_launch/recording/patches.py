@@ -31,27 +31,27 @@ class Patch(NamedTuple):
     text: str
 
 
-def manifest_patch(file: str, text: str, line: int, asked: RequestedEndpoint) -> Patch | None:
+def manifest_patch(file: str, text: str, line: int, endpoint: RequestedEndpoint) -> Patch | None:
     """Add one entry for the node at ``line``; None if no line can be added safely."""
-    if not re.search(NAME_PATTERN, asked.name) or not re.search(TYPE_PATTERN, asked.type):
+    if not re.search(NAME_PATTERN, endpoint.name) or not re.search(TYPE_PATTERN, endpoint.type):
         return None
-    added = _into_v1(text, line, asked) if text.lstrip()[:1] == "<" else _into_v2(text, asked)
+    added = _into_v1(text, line, endpoint) if text.lstrip()[:1] == "<" else _into_v2(text, endpoint)
     if added is None:
         return None
     return Patch(file, _diff(file, text, added), "start the launch again", added)
 
 
 def policy_patch(
-    enclave: str, node: str, asked: RequestedEndpoint, file: str, text: str = ""
+    enclave: str, node: str, endpoint: RequestedEndpoint, file: str, text: str = ""
 ) -> Patch | None:
     """Return the change of a policy file that adds the one permission; None if its shape does not allow it."""
-    operation = OPERATIONS[asked.kind]
+    operation = OPERATIONS[endpoint.kind]
     element = KIND_OF[LIST_NAMES[operation]]
     namespace, name = split_fqn(node)
     profile = (
         f"        <profile ns={quoteattr(namespace)} node={quoteattr(name)}>\n"
         f'          <{element}s {operation.value}="ALLOW">\n'
-        f"            <{element}>{asked.final}</{element}>\n"
+        f"            <{element}>{endpoint.final}</{element}>\n"
         f"          </{element}s>\n"
         "        </profile>\n"
     )
@@ -84,28 +84,28 @@ def _diff(file: str, before: str, after: str) -> str:
     )
 
 
-def _into_v2(text: str, asked: RequestedEndpoint) -> str | None:
-    category = asked.kind.category
+def _into_v2(text: str, endpoint: RequestedEndpoint) -> str | None:
+    category = endpoint.kind.category
     head = re.search(rf"^{category}:[ \t]*(#.*)?$", text, re.MULTILINE)
     empty = re.search(rf"^{category}:[ \t]*\[[ \t]*\][ \t]*$", text, re.MULTILINE)
     if empty is not None:
-        return f"{text[: empty.start()]}{category}:\n  - {_v2_entry(asked)}{text[empty.end() :]}"
+        return f"{text[: empty.start()]}{category}:\n  - {_v2_entry(endpoint)}{text[empty.end() :]}"
     if head is None:
         if re.search(rf"^[\"']?{category}[\"']?[ \t]*:", text, re.MULTILINE) or text.lstrip()[:1] == "{":
             return None  # written inline, or JSON
         end = "" if text.endswith("\n") else "\n"
-        return f"{text}{end}{category}:\n  - {_v2_entry(asked)}\n"
+        return f"{text}{end}{category}:\n  - {_v2_entry(endpoint)}\n"
     first = re.match(r"(?:[ \t]*(?:#.*)?\n)*([ \t]*)- ", text[head.end() :] + "\n")
     if first is None:
         return None
-    return f"{text[: head.end()]}\n{first[1]}- {_v2_entry(asked)}{text[head.end() :]}"
+    return f"{text[: head.end()]}\n{first[1]}- {_v2_entry(endpoint)}{text[head.end() :]}"
 
 
-def _v2_entry(asked: RequestedEndpoint) -> str:
-    fields = f"name: '{asked.name}', type: {asked.type}"  # ~, y or no are something else without quotes
-    if asked.kind not in (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION):
+def _v2_entry(endpoint: RequestedEndpoint) -> str:
+    fields = f"name: '{endpoint.name}', type: {endpoint.type}"  # ~, y or no are something else without quotes
+    if endpoint.kind not in (EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION):
         return f"{{{fields}}}"
-    history, depth, reliability, durability = asked.qos if len(asked.qos) == 4 else (1, 10, 1, 2)
+    history, depth, reliability, durability = endpoint.qos if len(endpoint.qos) == 4 else (1, 10, 1, 2)
     qos = f"history: {_HISTORY.get(history, 'SYSTEM_DEFAULT')}"
     qos += f", depth: {max(depth, 1)}" if history == 1 else ""
     qos += f", reliability: {'BEST_EFFORT' if reliability == 2 else 'RELIABLE'}"
@@ -113,12 +113,12 @@ def _v2_entry(asked: RequestedEndpoint) -> str:
     return f"{{{fields}, qos: {{{qos}}}}}"
 
 
-def _into_v1(text: str, line: int, asked: RequestedEndpoint) -> str | None:
+def _into_v1(text: str, line: int, endpoint: RequestedEndpoint) -> str | None:
     lines = text.splitlines(keepends=True)
     for number in range(max(line - 1, 0), len(lines)):
         if "</node>" in lines[number]:
-            kind = asked.kind
-            entry = f'<{kind.family} name="{asked.name}" type="{asked.type}" role="{kind.role}"/>'
+            kind = endpoint.kind
+            entry = f'<{kind.family} name="{endpoint.name}" type="{endpoint.type}" role="{kind.role}"/>'
             before, end, after = lines[number].partition("</node>")
             blank = before if not before.strip() else ""
             rest = "" if not before.strip() else before

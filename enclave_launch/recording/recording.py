@@ -149,7 +149,7 @@ class Recording:
             self.running.pop(event.pid, None)
         elif isinstance(event, LaunchOver) and self._folder is not None:
             self._look_once_more()  # what is told now is heard before the end
-            self._tell(float("inf"))
+            self._report(float("inf"))
         for listener in self._listeners:
             listener.happened(event)
 
@@ -165,7 +165,7 @@ class Recording:
             await asyncio.gather(self._task, return_exceptions=True)
         try:
             self._look_once_more()
-            self._tell(float("inf"))
+            self._report(float("inf"))
             self._take(self._files.unfinished())
             self._reader.close()
             self.record.complaints = [*self._reader.complaints, *(Complaint(0, why) for why in self._lost)]
@@ -220,7 +220,7 @@ class Recording:
         for report in self._files.reports:
             self._lose(report)
         self._files.reports.clear()
-        self._tell(time.monotonic())
+        self._report(time.monotonic())
 
     def _take(self, lines: bytes) -> None:
         self.data += lines
@@ -230,7 +230,7 @@ class Recording:
                 self.record.add(line)
                 self._untold.append((now, line))
 
-    def _tell(self, now: float) -> None:
+    def _report(self, now: float) -> None:
         """Inform the listeners of a line once its process is known: it may speak before it counts as started."""
         untold, self._untold = self._untold, []
         for since, line in untold:

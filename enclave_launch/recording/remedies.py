@@ -32,11 +32,11 @@ class Remedies:
         self._texts: dict[str, str] = {}
         """Files as the patches so far leave them."""
 
-    def patch(self, need: Need, asked: RequestedEndpoint, described: Description) -> Patch | None:
+    def patch(self, need: Need, endpoint: RequestedEndpoint, described: Description) -> Patch | None:
         """Return the first change that grants ``need``: of the node's manifest, else of a policy file."""
         if self._grants.denied(need):
             return None
-        for patch, cures in self._candidates(need, asked, described):
+        for patch, cures in self._candidates(need, endpoint, described):
             if cures:
                 self._texts[patch.file] = patch.text
                 return patch
@@ -55,16 +55,16 @@ class Remedies:
         return tuple(f"{operation.verb} {name}" for operation, name in sorted(found))
 
     def _candidates(
-        self, need: Need, asked: RequestedEndpoint, described: Description
+        self, need: Need, endpoint: RequestedEndpoint, described: Description
     ) -> Iterator[tuple[Patch, bool]]:
         source = described.node.interface.source if described.node is not None else None
         if source is not None and _is_manifest(source.file):
             text = self._text(source.file)
-            patch = manifest_patch(source.file, text, source.line, asked) if text else None
+            patch = manifest_patch(source.file, text, source.line, endpoint) if text else None
             if patch is not None:
                 yield patch, self._manifest_cures(patch, need, described)
         file = self._policy_file()
-        changed = policy_patch(need.enclave, need.node, asked, file, self._text(file))
+        changed = policy_patch(need.enclave, need.node, endpoint, file, self._text(file))
         if changed is not None:
             yield changed, self._policy_cures(changed, need)
 

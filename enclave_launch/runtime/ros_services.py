@@ -126,9 +126,9 @@ class RosServices:
     def _report_load(self, component: ResolvedComponent, response: Any) -> None:
         name = response.full_node_name or component.name
         if response.success:
-            self._tell("INFO", f"Loaded node '{name}' in container '{component.container}'")
+            self._report("INFO", f"Loaded node '{name}' in container '{component.container}'")
         else:
-            self._tell(
+            self._report(
                 "ERROR",
                 f"Failed to load node '{name}' of type '{component.plugin}' in container "
                 f"'{component.container}': {response.error_message}",
@@ -141,7 +141,7 @@ class RosServices:
         request.transition.id = transition
         response = self._call(ChangeState, f"{node}/change_state", request)
         if response is not None and not response.success:
-            self._tell("ERROR", f"Failed to make transition '{transition}' for LifecycleNode '{node}'")
+            self._report("ERROR", f"Failed to make transition '{transition}' for LifecycleNode '{node}'")
         return response is not None and bool(response.success)
 
     def _call(self, kind: Any, service: str, request: Any) -> Any:
@@ -161,11 +161,11 @@ class RosServices:
     def _wait(self, come: Callable[[], bool], what: str) -> bool:
         while not come():
             if self._closing.is_set():
-                self._tell("WARNING", f"Abandoning wait for the {what}, due to shutdown.")
+                self._report("WARNING", f"Abandoning wait for the {what}, due to shutdown.")
                 return False
         return True
 
-    def _tell(self, level: Level, message: str) -> None:
+    def _report(self, level: Level, message: str) -> None:
         self._loop.call_soon_threadsafe(self._say, level, message)
 
 

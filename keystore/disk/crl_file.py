@@ -12,7 +12,7 @@ from cryptography.hazmat.primitives.serialization import Encoding
 from keystore.disk import layout, safe_files
 from keystore.disk.view import KeystoreView
 from keystore.errors import DamagedKeystoreError, printable
-from keystore.formats.certificate import NOT_OUR_FORM, CertificateFacts, moment
+from keystore.formats.certificate import NOT_OUR_FORM, CertificateFacts, time_of
 from keystore.formats.register import Register
 from keystore.formats.role import Role
 from keystore.formats.validity import Validity
@@ -21,7 +21,7 @@ from keystore.formats.validity import Validity
 def crl_validity(view: KeystoreView) -> Validity:
     """Return thisUpdate and nextUpdate of the CRL (RFC 5280 section 5.1). Raises DamagedKeystoreError."""
     crl = load_crl(view)
-    return Validity(moment(crl, "last_update"), moment(crl, "next_update"))
+    return Validity(time_of(crl, "last_update"), time_of(crl, "next_update"))
 
 
 def crl_number(view: KeystoreView) -> int:
@@ -57,7 +57,7 @@ def revoked_serials(view: KeystoreView) -> dict[int, datetime]:
     """Return serial -> date of revocation, from a CRL whose signature was checked; empty without one."""
     if not view.has_crl:
         return {}
-    return {entry.serial_number: moment(entry, "revocation_date") for entry in load_crl(view)}
+    return {entry.serial_number: time_of(entry, "revocation_date") for entry in load_crl(view)}
 
 
 def load_crl(view: KeystoreView) -> x509.CertificateRevocationList:
@@ -89,8 +89,8 @@ def is_crl(pem: bytes) -> bool:
 def _parsed(pem: bytes) -> x509.CertificateRevocationList | None:
     try:
         crl = x509.load_pem_x509_crl(pem)
-        _ = crl.issuer, crl.extensions, moment(crl, "last_update"), moment(crl, "next_update")
-        _ = [moment(entry, "revocation_date") for entry in crl]
+        _ = crl.issuer, crl.extensions, time_of(crl, "last_update"), time_of(crl, "next_update")
+        _ = [time_of(entry, "revocation_date") for entry in crl]
     except (ValueError, TypeError, AttributeError, UnsupportedAlgorithm):
         return None
     return crl

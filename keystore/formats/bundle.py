@@ -20,7 +20,7 @@ from keystore.errors import DamagedKeystoreError, InvalidInputError, KeystoreErr
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.register import lines_json
 from keystore.formats.role import Role
-from keystore.formats.validity import iso, parse_moment
+from keystore.formats.validity import iso, parse_time
 
 _HOST = re.compile(r"[A-Za-z0-9](?:[A-Za-z0-9._-]{0,61}[A-Za-z0-9])?\Z")
 TYPE = "enclave-launch bundle"
@@ -115,7 +115,7 @@ def parse_manifest(text: bytes, place: str) -> Manifest:
             int(content["crl_number"]),
             tuple(map(_enclave, content["enclaves"])),
             {str(name): str(digest) for name, digest in content["files"]},
-            parse_moment(content["ends"]),
+            parse_time(content["ends"]),
         )
     except (ValueError, KeyError, TypeError, AttributeError, IndexError, RecursionError) as error:
         if isinstance(error, KeystoreError):
@@ -153,7 +153,7 @@ def pins_of(named: Iterable[str]) -> dict[Role, frozenset[str]]:
 
 def _enclave(row: list[Any]) -> BundledEnclave:
     name, serial, key, document, not_before, not_after, has_key = row
-    dates = (parse_moment(not_before), parse_moment(not_after))
+    dates = (parse_time(not_before), parse_time(not_after))
     return BundledEnclave(
         validate_enclave_name(name), int(serial, 16), str(key), str(document), *dates, bool(has_key)
     )

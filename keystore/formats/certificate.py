@@ -72,7 +72,7 @@ class CertificateFacts:
     @cached_property
     def validity(self) -> Validity:
         return Validity(
-            moment(self.certificate, "not_valid_before"), moment(self.certificate, "not_valid_after")
+            time_of(self.certificate, "not_valid_before"), time_of(self.certificate, "not_valid_after")
         )
 
     @cached_property
@@ -102,7 +102,7 @@ class CertificateFacts:
         return self.extension(x509.SubjectAlternativeName) is not None
 
 
-def moment(value: Any, name: str) -> datetime:
+def time_of(value: Any, name: str) -> datetime:
     """Return a date of a certificate or CRL as UTC; cryptography before 42 gives those of RFC 5280 without a zone."""
     if hasattr(value, f"{name}_utc"):
         found: datetime = getattr(value, f"{name}_utc")

@@ -186,8 +186,8 @@ def _dates(validity: Validity) -> str:
     )
 
 
-def _utc(moment: datetime) -> str:
-    return moment.strftime("%Y-%m-%dT%H:%M:%S")
+def _utc(time: datetime) -> str:
+    return time.strftime("%Y-%m-%dT%H:%M:%S")
 
 
 def _line(text: str) -> str:

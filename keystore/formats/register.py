@@ -23,10 +23,10 @@ from typing import Any, NamedTuple
 from keystore.errors import DamagedKeystoreError
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.role import Role
-from keystore.formats.validity import iso, later, parse_moment
+from keystore.formats.validity import iso, later, parse_time
 
 _VERSION = 1
-_moment = lru_cache(maxsize=1024)(parse_moment)  # what was issued together has the same dates
+_time = lru_cache(maxsize=1024)(parse_time)  # what was issued together has the same dates
 REVOKED_MARGIN = timedelta(days=400)
 """How long a revoked certificate stays on the CRL after it has ended; longer than a clock may jump unasked."""
 UNKNOWN = ""
@@ -242,7 +242,7 @@ def parse_register(text: bytes, place: str) -> Register:
             content["governance"].encode(),
             int(content["crl_number"]),
             bool(content["crl_published"]),
-            _moment(content["written"]) if content.get("written") is not None else None,
+            _time(content["written"]) if content.get("written") is not None else None,
         )
     except (ValueError, KeyError, TypeError, AttributeError, IndexError, OverflowError, RecursionError):
         raise DamagedKeystoreError(
@@ -263,10 +263,10 @@ def _certificate(row: list[Any]) -> IssuedCertificate:
         str(subject),
         str(key),
         str(issuer),
-        _moment(not_before),
-        _moment(not_after),
+        _time(not_before),
+        _time(not_after),
         bool(replaced),
-        _moment(revoked) if revoked is not None else None,
+        _time(revoked) if revoked is not None else None,
         int(lifetime) if lifetime is not None else None,
     )
 
@@ -274,5 +274,5 @@ def _certificate(row: list[Any]) -> IssuedCertificate:
 def _document(row: list[Any]) -> SignedPermissions:
     enclave, subject, document, rules, not_after = row
     return SignedPermissions(
-        validate_enclave_name(enclave), str(subject), str(document), str(rules), _moment(not_after)
+        validate_enclave_name(enclave), str(subject), str(document), str(rules), _time(not_after)
     )

@@ -74,10 +74,10 @@ class Validity(_Ends):
         return self.not_before <= now <= self.not_after
 
 
-def _whole(name: str, moment: datetime) -> datetime:
-    if moment.tzinfo is None:
+def _whole(name: str, time: datetime) -> datetime:
+    if time.tzinfo is None:
         raise ValueError(f"{name} needs a time zone")
-    return min(moment.astimezone(timezone.utc).replace(microsecond=0), LATEST)
+    return min(time.astimezone(timezone.utc).replace(microsecond=0), LATEST)
 
 
 def later(now: datetime, span: timedelta) -> datetime:
@@ -97,16 +97,16 @@ def parse_duration(text: str) -> timedelta:
     return timedelta(days=365 * count) if unit == "y" else timedelta(**{_UNITS[unit]: count})
 
 
-def parse_moment(text: str) -> datetime:
+def parse_time(text: str) -> datetime:
     """Parse an ISO date or date-time, in UTC unless it says otherwise; raises InvalidInputError."""
     try:
-        moment = datetime.fromisoformat(text.strip().replace("Z", "+00:00"))
+        time = datetime.fromisoformat(text.strip().replace("Z", "+00:00"))
     except ValueError:
         raise InvalidInputError(
             f"{printable(text)} is not an ISO date; write for example 2030-12-31"
         ) from None
     try:
-        return moment.astimezone(timezone.utc) if moment.tzinfo else moment.replace(tzinfo=timezone.utc)
+        return time.astimezone(timezone.utc) if time.tzinfo else time.replace(tzinfo=timezone.utc)
     except OverflowError:
         raise InvalidInputError(f"{printable(text)} is a date before the year 1 or after 9999") from None
 
@@ -116,7 +116,7 @@ def parse_end(text: str, now: datetime) -> datetime:
     if _DURATION.match(text.strip()):
         return later(now, parse_duration(text))
     try:
-        return parse_moment(text)
+        return parse_time(text)
     except InvalidInputError as error:
         raise InvalidInputError(f"{error}, or a duration such as 90d") from None
 
@@ -126,6 +126,6 @@ def utc_now() -> datetime:
     return datetime.now(timezone.utc).replace(microsecond=0)
 
 
-def iso(moment: datetime) -> str:
+def iso(time: datetime) -> str:
     """Render ``2030-12-31T00:00:00Z``, for reports."""
-    return moment.astimezone(timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ")
+    return time.astimezone(timezone.utc).strftime("%Y-%m-%dT%H:%M:%SZ")

@@ -150,8 +150,8 @@ class IdentityIssuer:
             .add_extension(self._authority_key, critical=False)
             .add_extension(x509.CRLNumber(number), critical=False)
         )
-        for serial, moment in sorted(serials.items()):
-            entry = x509.RevokedCertificateBuilder().serial_number(serial).revocation_date(moment).build()
+        for serial, revoked_at in sorted(serials.items()):
+            entry = x509.RevokedCertificateBuilder().serial_number(serial).revocation_date(revoked_at).build()
             builder = builder.add_revoked_certificate(entry)
         crl = builder.sign(builder_key(self._authority.signer), hashes.SHA256())
         return crl.public_bytes(serialization.Encoding.PEM)

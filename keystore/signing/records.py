@@ -9,7 +9,7 @@ from keystore.formats.certificate import CertificateFacts
 from keystore.formats.permissions_document import Grant, grant_for, rules_text
 from keystore.formats.register import UNKNOWN, IssuedCertificate, SignedPermissions
 from keystore.formats.subject import subject_name
-from keystore.formats.validity import parse_moment
+from keystore.formats.validity import parse_time
 from keystore.signing.public_key import fingerprint
 
 
@@ -36,7 +36,7 @@ def permissions_record(enclave: str, common_name: str, document: bytes) -> Signe
             f"the permissions of {enclave} have no grant for {subject_name(common_name)}"
         )
     return SignedPermissions(
-        enclave, common_name, fingerprint(document), rules_digest(grant), parse_moment(grant.not_after)
+        enclave, common_name, fingerprint(document), rules_digest(grant), parse_time(grant.not_after)
     )
 
 

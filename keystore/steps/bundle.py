@@ -83,8 +83,10 @@ def refuse_unfit(view: KeystoreView, names: list[str], now: datetime, accept_exp
                     f"enclave {name} is incomplete ({file}); secure-keystore renew completes it"
                 )
     owners = {layout.enclave_directory(name): f"enclave {name}" for name in names}
-    told = [(_concerned(finding.place, owners), finding) for finding in verify(view.root, now=now).findings]
-    for what, finding in sorted(told, key=lambda one: one[0] != _KEYSTORE):
+    reported = [
+        (_concerned(finding.place, owners), finding) for finding in verify(view.root, now=now).findings
+    ]
+    for what, finding in sorted(reported, key=lambda one: one[0] != _KEYSTORE):
         if what is not None:
             _refuse(what, finding, accept_exposures)
 

@@ -126,9 +126,9 @@ def complete(opened: Store, options: CreateOptions) -> CreateReport:
         if os.path.exists(opened.root / layout.ca_cert(role)):
             _record_present_ca(opened, role, options)  # its key may be missing: the CA may be kept elsewhere
             continue
-        verb, told = _add_ca(opened, role, options)
+        verb, reported = _add_ca(opened, role, options)
         actions.append(f"{role.label} {verb}")
-        warnings += told
+        warnings += reported
     if _complete_governance(opened, options):
         actions.append("governance signed")
     return CreateReport(opened.root, tuple(actions), tuple(warnings))

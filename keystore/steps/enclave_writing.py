@@ -82,8 +82,8 @@ class EnclaveWriter:
     def _validity(self, enclave: str) -> Validity:
         self._view.refuse_ended(self._now, *Role)
         cas = [self._view.ca(role).validity for role in Role]
-        asked = Validity.starting(self._now, self._lifetime(enclave), backdate=self._options.backdate)
-        return asked.within(cas[0]).within(cas[1])
+        requested = Validity.starting(self._now, self._lifetime(enclave), backdate=self._options.backdate)
+        return requested.within(cas[0]).within(cas[1])
 
     @property
     def _scheme(self) -> SubjectScheme:

@@ -15,7 +15,7 @@ from keystore.errors import DamagedKeystoreError, InvalidInputError
 from keystore.formats.certificate import read_certificate
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.role import Role
-from keystore.formats.validity import Validity, later, parse_moment, utc_now
+from keystore.formats.validity import Validity, later, parse_time, utc_now
 from keystore.signing import smime
 
 _DATE = rb"<not_(before|after)>\s*([^<]{1,40}?)\s*</not_"
@@ -79,9 +79,9 @@ def expires_soon(
     """
     view = keystore_at(keystore)
     names = view.enclaves() if enclaves is None else [validate_enclave_name(name) for name in enclaves]
-    moment = now or utc_now()
-    limit = later(moment, within)
-    due = [one for one in _expiries(view, names, known or {}) if one.is_due(moment, limit)]
+    at = now or utc_now()
+    limit = later(at, within)
+    due = [one for one in _expiries(view, names, known or {}) if one.is_due(at, limit)]
     return tuple(sorted(due, key=_order))
 
 
@@ -119,6 +119,6 @@ def _expiry(what: str, enclave: str | None, validity: Validity) -> Expiry:
 def _permissions_validity(signed: bytes, place: str) -> Validity:
     found = dict(reversed(re.findall(_DATE, smime.read_any(signed, place).document)))
     try:
-        return Validity(parse_moment(found[b"before"].decode()), parse_moment(found[b"after"].decode()))
+        return Validity(parse_time(found[b"before"].decode()), parse_time(found[b"after"].decode()))
     except (KeyError, UnicodeDecodeError, InvalidInputError):
         raise DamagedKeystoreError(f"{place} states no validity") from None

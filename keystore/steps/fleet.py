@@ -75,7 +75,7 @@ def fleet_status(
 
     Raises InvalidInputError when there is nothing to read, and a KeystoreError for a keystore that cannot be used.
     """
-    moment = now or utc_now()
+    at = now or utc_now()
     reference = _reference(resolve_root(keystore)) if keystore is not None else None
     latest: dict[str, tuple[Path, Manifest]] = {}
     unreadable = []
@@ -91,10 +91,8 @@ def fleet_status(
     if not latest and not unreadable:
         raise InvalidInputError("no bundle (*.bundle) and no imported keystore there")
     newest = max((manifest.crl_number for _, manifest in latest.values()), default=0)
-    hosts = [
-        _judge(*latest[host], reference, newest, moment, later(moment, within)) for host in sorted(latest)
-    ]
-    return FleetReport(moment, tuple(hosts), tuple(unreadable))
+    hosts = [_judge(*latest[host], reference, newest, at, later(at, within)) for host in sorted(latest)]
+    return FleetReport(at, tuple(hosts), tuple(unreadable))
 
 
 def _reference(root: Path) -> Reference:

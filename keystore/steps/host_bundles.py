@@ -157,7 +157,7 @@ def hosts_that_left(
 
     Only enclaves whose certificates on that host are neither revoked nor expired: whoever has the host can use them.
     """
-    view, moment = keystore_at(keystore), now or utc_now()
+    view, at = keystore_at(keystore), now or utc_now()
     register = read_register(view.root) or Register()
     present = set(hosts)
     found = {}
@@ -168,7 +168,7 @@ def hosts_that_left(
             for one in (last[0].enclaves if last is not None else ())
             if (issued := register.certificates.get(one.serial)) is not None
             and issued.revoked is None
-            and one.not_after > moment
+            and one.not_after > at
         ]
         if good:
             found[path.stem] = tuple(good)

@@ -173,9 +173,9 @@ def _with_crl(view: KeystoreView, register: Register) -> Register:
     revoked = revoked_serials(view)
     unknown = {
         serial: IssuedCertificate(
-            serial, UNKNOWN, UNKNOWN, UNKNOWN, issuer, moment, end, replaced=True, revoked=moment
+            serial, UNKNOWN, UNKNOWN, UNKNOWN, issuer, revoked_at, end, replaced=True, revoked=revoked_at
         )
-        for serial, moment in revoked.items()
+        for serial, revoked_at in revoked.items()
         if serial not in register.certificates
     }
     known = {

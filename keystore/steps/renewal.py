@@ -145,8 +145,8 @@ def _with_names_of_their_own(
 
 def _wanted(view: KeystoreView, name: str, named: list[str] | None, options: RenewOptions) -> WantedEnclave:
     """Decide what is renewed; enclaves not named are only completed, as any change of a CA demands it of all."""
-    asked = name in named if named is not None else options.everything or _is_exposed(view, name, options)
-    if not asked:
+    requested = name in named if named is not None else options.everything or _is_exposed(view, name, options)
+    if not requested:
         return WantedEnclave(keep)
     return WantedEnclave(keep, Reissue.KEY_PAIR if options.new_keys else Reissue.CERTIFICATE)
 

@@ -59,8 +59,8 @@ def sign_requests(
         for one in listed:
             opened.remove(f"{layout.enclave_directory(one.enclave)}/{layout.KEY}")
     names = [one.enclave for one in fresh]
-    asked = RenewOptions(revoke_old=chosen.revoke_old, provisioning=provisioning)
-    return renew(root, names, options=asked)
+    requested = RenewOptions(revoke_old=chosen.revoke_old, provisioning=provisioning)
+    return renew(root, names, options=requested)
 
 
 def accept_certificates(
@@ -155,10 +155,10 @@ def _refuse_unfit(view: KeystoreView, register: Register, one: Request) -> None:
             f"no enclave {one.enclave} in {printable(view.root)}; give it its permissions first (secure-launch, "
             "apply-policy or create-enclave)"
         )
-    asked = request_key(one.pem, f"the request of {one.enclave}")
-    if not names_enclave(asked.common_name, one.enclave):
+    requested = request_key(one.pem, f"the request of {one.enclave}")
+    if not names_enclave(requested.common_name, one.enclave):
         raise InvalidInputError(
-            f"the request of {one.enclave} names {printable(asked.common_name)}, another enclave's subject"
+            f"the request of {one.enclave} names {printable(requested.common_name)}, another enclave's subject"
         )
     _refuse_taken_key(register, one)
 

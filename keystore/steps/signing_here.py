@@ -65,9 +65,9 @@ def beyond_and_missing(
         signed = safe_files.read(view.root, f"{layout.enclave_directory(state.enclave)}/{layout.PERMISSIONS}")
         present = grant_for(smime.read(signed, place).document, subject, place)
         document = wanted.permissions(subject, state.facts.validity)
-        asked = grant_for(document, subject, place) if document is not None else None
+        requested = grant_for(document, subject, place) if document is not None else None
     except KeystoreError:
         return (), ()
-    if present is None or asked is None:
+    if present is None or requested is None:
         return (), ()
-    return taken_away(present, asked), taken_away(asked, present)
+    return taken_away(present, requested), taken_away(requested, present)

@@ -30,7 +30,7 @@ from keystore.formats.governance import NoGovernanceRuleError
 from keystore.formats.policy import EnclavePolicy
 from keystore.formats.shares import Share, parse_shares, shares_json
 from keystore.formats.subject import Half
-from keystore.formats.validity import Validity, iso, parse_moment
+from keystore.formats.validity import Validity, iso, parse_time
 from keystore.signing.ca_access import Secret
 from keystore.steps.options import EnclaveReport, ProvisionOptions, ProvisionReport
 from keystore.steps.provisioning import provision
@@ -197,11 +197,11 @@ _ACTIONS = {"provision": _provision, "zenoh": _zenoh}
 def _report(found: Any) -> ProvisionReport:
     enclaves = tuple(
         EnclaveReport(
-            name, tuple(actions), tuple(reasons), Validity(*map(parse_moment, ends)) if ends else None
+            name, tuple(actions), tuple(reasons), Validity(*map(parse_time, ends)) if ends else None
         )
         for name, actions, reasons, ends in found["enclaves"]
     )
-    end = parse_moment(found["ends"]) if found["ends"] is not None else None
+    end = parse_time(found["ends"]) if found["ends"] is not None else None
     return ProvisionReport(
         Path(found["keystore"]), tuple(found["created"]), enclaves, tuple(found["warnings"]), end
     )

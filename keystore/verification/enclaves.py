@@ -37,7 +37,7 @@ from keystore.formats.subject import (
     scheme_of,
     subject_name,
 )
-from keystore.formats.validity import LATEST, Validity, iso, parse_moment
+from keystore.formats.validity import LATEST, Validity, iso, parse_time
 from keystore.signing import smime
 from keystore.signing.public_key import CYCLONE_KINDS, is_our_form, issued_by, key_kind, key_matches
 from keystore.verification import repair
@@ -315,13 +315,13 @@ class _EnclaveCheck:
 
     def _validity(self, grant: Grant, facts: CertificateFacts) -> Iterator[Finding]:
         try:
-            validity = Validity(parse_moment(grant.not_before), parse_moment(grant.not_after))
+            validity = Validity(parse_time(grant.not_before), parse_time(grant.not_after))
         except InvalidInputError as error:
             yield self.error("permissions-dates", layout.PERMISSIONS, str(error))
             return
         if not validity.covers(self._now):
             dates = f"valid from {grant.not_before} to {grant.not_after}"
             yield self.error("permissions-expired", layout.PERMISSIONS, dates)
-        elif validity.not_after != facts.validity.not_after or parse_moment(grant.not_after) > LATEST:
+        elif validity.not_after != facts.validity.not_after or parse_time(grant.not_after) > LATEST:
             text = "not valid as long as the certificate"
             yield self._finding(Severity.WARNING, "validity-differs", layout.PERMISSIONS, text, self._renew())

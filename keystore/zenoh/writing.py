@@ -72,9 +72,9 @@ def write_zenoh(
     if chosen.signing is not None:
         return _signed_elsewhere(chosen.signing, enclaves, router, chosen)
     view = keystore_at(keystore)
-    asked = set(enclaves)
-    view.require_enclaves(asked)
-    names = sorted({*asked, *view.zenoh_enclaves()})
+    requested = set(enclaves)
+    view.require_enclaves(requested)
+    names = sorted({*requested, *view.zenoh_enclaves()})
     address = RouterAddress.parse(router) if router is not None else present_address(view) or RouterAddress()
     if (found := _as_wanted(view, names, address, chosen)) is not None:
         return ZenohReport(view.root, address, (), found.served, found.gaps, restart=False)

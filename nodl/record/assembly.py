@@ -185,9 +185,9 @@ class Record:
 
     def _component(self, node: RecordedNode, container: str, taken: set[int]) -> LoadedComponent | None:
         """Return the first request with this name; a plugin may have been loaded twice under one."""
-        asked = [item for item in self.components if _is(item.container, container) and _made(item, node)]
-        named = [item for item in asked if item.name]
-        return next((item for item in asked if id(item) not in taken), named[-1] if named else None)
+        requested = [item for item in self.components if _is(item.container, container) and _made(item, node)]
+        named = [item for item in requested if item.name]
+        return next((item for item in requested if id(item) not in taken), named[-1] if named else None)
 
 
 _CONSTRUCTION = 2_000_000_000

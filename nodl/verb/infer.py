@@ -53,7 +53,7 @@ def run(args: argparse.Namespace) -> int:
     chosen = args.format or ("v2" if args.output else "text")
     documents = _documents(chosen, system, expanded, args)
     if chosen == "v2" and not args.quiet:
-        _tell_guesses(system)
+        _report_guesses(system)
     if args.output:
         write_documents(args.output, documents)
     else:
@@ -68,7 +68,7 @@ def run(args: argparse.Namespace) -> int:
     return 0 if system.nodes else 1
 
 
-def _tell_guesses(system: InferredSystem) -> None:
+def _report_guesses(system: InferredSystem) -> None:
     """Report guesses: a source file that nothing installs does not say which program it becomes."""
     for node in system.nodes:
         if node.executable is None and node.plugin is None and node.name:

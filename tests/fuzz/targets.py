@@ -30,7 +30,7 @@ from keystore.formats.permissions_document import parse_permissions
 from keystore.formats.policy_xml import parse_policy
 from keystore.formats.register import parse_register
 from keystore.formats.shares import parse_shares
-from keystore.formats.validity import parse_duration, parse_moment
+from keystore.formats.validity import parse_duration, parse_time
 from keystore.signing import smime
 from keystore.steps.host_keys import parse_requests, request, requests_text
 from keystore.verification.contents import holds_private_key
@@ -317,6 +317,6 @@ def targets() -> dict[str, Target]:
         ),
         "duration": Target(text(parse_duration), refused, (b"10d", b"2y"), words("9", "y")),
         "date": Target(
-            text(parse_moment), refused, (b"2031-05-01T12:00:00Z",), words("-", ":", "+14:00", "9999")
+            text(parse_time), refused, (b"2031-05-01T12:00:00Z",), words("-", ":", "+14:00", "9999")
         ),
     }

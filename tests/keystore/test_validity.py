@@ -7,7 +7,7 @@ from datetime import datetime, timedelta, timezone
 import pytest
 
 from keystore.errors import InvalidInputError
-from keystore.formats.validity import LATEST, Validity, iso, parse_duration, parse_end, parse_moment, utc_now
+from keystore.formats.validity import LATEST, Validity, iso, parse_duration, parse_end, parse_time, utc_now
 from tests.keystore.kit import DAY, NOW
 
 
@@ -92,9 +92,9 @@ def test_no_durations(text: str) -> None:
 
 
 def test_iso_dates_are_utc_unless_they_say_otherwise() -> None:
-    assert iso(parse_moment("2030-12-31")) == "2030-12-31T00:00:00Z"
-    assert iso(parse_moment("2030-12-31T10:00:00+02:00")) == "2030-12-31T08:00:00Z"
+    assert iso(parse_time("2030-12-31")) == "2030-12-31T00:00:00Z"
+    assert iso(parse_time("2030-12-31T10:00:00+02:00")) == "2030-12-31T08:00:00Z"
     assert iso(parse_end("2035-01-01", NOW)) == "2035-01-01T00:00:00Z"
     assert parse_end("1d", NOW) == NOW + DAY
     with pytest.raises(InvalidInputError, match="ISO date"):
-        parse_moment("next year")
+        parse_time("next year")

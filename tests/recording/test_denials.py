@@ -303,7 +303,7 @@ def test_harmless_lines_explain_nothing() -> None:
     assert cause_of(["process has died"]) is None
 
 
-def asked(kind: str, name: str, final: str = "/n") -> RequestedEndpoint:
+def endpoint(kind: str, name: str, final: str = "/n") -> RequestedEndpoint:
     return RequestedEndpoint(EndpointKind(kind), name, name, final, TYPES[kind], 1)
 
 
@@ -312,7 +312,7 @@ def test_a_patch_adds_one_entry_to_a_manifest(kind: str, tmp_path: Path) -> None
     for text in (manifest_text(GRANTED, "library: rclcpp"), manifest_text((), "library: rclcpp")):
         file = tmp_path / f"{PACKAGE}__x.nodl.yaml"
         file.write_text(text)
-        patch = manifest_patch(str(file), text, 1, asked(kind, "~/new"))
+        patch = manifest_patch(str(file), text, 1, endpoint(kind, "~/new"))
         assert patch is not None
         plus = [line[1:] for line in patch.diff.splitlines() if line[:1] == "+" and line[:3] != "+++"]
         minus = [line for line in patch.diff.splitlines() if line[:1] == "-" and line[:3] != "---"]
@@ -329,7 +329,7 @@ def test_a_patch_of_a_v1_manifest_goes_into_the_right_node(tmp_path: Path) -> No
   </node>
 </interface>
 """
-    patch = manifest_patch("f.nodl.xml", text, 5, asked("subscription", "z"))
+    patch = manifest_patch("f.nodl.xml", text, 5, endpoint("subscription", "z"))
     assert patch is not None
     lines = text.splitlines()
     added = '    <topic name="z" type="std_msgs/msg/String" role="subscription"/>'
@@ -340,20 +340,20 @@ def test_a_patch_of_a_v1_manifest_goes_into_the_right_node(tmp_path: Path) -> No
 
 
 def test_a_patch_fills_an_empty_list() -> None:
-    patch = manifest_patch("f", "nodl_version: 2\npublishers: []\n", 1, asked("publisher", "x"))
+    patch = manifest_patch("f", "nodl_version: 2\npublishers: []\n", 1, endpoint("publisher", "x"))
     assert patch is not None
     assert [line for line in patch.diff.splitlines() if line.startswith("-p")] == ["-publishers: []"]
 
 
 @pytest.mark.parametrize("text", ["{nodl_version: 2}", "nodl_version: 2\npublishers: [{name: y}]\n"])
 def test_a_manifest_of_another_shape_is_left_alone(text: str) -> None:
-    assert manifest_patch("f", text, 1, asked("publisher", "x")) is None
+    assert manifest_patch("f", text, 1, endpoint("publisher", "x")) is None
 
 
 def test_a_node_without_manifest_gets_exactly_the_refused_name_in_a_policy_file(tmp_path: Path) -> None:
     from keystore.formats.policy_xml import read_policy
 
-    patch = policy_patch("/e", "/ns/me", asked("action_client", "go", "/ns/go"), "p.xml")
+    patch = policy_patch("/e", "/ns/me", endpoint("action_client", "go", "/ns/go"), "p.xml")
     assert patch is not None
     text = "".join(line[1:] + "\n" for line in patch.diff.splitlines()[3:])
     assert text == patch.text
@@ -400,7 +400,7 @@ def test_the_policy_file_in_use_is_the_one_that_is_changed(stand_in: Path, tmp_p
     workspace = make_workspace(tmp_path, stand_in, [program])
     as_json(workspace)
     policy = tmp_path / "mine.policy.xml"
-    patch = policy_patch("/bad", "/bad", asked("publisher", "one", "/one"), str(policy))
+    patch = policy_patch("/bad", "/bad", endpoint("publisher", "one", "/one"), str(policy))
     assert patch is not None
     policy.write_text(patch.text)
     output = secured(workspace, "--policy", str(policy))
@@ -413,7 +413,7 @@ def test_what_the_policy_file_denies_has_no_patch(stand_in: Path, tmp_path: Path
     program = Program("bad", TWO_SECRETS, (("publisher", "one"), ("publisher", "granted")))
     workspace = make_workspace(tmp_path, stand_in, [program])
     policy = tmp_path / "mine.policy.xml"
-    patch = policy_patch("/bad", "/bad", asked("publisher", "one", "/one"), str(policy))
+    patch = policy_patch("/bad", "/bad", endpoint("publisher", "one", "/one"), str(policy))
     assert patch is not None
     policy.write_text(patch.text.replace("ALLOW", "DENY"))
     output = secured(workspace, "--policy", str(policy))

@@ -58,7 +58,7 @@ _NAMED = 5
 
 
 def _missing_ends(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
-    asked, users = _asked_for(plan), _users(document)
+    asked, users = _requested_names(plan), _users(document)
     everywhere: dict[Operation, set[str]] = {}
     for grant in frozenset[GrantedName]().union(*plan.enclaves.values()):
         everywhere.setdefault(grant.operation, set()).add(grant.name)
@@ -99,7 +99,7 @@ def _other_transforms(topic: str) -> str | None:
 
 def near_names(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
     """Yield pairs of names with opposite ends that never meet and differ by a typing error."""
-    asked, users = _asked_for(plan), _users(document)
+    asked, users = _requested_names(plan), _users(document)
     for here, there in _PAIRS:
         lonely_here = asked.get(here, set()) - asked.get(there, set())
         lonely_there = asked.get(there, set()) - asked.get(here, set())
@@ -200,7 +200,7 @@ def _quality(qos: Mapping[str, Any], other: Mapping[str, Any]) -> Quality:
     )
 
 
-def _asked_for(plan: PlanDocument) -> dict[str, set[str]]:
+def _requested_names(plan: PlanDocument) -> dict[str, set[str]]:
     asked: dict[str, set[str]] = {}
     for node in plan.nodes:
         for grant in node.own:

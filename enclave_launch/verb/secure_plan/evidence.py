@@ -30,7 +30,7 @@ from enclave_launch.verb.secure_plan.judging import EXPECT, WITHIN, judged
 from enclave_launch.verb.secure_plan.keystores import endings
 from enclave_launch.verb.secure_plan.plans import is_saved_plan, read_document
 from keystore.errors import InvalidInputError
-from keystore.formats.validity import iso, parse_moment, utc_now
+from keystore.formats.validity import iso, parse_time, utc_now
 from keystore.signing.ca_access import CaAccess, Secret
 from keystore.signing.dsse import envelope, envelope_text
 from keystore.signing.pkcs11_signer import open_signer
@@ -102,7 +102,7 @@ def _time(text: str | None) -> datetime:
     epoch = os.environ.get("SOURCE_DATE_EPOCH", "")
     try:
         if text is not None:
-            return parse_moment(text)
+            return parse_time(text)
         return datetime.fromtimestamp(int(epoch), timezone.utc) if epoch else utc_now()
     except InvalidInputError as error:
         raise UsageError(f"--at {text}: {error}") from error
