@@ -4,8 +4,8 @@ Takes a finished ``Run``, gives a gap for what was lost. It reads the text alone
 is a call of something that makes nodes or interfaces (``create_publisher``, ``ActionClient`` ...), or of a function or
 class of the program whose text reaches one, by its name. For every function that live text refers to, and for every
 call that entered it, each place in it must have been evaluated, unless the text says that control does not get there:
-a test of a literal or of ``__name__``, or a statement behind ``return`` or ``raise``. A function that something live
-refers to and that nothing entered is a gap as a whole.
+a test of a literal, of ``__name__`` or of a parameter that is a literal in this call, or a statement behind ``return``
+or ``raise``. A function that something live refers to and that nothing entered is a gap as a whole.
 
 So a mistake of the analysis that skips a branch, ends a path too early, loses a caller, a callback or a module shows up
 here. What it cannot see: a wrong value, and creation behind names that do not stand in the text.
@@ -17,7 +17,8 @@ import ast
 import functools
 import itertools
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 from nodl.infer.interpreter.imports import absolute_name
@@ -348,7 +349,10 @@ class _Net:
         self._meant.update(("", name) for name in scope.attributes)
         names = set(scope.names)
         for place in scope.calls:
-            seen = place.node in self._evaluated or self._is_dead(place, scope)
+            entries = self._run.entries.get(scope.node) if scope.node is not None else None
+            seen = place.node in self._evaluated or all(
+                self._is_dead(place, scope, entry) for entry in entries or (None,)
+            )
             if not seen or place.node in self._run.doubtful:
                 if isinstance(place.node.func, ast.Name):
                     names.add(place.name)
@@ -398,7 +402,7 @@ class _Net:
                     self._gap(
                         scope, place.node, f"{place.name}() is called on something that is not understood"
                     )
-            elif not self._is_dead(place, scope):
+            elif not self._is_dead(place, scope, entry):
                 self._gap(scope, place.node, self._skipped(scope, place, entry))
 
     def _skipped(self, scope: FunctionText, place: CallPlace, entry: ast.AST | None) -> str:
@@ -407,8 +411,8 @@ class _Net:
         where = f" where {scope.name} is called at {caller.path.rpartition('/')[2]}:{line}" if caller else ""
         return f"{place.name}() was not reached{where}; what it would make there is not listed"
 
-    def _is_dead(self, place: CallPlace, scope: FunctionText) -> bool:
-        return is_dead(place.around, self._names[scope.path])
+    def _is_dead(self, place: CallPlace, scope: FunctionText, entry: ast.AST | None) -> bool:
+        return is_dead(place.around, self._names[scope.path], _literals(scope, entry))
 
     def _gap(self, scope: FunctionText, node: ast.AST, why: str) -> None:
         self.gaps.append(Gap(SourceRef(scope.path, getattr(node, "lineno", 0)), why))
@@ -419,12 +423,14 @@ _CONSTRUCTORS = frozenset({"__init__", "__new__", "__post_init__"})
 
 # --- literals in the text -----------------------------------------------------------------------------------
 
+Literals = Mapping[str, object]  # by parameter
 
-def is_dead(around: tuple[ast.AST, ...], module: str) -> bool:
+
+def is_dead(around: tuple[ast.AST, ...], module: str, literals: Literals = MappingProxyType({})) -> bool:
     """Return True if a test of literals, or of the ``module``'s name, keeps control from the last of ``around``."""
     for outer, inner in itertools.pairwise(around):
         if isinstance(outer, ast.If | ast.While | ast.IfExp):
-            outcome = _decided(outer.test, module)
+            outcome = _decided(outer.test, module, literals)
             body = outer.body if isinstance(outer.body, list) else [outer.body]
             orelse = outer.orelse if isinstance(outer.orelse, list) else [outer.orelse]
             if (outcome is False and inner in body) or (
@@ -434,22 +440,61 @@ def is_dead(around: tuple[ast.AST, ...], module: str) -> bool:
         if isinstance(outer, ast.BoolOp) and inner in outer.values:
             stops = isinstance(outer.op, ast.Or)
             before = outer.values[: outer.values.index(inner)]
-            if any(_decided(each, module) is stops for each in before):
+            if any(_decided(each, module, literals) is stops for each in before):
                 return True
     return False
 
 
-def _decided(test: ast.expr, module: str) -> bool | None:
-    """Return the truth of a literal, or of a test of ``__name__`` or ``TYPE_CHECKING``; ``None`` for all others."""
+def _decided(test: ast.expr, module: str, literals: Literals) -> bool | None:
+    """Return the truth of a literal, or of a test of ``__name__``, ``TYPE_CHECKING`` or a parameter that is one;
+    ``None`` for all others."""
     if isinstance(test, ast.Constant):
         return bool(test.value)
+    if isinstance(test, ast.Name) and test.id in literals:
+        return bool(literals[test.id])
     if isinstance(test, ast.Name | ast.Attribute) and last_name(test) == "TYPE_CHECKING":
         return False
     if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not):
-        outcome = _decided(test.operand, module)
+        outcome = _decided(test.operand, module, literals)
         return None if outcome is None else not outcome
-    if isinstance(test, ast.Compare) and isinstance(test.left, ast.Name) and test.left.id == "__name__":
+    if isinstance(test, ast.Compare) and isinstance(test.left, ast.Name) and len(test.ops) == 1:
+        known = {**literals, "__name__": module}
         other, op = test.comparators[0], test.ops[0]
-        if isinstance(other, ast.Constant) and isinstance(op, ast.Eq | ast.NotEq) and len(test.ops) == 1:
-            return (other.value == module) is isinstance(op, ast.Eq)
+        if test.left.id in known and isinstance(other, ast.Constant):
+            equal = known[test.left.id] == other.value
+            if isinstance(op, ast.Eq | ast.NotEq) or other.value is None:
+                return equal is isinstance(op, ast.Eq | ast.Is)
     return None
+
+
+def _literals(scope: FunctionText, entry: ast.AST | None) -> Literals:
+    """Return the parameters for which the call ``entry`` of this function has a literal, or leaves the default, one."""
+    node = scope.node
+    if isinstance(node, ast.Lambda) or node is None or node.decorator_list or not isinstance(entry, ast.Call):
+        return {}
+    called = last_name(entry.func)
+    constructs = scope.name == "__init__" and scope.cls is not None and called == scope.cls.name
+    if not (constructs or called == scope.name) or any(each.arg is None for each in entry.keywords):
+        return {}
+    arguments = [*node.args.posonlyargs, *node.args.args]
+    defaults = dict(
+        zip(reversed([each.arg for each in arguments]), reversed(node.args.defaults), strict=False)
+    )
+    given = len(entry.args) + 1  # with self
+    values: dict[str, ast.expr | None] = {each.arg: defaults.get(each.arg) for each in arguments[given:]}
+    if any(isinstance(each, ast.Starred) for each in entry.args):
+        values = {}
+    values.update(
+        (each.arg, default) for each, default in zip(node.args.kwonlyargs, node.args.kw_defaults, strict=True)
+    )
+    values.update((each.arg, each.value) for each in entry.keywords if each.arg is not None)
+    changed = {
+        each.id
+        for each in ast.walk(node)
+        if isinstance(each, ast.Name) and not isinstance(each.ctx, ast.Load)
+    }
+    return {
+        name: value.value
+        for name, value in values.items()
+        if isinstance(value, ast.Constant) and name not in changed
+    }
