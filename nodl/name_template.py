@@ -71,7 +71,7 @@ class ParameterPart(NamedTuple):
     def may_be_none(self, parameters: Mapping[str, object]) -> bool:
         """Return whether it certainly stands for no text at all: an empty list, a condition that does not hold."""
         listed = self.item == "each" or any(
-            method in ("split", "range", "unless empty") for method, _ in self.edits
+            method in ("split", "part", "range", "unless empty") for method, _ in self.edits
         )
         if any(method == "only if set" for method, _ in self.edits):
             return True
@@ -107,6 +107,9 @@ def _edit(text: str, method: str, arguments: tuple[str, ...]) -> Sequence[str]:
         return (getattr(text, method)(*arguments),)
     if method == "split":
         return text.split(arguments[0] if arguments else None)
+    if method == "part":
+        index, parts = int(arguments[0]), text.split(arguments[1] if len(arguments) > 1 else None)
+        return (parts[index],) if -len(parts) <= index < len(parts) else ()
     if method == "range":
         first = int(arguments[0]) if arguments else 0
         return [str(number) for number in range(first, int(text))] if is_whole_number(text) else ()

@@ -173,7 +173,7 @@ def _input_parts(piece: Input) -> list[Part]:
 
 
 def _is_empty_list(atom: object) -> bool:
-    return isinstance(atom, Sequence) and atom.items.exact == () and not atom.escaped
+    return isinstance(atom, Sequence) and atom.items.exact == ()
 
 
 def _default_texts(value: Value, item: int | str | None) -> list[str | None]:

@@ -111,9 +111,10 @@ def text_of(pieces: Iterable[Piece]) -> TextAtom:
         if not (type(piece) is Hole and type(last) is Hole):
             merged.append(piece)
             last = piece
-    for index, piece in enumerate(merged):
-        if type(piece) is Input and is_one_of_several(piece) and piece in merged[:index]:
-            merged[index] = Hole("which parts go together")
+    several = [piece for piece in merged if type(piece) is Input and is_one_of_several(piece)]
+    for index, piece in enumerate(several):
+        if any(each._replace(edits=()) == piece._replace(edits=()) for each in several[:index]):
+            merged = [Hole("which parts go together") if each is piece else each for each in merged]
     if not merged:
         return ""
     if len(merged) == 1 and isinstance(merged[0], str):
@@ -142,7 +143,7 @@ def concatenate(left: TextAtom, right: TextAtom) -> TextAtom:
         return left or right
     head, tail = pieces_of(left), pieces_of(right)
     melts = (
-        any(type(piece) is Input and piece in head for piece in tail)
+        any(type(piece) is Input and is_one_of_several(piece) for piece in tail)
         or len(head) + len(tail) > MAX_PARTS
         or type(head[-1]) is type(tail[0])
     )

@@ -158,9 +158,10 @@ class Sequence(HeapObject):
 
     @property
     def items(self) -> Items:
+        """The contents; others may have changed what they were handed."""
         items = self.cells[ITEMS][0]
         assert isinstance(items, Items)
-        return items
+        return Items(None, join(items.any_element(), ANY)) if self.escaped else items
 
 
 class Key(NamedTuple):

@@ -28,7 +28,6 @@ from nodl.infer.text import (
 from nodl.infer.values import (
     BOTTOM,
     CONSTANTS,
-    ITEMS,
     ClassValue,
     Dictionary,
     External,
@@ -61,8 +60,7 @@ def truth_of(atom: object) -> bool | None:
         return True if any(isinstance(piece, str) for piece in atom.pieces) else None
     if isinstance(atom, Sequence):
         items = atom.items
-        known = items.exact is not None and len(atom.cells[ITEMS]) == 1 and not atom.escaped
-        return bool(items.exact) if known else None
+        return None if items.exact is None else bool(items.exact)
     if isinstance(atom, FunctionValue | ModuleValue | ClassValue):
         return True
     if isinstance(atom, Dictionary):
@@ -203,7 +201,7 @@ def _texts_in(value: Value) -> tuple[str, ...] | None:
         keys = [cell.constant for cell, _, certain in container.entries() if certain]
         texts = tuple(each for each in keys if isinstance(each, str))
         return texts if len(texts) == len(container.entries()) else None
-    if not isinstance(container, Sequence) or container.escaped or container.items.exact is None:
+    if not isinstance(container, Sequence) or container.items.exact is None:
         return None
     known = [item[0] for item in container.items.exact if len(item) == 1 and type(item[0]) is str]
     texts = tuple(each for each in known if isinstance(each, str))
@@ -355,7 +353,7 @@ def _is_among(constant: object, container: object) -> bool | None:
         return None
     if isinstance(constant, str) and isinstance(container, str):
         return constant in container
-    if isinstance(container, Sequence) and container.items.exact is not None and not container.escaped:
+    if isinstance(container, Sequence) and container.items.exact is not None:
         known = [item[0] for item in container.items.exact if len(item) == 1]
         certain = len(known) == len(container.items.exact) and all(isinstance(k, CONSTANTS) for k in known)
         return constant in known if certain else None

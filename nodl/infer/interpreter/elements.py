@@ -33,6 +33,7 @@ from nodl.infer.values import (
     join,
     join_all,
     present,
+    sole,
     unknown,
 )
 
@@ -40,11 +41,14 @@ from nodl.infer.values import (
 def subscript(run: Run, node: ast.Subscript, frame: Frame) -> Value:
     """Return what ``owner[key]`` gives for each owner but ``None``; ``ANY`` when nothing comes of it."""
     owner = run.evaluate(node.value, frame)
-    key = run.evaluate(node.slice, frame) if not isinstance(node.slice, ast.Slice) else ANY
+    key: Value = ANY
     if isinstance(node.slice, ast.Slice):
-        for bound in (node.slice.lower, node.slice.upper, node.slice.step):
-            if bound is not None:
-                run.evaluate(bound, frame)
+        given = (node.slice.lower, node.slice.upper, node.slice.step)
+        bounds = [sole(run.evaluate(each, frame)) if each is not None else None for each in given]
+        if all(each is None or type(each) is int for each in bounds) and bounds[2] != 0:
+            key = (slice(*bounds),)
+    else:
+        key = run.evaluate(node.slice, frame)
     result: Value = BOTTOM
     for atom in owner:
         if atom is not None:
@@ -57,7 +61,7 @@ def _element(run: Run, atom: object, key: Value, node: ast.Subscript, frame: Fra
         return dictionary_item(run, atom, key, node, frame)
     if isinstance(atom, Sequence):
         if isinstance(node.slice, ast.Slice):
-            return _sliced(run, atom, node)
+            return _sliced(run, atom, key[0] if isinstance(key[0], slice) else None, node)
         return _sequence_item(run, atom, key)
     if isinstance(atom, str):
         return _character(atom, key)
@@ -111,7 +115,7 @@ def _certain_entries(obj: Dictionary | Sequence) -> list[tuple[object, Value]] |
     """Return each key or index with what is there, if all are known."""
     if isinstance(obj, Sequence):
         exact = obj.items.exact
-        if exact is None or obj.escaped:
+        if exact is None:
             return None
         return [pair for start in (0, -len(exact)) for pair in enumerate(exact, start)]
     if obj.is_open or obj.default or not all(certain for _, _, certain in obj.entries()):
@@ -163,10 +167,12 @@ def _sequence_item(run: Run, sequence: Sequence, key: Value) -> Value:
     chosen = chosen_by_parameter(sequence, key)
     if chosen is not None:
         return chosen
-    if items.exact is None or sequence.escaped:
+    if items.exact is None:
         found = items.any_element()
+        if len(key) == 1 and type(key[0]) is int:
+            found = _part(found, key[0])
         one_of_several = len(found) > 1 and all(type(index) is int for index in key)
-        return join(found, ANY) if sequence.escaped or one_of_several else found or ANY
+        return join(found, ANY) if one_of_several else found or ANY
     if all(type(index) is int for index in key):
         length = len(items.exact)
         result: Value = BOTTOM
@@ -177,15 +183,26 @@ def _sequence_item(run: Run, sequence: Sequence, key: Value) -> Value:
     return items.any_element() or ANY
 
 
-def _sliced(run: Run, sequence: Sequence, node: ast.AST) -> Value:
-    """Return some of the elements; nobody knows which."""
-    found = sequence.items.any_element()
-    return run.sequence(node, sequence.kind, Items(None, _any_of(found)))
+def _part(value: Value, index: int) -> Value:
+    """Return what stands at ``index``, if ``value`` is any part of a text that is split."""
+    asked = input_of(value[0]) if len(value) == 1 else None
+    if asked is None or not asked.edits or asked.edits[-1][0] != "split":
+        return value
+    part = ("part", (str(index), *asked.edits[-1][1]))
+    return (make_text((asked._replace(edits=(*asked.edits[:-1], part)),)),)
+
+
+def _sliced(run: Run, sequence: Sequence, bounds: slice | None, node: ast.AST) -> Value:
+    """Return the elements between known bounds; else some, nobody knows which."""
+    exact = sequence.items.exact
+    if exact is not None and bounds is not None:
+        return run.sequence(node, sequence.kind, Items(exact[bounds]))
+    return run.sequence(node, sequence.kind, Items(None, _any_of(sequence.items.any_element())))
 
 
 def _character(text: str, key: Value) -> Value:
-    index = key[0] if len(key) == 1 else None
-    if type(index) is int and -len(text) <= index < len(text):
+    index = sole(key)
+    if isinstance(index, slice) or (type(index) is int and -len(text) <= index < len(text)):
         return (text[index],)
     return unknown("a part of a text")
 
@@ -203,10 +220,7 @@ def elements(run: Run, value: Value, node: ast.AST, frame: Frame) -> Items:
 
 def _elements_of(run: Run, atom: object, node: ast.AST, frame: Frame) -> Items:
     if isinstance(atom, Sequence):
-        items = atom.items
-        if atom.escaped and atom.kind != "tuple":
-            return Items(None, join(items.any_element(), ANY))
-        return items
+        return atom.items
     if isinstance(atom, Dictionary):
         return keys_of(atom)
     if isinstance(atom, str):
@@ -402,11 +416,11 @@ def _unpack(run: Run, targets: list[ast.expr], value: Value, frame: Frame) -> No
     element = items.any_element() or ANY
     if exact is not None:
         element = _any_of(element)
-    for target in targets:
+    for index, target in enumerate(targets):
         if isinstance(target, ast.Starred):
             assign(run, target, run.sequence(target, "list", Items(None, element)), frame)
         else:
-            assign(run, target, element, frame)
+            assign(run, target, element if starred else _part(element, index), frame)
 
 
 def delete(run: Run, target: ast.expr, frame: Frame) -> None:

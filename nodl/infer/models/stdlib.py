@@ -70,7 +70,7 @@ def _len(run: Run, call: Call) -> Value:
     atom = sole(call.args.at(0))
     if isinstance(atom, str):
         return (len(atom),)
-    if isinstance(atom, Sequence) and atom.items.exact is not None and not atom.escaped:
+    if isinstance(atom, Sequence) and atom.items.exact is not None:
         return (len(atom.items.exact),)
     keys = keys_of(atom).exact if isinstance(atom, Dictionary) else None
     return ANY if keys is None else (len(keys),)
