@@ -25,16 +25,31 @@ from nodl.infer.cpp.running.values import (
 LARGEST = 2**31 - 1
 """Larger numbers are not known; below zero neither are results: of unsigned numbers they are large ones."""
 _ARITHMETIC: dict[str, Callable[[Any, Any], Any]] = {
-    "+": operator.add, "-": operator.sub, "*": operator.mul,
-    "<": operator.lt, ">": operator.gt, "<=": operator.le, ">=": operator.ge,
+    "+": operator.add,
+    "-": operator.sub,
+    "*": operator.mul,
+    "<": operator.lt,
+    ">": operator.gt,
+    "<=": operator.le,
+    ">=": operator.ge,
+}
+_OF_INTEGERS: dict[str, Callable[[int, int], int]] = {
+    "/": operator.floordiv, "%": operator.mod, "&": operator.and_, "|": operator.or_, "^": operator.xor,
+    "<<": lambda left, right: left << min(right, 64), ">>": operator.rshift,
 }  # fmt: skip
 
 
 def arithmetic(sign: str, left: object, right: object) -> Value:
     """Compute ``left sign right`` of two numbers."""
-    if not isinstance(left, int | float) or not isinstance(right, int | float) or sign not in _ARITHMETIC:
+    if not isinstance(left, int | float) or not isinstance(right, int | float):
         return unknown("a computed value")
-    found = _ARITHMETIC[sign](left, right)
+    found: int | float
+    if sign in _ARITHMETIC:
+        found = _ARITHMETIC[sign](left, right)
+    elif sign in _OF_INTEGERS and isinstance(left, int) and isinstance(right, int) and min(left, right) >= 0:
+        found = _OF_INTEGERS[sign](left, right) if right or sign not in ("/", "%") else -1
+    else:
+        return unknown("a computed value")
     return (found,) if isinstance(found, float) or 0 <= found <= LARGEST else unknown("a computed value")
 
 
@@ -101,7 +116,7 @@ def _held(atom: object, kind: re.Match[str]) -> object:
         return Unknown("a parameter as a whole number")
     if not isinstance(atom, int | float):
         return atom
-    is_small = kind[0] == "short" or kind["bits"] in ("8", "16")
+    is_small = "short" in kind[0] or "char" in kind[0] or kind["bits"] in ("8", "16")
     is_signed = kind[0] in ("int", "long") or (kind["unsigned"] == "" and kind["bits"])
     least, most = -128 if is_signed else 0, 127 if is_small else LARGEST
     whole = int(atom) if math.isfinite(atom) else -LARGEST

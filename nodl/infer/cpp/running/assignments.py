@@ -253,8 +253,8 @@ def _assign_name(run: Machine, target: Node, value: Value, frame: Frame) -> None
 
 def _writes_through(field: Field, value: Value) -> bool:
     """Return whether a plain value is written to what a member refers to."""
-    declared = text(field.node).partition("=")[0].partition("{")[0]
-    return "&" in declared and any(not isinstance(atom, Obj) for atom in value)
+    refers = any(each.type == "reference_declarator" for each in field.node.named_children)
+    return refers and any(not isinstance(atom, Obj) for atom in value)
 
 
 def _assign_field(run: Machine, node: Node, value: Value, frame: Frame) -> None:

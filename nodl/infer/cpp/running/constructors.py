@@ -37,7 +37,7 @@ from nodl.infer.cpp.running.values import (
     open_sequence,
     unknown,
 )
-from nodl.infer.cpp.syntax import Node, children, field_of, text
+from nodl.infer.cpp.syntax import Node, callee_name, children, field_of, text
 
 SEQUENCES = frozenset({
     "std::vector", "std::array", "std::list", "std::deque", "std::set", "std::unordered_set", "std::initializer_list",
@@ -94,11 +94,23 @@ def initial_value(run: Machine, value: Node, frame: Frame, reference: bool = Fal
             return initial_value(run, inner[0], frame, reference)
         return BOTTOM if not inner else run.evaluate(value, frame)
     found = run.evaluate(value, frame)
-    if reference or _gives_iterator(value):
+    if reference or _gives_iterator(value) or _gives_pointer(run, value):
         return found
     if any(isinstance(atom, Seq | Map) for atom in found):
         return elements_copied(run, seen_type(run, value, frame), found, value, frame)
     return copied(run, found, value, frame)
+
+
+def _gives_pointer(run: Machine, value: Node) -> bool:
+    """Return whether it is ``&x``, or a call of a function of the program that gives a pointer."""
+    if value.type != "call_expression":
+        return text(value).startswith("&")
+    name = callee_name(field_of(value, "function") or value)
+    listed = run.names.functions_by_name.get(re.split(r"::|->|\.", name)[-1], ())
+    declarators = [field_of(each.node, "declarator") for each in listed]
+    return bool(listed) and all(
+        each is not None and each.type == "pointer_declarator" for each in declarators
+    )
 
 
 def _gives_iterator(value: Node) -> bool:
@@ -140,7 +152,7 @@ def made(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame: Fra
     values: list[Value] | None = None
     if cls is not None and len(given) == 1 and not given[0].type.startswith("initializer_"):
         values = [run.evaluate(given[0], frame)]
-        if _copies(run, cls, values[0]):
+        if copies(run, cls, values[0]):
             return copied(run, values[0], node, frame, cls)
     if cls is not None and is_aggregate(run, cls) and given:
         found = _aggregate(run, node, kind, cls, given, frame, values)
@@ -221,7 +233,7 @@ def text_of(run: Machine, values: Sequence[Value]) -> Value:
     return unknown("a text made of several values")
 
 
-def _copies(run: Machine, cls: Class, value: Value) -> bool:
+def copies(run: Machine, cls: Class, value: Value) -> bool:
     """Return whether an object of the class, or of a derived one, is all that a constructor gets."""
     derived = all(isinstance(atom, Obj) and cls in run.names.ancestry(atom.cls) for atom in value)
     return bool(value) and derived and not any(map(takes_another, run.names.methods[cls].get(cls.name, ())))

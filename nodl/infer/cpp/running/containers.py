@@ -7,7 +7,7 @@ from contextlib import suppress
 
 from nodl.infer.cpp.running.arithmetic import added
 from nodl.infer.cpp.running.assignments import assign, with_entry
-from nodl.infer.cpp.running.constructors import ORDERED, construct, made
+from nodl.infer.cpp.running.constructors import ORDERED, construct, copies, made
 from nodl.infer.cpp.running.contents import copied, elements_copied, handed_over, items_of
 from nodl.infer.cpp.running.expressions import element
 from nodl.infer.cpp.running.invocation import CallSite
@@ -95,7 +95,12 @@ def _added(run: Machine, atom: object, name: str, site: CallSite) -> Value:
     inner = kind.arguments[0] if kind.arguments else None
     cls = run.held_class(inner, frame)
     if name.startswith("emplace") and inner is not None and cls is not None:
-        value = construct(run, inner, site.values, site.node, frame)
+        is_copy = len(site.values) == 1 and copies(run, cls, site.values[0])
+        value = (
+            copied(run, site.values[0], site.node, frame, cls)
+            if is_copy
+            else construct(run, inner, site.values, site.node, frame)
+        )
     elif given and given[-1].type == "initializer_list" and inner is not None and inner.name:
         value = made(run, given[-1], inner, children(given[-1]), frame)
     else:
@@ -273,6 +278,10 @@ def _text_call(run: Machine, atom: Text | Param, name: str, site: CallSite) -> V
         if name == "str" and values:
             assign(run, site.receiver, values[0], site.frame)
         return (atom,)
+    if name == "swap" and len(values) == 1:
+        assign(run, site.given[0], (atom,), site.frame)
+        assign(run, site.receiver, values[0], site.frame)
+        return BOTTOM
     if name in _CHANGES_TEXT:
         adds = name in ("append", "push_back") and len(values) == 1
         changed = literal("") if name == "clear" else computed_text(run, atom, name, values)

@@ -9,7 +9,7 @@ from dataclasses import replace
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.arithmetic import added, computed
 from nodl.infer.cpp.running.assignments import as_declared, assign
-from nodl.infer.cpp.running.constructors import as_map, cast, construct, default_value, made
+from nodl.infer.cpp.running.constructors import as_map, cast, construct, default_value, initial_value, made
 from nodl.infer.cpp.running.contents import copied, elements_copied, items_of
 from nodl.infer.cpp.running.invocation import by_operator, pointed_to
 from nodl.infer.cpp.running.launch_values import decided, settled, settled_text
@@ -241,8 +241,8 @@ def lambda_(run: Machine, node: Node, frame: Frame) -> Value:
     for child in captures:
         if child.type == "lambda_capture_initializer" and len(children(child)) >= 2:
             named = children(child)
-            name, value = text(named[0]), run.evaluate(named[-1], frame)
-            run.local(inner, name.lstrip("&"), value if name[:1] == "&" else copied(run, value, child, frame))
+            name, refers = text(named[0]).lstrip("&"), text(named[0]).startswith("&")
+            run.local(inner, name, initial_value(run, named[-1], frame, refers))
     if frame.blocks or frame.kept:
         owners = {name: frame.owner_of(name) for name in words_of(node)}
         inner.kept = {name: owner for name, owner in owners.items() if owner is not None}

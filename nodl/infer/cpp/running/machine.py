@@ -27,6 +27,7 @@ from nodl.infer.cpp.running.values import (
     Text,
     Value,
     concatenated,
+    plain,
     unknown,
 )
 from nodl.infer.cpp.syntax import Node, line_of, text, walk, words_in
@@ -120,6 +121,7 @@ class Machine:
         self.steps = 0
         self.repeated = 0  # how many of the elements being made stand for several each
         self.calls_back = False  # the program has come to its end, callbacks run
+        self.undecided = 0  # how many conditions that are not known decide whether this runs
         self.consulted: dict[str, object] = {}  # parameters whose value decided what is made
         self.from_default: dict[str, None] = {}  # those of them that no launch was asked for
         self.unset: dict[tuple[str, int], tuple[SourceRef, str, str]] = {}  # calls on pointers to nothing
@@ -171,17 +173,22 @@ class Machine:
             return NEXT
         return handler(self, node, frame)
 
-    def branches(self, alternatives: Sequence[Callable[[], int]]) -> int:
-        """Run each alternative from the present state; continue with any that goes on."""
+    def branches(self, alternatives: Sequence[Callable[[], int]], tested: bool = False) -> int:
+        """Run each alternative from the present state; continue with any that goes on.
+
+        ``tested``: a condition of the program decides.
+        """
         mark = self.store.mark()
         outcome = 0
         going: list[Changes] = []
+        self.undecided += tested
         for alternative in alternatives:
             result = alternative()
             outcome |= result
             if result & NEXT:
                 going.append(self.store.changes(mark))
             self.store.undo(mark)
+        self.undecided -= tested
         if going:
             self.store.merge(going)
         self.left = None
@@ -295,7 +302,10 @@ class Machine:
     ) -> None:  # fmt: skip
         source = self.place(call.node, call.frame)
         conditions = self.conditions(call.node, call.frame)
-        for atom in concatenated(name or unknown("a name that is never set")):
+        atoms = concatenated(name or unknown("a name that is never set"))
+        if self.calls_back and self.undecided and sum(plain(atom) is not None for atom in atoms) > 1:
+            atoms = unknown("which of several names goes with a condition that callbacks change")
+        for atom in atoms:
             parts = atom.parts if isinstance(atom, Text) else (UnknownPart(atom.why),)
             found = PossibleEndpoint(kind, Text(parts), type_name, source, follows=follows)
             record.endpoints.setdefault(found, []).append(conditions)

@@ -43,7 +43,8 @@ def _of_text(kind: str, written: str, is_generic: bool) -> float:
     """Rate a parameter's type for a text: a literal is rather any template's ``T``, or ``true``, than a
     ``std::string`` ([over.ics.rank]).
     """
-    if "char" in kind or "string" in kind:
+    whole = kind.partition("<")[0]  # a list of texts is none
+    if "char" in whole or "string" in whole:
         return {"char": 3 if "char" in kind else 2, "string": -3 if "char" in kind else 3}.get(written, 3)
     if is_generic:
         return 2.8 if written == "char" else 1

@@ -25,7 +25,7 @@ from nodl.infer.cpp.running.machine import (
 from nodl.infer.cpp.running.memory import Changes
 from nodl.infer.cpp.running.references import bind_reference, elements_written
 from nodl.infer.cpp.running.static_types import element_type, seen_type
-from nodl.infer.cpp.running.values import BOTTOM, Const, Group, Obj, Seq, Value, join, unknown
+from nodl.infer.cpp.running.values import BOTTOM, Const, Group, Obj, Seq, Text, Value, join, plain, unknown
 from nodl.infer.cpp.running.variables import member
 from nodl.infer.cpp.syntax import Node, children, field_of, parse_expression, text, unwrapped, walk
 
@@ -160,7 +160,7 @@ def if_statement(run: Machine, node: Node, frame: Frame) -> int:
     value = condition_value(run, condition, frame)
     then, other = field_of(node, "consequence"), field_of(node, "alternative")
     if value is None:
-        return run.branches([partial(run.execute, side, frame) for side in (then, other)])
+        return run.branches([partial(run.execute, side, frame) for side in (then, other)], tested=True)
     always = "always" if value else "never"
     run.kill(other if value else then, frame, f"the condition {text(condition)[:60]} is {always} true")
     return run.execute(then if value else other, frame)
@@ -199,10 +199,11 @@ def switch_statement(run: Machine, node: Node, frame: Frame) -> int:
     loop = _Switch(run.store.mark())
     frame.loops.append(loop)
     starts = range(len(cases)) if chosen is None else chosen
-    sides: list[Callable[[], int]] = [partial(_falling, run, cases[at:], frame) for at in starts]
+    certain = chosen is not None
+    sides: list[Callable[[], int]] = [partial(_falling, run, cases[at:], certain, frame) for at in starts]
     if not sides or (chosen is None and all(field_of(case, "value") is not None for case in cases)):
         sides.append(lambda: NEXT)
-    outcome = run.branches(sides)
+    outcome = run.branches(sides, tested=len(sides) > 1)
     frame.loops.pop()
     run.settle(loop.start, loop.breaks, bool(outcome & NEXT))
     if outcome & BREAK:
@@ -220,20 +221,27 @@ def _chosen_case(
     default = [index for index, case in enumerate(cases) if field_of(case, "value") is None]
     labels = [run.evaluate(field_of(case, "value"), frame) for case in cases]
     known = [subject, *(label for index, label in enumerate(labels) if index not in default)]
-    if len(listed) != len(cases) or not all(len(v) == 1 and isinstance(v[0], Const | int) for v in known):
+    if len(listed) != len(cases) or not all(len(v) == 1 and _is_label(v[0]) for v in known):
         return None
     if len({type(value[0]) for value in known}) > 1:
         return None
     return ([index for index, label in enumerate(labels) if label == subject] or default)[:1]
 
 
-def _falling(run: Machine, cases: list[Node], frame: Frame) -> int:
+def _is_label(atom: object) -> bool:
+    """Return whether it is an enumerator, a number or a letter."""
+    return isinstance(atom, Const | int) or (isinstance(atom, Text) and plain(atom) is not None)
+
+
+def _falling(run: Machine, cases: list[Node], certain: bool, frame: Frame) -> int:
     outcome = NEXT
-    for case in cases:
+    for index, case in enumerate(cases):
         value = field_of(case, "value")
         result = sequence(run, [child for child in children(case) if child != value], frame)
         outcome = (outcome & ~NEXT) | result
         if not result & NEXT:
+            for rest in cases[index + 1 :] if certain else ():
+                run.kill(rest, frame, "the switch never takes this case")
             break
     return outcome
 
@@ -341,6 +349,10 @@ def nothing(run: Machine, node: Node, frame: Frame) -> int:
     """Runs nothing; ``using``, aliases and typedefs change what names of types mean from here on."""
     if node.type in ("using_declaration", "alias_declaration", "type_definition"):
         _local_alias(run, node, frame)
+    if node.type == "enum_specifier":
+        for each in children(field_of(node, "body")):
+            name = text(field_of(each, "name"))
+            run.local(frame, name, (Const(f"{name} in line {node.start_point[0] + 1}"),))
     return NEXT
 
 

@@ -112,6 +112,19 @@ FOUND = {
         'template <int I> std::string name() { if constexpr (I > 2) return "t" + std::to_string(I); return "small"; }',
         ["t3"],
     ),
+    "whole numbers that are divided": (f'{PUB}("t" + std::to_string(7 / 2 + 7 % 4), 1);', "", ["t6"]),
+    "an enumeration of a function": (
+        f'enum Mode {{ On, Off }}; Mode m = Off; {PUB}(m == On ? "on" : "off", 1);', "", ["off"]
+    ),
+    "a case for a letter": (
+        f"char c = 'b'; switch (c) {{ case 'a': {PUB}(\"a\", 1); break; case 'b': {PUB}(\"b\", 1); }}", "", ["b"]
+    ),
+    "texts that are swapped": (f'std::string a = "a", b = "b"; a.swap(b); {PUB}(b + "_b", 1);', "", ["a_b"]),
+    "pointers to objects": (
+        'C c; auto p = &c; p->t = "p"; auto f = [q = &c]() { q->t += "_q"; }; f(); auto m = own(); m->t = "m"; '
+        f"{PUB}(c.t, 1); {PUB}(c_.t, 1);",
+        "struct C { std::string t; }; C c_; C * own() { return &c_; }", ["m", "p_q"],
+    ),
     "objects in closures": (
         'C a; a.t = "a"; auto copy = [a]() { return a.t; }; auto same = [&a]() { return a.t; }; a.t = "b"; '
         f'{PUB}("copy_" + copy(), 1); {PUB}("same_" + same(), 1);',

@@ -714,3 +714,16 @@ def test_what_a_call_gives_is_copied_if_it_is_no_pointer(body: str, expected: st
     assert names(infer(tmp_path, in_class(use, members, before='struct C { std::string t = "a"; };\n'))) == [
         expected
     ]
+
+
+def test_a_name_that_changes_with_the_state_of_a_machine_is_open(tmp_path: Path) -> None:
+    """Nobody knows which value of the one variable goes with which of the other."""
+    step = (
+        f'if (state == 0) {{ name = "b"; state = 1; }} else {{ create_publisher<{S}>(name, 1); name = "c"; }}'
+    )
+    members = 'int state = 0; std::string name = "a";'
+    made = infer(tmp_path / "state", in_class(f"create_wall_timer(1s, [this]() {{ {step} }});", members))
+    assert names(made) == ["?"]
+    always = f'create_publisher<{S}>(name, 1); name = "b";'
+    made = infer(tmp_path / "any", in_class(f"create_wall_timer(1s, [this]() {{ {always} }});", members))
+    assert names(made) == ["a", "b"]
