@@ -260,7 +260,7 @@ def add_absent_verb(
 def guarded(program: str, work: Callable[[], int], *mistakes: type[Exception]) -> int:
     """Return the exit status of ``work``, or of the error that ended it: one line on stderr, no traceback.
 
-    An error of ``mistakes`` tells its own ``exit_status``, else 1. 130: interrupted (Ctrl-C). 0: who read our output
+    An error of ``mistakes`` may have its own ``exit_status``, else 1. 130: interrupted (Ctrl-C). 0: who read our output
     has enough. What is nobody's mistake but ours is raised.
     """
     try:

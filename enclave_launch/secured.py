@@ -36,7 +36,7 @@ from keystore.steps.sharing import shared_enclaves
 
 
 class ProvisionedLaunch(NamedTuple):
-    """``report`` tells what was done to the keystore; ``settings`` how processes are pointed at it;
+    """``report`` says what was done to the keystore; ``settings`` how processes are pointed at it;
     ``options`` are those ``requested``, with what the plan decided."""
 
     plan: LaunchPlan

@@ -62,7 +62,7 @@ class ParsedRule(NamedTuple):
     replacement: str
     node: str | None = None
     text: str = ""
-    origin: str = ""  # "file:line" or what else tells a reader where the rule was written
+    origin: str = ""  # "file:line" or what else shows a reader where the rule was written
 
     def __str__(self) -> str:
         return f"{self.text} ({self.origin})" if self.origin else self.text

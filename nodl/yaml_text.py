@@ -34,7 +34,7 @@ class YamlList(NamedTuple):
 
 
 class YamlMap(NamedTuple):
-    """``items`` in document order; ``keys`` tells where each key is written."""
+    """``items`` in document order; ``keys`` says where each key is written."""
 
     items: dict[str, YamlValue]
     keys: dict[str, SourceRef]

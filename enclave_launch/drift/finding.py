@@ -57,7 +57,7 @@ class FindingCertainty(Enum):
 
 class DriftFinding(NamedTuple):
     """``subject``: the node or participant it is about, ``name`` the topic, service or action; ``who``: where it was
-    seen, for a person (a pid, a host). Two findings with one ``key`` are the same at two moments."""
+    seen, for a person (a pid, a host). Two findings with one ``key`` are the same at two times."""
 
     kind: Kind
     subject: str

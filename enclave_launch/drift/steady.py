@@ -44,7 +44,7 @@ class Change(NamedTuple):
 
 
 class Steady:
-    """Told of all findings of each moment, in order."""
+    """Takes all findings of each point in time, in order."""
 
     def __init__(self, patience: SettlingTimes | None = None) -> None:
         self._patience = patience or SettlingTimes()

@@ -2,7 +2,7 @@
 
 After the visit of the launch file, first comes what happens in every run, in order: events that the file
 emitted itself, completions, process starts, timers by due time. Then each remaining handler is given a made-up
-event (a process exits, writes, a lifecycle node changes state) in the state of that moment, and everything is
+event (a process exits, writes, a lifecycle node changes state) in the state at that time, and everything is
 put back afterwards: one supposition must not colour the next. What a handler starts is followed further.
 """
 

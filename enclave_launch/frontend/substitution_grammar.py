@@ -27,7 +27,7 @@ Template: TypeAlias = tuple[TemplatePart, ...]
 
 
 class SubstitutionCall:
-    """``$(name arg ...)``. ``rule``: upstream's grammar rule, which tells the quotes it stands in; calls that differ
+    """``$(name arg ...)``. ``rule``: upstream's grammar rule, which says in which quotes it stands; calls that differ
     in nothing else are equal."""
 
     __slots__ = ("args", "name", "rule")

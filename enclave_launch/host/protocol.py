@@ -109,7 +109,7 @@ class Host(Protocol):
         """Return the launch files parsed so far."""
 
     def prefixes(self) -> tuple[str, ...]:
-        """Return ament prefixes to search, first wins, from the environment of this moment."""
+        """Return ament prefixes to search, first wins, from the present environment."""
 
     def find_package_prefix(self, package: str) -> str:
         """Return the prefix; raises ``PackageNotFoundError`` (a ``KeyError``), ``ValueError`` for an invalid name."""

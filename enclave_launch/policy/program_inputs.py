@@ -62,7 +62,7 @@ def program_inputs(process: ResolvedProcess) -> ProgramInputs:
         if _is_flag(word):
             name, equals, value = word.partition("=")
             values[name] = value if equals or _is_flag(following) else following
-    leading = [*takewhile(lambda word: not _is_flag(word), words)]  # behind an option places tell nothing
+    leading = [*takewhile(lambda word: not _is_flag(word), words)]  # behind an option places mean nothing
     values.update((f"<{place}>", word) for place, word in enumerate(leading, 1))
     return ProgramInputs(
         values,

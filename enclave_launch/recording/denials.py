@@ -42,7 +42,7 @@ class Denial(NamedTuple):
     patch: Patch | None
     cause: Cause | None = None
     silent: bool = False
-    """On Zenoh: the node was not told, its messages are dropped."""
+    """On Zenoh: the node got no error, its messages are dropped."""
     unseen: tuple[str, ...] = ()
     """All that ``--also unseen`` grants, this endpoint among it."""
     denied: bool = False
@@ -101,7 +101,7 @@ class NotJoined(NamedTuple):
 
 
 class Explainer(Listener):
-    """Follows one recording of a secured launch; ``denials`` and ``not_joined`` are what it told."""
+    """Follows one recording of a secured launch; ``denials`` and ``not_joined`` are what it reported."""
 
     def __init__(self, plan: LaunchPlan) -> None:
         self.denials: list[Denial] = []

@@ -1,4 +1,4 @@
-"""Programs that the recorder cannot get into, and those that need care: told before they start. Reads their heads.
+"""Programs that the recorder cannot get into, and those that need care: reported before they start. Reads their heads.
 
 ``ld.so`` ignores LD_PRELOAD without a word for programs that gain privileges; a static program has no ``ld.so``; some
 programs start others with a cleaned environment (man 8 ld.so, ELF specification).

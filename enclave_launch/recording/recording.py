@@ -148,7 +148,7 @@ class Recording:
         elif isinstance(event, ProcessExited):
             self.running.pop(event.pid, None)
         elif isinstance(event, LaunchOver) and self._folder is not None:
-            self._look_once_more()  # what is told now is heard before the end
+            self._look_once_more()  # what is reported now is printed before the end
             self._report(float("inf"))
         for listener in self._listeners:
             listener.happened(event)

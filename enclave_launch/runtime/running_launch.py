@@ -195,7 +195,7 @@ class RunningLaunch:
     ) -> int:
         """End every process (SIGINT, SIGTERM, SIGKILL), wait, return the exit status; raises TimeoutError."""
         if self._loop is not None and self._service is not None and not self._is_over:
-            with contextlib.suppress(RuntimeError):  # its loop was closed in this moment: it is over
+            with contextlib.suppress(RuntimeError):  # its loop was closed meanwhile: it is over
                 self._loop.call_soon_threadsafe(self._service.shut_down, reason)
         return self.wait(timeout)
 

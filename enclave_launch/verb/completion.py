@@ -1,7 +1,7 @@
 """Complete, for a shell, the words that name a launch: packages, launch files, launch arguments.
 
 The shell asks through argcomplete, as for ``ros2`` (``command_line.complete``). Nothing of a launch file is
-executed for it: the arguments of a Python file, which only running it would tell, are not offered.
+executed for it: the arguments of a Python file, which only running it would show, are not offered.
 """
 
 from __future__ import annotations

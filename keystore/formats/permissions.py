@@ -53,7 +53,7 @@ class DdsRules(NamedTuple):
     """The rules of a grant in their order: ``first`` and ``allow`` are allow rules, ``deny`` stands between.
 
     ``first`` holds names that ``allow`` grants as well; they only keep Cyclone DDS before 11.0 from
-    blocking a topic whose other direction is denied. ``hazards`` tells of denials where that is not
+    blocking a topic whose other direction is denied. ``hazards`` lists denials where that is not
     possible, in words for a person.
     """
 

@@ -16,7 +16,7 @@ class PolicyError(InvalidInputError):
 
 class Operation(str, Enum):
     """What a rule is about; the value is the attribute of the policy XML, where ``call`` is said of actions alone.
-    ``verb`` is what people are told: the same words for topics, services and actions everywhere."""
+    ``verb`` is the word in messages: the same for topics, services and actions everywhere."""
 
     __str__ = str.__str__
 

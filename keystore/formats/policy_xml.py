@@ -1,6 +1,6 @@
 """SROS2 policy XML, version 0.2.0 <-> ``keystore.formats.policy.Policy``.
 
-Reading accepts what the schema accepts (checked here, to tell file and line also in included files),
+Reading accepts what the schema accepts (checked here, to report file and line also in included files),
 merges profiles and enclaves that occur twice, and checks every name as permissions would need it.
 Writing is sorted and stable, so that a derived policy can be committed and reviewed.
 

@@ -30,7 +30,7 @@ _time = lru_cache(maxsize=1024)(parse_time)  # what was issued together has the 
 REVOKED_MARGIN = timedelta(days=400)
 """How long a revoked certificate stays on the CRL after it has ended; longer than a clock may jump unasked."""
 UNKNOWN = ""
-"""In place of an enclave, subject or key: of certificates of which only a CRL tells."""
+"""In place of an enclave, subject or key: of certificates that only a CRL lists."""
 
 
 class AuthorityState(str, Enum):

@@ -137,7 +137,7 @@ def load_private_key(pem: bytes, passphrase: Secret | None, place: str) -> Priva
             f"{place} is encrypted; give its passphrase with --passphrase-file, -fd or -env"
         )
     if encrypted and passphrase is not None:
-        passphrase.value()  # what is wrong with it is told as that
+        passphrase.value()  # reports what is wrong with it
     try:
         key = serialization.load_pem_private_key(
             pem, passphrase.value() if encrypted and passphrase else None

@@ -84,7 +84,7 @@ def _framed(content: bytes, signature: bytes) -> bytes:
 
 
 class SignedDocument(NamedTuple):
-    """A ``.p7s`` taken apart; ``check`` tells who signed it. ``document`` has LF line ends, ``pkcs7`` is DER."""
+    """A ``.p7s`` taken apart; ``check`` returns who signed it. ``document`` has LF line ends, ``pkcs7`` is DER."""
 
     document: bytes
     pkcs7: bytes

@@ -37,7 +37,7 @@ from keystore.steps.signing_here import beyond_and_missing
 
 
 class WantedEnclave(NamedTuple):
-    """What one enclave should have: these permissions, and at least this much of its identity issued anew."""
+    """What one enclave should have: these permissions, and at least this much of its identity issued again."""
 
     permissions: PermissionsSource
     reissue: Reissue = Reissue.NOTHING
@@ -184,7 +184,7 @@ def inspect_wanted(
     options: ProvisionOptions,
     now: datetime,
 ) -> EnclaveState:
-    """Compare the enclave with what is wanted; what is requested to be issued anew counts as a difference."""
+    """Compare the enclave with what is wanted; what is requested to be issued again counts as a difference."""
     # A certificate that ends with its CA cannot be renewed for longer.
     due = min(later(now, options.renew_within), *(view.ca(role).validity.not_after for role in Role))
     state = inspect(view, register, enclave, wanted.permissions, now, due)

@@ -144,7 +144,7 @@ def last_signed(view: KeystoreView, host: str) -> tuple[Manifest, bytes] | None:
     document = smime.read(signed, place)
     manifest = parse_manifest(document.document, place)
     if not document.embeds(view.ca(Role.PERMISSIONS).der):
-        # By an earlier CA: signed anew, with a higher number.
+        # By an earlier CA: signed again, with a higher number.
         return manifest._replace(files={}), signed
     smime.check(document, [view.ca(Role.PERMISSIONS)], place)
     return manifest, signed

@@ -94,7 +94,7 @@ def install(folder: Path, options: UnitOptions | None = None) -> Installed:
 
     Raises:
         InvalidInputError: ``folder`` is not such a folder, or a unit of that name is not ours.
-        StorageError: A file cannot be written; systemd is then not told of any.
+        StorageError: A file cannot be written; systemd is then not reloaded.
     """
     chosen = options or UnitOptions()
     brought = {unit.name: text for unit, text in _generated(folder)}

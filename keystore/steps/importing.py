@@ -3,7 +3,7 @@
 Needs neither a network nor a CA key. Refused: what the pinned permissions CA did not sign, another host's bundle, an
 earlier one, one that is cut off or has a file more, less or changed, an earlier CRL, an enclave that was revoked, a
 governance weaker than the default, and what ``verify`` calls an error. The same bundle again restores what was changed
-since. Nothing is half-imported: a run that is killed leaves the keystore of before.
+since. Nothing is half-imported: a run that is killed leaves the previous keystore.
 """
 
 from __future__ import annotations

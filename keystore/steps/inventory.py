@@ -26,7 +26,7 @@ from keystore.verification.governance import weaknesses
 
 class KeyEntry(NamedTuple):
     """``use``: ``identity CA``, ``permissions CA`` or ``enclave``. ``private_key``: where it is, as far as this copy of
-    the keystore tells. Dates as ISO 8601; fingerprint and key identifier as SHA-256 in hex."""
+    the keystore says. Dates as ISO 8601; fingerprint and key identifier as SHA-256 in hex."""
 
     use: str
     name: str

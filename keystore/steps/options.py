@@ -1,4 +1,4 @@
-"""What a caller can choose when enclaves are provisioned, and what is told of it."""
+"""What a caller can choose when enclaves are provisioned, and what is reported of it."""
 
 from __future__ import annotations
 

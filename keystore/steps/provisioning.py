@@ -151,7 +151,7 @@ def apply_policy(
 
 
 def _as_long_as_asked(options: ProvisionOptions) -> ProvisionOptions:
-    """Give a requested life to existing enclaves too: what expires an hour sooner or later is issued anew."""
+    """Give a requested life to existing enclaves too: what expires an hour sooner or later is issued again."""
     end = asked_end(options)
     within = options.renew_within if end is None else end - (options.now or utc_now()) - timedelta(hours=1)
     return options._replace(create=False, renew_within=max(options.renew_within, within))

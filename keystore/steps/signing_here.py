@@ -1,4 +1,4 @@
-"""A host without the CA keys: what would have to be signed is told, enclave by enclave, before anything is tried."""
+"""A host without the CA keys: what would have to be signed is reported, by enclave, before anything is tried."""
 
 from __future__ import annotations
 

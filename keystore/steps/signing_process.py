@@ -134,7 +134,7 @@ def _answer(root: Path, base: ProvisionOptions, request: Any, descriptor: int | 
     except KeystoreError as error:
         domains = str(error.domains) if isinstance(error, NoGovernanceRuleError) else ""
         return {"error": [type(error).__name__, str(error), domains]}
-    except Exception as error:  # whatever was sent: the launcher is told, and asks no more
+    except Exception as error:  # whatever was sent: the launcher gets the error, and requests no more
         return {"error": ["InvalidInputError", f"the plan cannot be signed: {type(error).__name__}", ""]}
     finally:
         if descriptor is not None:

@@ -132,7 +132,7 @@ def _assigned(arguments: argparse.Namespace) -> dict[str, list[str]]:
 
 
 def _pinned(keystore: Path) -> str:
-    """Return the command that verifies the bundle; a bundle has no register that could tell a foreign CA."""
+    """Return the command that verifies the bundle; a bundle has no register that would reveal a foreign CA."""
     view = KeystoreView(resolve_root(keystore))
     found = dict.fromkeys(fingerprint(ca.der) for role in Role for ca in view.ca_bundle(role))
     return " ".join(("secure-keystore verify BUNDLE", *(f"--require-ca {one}" for one in found)))

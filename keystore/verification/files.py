@@ -65,7 +65,7 @@ def check_files(root: Path) -> Iterator[Finding]:
 
 
 def _less_of_an_enclave(root: Path, name: str, names: list[str]) -> str:
-    """Return, of directories that only case tells apart, one without key and certificate, if there is one."""
+    """Return, of directories that differ only in case, one without key and certificate, if there is one."""
     alike = [layout.enclave_directory(other) for other in names if other.lower() == name.lower()]
     empty = [one for one in alike if not {layout.KEY, layout.CERT} & set(os.listdir(root / one))]
     return (empty or alike)[0]

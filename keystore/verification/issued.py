@@ -82,7 +82,7 @@ def check_published(view: KeystoreView, register: Register | None, now: datetime
     if register is None:
         return
     problem = crl_problem(view, register, now)
-    if problem is not None and problem != "the CRL has expired":  # which is told by its dates
+    if problem is not None and problem != "the CRL has expired":  # which its dates report
         yield Finding(
             Severity.ERROR, "crl-not-last", layout.CRL,
             f"{problem}: enclaves that were revoked since may talk again",

@@ -1,6 +1,6 @@
 """What a Zenoh router refused, explained from its log and the keystore: who, what, why, and what allows it.
 
-Reads only. The log is untrusted text, and keeps what clients sent: everything of it is told as text.
+Reads only. The log is untrusted text, and keeps what clients sent: everything of it is printed as text.
 """
 
 from __future__ import annotations
@@ -117,7 +117,7 @@ class RouterLogExplainer:
                 address = present_address(self._view) or RouterAddress()
                 content = router_file(self._view, [enclave], address).content
             except KeystoreError:
-                return frozenset()  # verify tells of it
+                return frozenset()  # verify reports it
             admitted = read_configuration(content, layout.ZENOH_ROUTER).admitted
             found = (meaning(*one[:3]) for permissions in admitted.values() for one in permissions)
             self._granted[enclave] = frozenset(one for one in found if one is not None)

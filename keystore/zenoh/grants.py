@@ -1,4 +1,4 @@
-"""What one enclave may do, in the four ways that a Zenoh router can tell apart. Performs no I/O.
+"""What one enclave may do, in the four ways that a Zenoh router can distinguish. Performs no I/O.
 
 Made from the DDS topics that its permissions grant, so that both middlewares enforce the same and never anything else:
 what ``permissions`` decided about denials holds here too.

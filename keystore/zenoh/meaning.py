@@ -1,7 +1,7 @@
 """What a message on a key is about, in ROS words: ``key_expressions`` and ``rules`` the other way round.
 
 For whoever reads a router's rules or its log. A key is untrusted text: what is not shaped as ROS makes it has no
-meaning, which is told as it is.
+meaning, which is printed unchanged.
 """
 
 from __future__ import annotations

@@ -61,7 +61,7 @@ _TABLE = (
     _Row("learn of history", Use.SUBSCRIBE, "egress", ("put", "liveliness_token"), cache),
     _Row("call", Use.CALL, "ingress", ("query",)),
     # rmw_zenoh_cpp declares a querier for each client (since 0.2.6 on jazzy): it sends nothing to a service that its
-    # session has not been told of.
+    # session does not know yet.
     _Row("be answered", Use.CALL, "egress", ("reply", "declare_queryable")),
     _Row("serve", Use.SERVE, "ingress", ("declare_queryable", "reply")),
     _Row("be called", Use.SERVE, "egress", ("query",)),

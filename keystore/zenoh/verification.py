@@ -1,7 +1,7 @@
 """The files for Zenoh: whether the router enforces what is signed, and whether it is who it says it is.
 
-Where a file is not what follows from the keystore, each difference is told: settings, who is admitted, and in ROS words
-who may do more or less than was signed.
+If a file is not what follows from the keystore, each difference is reported: settings, who is admitted, and in
+ROS words who may do more or less than was signed.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from keystore.zenoh.files import (
 )
 
 _TOLD = 40
-"""Differences of one file, beyond which only their number is told."""
+"""Differences of one file, beyond which only their number is reported."""
 
 
 def check_zenoh(view: KeystoreView, now: datetime) -> Iterator[Finding]:

@@ -1,6 +1,6 @@
 """A described node and one situation of it give the interface that it has there, and the nodes it brings along.
 
-What cannot be told is a gap of the interface, never a name that was guessed. Reads configuration files that launch
+What cannot be decided is a gap of the interface, never a name that was guessed. Reads configuration files that launch
 names, and asks ``Documents`` for plugins and further nodes.
 """
 

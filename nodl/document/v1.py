@@ -1,7 +1,7 @@
 """NoDL v1 (``*.nodl.xml``) -> ``ManifestNode`` values.
 
-What ubuntu-robotics/nodl's schema ``v1.xsd`` accepts is accepted, and told with file and line where it is
-not; comments are ignored and a name with two roles keeps both, unlike in its parser. Names are checked
+What ubuntu-robotics/nodl's schema ``v1.xsd`` accepts is accepted, everything else refused with file and
+line; comments are ignored and a name with two roles keeps both, unlike in its parser. Names are checked
 as rcl would, which the schema leaves open.
 """
 

@@ -2,7 +2,7 @@
 
 A v2 document does not say who runs the node. The resource key ``<package>__<name>`` (or the file name
 ``<name>.nodl.yaml``) does: *name* is the executable and the node's name. Where that is not so, a section
-of the opaque ``codegen`` tells, which other tools ignore:
+of the opaque ``codegen`` says, which other tools ignore:
 
     codegen:
       enclave_launch: {package: demo, executable: talker, node: chatterbox, namespace: /demo, plugin: demo::Talker,

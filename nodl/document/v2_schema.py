@@ -1,7 +1,7 @@
 """The schema of a NoDL v2 document, as a table of small checkers over lined YAML values. Performs no I/O.
 
 The rules of ros-tooling/nodl's ``nodl.schema.yaml`` and ``parameter.schema.yaml`` (JSON Schema, draft 7),
-told with file and line. Written by hand because the dry run must not pay for a JSON-Schema library. Our own
+reported with file and line. Written by hand because the dry run must not pay for a JSON-Schema library. Our own
 section of the opaque ``codegen`` has its rules in ``v2_section``.
 """
 

@@ -53,7 +53,7 @@ class RecordedNode:
 
 @dataclass(slots=True)
 class RecordedProcess:
-    """One program in one process; ``started`` is ``None`` if no line tells who started it."""
+    """One program in one process; ``started`` is ``None`` if no line says who started it."""
 
     loaded: Loaded | None
     pid: int

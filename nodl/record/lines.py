@@ -1,4 +1,4 @@
-"""The lines of a record: JSON objects, one a line, told apart by ``what``. Performs no I/O.
+"""The lines of a record: JSON objects, one a line, distinguished by ``what``. Performs no I/O.
 
 ``loaded``, ``init``, ``node``, ``node_end``, ``state``, ``parameters``, ``ended`` and the six kinds of endpoints come
 from the recorder in a process (``enclave_launch/recording/recorder.c``); they carry ``pid``, ``thread``, ``at``

@@ -102,7 +102,7 @@ FIXED = NameOrigin()
 def arguments_as_inputs(words: Sequence[str]) -> dict[str, str]:
     """Return the words of a command line by their place, from ``<1>``, and the values of options by their names.
 
-    Behind an option, which may take the next word, a place tells nothing.
+    Behind an option, which may take the next word, a place means nothing.
     """
     leading = takewhile(lambda word: not word.startswith("-"), words)
     options = {f"<{index}>": word for index, word in enumerate(leading, 1)}

@@ -1,4 +1,4 @@
-"""What a recorded node asked for, apart from what libraries make for every node, as told by who called rcl."""
+"""What a recorded node requested, apart from what libraries make for every node, by who called rcl."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class RequestedNode(NamedTuple):
     """What one node asked for. ``name`` and ``namespace`` are the source's own, ``fqn`` the final name.
 
     ``parameters``, ``arguments`` and ``rules`` are those that the launch gave it; ``known_start``: whether a line of
-    the supervisor tells them at all; ``declared``: values of parameters that the node declared;
+    the supervisor reports them at all; ``declared``: values of parameters that the node declared;
     ``started_as``: what the launch calls it (``node``, ``component`` ...).
     """
 

@@ -31,7 +31,7 @@ _PERIOD_TYPES = (*SomeSubstitutionsType_types_tuple, float)
 class TimerAction(Action):
     """Visit ``actions`` once, ``period`` seconds after execution, unless cancelled.
 
-    They find the state of that later moment; only the locals are those of the timer's own position. The
+    They find the state at that later time; only the locals are those of the timer's own position. The
     period is performed after the visit in progress.
     """
 

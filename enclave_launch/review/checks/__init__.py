@@ -1,4 +1,4 @@
-"""Checks of a plan beyond what planning itself tells. Pure; each check is one function from a plan to findings.
+"""Checks of a plan beyond what planning itself reports; each is one function from a plan to findings.
 
 rules.py       what each code means, and what to do about it
 meetings.py    names, types and QoS of which two ends should meet and do not

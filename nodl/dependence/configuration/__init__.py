@@ -1,6 +1,6 @@
 """Configuration files of tools that take any topic: what they name is what the tool needs, nothing else.
 
-``read_configuration`` gives endpoints with file and line, and a gap for each thing that cannot be told.
+``read_configuration`` gives endpoints with file and line, and a gap for each thing that cannot be decided.
 """
 
 from __future__ import annotations
