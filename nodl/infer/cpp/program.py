@@ -155,7 +155,7 @@ _CORE = frozenset({
 })  # fmt: skip
 
 
-_MODELLED_IF_INSTALLED = frozenset({"nav2_core", "nav2_ros_common", "nav2_util"})
+_MODELLED_IF_INSTALLED = frozenset({"nav2_core", "nav2_costmap_2d", "nav2_ros_common", "nav2_util"})
 """Of whose classes the table has what plugins and nodes of others use; beside its sources nav2 itself is followed."""
 
 

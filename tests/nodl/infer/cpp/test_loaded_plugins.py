@@ -237,3 +237,21 @@ def test_a_layer_makes_interfaces_on_the_node_of_its_costmap(
         return
     assert not plan.problems
     assert {"/ranges", "/local_costmap/mine/ranges"} & names(plan)
+
+
+def test_an_installed_header_of_nav2_changes_nothing(
+    planned: Planned, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    header = tmp_path / "install/include/nav2_costmap_2d/nav2_costmap_2d/layer.hpp"
+    header.parent.mkdir(parents=True)
+    header.write_text(
+        "namespace nav2_costmap_2d { class Layer { public: Layer();\n"
+        "  void initialize(LayeredCostmap *, std::string, const nav2::LifecycleNode::WeakPtr &);\n"
+        "  virtual void onInitialize() {}\n"
+        "protected: nav2::LifecycleNode::WeakPtr node_; std::string name_; }; }\n"
+    )
+    monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path / "install"))
+    body = 'sub_ = node->create_subscription<std_msgs::msg::Float64>("/ranges", 1, [](const auto &) {});'
+    plan = planned(LAYER, "nav2_costmap_2d::Layer", DRIVE, OF_COSTMAP, body)
+    assert not plan.problems
+    assert "/ranges" in names(plan)
