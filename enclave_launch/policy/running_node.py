@@ -67,12 +67,12 @@ def node_of_process(
     if interface.global_arguments is False:  # rcl_node_options_t.use_global_arguments
         rules = RemapRules(local=_own_rules(interface), process=())
         return _named(interface, rules, enclave, process.location, role, inputs)
-    if interface.global_arguments is None and (given or process.parameters):
-        interface = interface._replace(gaps=(*interface.gaps, Gap(interface.source, _UNDECIDED)))
     rules = RemapRules(local=_own_rules(interface), process=given)
     node = _named(interface, rules, enclave, process.location, role, inputs)
     parameters = {**process.parameters, **parameters_of_node(process, node.namespace, node.name)}
-    return node._replace(parameters=parameters, process_namespace=_namespace(process))
+    if interface.global_arguments is None and (given or parameters):
+        interface = interface._replace(gaps=(*interface.gaps, Gap(interface.source, _UNDECIDED)))
+    return node._replace(interface=interface, parameters=parameters, process_namespace=_namespace(process))
 
 
 def parameters_of_node(process: ResolvedProcess, namespace: str, name: str) -> Mapping[str, ParameterValue]:

@@ -104,11 +104,16 @@ def test_its_own_rules_come_before_those_of_the_command_line(tmp_path: Path) -> 
         ("", REMAP, True),
         ('name="eye"', "", True),
         ("", '<param name="rate" value="1"/>', True),
+        ("", '<param from="{folder}/talker.yaml"/>', True),
+        ("", '<param from="{folder}/other.yaml"/>', False),
     ],
 )
 def test_whether_a_node_listens_is_asked_where_launch_gives_it_something(
     attributes: str, children: str, open_question: bool, tmp_path: Path
 ) -> None:
+    for name in ("talker", "other"):
+        (tmp_path / f"{name}.yaml").write_text(f"{name}: {{ros__parameters: {{rate: 1}}}}\n")
+    children = children.format(folder=tmp_path)
     known = Gap(SourceRef("talker.py", 3), "known before")
     node = process_node(tmp_path, interface(global_arguments=None, gaps=(known,)), attributes, children)
     assert node.interface.gaps[0] == known
