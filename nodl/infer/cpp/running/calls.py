@@ -118,7 +118,7 @@ def _own_method(run: Machine, name: str, site: CallSite) -> Value | None:
             return site.call_value(field)
     if run.names.find_functions(name, frame.scope, frame.file):
         return None
-    if model_of(this, name) is not None:
+    if model_of(this, name) is not None or name in _ITSELF:
         return on_object(run, this, name, site)
     return only_declared(run, this.cls, name, site, this)
 
@@ -297,6 +297,10 @@ def _on_atom(run: Machine, atom: object, name: str, site: CallSite) -> Value:
     return _on_unknown(run, atom, name, site)
 
 
+_ITSELF = ("shared_from_this", "weak_from_this")
+"""Of ``std::enable_shared_from_this``."""
+
+
 def on_object(run: Machine, atom: Obj, name: str, site: CallSite) -> Value:
     """Call a method of one object: its source, else a closure in a member, else the tables, else unknown code."""
     callee, frame = site.callee, site.frame
@@ -357,6 +361,9 @@ def model_of(this: Obj, name: str) -> FunctionModel | None:
 def by_model(run: Machine, atom: Obj, name: str, site: CallSite) -> Value | None:
     """Return what the tables know of a method; ``None`` if they do not know it."""
     model = model_of(atom, name)
+    if model is None and name in _ITSELF:
+        run.resolve(site.node, site.frame)
+        return (atom,)
     if model is None:
         return None
     call = site.call(atom)

@@ -208,7 +208,15 @@ def join(*values: Value) -> Value:
     first = values[0] if values else BOTTOM
     if all(value is first or value == first for value in values[1:]):
         return first
-    found = _one_unknown(dict.fromkeys(atom for value in values for atom in value))
+    every: dict[Atom, None] = {}
+    unknown_one: Unknown | None = None  # of several things that are not known
+    for value in values:
+        for atom in value:
+            if isinstance(atom, Unknown):
+                unknown_one = unknown_one or atom
+                atom = unknown_one
+            every[atom] = None
+    found = tuple(every)
     if len(found) > MAX_SEQUENCES:
         found = _one_container(found)
     if len(found) <= MAX_ALTERNATIVES:
@@ -259,13 +267,6 @@ def open_sequence(items: Iterable[Value]) -> Seq:
             found.setdefault(item)
     every = (*found, unknown_one) if unknown_one is not None else tuple(found)
     return Seq(every if len(every) <= MAX_ITEMS else (join(*every),), open=True)
-
-
-def _one_unknown(atoms: Iterable[Atom]) -> Value:
-    """Keep one of several things that are not known."""
-    found = tuple(atoms)
-    first = next((atom for atom in found if isinstance(atom, Unknown)), None)
-    return found if first is None else tuple(a for a in found if a is first or not isinstance(a, Unknown))
 
 
 def unknown(why: str) -> Value:

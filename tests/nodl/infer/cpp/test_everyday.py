@@ -125,6 +125,13 @@ FOUND = {
         f"{PUB}(c.t, 1); {PUB}(c_.t, 1);",
         "struct C { std::string t; }; C c_; C * own() { return &c_; }", ["m", "p_q"],
     ),
+    "an object that hands itself on": (
+        "auto h = std::make_shared<H>(this); h->start();",
+        "struct H : std::enable_shared_from_this<H> { rclcpp::Node * n; explicit H(rclcpp::Node * x) : n(x) {} "
+        "void start() { auto self = shared_from_this(); self->go(); this->weak_from_this().lock()->go(); } "
+        f'void go() {{ n->{PUB}("a", 1); }} }};',
+        ["a"],
+    ),
     "objects in closures": (
         'C a; a.t = "a"; auto copy = [a]() { return a.t; }; auto same = [&a]() { return a.t; }; a.t = "b"; '
         f'{PUB}("copy_" + copy(), 1); {PUB}("same_" + same(), 1);',
