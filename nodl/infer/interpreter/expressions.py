@@ -268,7 +268,7 @@ def _add_keywords(args: Arguments, value: Value) -> None:
         if isinstance(atom, Dictionary):
             for cell, held, _ in atom.entries():
                 if isinstance(cell.constant, str):
-                    args.keywords[cell.constant] = held
+                    args.keywords[cell.constant] = join(held, ANY) if atom.escaped else held
             if atom.is_open:
                 args.more_keywords = join(args.more_keywords, present(atom.cells.get(OTHER, ANY)))
         elif isinstance(atom, Unknown):

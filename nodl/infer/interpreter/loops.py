@@ -197,14 +197,20 @@ Emit = Callable[[], None]
 
 def comprehension(run: Run, node: ast.ListComp | ast.SetComp | ast.GeneratorExp, frame: Frame) -> Value:
     """Return a list (a set for a set comprehension), exact only where iterables and conditions are decided."""
+    lazy = isinstance(node, ast.GeneratorExp)
+    run.state.depth += lazy
     inner = _inner_frame(run, frame)
     collected: list[Value] = []
+    mark = run.state.mark()
 
     def emit() -> None:
         collected.append(run.evaluate(node.elt, inner))
 
     exact = _generate(run, node.generators, inner, emit, frame)
     _leave(inner)
+    run.state.depth -= lazy
+    if lazy:
+        run.state.join_seen(mark, mixed=True)  # it may be asked for some of its elements only
     kind = {ast.SetComp: "set", ast.GeneratorExp: LAZY}.get(type(node), "list")
     return run.sequence(node, kind, Items(tuple(collected)) if exact else Items(None, join_all(collected)))
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os.path
 from collections.abc import Callable
+from functools import partial
 
 from nodl.infer.interpreter.conditions import truth
 from nodl.infer.interpreter.define import expect_methods, is_constant, new_instance, program_classes
@@ -23,9 +24,11 @@ from nodl.infer.values import (
     NONE,
     OF_A_NODE,
     OTHER,
+    BoundMethod,
     ClassValue,
     Dictionary,
     External,
+    FunctionValue,
     HeapObject,
     Instance,
     Items,
@@ -132,6 +135,15 @@ def _sorted(run: Run, call: Call) -> Value:
     element = _items(run, call).any_element()
     call_each(run, call.args.keywords.get("key", NONE), element, call)
     return run.sequence(call.node, "list", Items(None, element))
+
+
+def call_now(run: Run, call: Call) -> None:
+    """Call each function among the arguments, with anything, as a library may do before it returns."""
+    given = Arguments(more=unknown("an argument given by code that is not analysed"))
+    for value in call.args.all_values():
+        functions = tuple(atom for atom in value if isinstance(atom, FunctionValue | BoundMethod | Partial))
+        if functions:
+            run.state.perhaps(partial(run.call, functions, given, call.node, call.frame))
 
 
 def call_each(run: Run, function: Value, element: Value, call: Call) -> None:
@@ -466,6 +478,11 @@ def _namespace(run: Run, call: Call) -> Value:
     return (made,)
 
 
+def _loaded(run: Run, call: Call) -> Value:
+    call_now(run, call)
+    return unknown(CONTENTS)
+
+
 def _copy(run: Run, call: Call) -> Value:
     """Model ``copy`` and ``deepcopy``: something unknown; a copy of an object of the program is a gap."""
     given = call.args.at(0) or ANY
@@ -501,9 +518,7 @@ FUNCTIONS: dict[str, Model] = {
     **dict.fromkeys(("copy.copy", "copy.deepcopy"), _copy),
     "random.choice": _BUILT_IN["builtins.next"],
     **dict.fromkeys(("importlib.import_module", "importlib.reload"), import_dynamic),
-    **dict.fromkeys(
-        ("yaml.safe_load", "yaml.load", "json.load", "json.loads"), lambda run, call: unknown(CONTENTS)
-    ),
+    **dict.fromkeys(("yaml.safe_load", "yaml.load", "json.load", "json.loads"), _loaded),
 }
 
 METHODS: dict[tuple[str, str], Method] = {
