@@ -121,7 +121,11 @@ def conditions_of(run: Run, test: ast.expr, holds: bool, frame: Frame) -> tuple[
     if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not):
         return conditions_of(run, test.operand, not holds, frame)
     if isinstance(test, ast.BoolOp):
-        parts = test.values if isinstance(test.op, ast.And) == holds else ()
+        parts = test.values
+        if isinstance(test.op, ast.And) != holds:  # of several parts nobody knows which
+            neutral = isinstance(test.op, ast.And)
+            open_parts = [part for part in parts if _truth_again(run, part, frame) is not neutral]
+            parts = open_parts if len(open_parts) == 1 else []
         return tuple(each for part in parts for each in conditions_of(run, part, holds, frame))
     condition = condition_of(run, test, frame)
     found = condition if holds else opposite(condition)
@@ -211,6 +215,13 @@ def _texts_in(value: Value) -> tuple[str, ...] | None:
 def _answer(run: Run, node: ast.expr, frame: Frame) -> Value:
     """Return the value of a part of a test; a call is not made again."""
     return run.answers.get(node, BOTTOM) if isinstance(node, ast.Call) else run.evaluate(node, frame)
+
+
+def _truth_again(run: Run, part: ast.expr, frame: Frame) -> bool | None:
+    """Return the truth of a part of a test, ``None`` also where it would have to call something again."""
+    if isinstance(part, ast.Call) or _only_reads(part):
+        return truth(_answer(run, part, frame))
+    return None
 
 
 def _asked(run: Run, node: ast.expr, frame: Frame) -> tuple[Input | None, Value]:

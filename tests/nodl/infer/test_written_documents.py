@@ -121,6 +121,15 @@ def test_a_parameter_that_a_function_of_the_program_reads_decides(tmp_path: Path
     assert _names(node, {"mode": "b"}) == {"b"}
 
 
+def test_a_parameter_decides_what_else_is_known_to_leave_open(tmp_path: Path) -> None:
+    rows = "for name, optional in (('gps', False), ('imu', True)):\n"
+    skip = "    if optional and not p('all', False):\n        continue\n    self.P(name)"
+    node = _inferred(tmp_path, rows + skip)
+    assert not node.gaps
+    assert _names(node, {}) == {"gps"}
+    assert _names(node, {"all": True}) == {"gps", "imu"}
+
+
 def test_a_parameter_decides_in_a_comprehension(tmp_path: Path) -> None:
     node = _inferred(tmp_path, "[self.P(each) for each in ('left', 'right') if p(each, False)]")
     assert not node.gaps
