@@ -600,9 +600,14 @@ def bind_parameters(run: Machine, function: Function, arguments: Sequence[Value]
 
 def as_parameter(run: Machine, parameter: FunctionParameter, value: Value, node: Node, inner: Frame) -> Value:
     """Return an argument as its parameter has it: an object of its class unless it is a reference or pointer."""
-    if parameter.type.rstrip().endswith(("&", "*")):
+    if parameter.type.rstrip().endswith(("&", "*")) or _is_pointer_in(node, parameter.name):
         return value
     return copied(run, value, node, inner, _class_of_parameter(run, parameter, value, inner))
+
+
+def _is_pointer_in(function: Node, name: str) -> bool:
+    """Return whether the body uses a parameter as a pointer, whatever its template argument or ``auto`` is."""
+    return re.search(rf"\b{name}\s*->", text(field_of(function, "body"))) is not None
 
 
 def _class_of_parameter(

@@ -122,8 +122,12 @@ FOUND = {
     "texts that are swapped": (f'std::string a = "a", b = "b"; a.swap(b); {PUB}(b + "_b", 1);', "", ["a_b"]),
     "pointers to objects": (
         'C c; auto p = &c; p->t = "p"; auto f = [q = &c]() { q->t += "_q"; }; f(); auto m = own(); m->t = "m"; '
+        'add(&c, "_r"); same(c, "_s"); '
         f"{PUB}(c.t, 1); {PUB}(c_.t, 1);",
-        "struct C { std::string t; }; C c_; C * own() { return &c_; }", ["m", "p_q"],
+        "struct C { std::string t; }; C c_; C * own() { return &c_; } "
+        "template <class T> void add(T c, std::string s) { c->t += s; } "
+        "template <class T> void same(T c, std::string s) { c.t += s; }",
+        ["m", "p_q_r"],
     ),
     "an object that hands itself on": (
         "auto h = std::make_shared<H>(this); h->start();",
