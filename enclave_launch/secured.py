@@ -36,8 +36,10 @@ from keystore.steps.sharing import shared_enclaves
 
 
 class ProvisionedLaunch(NamedTuple):
-    """``report`` says what was done to the keystore; ``settings`` how processes are pointed at it;
-    ``options`` are those ``requested``, with what the plan decided."""
+    """A plan whose enclaves have their files.
+
+    ``report`` lists what was done to the keystore, ``settings`` the variables that lead processes to it; ``options``
+    are those ``requested``, with what the plan decided."""
 
     plan: LaunchPlan
     settings: SecuritySettings

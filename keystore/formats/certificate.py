@@ -171,7 +171,7 @@ def _read_block(block: bytes) -> CertificateFacts:
 
 
 def given_certificates(pem: bytes, place: str) -> list[CertificateFacts]:
-    """Reads the certificates of a file that somebody gave, such as a chain with comments between the blocks.
+    """Read the certificates of a file that the user names, such as a chain with comments between the blocks.
 
     It is never used as it stands: what is taken from it is written in the keystore's own form.
     Raises DamagedKeystoreError for a file without any.

@@ -37,7 +37,7 @@ from keystore.steps.signing_here import beyond_and_missing
 
 
 class WantedEnclave(NamedTuple):
-    """What one enclave should have: these permissions, and at least this much of its identity issued again."""
+    """The permissions that one enclave should have, and the least that must be issued again of its identity."""
 
     permissions: PermissionsSource
     reissue: Reissue = Reissue.NOTHING

@@ -36,7 +36,7 @@ OTHER_PERMISSIONS = "other permissions"
 
 
 class Reissue(Enum):
-    """What of an enclave's identity must be issued again."""
+    """The parts of an enclave's identity that must be issued again."""
 
     NOTHING = "nothing"
     CERTIFICATE = "certificate"  # for the key that is there

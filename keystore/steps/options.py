@@ -1,4 +1,4 @@
-"""What a caller can choose when enclaves are provisioned, and what is reported of it."""
+"""The options of provisioning enclaves, and the report of what was done."""
 
 from __future__ import annotations
 

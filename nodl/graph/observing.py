@@ -124,10 +124,12 @@ def in_own_process(observe: Callable[[], _Result]) -> _Result:
 def _answered(observe: Callable[[], Any], answer: Connection) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends this process
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    value: Any
     try:
-        answer.send(observe())
-    except Exception as error:
-        answer.send(error)
+        value = observe()
+    except Exception as error:  # whatever it is, the parent raises it
+        value = error
+    answer.send(value)
 
 
 def look_until(up: Observer, done: Callable[[], bool]) -> None:

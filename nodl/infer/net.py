@@ -481,9 +481,9 @@ def _literals(scope: FunctionText, entry: ast.AST | None) -> Literals:
         zip(reversed([each.arg for each in arguments]), reversed(node.args.defaults), strict=False)
     )
     given = len(entry.args) + 1  # with self
-    values: dict[str, ast.expr | None] = {each.arg: defaults.get(each.arg) for each in arguments[given:]}
     if any(isinstance(each, ast.Starred) for each in entry.args):
-        values = {}
+        given = len(arguments)
+    values: dict[str, ast.expr | None] = {each.arg: defaults.get(each.arg) for each in arguments[given:]}
     values.update(
         (each.arg, default) for each, default in zip(node.args.kwonlyargs, node.args.kw_defaults, strict=True)
     )

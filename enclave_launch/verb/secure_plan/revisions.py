@@ -32,7 +32,7 @@ _OPTIONS_WITH_PATHS = ("prefix", "nodl", "library", "source", "policy")
 
 
 class Revised(NamedTuple):
-    """``as_installed``: packages that both took as they are installed now."""
+    """A plan at two revisions. ``as_installed``: packages that both read as they are installed now."""
 
     before: DryRun
     after: DryRun

@@ -219,8 +219,9 @@ def _call(run: Run, node: ast.Call, frame: Frame) -> Value:
     args = arguments_of(run, node, frame)
     run.at = node, frame
     if len(callee) > 1 and type(function) is ast.Subscript:
-        return _call_of_entry(run, function, callee, args, node, frame)
-    result = run.call(callee, args, node, frame)
+        result = _call_of_entry(run, function, callee, args, node, frame)
+    else:
+        result = run.call(callee, args, node, frame)
     if node in run.answers:
         run.answers[node] = result
     return result

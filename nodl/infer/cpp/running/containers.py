@@ -311,15 +311,22 @@ def _erased(written: str, start: int = 0, count: int = NPOS) -> str:
     return written[:start] + written[start:][count:]
 
 
+def _letter(letters: str) -> str:
+    """Return the only letter; raises ``TypeError`` for a set of them, which is not followed."""
+    if len(letters) != 1:
+        raise TypeError
+    return letters
+
+
 _OF_TEXT: dict[str, Callable[..., str | int]] = {
     "empty": lambda t: not t, "size": len, "length": len,
     "front": lambda t: t[0], "back": lambda t: t[-1], "at": lambda t, i: t[i],
     "substr": lambda t, i=0, n=NPOS: t[i:][:n],
     "find": str.find, "rfind": lambda t, part: t.rfind(part), "contains": str.__contains__,
-    "find_first_of": lambda t, letter: t.find(letter) if len(letter) == 1 else t[None],
-    "find_last_of": lambda t, letter: t.rfind(letter) if len(letter) == 1 else t[None],
+    "find_first_of": lambda t, letters: t.find(_letter(letters)),
+    "find_last_of": lambda t, letters: t.rfind(_letter(letters)),
     "starts_with": str.startswith, "ends_with": str.endswith,
-    "erase": _erased, "pop_back": lambda t: t[:-1], "assign": lambda t, other: other + "",
+    "erase": _erased, "pop_back": lambda t: t[:-1], "assign": lambda t, other: "" + other,  # a number is a TypeError
     "insert": lambda t, i, part: t[:i] + part + t[i:],
     "replace": lambda t, i, n, part: t[:i] + part + t[i:][n:],
 }  # fmt: skip
