@@ -57,7 +57,9 @@ class ParameterPart(NamedTuple):
         given = self._given(parameters)
         if self.edits[:1] == (ONLY_IF_UNSET,):
             return () if given else ("",)
-        if given:
+        if self.edits and self.edits[0][0] == "given":  # of a flag it counts only whether it is there
+            values = [self.edits[0][1][0 if given else 1]]
+        elif given:
             values = [value for each in given for value in self._items(each)]
         if not values and not given and self.is_condition:
             return ("",)  # what is not known may hold

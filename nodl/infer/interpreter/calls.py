@@ -104,6 +104,7 @@ def _recursive(run: Run, function: FunctionValue, cells: LocalCells, call: Call)
         result_so_far: Value = outer.result
         return result_so_far  # nothing yet: this path ends in a call that has not come back so far
     recursion = run.recursions[function.node] = Recursion(cells)
+    mark = run.state.mark()
 
     def turn() -> bool:
         inner = LocalCells()
@@ -121,6 +122,7 @@ def _recursive(run: Run, function: FunctionValue, cells: LocalCells, call: Call)
     else:
         run.gap(call.node, call.frame, f"the recursion of {function.name} does not settle")
     del run.recursions[function.node]
+    run.state.join_seen(mark, mixed=True)
     return recursion.result
 
 

@@ -11,6 +11,7 @@ import operator
 from collections.abc import Callable
 from typing import Any, TypeVar
 
+from nodl.infer.findings import NodeRecord, OptionDefaults
 from nodl.infer.interpreter.define import is_enumeration
 from nodl.infer.interpreter.run import Frame, Run
 from nodl.infer.text import (
@@ -227,9 +228,9 @@ def _truth_again(run: Run, part: ast.expr, frame: Frame) -> bool | None:
 def _asked(run: Run, node: ast.expr, frame: Frame) -> tuple[Input | None, Value]:
     value = _answer(run, node, frame)
     asked = input_of(value[0]) if len(value) == 1 else None
-    if asked is None or not is_parameter(asked):
+    if asked is None or not is_parameter(asked) or not isinstance(asked.owner, NodeRecord | OptionDefaults):
         return None, ()
-    defaults: Value = getattr(asked.owner, "parameters", {}).get(asked.name, ())
+    defaults = asked.owner.default(asked.name)
     if asked.item is not None:
         lists = [atom.items.any_element() for atom in defaults if isinstance(atom, Sequence)]
         defaults = join_all(lists) if len(lists) == len(defaults) else ()
@@ -237,9 +238,9 @@ def _asked(run: Run, node: ast.expr, frame: Frame) -> tuple[Input | None, Value]
 
 
 def is_parameter(asked: Input) -> bool:
-    """Return True if it is a ROS parameter or one of its parts, with its default as far as the code gives one."""
+    """Return True if it is a parameter, an option or a part of one, with its default as far as the code gives one."""
     edited = any(method in ("unless empty", "only if set", "key") for method, _ in asked.edits)
-    return not edited and type(asked.item) is not int and not asked.name.startswith(("-", "<", "$"))
+    return not edited and type(asked.item) is not int
 
 
 _READS = EDITS | {"get_parameter", "get_parameter_value", "declare_parameter"}
@@ -341,7 +342,9 @@ def _compare_atoms(op: ast.cmpop, left: object, right: object) -> bool | None:
     if isinstance(op, ast.In | ast.NotIn):
         found = _is_among(left, right)
         return None if found is None else found is isinstance(op, ast.In)
-    if isinstance(left, CONSTANTS) and isinstance(right, CONSTANTS):
+    if not isinstance(op, ast.Is | ast.IsNot):
+        left, right = _plain_tuple(left), _plain_tuple(right)
+    if isinstance(left, (*CONSTANTS, tuple)) and isinstance(right, (*CONSTANTS, tuple)):
         return _compare_constants(op, left, right)
     if not isinstance(op, ast.Is | ast.IsNot | ast.Eq | ast.NotEq):
         return None
@@ -356,6 +359,13 @@ def _compare_atoms(op: ast.cmpop, left: object, right: object) -> bool | None:
         own = isinstance(other, Instance) and isinstance(op, ast.Eq | ast.NotEq)
         return not same if isinstance(other, _NEVER_NONE) and not own else None
     return None
+
+
+def _plain_tuple(atom: object) -> object:
+    """Return a tuple of constants as itself."""
+    exact = atom.items.exact if isinstance(atom, Sequence) and atom.kind == "tuple" else None
+    values = tuple(map(sole, exact or ()))
+    return atom if exact is None or not all(isinstance(each, CONSTANTS) for each in values) else values
 
 
 def _is_among(constant: object, container: object) -> bool | None:

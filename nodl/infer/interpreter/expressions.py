@@ -374,7 +374,9 @@ def _after(run: Run, operand: ast.expr, before: list[ast.expr], held: bool, fram
 def _where_set(atom: object) -> object:
     """Return an input in front of ``or``: where it is empty, what follows is taken."""
     asked = input_of(atom)
-    return atom if asked is None or asked.item is not None else with_edit(asked, "unless empty", ())
+    if asked is None or asked.item is not None or "given" in dict(asked.edits):
+        return atom
+    return with_edit(asked, "unless empty", ())
 
 
 def _otherwise(before: Value, value: Value) -> Value:

@@ -49,18 +49,10 @@ class _Turns(NamedTuple):
 def _looped(run: Run, node: Loop, frame: Frame, turns: Callable[[], _Turns]) -> bool:
     """Run the ``turns`` of a loop, then its ``else``, which a ``break`` skips."""
     before, loop_forks = frame.unsettled, frame.loop_forks
-    loop_mark, breaks = frame.loop_mark, frame.breaks
-    frame.unsettled = False
+    frame.unsettled = ""
     frame.loop_forks = run.state.forks
-    frame.loop_mark = run.state.mark()
-    frame.breaks = None if _cleans_up(node) else []
     outcome = turns()
-    if frame.breaks:
-        end = [run.state.written(frame.loop_mark)] if outcome.finished else []
-        run.state.settle(frame.loop_mark, [*frame.breaks, *end])
-        outcome = outcome._replace(passes=True, left=True)
     frame.unsettled, frame.loop_forks = before, loop_forks
-    frame.loop_mark, frame.breaks = loop_mark, breaks
     frame.jump = ""
     if outcome.passes and outcome.finished and node.orelse:
         if not outcome.left:
@@ -72,20 +64,6 @@ def _looped(run: Run, node: Loop, frame: Frame, turns: Callable[[], _Turns]) -> 
 @functools.lru_cache(maxsize=4096)
 def _breaks(node: Loop) -> bool:
     return any(isinstance(inner, ast.Break) for inner in ast.walk(node))
-
-
-@functools.lru_cache(maxsize=4096)
-def _cleans_up(node: Loop) -> bool:
-    """Return True if a ``break`` of the loop leaves a ``with`` or a ``try`` with ``finally``."""
-    return any(map(_leaves, node.body))
-
-
-def _leaves(node: ast.AST, cleaning: bool = False) -> bool:
-    cleaning = cleaning or bool(getattr(node, "finalbody", ())) or isinstance(node, ast.With | ast.AsyncWith)
-    if isinstance(node, ast.Break):
-        return cleaning
-    inner = node.orelse if isinstance(node, Loop) else ast.iter_child_nodes(node)
-    return any(_leaves(each, cleaning) for each in inner if not isinstance(each, ast.expr))
 
 
 def _for(run: Run, node: For, iterated: Value, frame: Frame) -> _Turns:
@@ -122,9 +100,9 @@ def _unrolled(run: Run, node: For, exact: tuple[Value, ...], frame: Frame) -> _T
             break
     run.state.depth -= 1
     left = broken or (not passes and frame.jump == "break")
-    if broken and frame.breaks is None:
-        run.state.join_seen(start)
-    if left or frame.breaks:
+    if broken:
+        run.state.join_seen(start, mixed=True)
+    if left:
         run.guards = guards
     return _Turns(passes or left, passes or broken, left)
 
@@ -137,13 +115,12 @@ def _followed(run: Run, node: For, index: int, element: Value, frame: Frame) -> 
     assign(run, node.target, element, frame)
     passes = run.execute(node.body, frame)
     run.context = previous
-    if frame.unsettled:
-        run.state.join_seen(mark)
-        frame.unsettled = False
-        return True, True
-    if passes:
+    jumped, frame.unsettled = frame.unsettled, ""
+    if jumped:
+        run.state.join_seen(mark, mixed=True)
+    if passes and jumped != "continue":
         run.guards = run.guards_at_end  # what a test of a parameter let through comes to the next turn
-    return passes or frame.jump == "continue", False
+    return passes or bool(jumped) or frame.jump == "continue", bool(jumped)
 
 
 def _while(run: Run, node: ast.While, frame: Frame) -> _Turns:
@@ -155,7 +132,7 @@ def _while(run: Run, node: ast.While, frame: Frame) -> _Turns:
         nonlocal broken
         narrowed(run, node.test, True, frame)
         passes = run.execute(node.body, frame)
-        broken = broken or (frame.unsettled and frame.breaks is None)
+        broken = broken or bool(frame.unsettled)
         run.evaluate(node.test, frame)
         return passes
 
@@ -178,8 +155,8 @@ def fixpoint(run: Run, frame: Frame, turn: Callable[[], bool]) -> None:
         passes = turn()
         if frame.unsettled or not passes:
             jumped = True
-            frame.unsettled = False
-            run.state.join_seen(mark)
+            frame.unsettled = ""
+            run.state.join_seen(mark, mixed=True)
         if run.state.join_head(mark, count >= WIDEN_TEXTS_FROM):
             break
     else:
@@ -188,8 +165,8 @@ def fixpoint(run: Run, frame: Frame, turn: Callable[[], bool]) -> None:
     run.state.depth -= 1
     run.state.forks -= 1
     run.repeated -= 1
-    if jumped and frame.breaks is None:
-        run.state.join_seen(start)
+    if jumped:
+        run.state.join_seen(start, mixed=True)
 
 
 Emit = Callable[[], None]

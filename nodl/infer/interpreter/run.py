@@ -47,8 +47,8 @@ class Frame:
     """The variables of a running function, class body or module."""
 
     __slots__ = (
-        "again", "breaks", "cells", "closure", "depth", "early", "entry", "exits", "forks", "function", "globals",
-        "guards", "is_class", "is_comprehension", "jump", "loop_forks", "loop_mark", "mark", "module", "nonlocals",
+        "again", "cells", "closure", "depth", "early", "entry", "exits", "forks", "function", "globals",
+        "guards", "is_class", "is_comprehension", "jump", "loop_forks", "mark", "module", "nonlocals",
         "returned", "runs_more", "trying", "unsettled", "yielded",
     )  # fmt: skip
 
@@ -68,12 +68,10 @@ class Frame:
         self.runs_more = (
             False  # something unknown may run after a return, or between two values of a generator
         )
-        self.unsettled = False  # a break or continue that may have happened, since the loop asked last
+        self.unsettled = ""  # the break or continue that may have happened, since the loop asked last
         self.jump = ""  # the break or continue that certainly ended the latest statement
         self.forks = 0  # undecided branches when the frame was entered, and when its innermost loop was
         self.loop_forks = 0
-        self.loop_mark = 0  # of the state, when the innermost loop was entered
-        self.breaks: list[Written] | None = None  # what was written since, at each ``break``
         self.guards = 0  # how many conditions held when the frame was entered
         self.again = False  # the cells also hold an earlier call, whose inner functions live on
         self.is_class = False

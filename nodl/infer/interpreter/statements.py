@@ -140,13 +140,11 @@ def _raise(run: Run, node: ast.Raise, frame: Frame) -> bool:
 
 
 def _jump(run: Run, node: ast.Break | ast.Continue, frame: Frame) -> bool:
-    breaks = frame.breaks if isinstance(node, ast.Break) else None
-    if breaks is not None:
-        breaks.append(run.state.written(frame.loop_mark))
+    jump = "break" if isinstance(node, ast.Break) else "continue"
     if run.state.forks == frame.loop_forks:
-        frame.jump = "break" if isinstance(node, ast.Break) else "continue"
-    elif breaks is None:
-        frame.unsettled = True
+        frame.jump = jump
+    elif frame.unsettled != "continue":
+        frame.unsettled = jump
     return False
 
 
@@ -201,7 +199,7 @@ def run_try(run: Run, node: Any, frame: Frame) -> bool:
     """Run each handler after any part of the body; it sees every value written on the way."""
     mark, returned, exits = run.state.mark(), frame.returned, len(frame.exits)
     early, unsettled = frame.early, frame.unsettled
-    frame.early = frame.unsettled = False
+    frame.early, frame.unsettled = False, ""
     without_value = any(map(_catches_no_value, node.handlers))
     run.state.depth += 1
     frame.trying += 1
@@ -214,8 +212,9 @@ def run_try(run: Run, node: Any, frame: Frame) -> bool:
     if node.handlers and not all(_cannot_fail(statement) for statement in node.body):
         passes = _perhaps_handled(run, node.handlers, passes, mark, frame)
     frame.trying -= 1
-    left = frame.early or frame.unsettled or not passes
-    frame.early, frame.unsettled = frame.early or early, frame.unsettled or unsettled
+    left = frame.early or bool(frame.unsettled) or not passes
+    frame.early = frame.early or early
+    frame.unsettled = unsettled if unsettled == "continue" else frame.unsettled or unsettled
     if not node.finalbody:
         return passes
     jump, within = frame.jump, frame.returned
@@ -243,7 +242,7 @@ def _finally_left(run: Run, body: list[ast.stmt], mark: int, exits: int, passes:
     def left() -> bool:
         nonlocal done
         before = len(frame.exits)
-        run.state.join_seen(mark)
+        run.state.join_seen(mark, mixed=True)
         start = run.state.mark()
         done = run.execute(body, frame)
         written = run.state.written(start)
@@ -295,7 +294,7 @@ def _perhaps_handled(
     result = run.state.branches([lambda: passes, *(partial(handle, handler) for handler in handlers)])
     if not passes:
         if jump:
-            frame.unsettled = True  # the jump of the body may happen, or a handler runs instead
+            frame.unsettled = jump  # the jump of the body may happen, or a handler runs instead
         else:
             frame.early = True
     return result
@@ -315,7 +314,7 @@ def run_with(run: Run, node: ast.With | ast.AsyncWith, frame: Frame) -> bool:
     passes = run.execute(node.body, frame)
     run.state.depth -= 1
     if not all(isinstance(atom, External) and run.tables.lets_through(atom.path) for atom in managers):
-        run.state.join_seen(mark)  # after any part of the body
+        run.state.join_seen(mark, mixed=True)  # after any part of the body
         passes = frame.runs_more = True
     for atom in reversed(managers):
         if isinstance(atom, Instance) and isinstance(atom.cls, ClassValue):

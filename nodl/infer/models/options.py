@@ -50,7 +50,8 @@ def _add_argument(run: Run, parser: Instance, call: Call) -> Value:
     name = long if long.startswith("-") else _place(run, owner, long, call)
     run.options.declare(name, tuple(atom for atom in default if atom is not None))
     if isinstance(dest, str):
-        run.state.store(owner, "dest " + dest, _parsed(run, name, call))
+        parsed, before = _parsed(run, name, call), owner.cells.get("dest " + dest)
+        run.state.store(owner, "dest " + dest, parsed if before in (None, parsed) else ANY)
     return ANY
 
 
@@ -84,11 +85,15 @@ def _forget_places(run: Run, parser: Instance) -> None:
 
 
 def _parsed(run: Run, name: str, call: Call) -> Value:
-    """Return what the option holds: its text, unless it is a flag, several texts or made into something else."""
+    """Return what the option holds: its text, or whether a flag is there; unknown if it is made into anything else."""
     given = call.args.keywords
     action, nargs = sole(given.get("action", ("store",))), sole(given.get("nargs", NONE))
     if action in ("store_true", "store_false"):
-        return BOOLEAN
+        there = action == "store_true"
+        default = sole(given.get("default", (not there,)))
+        run.options.declare(name, (default,))
+        flag = Input(name, run.options, None, (("given", (str(there), str(default))),))
+        return (make_text((flag,)),) if isinstance(default, bool) else BOOLEAN
     kept = all(isinstance(atom, External) and atom.path in _KEEP_TEXT for atom in given.get("type", BOTTOM))
     if action != "store" or nargs not in (None, "?") or not kept:
         return unknown(f"what is made of the command line option {name}")
@@ -99,7 +104,7 @@ def _set_defaults(run: Run, parser: Instance, call: Call) -> Value:
     for dest, value in call.args.keywords.items():
         cell = "dest " + dest
         option = input_of(sole(parser.cells.get(cell)))
-        if option is not None:
+        if option is not None and not option.edits:
             (run.options.declare if run.state.forks else run.options.replace)(option.name, value)
             continue
         run.state.store(parser, cell, join(parser.cells.get(cell, BOTTOM), value))

@@ -227,8 +227,8 @@ def add_endpoint(
     call: Call,
     qos: QosPolicies = (),
 ) -> None:
-    """Add an endpoint to the node, under the conditions on the node's parameters that hold here."""
-    conditions = [guard.piece for guard in run.guards if guard.asked.owner is record]
+    """Add an endpoint to the node, under the conditions on its parameters and the options that hold here."""
+    conditions = [guard.piece for guard in run.guards if guard.asked.owner in (record, run.options)]
     if conditions and isinstance(name, str | Text):
         pieces = pieces_of(name)
         name = make_text((*(each for each in conditions if each not in pieces), *(pieces if name else ())))

@@ -143,12 +143,19 @@ def call_now(run: Run, call: Call) -> None:
     for value in call.args.all_values():
         functions = tuple(atom for atom in value if isinstance(atom, FunctionValue | BoundMethod | Partial))
         if functions:
-            run.state.perhaps(partial(run.call, functions, given, call.node, call.frame))
+            _perhaps_called(run, functions, given, call)
 
 
 def call_each(run: Run, function: Value, element: Value, call: Call) -> None:
     """Call ``function`` for any of the elements, of which there may be none."""
-    run.state.perhaps(lambda: run.call(function, Arguments([element or ANY]), call.node, call.frame))
+    _perhaps_called(run, function, Arguments([element or ANY]), call)
+
+
+def _perhaps_called(run: Run, function: Value, given: Arguments, call: Call) -> None:
+    """Call ``function`` as a library may do, or not: what it changes is then not known."""
+    mark = run.state.mark()
+    run.state.perhaps(partial(run.call, function, given, call.node, call.frame))
+    run.state.join_seen(mark, mixed=True)
 
 
 def _set(run: Run, call: Call) -> Value:

@@ -122,7 +122,9 @@ def _defaults(node: NodeInterface) -> dict[str, str]:
     found = {name: str(default) for name, default in (node.depends.defaults if node.depends else {}).items()}
     for endpoint in node.endpoints:
         for part in endpoint.name.parts:
-            if isinstance(part, ParameterPart) and part.is_condition and part.default is not None:
+            if not isinstance(part, ParameterPart) or not _PARAMETER.match(part.name):
+                continue
+            if part.is_condition and part.default is not None:
                 found[part.name] = part.default
     return found
 

@@ -289,3 +289,49 @@ def test_whether_a_node_listens_must_be_known_where_the_launch_gives_it_somethin
     install_program(prefix, TALKER.format(python=PYTHON, init="", node=undecided))
     assert any("use_global_arguments" in str(problem) for problem in launch(RENAMED).problems)
     assert not launch('<launch><node pkg="demo" exec="repeater"/></launch>').problems
+
+
+OPTIONS = """
+import argparse
+import rclpy
+from std_msgs.msg import String
+parser = argparse.ArgumentParser()
+parser.add_argument("--raw", action="store_true")
+parser.add_argument("--no-status", action="store_false", dest="status")
+parser.add_argument("--mode", default="slow")
+given, _ = parser.parse_known_args()
+rclpy.init()
+node = rclpy.create_node("flags")
+if given.raw:
+    node.create_publisher(String, "raw", 10)
+if given.status:
+    node.create_publisher(String, "status", 10)
+if given.mode == "fast":
+    node.create_publisher(String, "fast", 10)
+rclpy.spin(node)
+"""
+
+
+@pytest.mark.parametrize(
+    ("words", "published"),
+    [
+        ("", {"/status"}),
+        ("--raw", {"/raw", "/status"}),
+        ("--raw --no-status", {"/raw"}),
+        ("--mode fast", {"/status", "/fast"}),
+        ("--mode=medium", {"/status"}),
+    ],
+)
+def test_options_of_the_command_line_decide_which_interfaces_there_are(
+    words: str, published: set[str], launch: Launch, prefix: Path
+) -> None:
+    install_program(prefix, PYTHON + OPTIONS, "flags")
+    plan = launch(f'<launch><node pkg="demo" exec="flags" args="{words}"/></launch>')
+    assert not plan.problems
+    names = {name for operation, name in permissions(plan) if operation == "publish"}
+    assert names & {"/raw", "/status", "/fast"} == published
+
+
+def test_a_flag_that_another_spelling_may_give_is_open(launch: Launch, prefix: Path) -> None:
+    install_program(prefix, PYTHON + OPTIONS, "flags")
+    assert launch('<launch><node pkg="demo" exec="flags" args="-r"/></launch>').problems
