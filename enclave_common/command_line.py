@@ -5,17 +5,20 @@ from __future__ import annotations
 import argparse
 import os
 import re
+import shutil
 import sys
+import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from importlib import import_module
 from pathlib import Path
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NamedTuple, NoReturn, Protocol
 
 from enclave_common import VERSION
 from enclave_common.dependencies import missing_dependency
 from enclave_common.terminal import OutputError
 from enclave_common.words import did_you_mean
 
-_INVALID_CHOICE = re.compile(r"^(.*invalid choice: '([^']*)') \(choose from .*\)$", re.DOTALL)
+_INVALID_CHOICE = re.compile(r".*invalid choice: '([^']*)' \(choose from (.*)\)$", re.DOTALL)
 
 
 Kind = Mapping[str, Any]
@@ -55,13 +58,30 @@ def one_of(*choices: str) -> Kind:
     return {"choices": choices, "default": choices[0]}
 
 
-def add_options(group: argparse._ActionsContainer, options: Iterable[Option]) -> None:
-    """Add each to a parser, or to a group of its options."""
+class OptionGroup(Protocol):
+    """A parser, or a group of its options."""
+
+    def add_argument(self, *flags: str, **kind: Any) -> argparse.Action:
+        """Add one option, as ``argparse`` does."""
+
+    def add_mutually_exclusive_group(self) -> OptionGroup:
+        """Add a group of options of which one at most may be given, as ``argparse`` does."""
+
+
+def add_options(group: OptionGroup, options: Iterable[Option]) -> list[argparse.Action]:
+    """Add each to a parser or group, with what completes it in a shell (``completer``); return argparse's actions."""
+    added = []
     for written, kind, text in options:
         words = written.split()
         flags = [word for word in words if word.startswith("-")] or words[:1]
         metavar = {"metavar": words[-1]} if len(words) > len(flags) else {}
-        group.add_argument(*flags, **{**metavar, **kind, "help": text})
+        settings = {**metavar, **kind, "help": text}
+        completer = settings.pop("completer", None)
+        action = group.add_argument(*flags, **settings)
+        if completer is not None:
+            setattr(action, "completer", completer)  # noqa: B010  # argcomplete's own attribute
+        added.append(action)
+    return added
 
 
 class VerbHead(NamedTuple):
@@ -80,17 +100,14 @@ def verb_head(docstring: str | None) -> VerbHead:
     return VerbHead(text.partition("\n")[0], description.rstrip(), f"{mark}{status}" if mark else None)
 
 
-class HelpText(argparse.HelpFormatter):
-    """Paragraphs are filled; those with an indented line (examples, tables) stay as they are written."""
-
-    def _fill_text(self, text: str, width: int, indent: str) -> str:
-        paragraphs = re.split(r"\n\s*\n", text.strip("\n"))
-        return "\n\n".join(
-            each.strip("\n")
-            if re.search(r"^ ", each, re.M)
-            else super(HelpText, self)._fill_text(each, width, indent)
-            for each in paragraphs
-        )
+def filled(text: str, indent: int = 0) -> str:
+    """Fill the paragraphs of ``text`` to the terminal's width; those with an indented line (examples, tables) stay."""
+    width = max(shutil.get_terminal_size().columns - 2, 20) - indent  # argparse's own measure
+    paragraphs = re.split(r"\n\s*\n", text.strip("\n"))
+    return "\n\n".join(
+        each.strip("\n") if re.search(r"^ ", each, re.M) else textwrap.fill(" ".join(each.split()), width)
+        for each in paragraphs
+    )
 
 
 class CommandParser(argparse.ArgumentParser):
@@ -98,77 +115,114 @@ class CommandParser(argparse.ArgumentParser):
     answered with what was probably meant.
 
     The help has one form: the usage on one line, then what belongs to the command itself, last a list of the options
-    that another help describes (``fold``)."""
+    that another help describes (``fold``). ``arguments`` are those of the command, ``verbs`` its verbs' parsers."""
 
     def __init__(self, **settings: Any):
-        settings.setdefault("allow_abbrev", False)
-        settings.setdefault("formatter_class", HelpText)
-        super().__init__(**settings)
-        self._positionals.title = "arguments"
-        self._folded: list[argparse.Action] = []
-        self._described_in = ""
+        self.arguments: list[argparse.Action] = []
+        self.verbs: dict[str, CommandParser] = {}
+        texts = {name: filled(settings[name]) for name in ("description", "epilog") if settings.get(name)}
+        form = {"allow_abbrev": False, "formatter_class": argparse.RawDescriptionHelpFormatter}
+        super().__init__(**{**form, **settings, **texts})
+
+    def add_options(self, options: Iterable[Option], title: str = "") -> None:
+        """Add each, those with a ``title`` as a group of the help."""
+        self.arguments += add_options(self.add_argument_group(title) if title else self, options)
+
+    def add_one_of(self, options: Iterable[Option], title: str = "") -> None:
+        """Add options of which one at most may be given."""
+        group = self.add_argument_group(title) if title else self
+        self.arguments += add_options(group.add_mutually_exclusive_group(), options)
+
+    def add_verbs(self, **settings: Any) -> None:
+        """Prepare for ``add_verb``."""
+        self._add_parser = self.add_subparsers(
+            title="verbs", metavar="VERB", required=True, **settings
+        ).add_parser
+
+    def add_verb(self, name: str, docstring: str | None, **settings: Any) -> CommandParser:
+        """Add the parser of a verb, described by the docstring of its module."""
+        self.verbs[name] = self._add_parser(name, **{**verb_head(docstring)._asdict(), **settings})
+        return self.verbs[name]
+
+    def add_verb_modules(self, package: str, names: Iterable[str]) -> Iterator[tuple[CommandParser, Any]]:
+        """Add a verb for each module of ``package``, and yield its parser and module; those of an add-on that is not
+        installed say so when they are used."""
+        for name in names:
+            try:
+                module: Any = import_module(f"{package}.{name.replace('-', '_')}")
+            except ModuleNotFoundError as error:
+                self._add_absent_verb(name, error)
+                continue
+            verb = self.add_verb(name, module.__doc__, **getattr(module, "SETTINGS", {}))
+            verb.set_defaults(run=getattr(module, "run", None))
+            yield verb, module
+
+    def _add_absent_verb(self, name: str, error: ImportError) -> None:
+        if missing_dependency(error) is None:
+            raise error
+        missing = error
+
+        def run(_: argparse.Namespace) -> int:
+            raise missing
+
+        # No word begins with this prefix, so options of the verb are words like others.
+        verb = self._add_parser(name, help="not part of this installation", add_help=False, prefix_chars="\0")
+        verb.add_argument("words", nargs="*")
+        verb.set_defaults(run=run)
 
     def fold(self, options: Iterable[Option], described_in: str) -> None:
         """Let the help only name those of ``options`` that were added; ``described_in`` describes them."""
         flags = {word for written, *_ in options for word in written.split() if word.startswith("-")}
-        self._folded = [each for each in self._actions if flags.intersection(each.option_strings)]
-        self._described_in = described_in
+        folded = [each for each in self.arguments if flags.intersection(each.option_strings)]
+        for each in folded:
+            each.help = argparse.SUPPRESS
+        names = ", ".join(max(each.option_strings, key=len) for each in folded)
+        if folded:
+            self.add_argument_group(f"options described by {described_in}", filled(names, indent=2))
 
     def format_usage(self) -> str:
         """Return the usage on one line; options are in the help."""
-        return f"usage: {self.usage or self._one_usage()}\n"
+        self.usage = self.usage or self._one_usage()
+        return super().format_usage()
 
     def format_help(self) -> str:
-        """Return the help."""
-        formatter = self._get_formatter()
-        formatter.add_text(self.description)
-        for group in self._action_groups:
-            formatter.start_section(group.title)
-            formatter.add_text(group.description)
-            formatter.add_arguments(each for each in group._group_actions if each not in self._folded)
-            formatter.end_section()
-        if self._folded:
-            formatter.start_section(f"options described by {self._described_in}")
-            formatter.add_text(", ".join(max(each.option_strings, key=len) for each in self._folded))
-            formatter.end_section()
-        formatter.add_text(self.epilog)
-        return f"{self.format_usage()}\n{formatter.format_help()}"
+        """Return the help, below the usage on one line."""
+        self.usage = self.usage or self._one_usage()
+        return super().format_help()
 
     def _one_usage(self) -> str:
         """Return the command with the options that it cannot do without, and its arguments."""
         required = [
             f"{each.option_strings[0]} {_in_usage(each)}"
-            for each in self._actions
+            for each in self.arguments
             if each.option_strings and each.required
         ]
         arguments = [
             _in_usage(each)
-            for each in self._actions
+            for each in self.arguments
             if not each.option_strings and each.help != argparse.SUPPRESS
         ]
-        return " ".join((self.prog, *required, "[options]", *arguments))
+        verb = ["VERB ..."] if self.verbs else []
+        return " ".join(("%(prog)s", *required, "[options]", *arguments, *verb))
 
     def error(self, message: str) -> NoReturn:
         """Print usage and message, and exit with status 2, as argparse."""
+        self.usage = self.usage or self._one_usage()
         super().error(message + self._suggestion(message))
 
     def _suggestion(self, message: str) -> str:
         if message.startswith("unrecognized arguments: "):
             options = [word.partition("=")[0] for word in message.split()[2:] if word.startswith("-")]
-            known = [flag for parser in parsers(self) for flag in parser._option_string_actions]
+            known = [
+                flag for each in parsers(self) for action in each.arguments for flag in action.option_strings
+            ]
             return did_you_mean(options[0], known) if options else ""
         if choice := _INVALID_CHOICE.match(message):
-            return did_you_mean(choice[2], [str(known) for known in self._choices()])
+            return did_you_mean(choice[1], re.findall(r"[^\s',]+", choice[2]))
         return ""
-
-    def _choices(self) -> Iterator[object]:
-        for action in self._actions:
-            yield from action.choices or ()
 
 
 def _in_usage(action: argparse.Action) -> str:
-    if isinstance(action, argparse._SubParsersAction):
-        return f"{action.metavar} ..."
     metavar = action.metavar or action.dest.upper()
     if not isinstance(metavar, str):
         return f"{metavar[0]} [{metavar[1]} ...]"
@@ -180,13 +234,11 @@ def _in_usage(action: argparse.Action) -> str:
     return forms.get(str(action.nargs), metavar)
 
 
-def parsers(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
-    """Yield ``parser`` and those of its verbs, of any depth, each once."""
+def parsers(parser: CommandParser) -> Iterator[CommandParser]:
+    """Yield ``parser`` and those of its verbs, of any depth."""
     yield parser
-    for action in parser._actions:
-        if isinstance(action, argparse._SubParsersAction):
-            for below in dict.fromkeys(action.choices.values()):
-                yield from parsers(below)
+    for verb in parser.verbs.values():
+        yield from parsers(verb)
 
 
 def add_version(parser: argparse.ArgumentParser) -> None:
@@ -194,67 +246,28 @@ def add_version(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--version", action="version", version=f"{parser.prog} {VERSION}")
 
 
-def complete_with(
-    commands: Iterable[argparse.ArgumentParser], name: str, completer: Callable[..., Iterable[str]]
-) -> None:
-    """Let the positional argument ``name`` of ``commands`` be completed by ``completer``, which argcomplete calls."""
-    for each in commands:
-        for action in each._actions:
-            if action.dest == name and not action.option_strings:
-                setattr(action, "completer", completer)  # noqa: B010  # argcomplete's own attribute
-
-
-def complete(
-    parser: argparse.ArgumentParser, offer: Callable[[argparse.ArgumentParser], None] | None = None
-) -> None:
-    """Answer a shell that asks for completions through argcomplete, if it is installed; then end.
-
-    ``offer`` says what can be offered for the arguments of ``parser``."""
+def complete(parser: argparse.ArgumentParser) -> None:
+    """Answer a shell that asks for completions through argcomplete, if it is installed; then end."""
     if "_ARGCOMPLETE" not in os.environ:
         return
     try:
         import argcomplete
     except ImportError:
         raise SystemExit(1) from None
-    if offer is not None:
-        offer(parser)
-    argcomplete.autocomplete(parser, always_complete_options="long")
+    argcomplete.autocomplete(parser, always_complete_options="long", print_suppressed=True)
 
 
-def add_verbosity(parser: argparse.ArgumentParser) -> None:
+VERBOSITY: tuple[Option, ...] = (
+    ("-q --quiet", FLAG, "only errors and the answer; no warnings"),
+    ("-v --verbose", FLAG, "list everything instead of counts"),
+)
+
+
+def add_verbosity(parser: CommandParser) -> None:
     """Add ``-q`` and ``-v`` to a command, or to each of its verbs."""
-    verbs = [each for each in parsers(parser) if each is not parser]
-    for each in verbs or [parser]:
-        if each.prefix_chars != "-":  # an absent verb, which takes no options
-            continue
-        group = each.add_mutually_exclusive_group()
-        group.add_argument(
-            "-q",
-            "--quiet",
-            action="store_true",
-            help="only errors and the answer; no warnings",
-        )
-        group.add_argument("-v", "--verbose", action="store_true", help="list everything instead of counts")
-
-
-def add_absent_verb(
-    verbs: argparse._SubParsersAction[CommandParser],
-    name: str,
-    error: ImportError,
-    handler: str = "run",
-) -> None:
-    """Add a verb of an add-on that is not installed; raises ``error`` again if it is about something else."""
-    if missing_dependency(error) is None:
-        raise error
-    missing = error
-
-    def run(_: argparse.Namespace) -> int:
-        raise missing
-
-    # No word begins with this prefix, so options of the verb are words like others.
-    verb = verbs.add_parser(name, help="not part of this installation", add_help=False, prefix_chars="\0")
-    verb.add_argument("words", nargs="*")
-    verb.set_defaults(**{handler: run})
+    for each in parsers(parser):
+        if not each.verbs:
+            each.add_one_of(VERBOSITY)
 
 
 def guarded(program: str, work: Callable[[], int], *mistakes: type[Exception]) -> int:

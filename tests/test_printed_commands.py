@@ -17,7 +17,7 @@ from typing import NamedTuple, NoReturn
 
 import pytest
 
-from enclave_common.command_line import CommandParser
+from enclave_common.command_line import CommandParser, parsers
 
 ROOT = Path(__file__).resolve().parents[1]
 PARSERS = {
@@ -97,7 +97,7 @@ def _command(where: str, name: str, rest: str) -> Iterator[Printed]:
     for word in re.split(r" {2,}| \||[`'\"]? &&|[<>#]", rest.strip())[0].split():
         bare = word if word.startswith("...") else word.rstrip(",.;:)`'\"*")
         bare = re.split(r"[|,]", bare.strip("{}"))[0] if re.search(r"\w[|]\w|\{\w+,", bare) else bare
-        verbs = _verbs(parser)
+        verbs = parser.verbs
         if bare in verbs:
             parser = verbs[bare]
         elif bare.startswith("-") and bare != "-":
@@ -117,23 +117,17 @@ def _command(where: str, name: str, rest: str) -> Iterator[Printed]:
         yield Printed(where, tuple(word for word in words if word != "..."))
 
 
-def parser_of(name: str) -> argparse.ArgumentParser:
+def parser_of(name: str) -> CommandParser:
     if name not in _parsers:
         _parsers[name] = import_module(PARSERS[name]).build_parser()
     return _parsers[name]
 
 
-_parsers: dict[str, argparse.ArgumentParser] = {}
+_parsers: dict[str, CommandParser] = {}
 
 
-def _verbs(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
-    found = [each for each in parser._actions if isinstance(each, argparse._SubParsersAction)]
-    return dict(found[0].choices) if found else {}
-
-
-def _takes_value(parser: argparse.ArgumentParser, option: str) -> bool:
-    action = parser._option_string_actions.get(option)
-    return action is not None and action.nargs != 0
+def _takes_value(parser: CommandParser, option: str) -> bool:
+    return any(option in each.option_strings and each.nargs != 0 for each in parser.arguments)
 
 
 def refused(command: Printed, monkeypatch: pytest.MonkeyPatch) -> str:
@@ -163,7 +157,11 @@ def test_every_command_in_a_message_or_a_page_is_one_that_its_parser_takes(
 @pytest.mark.parametrize("folder", ["diagnostics", "recording", "review"])
 def test_every_option_in_a_remedy_is_one_of_our_commands(folder: str) -> None:
     known = {
-        option for name in PARSERS for each in _all(parser_of(name)) for option in each._option_string_actions
+        option
+        for name in PARSERS
+        for each in parsers(parser_of(name))
+        for argument in each.arguments
+        for option in argument.option_strings
     }
     named = {
         (where, option)
@@ -172,12 +170,6 @@ def test_every_option_in_a_remedy_is_one_of_our_commands(folder: str) -> None:
         for option in re.findall(r"(?<![\w-])--[a-z][a-z-]+", text)
     }
     assert named and [each for each in named if each[1] not in known | OF_OTHERS] == []
-
-
-def _all(parser: argparse.ArgumentParser) -> Iterator[argparse.ArgumentParser]:
-    yield parser
-    for verb in _verbs(parser).values():
-        yield from _all(verb)
 
 
 @pytest.mark.parametrize(

@@ -35,9 +35,8 @@ class EnclaveOption(OptionExtension):  # type: ignore[misc]  # untyped without R
         from enclave_launch.verb.options import DENIALS, LOOKING, POLICY, add_security_options
 
         group = parser.add_argument_group("secure enclaves", conflict_handler="resolve")
-        add_security_options(group)
-        add_options(group, (*POLICY, *DENIALS, *LOOKING))
-        self._ours = tuple(group._group_actions)
+        secure = add_security_options(group)
+        self._ours = (*secure, *add_options(group, (*POLICY, *DENIALS, *LOOKING)))
         for action in self._ours:
             action.default = argparse.SUPPRESS  # what is there then was given
             if "--secure" in action.option_strings:

@@ -10,7 +10,6 @@ import argparse
 import os
 from collections.abc import Iterable, Sequence
 
-from enclave_common.command_line import complete_with, parsers
 from enclave_launch.errors import EnclaveLaunchError
 from enclave_launch.evaluation.evaluate import read_description
 from enclave_launch.host.plan_host import PlanHost
@@ -19,12 +18,8 @@ from enclave_launch.verb.target import find_target
 from nodl import ament_index
 
 
-def offer_launches(parser: argparse.ArgumentParser) -> None:
-    """Let the positional words of ``parser`` and its verbs be completed."""
-    complete_with(parsers(parser), "words", _words)
-
-
-def _words(prefix: str, parsed_args: argparse.Namespace, **_: object) -> Iterable[str]:
+def launch_words(prefix: str, parsed_args: argparse.Namespace, **_: object) -> Iterable[str]:
+    """Return what can follow at ``prefix`` among the words that name a launch, as argcomplete asks for it."""
     words: Sequence[str] = vars(parsed_args).get("words") or ()
     prefixes = ament_index.search_prefixes(vars(parsed_args).get("prefix") or ())
     if not words:

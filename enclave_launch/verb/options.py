@@ -17,6 +17,7 @@ from enclave_common.command_line import (
     TIME,
     CommandParser,
     Option,
+    OptionGroup,
     add_options,
     add_verbosity,
     add_version,
@@ -27,6 +28,7 @@ from enclave_launch.errors import UsageError, translated
 from enclave_launch.options import ResolveOptions
 from enclave_launch.policy.node_permissions import ALSO
 from enclave_launch.ros_rules.distro import Distro
+from enclave_launch.verb.completion import launch_words
 
 DESCRIPTION = """\
 Launch a ROS 2 launch file (XML, YAML or Python), with or without ROS installed.
@@ -161,7 +163,7 @@ DENIALS: tuple[Option, ...] = (
 )
 
 
-def build_parser() -> argparse.ArgumentParser:
+def build_parser() -> CommandParser:
     """Build the parser, its options grouped by the question they answer."""
     parser = CommandParser(
         prog="secure-launch",
@@ -169,10 +171,11 @@ def build_parser() -> argparse.ArgumentParser:
         epilog=EPILOG,
     )
     words = "PACKAGE LAUNCH_FILE | PATH [name:=value ...]"
-    parser.add_argument("words", nargs="*", metavar=words, help="a launch file, and its launch arguments")
+    kind = {"nargs": "*", "metavar": words, "completer": launch_words}
+    parser.add_options((("words", kind, "a launch file, and its launch arguments"),))
     add_version(parser)
     add_verbosity(parser)
-    add_security_options(parser.add_argument_group("security"))
+    parser.arguments += add_security_options(parser.add_argument_group("security"))
     for title, options in (
         ("permissions", POLICY),
         ("looking without starting", (*LOOKING, *WRITTEN)),
@@ -180,19 +183,22 @@ def build_parser() -> argparse.ArgumentParser:
         ("running", RUNNING),
         ("recording what nodes request", (*RECORDING, *DENIALS)),
     ):
-        add_options(parser.add_argument_group(title), options)
+        parser.add_options(options, title)
     return parser
 
 
-def add_security_options(group: argparse._ArgumentGroup) -> None:
+def add_security_options(group: OptionGroup) -> list[argparse.Action]:
     """Add options that are also those of ``ros2 launch``, see ``ros2.option``."""
-    add_options(group, SECURITY)
+    secure = add_options(group, SECURITY)
     keystore = os.environ.get("ROS_SECURITY_KEYSTORE")
-    for action in group._group_actions:
+    for action in secure:
         if action.dest == "keystore" and keystore:
             action.default = Path(keystore)
-    add_options(group.add_mutually_exclusive_group(), PASSPHRASE)
-    add_options(group, LATE)
+    return [
+        *secure,
+        *add_options(group.add_mutually_exclusive_group(), PASSPHRASE),
+        *add_options(group, LATE),
+    ]
 
 
 def resolve_options(options: argparse.Namespace) -> ResolveOptions:

@@ -7,7 +7,7 @@ import os
 import sys
 from collections.abc import Sequence
 
-from enclave_common.command_line import complete, guarded
+from enclave_common.command_line import CommandParser, complete, guarded
 from enclave_common.terminal import (
     printable,
     safe_output,
@@ -28,9 +28,9 @@ from enclave_launch.report.plan_json import plan_document, plan_json
 from enclave_launch.report.terminal_style import terminal_style_of
 from enclave_launch.report.tree import plan_tree
 from enclave_launch.security_environment import SecuritySettings
-from enclave_launch.verb.completion import offer_launches
 from enclave_launch.verb.options import build_parser, resolve_options
-from enclave_launch.verb.target import LaunchTarget, find_target, planned
+from enclave_launch.verb.planning import planned
+from enclave_launch.verb.target import LaunchTarget, find_target
 from enclave_launch.verb.usage import (
     CommandLine,
     check_options,
@@ -45,13 +45,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line ``argv`` (default: the program's own); return the exit status."""
     with safe_output():
         parser = build_parser()
-        complete(parser, offer_launches)
+        complete(parser)
         line = read_command_line(parser, argv)
         return guarded("secure-launch", lambda: _main(line, parser), EnclaveLaunchError)
 
 
-def _main(line: CommandLine, parser: argparse.ArgumentParser) -> int:
-    check_options(line, parser)
+def _main(line: CommandLine, parser: CommandParser) -> int:
+    check_options(line, parser.arguments)
     options = line.options
     for prefix in options.prefix:  # absent folders on AMENT_PREFIX_PATH are passed over, as by ament
         if not prefix.is_dir():

@@ -16,6 +16,7 @@ from enclave_launch.plan import LaunchPlan, on_zenoh
 from enclave_launch.runtime.companion import LaunchCompanion
 from enclave_launch.runtime.ros_services import require_rclpy
 from enclave_launch.verb.options import resolve_options
+from enclave_launch.verb.planning import planned, resolve_target
 from enclave_launch.verb.security import (
     created_notices,
     expiry_notices,
@@ -24,7 +25,7 @@ from enclave_launch.verb.security import (
     sharing_notices,
     sign_elsewhere,
 )
-from enclave_launch.verb.target import LaunchTarget, planned, resolve_target
+from enclave_launch.verb.target import LaunchTarget
 from enclave_launch.verb.usage import PERMISSIVE_NOTICE, unsecured_notice
 from keystore.formats.validity import utc_now
 

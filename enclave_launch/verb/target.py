@@ -6,18 +6,13 @@ below its share directory, unless the first is a file that exists: then argument
 
 from __future__ import annotations
 
-import argparse
 import os
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from enclave_common.terminal import progress
 from enclave_common.words import did_you_mean
 from enclave_launch.errors import UsageError, translated
 from enclave_launch.evaluation import evaluate
-from enclave_launch.flow import resolve
-from enclave_launch.plan import LaunchPlan
-from enclave_launch.verb.options import resolve_options
 from nodl import ament_index
 
 
@@ -77,19 +72,3 @@ def parse_arguments(words: Sequence[str]) -> tuple[tuple[str, str], ...]:
     """Parse ``name:=value`` words; raises UsageError with upstream's message."""
     with translated(RuntimeError, UsageError):
         return tuple(evaluate.parse_arguments(words))
-
-
-def planned(target: LaunchTarget, options: argparse.Namespace, keystore: str | None) -> LaunchPlan:
-    """Plan ``target``; with a keystore, warn about enclaves shared with other launches there."""
-    plan = resolve_target(target, options)
-    if keystore is None or not os.path.isdir(keystore):
-        return plan
-    from enclave_launch.secured import with_shares_reported  # cryptography
-
-    return with_shares_reported(plan, keystore)
-
-
-def resolve_target(target: LaunchTarget, options: argparse.Namespace) -> LaunchPlan:
-    """Plan ``target``; on a terminal, report what takes long."""
-    chosen = resolve_options(options)._replace(progress=progress("analysing", quiet=options.quiet))
-    return resolve(target.launch_file, target.arguments, options=chosen)

@@ -9,6 +9,7 @@ import argparse
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
+from enclave_common.command_line import CommandParser
 from enclave_launch.errors import UsageError
 from enclave_launch.verb.options import DENIALS, LATE, PASSPHRASE, POLICY, SECURITY, names_of
 
@@ -30,19 +31,19 @@ _FOR_LEARN = {"learn_for", "learn_isolation", "learn_parameters"}
 _VIEWS = ("explain", "dump_params", "show_args", "print_description")
 
 
-def read_command_line(parser: argparse.ArgumentParser, argv: Sequence[str] | None) -> CommandLine:
+def read_command_line(parser: CommandParser, argv: Sequence[str] | None) -> CommandLine:
     """Parse as ``parse_intermixed_args`` does, separating given values from defaults."""
-    defaults = {action.dest: action.default for action in parser._actions}
-    for action in parser._actions:
+    defaults = {action.dest: action.default for action in parser.arguments}
+    for action in parser.arguments:
         action.default = argparse.SUPPRESS
     given = vars(parser.parse_intermixed_args(argv))
     known = {name: value for name, value in defaults.items() if value is not argparse.SUPPRESS}
     return CommandLine(argparse.Namespace(**{**known, **given}), frozenset(given))
 
 
-def check_options(line: CommandLine, parser: argparse.ArgumentParser) -> None:
+def check_options(line: CommandLine, actions: Sequence[argparse.Action]) -> None:
     """Refuse options without effect: ``UsageError`` names the flag that is missing."""
-    given, options, actions = line.given, line.options, parser._actions
+    given, options = line.given, line.options
     looks = check_views(line, actions)
     if options.learn is None:
         check_needs_secure(actions, given & _FOR_LEARN, "--learn")

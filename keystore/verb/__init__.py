@@ -7,20 +7,14 @@ something ends soon and 4 something has ended (``status``); 75 the keystore is i
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
-from importlib import import_module
 
 from enclave_common.command_line import (
     CommandParser,
-    add_absent_verb,
     add_verbosity,
     add_version,
     complete,
-    complete_with,
     guarded,
-    parsers,
-    verb_head,
 )
 from enclave_common.terminal import safe_output
 from keystore.errors import KeystoreError
@@ -36,26 +30,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command; errors become one line on stderr and an exit status, and nothing is printed twice."""
     with safe_output():
         parser = build_parser()
-        complete(parser, _offer)
+        complete(parser)
         arguments = parser.parse_args(argv)
         return guarded("secure-keystore", lambda: int(arguments.run(arguments)), KeystoreError)
 
 
-def _offer(parser: argparse.ArgumentParser) -> None:
-    existing = (each for each in parsers(parser) if not each.prog.endswith("create-enclave"))
-    complete_with(existing, "enclaves", _enclaves)
-
-
-def _enclaves(parsed_args: argparse.Namespace, **_: object) -> list[str]:
-    try:
-        from keystore.steps.provisioning import list_enclaves  # cryptography
-
-        return list_enclaves(parsed_args.keystore)
-    except KeystoreError:
-        return []
-
-
-def build_parser() -> argparse.ArgumentParser:
+def build_parser() -> CommandParser:
     """Build one subparser for each verb, described by the head of its file."""
     parser = CommandParser(
         prog="secure-keystore",
@@ -63,18 +43,10 @@ def build_parser() -> argparse.ArgumentParser:
         "command.",
     )
     add_version(parser)
-    verbs = parser.add_subparsers(title="verbs", metavar="VERB", required=True)
-    for name in VERBS:
-        try:
-            module = import_module(f"keystore.verb.{name.replace('-', '_')}")
-        except ModuleNotFoundError as error:
-            add_absent_verb(verbs, name, error)
-            continue
-        settings = {**verb_head(module.__doc__)._asdict(), **getattr(module, "SETTINGS", {})}
-        verb = verbs.add_parser(name, **settings)
+    parser.add_verbs()
+    for verb, module in parser.add_verb_modules("keystore.verb", VERBS):
         add_table(verb, module.OPTIONS)
-        if name != "create":
+        if module.__name__ != "keystore.verb.create":
             verb.fold(FOLDED, "secure-keystore create --help")
-        verb.set_defaults(run=module.run)
     add_verbosity(parser)
     return parser

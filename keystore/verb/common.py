@@ -9,11 +9,11 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from enclave_common.command_line import FLAG, PATH, TEXT, TIME, Option, add_options, one_of
+from enclave_common.command_line import FLAG, PATH, TEXT, TIME, CommandParser, Kind, Option, one_of
 from enclave_common.terminal import counted_progress, json_text
 from enclave_common.words import counted
 from keystore.disk.lock import DEFAULT_TIMEOUT
-from keystore.errors import InvalidInputError
+from keystore.errors import InvalidInputError, KeystoreError
 from keystore.formats.domains import Domains
 from keystore.formats.subject import SubjectScheme
 from keystore.formats.validity import DEFAULT_BACKDATE, iso, parse_duration, parse_end, utc_now
@@ -28,6 +28,7 @@ class SecretOptions(NamedTuple):
     """What opens CA keys, by file, descriptor or environment variable: arguments can be read by others. Only one of
     its options may be given."""
 
+    title: str
     options: tuple[Option, ...]
 
 
@@ -35,6 +36,20 @@ Table = tuple[Option | SecretOptions, ...]
 
 
 KEYSTORE: Option = ("keystore KEYSTORE", PATH, "root directory of the keystore")
+
+
+def _enclaves(parsed_args: argparse.Namespace, **_: object) -> list[str]:
+    """Return the names that a shell offers for ``ENCLAVES``."""
+    from keystore.disk.view import keystore_at  # cryptography
+
+    try:
+        return keystore_at(parsed_args.keystore).enclaves()
+    except KeystoreError:
+        return []
+
+
+ENCLAVES: Kind = {"metavar": "ENCLAVE", "completer": _enclaves}
+"""Enclaves of the keystore."""
 FORMAT: Option = ("--format", one_of("text", "json"), "how to print (text)")
 LOCK: Option = (
     "--lock-timeout TIME", {**TIME, "default": DEFAULT_TIMEOUT},
@@ -59,14 +74,14 @@ SUBJECTS: tuple[Option, ...] = (
 )  # fmt: skip
 """How certificate subjects are written."""
 SIGNING: tuple[SecretOptions, ...] = (
-    SecretOptions((
-        ("--passphrase-file FILE", PATH, "file with the CA keys' passphrase"),
+    SecretOptions("passphrase of the CA keys", (
+        ("--passphrase-file FILE", PATH, "file that holds it"),
         ("--passphrase-fd N", {"type": int}, "open descriptor to read it from"),
         ("--passphrase-env NAME", TEXT, "environment variable that holds it"),
     )),
-    SecretOptions((
-        ("--pin-file FILE", PATH, "file with the PIN of the PKCS#11 token"),
-        ("--pin-env NAME", TEXT, "environment variable that holds the PIN"),
+    SecretOptions("PIN of a PKCS#11 token with the CA keys", (
+        ("--pin-file FILE", PATH, "file that holds it"),
+        ("--pin-env NAME", TEXT, "environment variable that holds it"),
     )),
 )  # fmt: skip
 """Read by ``access``."""
@@ -95,14 +110,13 @@ FOLDED: tuple[Option, ...] = (
 """Described by ``create --help`` alone."""
 
 
-def add_table(parser: argparse.ArgumentParser, table: Table) -> None:
-    """Add the options of a verb; argparse's help leaves out a group without any."""
-    ca_keys = parser.add_argument_group("CA keys")
+def add_table(parser: CommandParser, table: Table) -> None:
+    """Add the options of a verb."""
     for row in table:
         if isinstance(row, SecretOptions):
-            add_options(ca_keys.add_mutually_exclusive_group(), row.options)
+            parser.add_one_of(row.options, row.title)
         else:
-            add_options(parser, (row,))
+            parser.add_options((row,))
 
 
 def domains(arguments: argparse.Namespace) -> Domains | None:

@@ -15,7 +15,7 @@ from keystore.verb import common
 
 OPTIONS: common.Table = (
     common.KEYSTORE,
-    ("enclaves ENCLAVE", {"nargs": "+"}, ""),
+    ("enclaves", {**common.ENCLAVES, "nargs": "+"}, ""),
     ("--no-revoke", FLAG, "only delete: copies elsewhere stay valid"),
     *common.CHANGE,
 )

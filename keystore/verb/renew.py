@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 OPTIONS: common.Table = (
     common.KEYSTORE,
-    ("enclaves ENCLAVE", {"nargs": "*"}, "enclaves to renew in any case"),
+    ("enclaves", {**common.ENCLAVES, "nargs": "*"}, "enclaves to renew in any case"),
     ("--within TIME", {"default": "30d"}, "what expires sooner is renewed (30d)"),
     ("--all", FLAG, "renew every enclave"),
     ("--new-keys", FLAG, "new private keys too, not only certificates"),

@@ -18,7 +18,7 @@ from keystore.verb import common
 
 OPTIONS: common.Table = (
     common.KEYSTORE,
-    ("enclaves ENCLAVE", {"nargs": "+"}, ""),
+    ("enclaves", {**common.ENCLAVES, "nargs": "+"}, ""),
     ("-o --output FILE", PATH, "where the requests go (standard output)"),
     ("--token URI", TEXT, "pkcs11: URI of the enclave's key in a token (RFC 7512)"),
     *common.SIGNING,

@@ -1,4 +1,5 @@
-"""``secure-nodl VERB``: one module per verb, with ``add_parser(subparsers)`` and ``run(arguments)``.
+"""``secure-nodl VERB``: one module per verb, with ``OPTIONS``, ``SECTIONS`` (more of
+them, by their title in the help) and ``run(arguments)``, or ``VERBS`` of its own.
 
 Exit status: 0 fine, 1 a document is wrong or nothing was found, 2 wrong usage.
 """
@@ -7,31 +8,36 @@ from __future__ import annotations
 
 import argparse
 import os
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from importlib import import_module
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 from enclave_common.command_line import (
     TEXTS,
     CommandParser,
     Option,
-    add_absent_verb,
-    add_options,
     add_verbosity,
     add_version,
     complete,
     guarded,
-    verb_head,
 )
 from enclave_common.new_file import write_text
 from enclave_common.terminal import printable, safe_output
 from nodl.errors import NoDLError
 
-VERBS = ("check_record", "convert", "infer", "library", "observe", "show", "validate")
+VERBS = ("check-record", "convert", "infer", "library", "observe", "show", "validate")
 PREFIX: Option = (
     "--prefix DIR", {**TEXTS, "type": os.path.abspath},
     "ament install prefix, searched before AMENT_PREFIX_PATH (repeatable)",
 )  # fmt: skip
+
+
+class Verb(NamedTuple):
+    """A verb of a verb."""
+
+    run: Callable[[argparse.Namespace], int]
+    options: tuple[Option, ...]
+    help: str
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -52,7 +58,7 @@ def _run(arguments: argparse.Namespace) -> int:
         raise NoDLError(f"{error.filename}: {error.strerror}") from error
 
 
-def build_parser() -> argparse.ArgumentParser:
+def build_parser() -> CommandParser:
     """Build one subparser for each verb."""
     parser = CommandParser(
         prog="secure-nodl",
@@ -60,30 +66,23 @@ def build_parser() -> argparse.ArgumentParser:
         epilog="exit status: 0 fine, 1 a document is wrong or nothing was found, 2 wrong usage",
     )
     add_version(parser)
-    verbs = parser.add_subparsers(dest="verb", title="verbs", required=True, metavar="VERB")
-    for name in VERBS:
-        try:
-            verb = import_module(f"nodl.verb.{name}")
-        except ModuleNotFoundError as error:
-            add_absent_verb(verbs, name.replace("_", "-"), error)
-            continue
-        verb.add_parser(verbs)
+    parser.add_verbs(dest="verb")
+    for verb, module in parser.add_verb_modules("nodl.verb", VERBS):
+        verb.add_options(module.OPTIONS)
+        for title, options in getattr(module, "SECTIONS", {}).items():
+            verb.add_options(options, title)
+        _add_verbs(verb, getattr(module, "VERBS", {}))
     add_verbosity(parser)
     return parser
 
 
-def add_verb(
-    verbs: argparse._SubParsersAction[argparse.ArgumentParser],
-    name: str,
-    run: Callable[[argparse.Namespace], int],
-    options: Iterable[Option],
-    docstring: str | None,
-) -> argparse.ArgumentParser:
-    """Add the parser of a verb, or of an action of a verb; ``docstring`` becomes its help."""
-    parser = verbs.add_parser(name, **verb_head(docstring)._asdict())
-    add_options(parser, options)
-    parser.set_defaults(run=run)
-    return parser
+def _add_verbs(parser: CommandParser, verbs: Mapping[str, Verb]) -> None:
+    if verbs:
+        parser.add_verbs(dest="action")
+    for name, each in verbs.items():
+        verb = parser.add_verb(name, each.help)
+        verb.add_options(each.options)
+        verb.set_defaults(run=each.run)
 
 
 def encodable(text: str) -> str:

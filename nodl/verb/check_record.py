@@ -28,7 +28,7 @@ from nodl.node_interface import NodeInterface
 from nodl.record.assembly import read_record
 from nodl.record.checking import Comparison, Verdict, compare
 from nodl.record.requested import RequestedNode, all_requested
-from nodl.verb import PREFIX, add_verb
+from nodl.verb import PREFIX
 
 _MOST_NODES = 32  # of one program: descriptions may refer to each other
 JUDGED = ("manifest", "inference", "library")
@@ -44,11 +44,6 @@ OPTIONS: tuple[Option, ...] = (
     ("--format", one_of("text", "json"), "how to print (text)"),
     PREFIX,
 )  # fmt: skip
-
-
-def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add ``secure-nodl check-record``."""
-    add_verb(subparsers, "check-record", run, OPTIONS, docstring=__doc__)
 
 
 class Judgement(NamedTuple):

@@ -15,7 +15,7 @@ from nodl.document import read_document
 from nodl.document.write import Written, v1_xml, v2_yaml
 from nodl.errors import NoDLError
 from nodl.node_interface import ManifestNode
-from nodl.verb import PREFIX, add_verb
+from nodl.verb import PREFIX
 
 OPTIONS: tuple[Option, ...] = (
     ("files FILE", {"nargs": "+"}, "documents of one version"),
@@ -23,11 +23,6 @@ OPTIONS: tuple[Option, ...] = (
      "file to write (default: standard output); a folder when v1 becomes several v2 files"),
     PREFIX,
 )  # fmt: skip
-
-
-def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add ``secure-nodl convert``."""
-    add_verb(subparsers, "convert", run, OPTIONS, docstring=__doc__)
 
 
 def run(arguments: argparse.Namespace) -> int:

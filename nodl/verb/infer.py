@@ -21,7 +21,7 @@ from nodl.infer.system import InferredSystem, infer_paths
 from nodl.lookup import ManifestLookup
 from nodl.node_interface import Gap, NodeInterface
 from nodl.source_ref import SourceRef
-from nodl.verb import PREFIX, add_verb, encodable, write_documents
+from nodl.verb import PREFIX, encodable, write_documents
 
 OPTIONS: tuple[Option, ...] = (
     ("subjects PACKAGE|PATH", {"nargs": "+"}, "an installed package, or files and folders"),
@@ -32,11 +32,6 @@ OPTIONS: tuple[Option, ...] = (
      "say what installed manifests lack of that which the sources make; 1: something is missing"),
     PREFIX,
 )  # fmt: skip
-
-
-def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add ``secure-nodl infer``."""
-    add_verb(subparsers, "infer", run, OPTIONS, docstring=__doc__)
 
 
 def run(args: argparse.Namespace) -> int:

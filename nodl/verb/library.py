@@ -6,7 +6,7 @@ import argparse
 import sys
 from collections.abc import Iterable, Iterator
 
-from enclave_common.command_line import FLAG, TEXT, TEXTS, Option, verb_head
+from enclave_common.command_line import FLAG, TEXT, TEXTS, Option
 from enclave_common.terminal import printable
 from nodl.ament_index import package_version, search_prefixes
 from nodl.library import SHIPPED, Hit, Library
@@ -14,7 +14,7 @@ from nodl.library.agreement import keep_agreements, read_agreements
 from nodl.library.contents import contents_text
 from nodl.library.document import LibraryDocument
 from nodl.library.index import write_index
-from nodl.verb import PREFIX, add_verb
+from nodl.verb import PREFIX, Verb
 from nodl.verb.show import description_lines
 
 LIBRARY: Option = ("--library DIR", TEXTS, "documents of your own, which come first")
@@ -34,21 +34,6 @@ CHECK: tuple[Option, ...] = (
 INDEX: tuple[Option, ...] = (
     ("folder DIR", {"nargs": "?", "default": SHIPPED}, "default: the one that ships with us"),
 )
-
-
-def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add ``secure-nodl library``."""
-    parser = subparsers.add_parser("library", **verb_head(__doc__)._asdict())
-    actions = parser.add_subparsers(dest="action", title="verbs", required=True, metavar="VERB")
-    for name, action, options, text in (
-        ("list", _list, LIST, "List the documents: what each describes, for which versions."),
-        ("show", _show, PROGRAM, "Print what a document says, and where that comes from."),
-        ("where", _where, PROGRAM, "Print the path of the document that would be used."),
-        ("check", _check, CHECK, "Compare the documents with the sources in a folder."),
-        ("table", _table, (), "Print all documents as a table in Markdown, as in docs/library-contents.md."),
-        ("index", _index, INDEX, "Write the index of a folder of documents again."),
-    ):
-        add_verb(actions, name, action, options, text)
 
 
 def _list(arguments: argparse.Namespace) -> int:
@@ -131,3 +116,14 @@ def _table(arguments: argparse.Namespace) -> int:
 def _index(arguments: argparse.Namespace) -> int:
     write_index(arguments.folder)
     return 0
+
+
+OPTIONS = ()
+VERBS: dict[str, Verb] = {
+    "list": Verb(_list, LIST, "List the documents: what each describes, for which versions."),
+    "show": Verb(_show, PROGRAM, "Print what a document says, and where that comes from."),
+    "where": Verb(_where, PROGRAM, "Print the path of the document that would be used."),
+    "check": Verb(_check, CHECK, "Compare the documents with the sources in a folder."),
+    "table": Verb(_table, (), "Print all documents as a table in Markdown, as in docs/library-contents.md."),
+    "index": Verb(_index, INDEX, "Write the index of a folder of documents again."),
+}

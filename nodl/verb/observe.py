@@ -21,7 +21,7 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
-from enclave_common.command_line import FLAG, PATH, TEXT, TIME, Option, add_options, one_of
+from enclave_common.command_line import FLAG, PATH, TEXT, TIME, Option, one_of
 from enclave_common.environment import domain_id
 from enclave_common.new_file import write_text
 from enclave_common.terminal import json_text, printable
@@ -37,7 +37,7 @@ from nodl.graph.starts import StartedNode, starts_of_plan
 from nodl.graph.text import graph_text
 from nodl.record.lines import RecordedRun
 from nodl.record.manifest import OBSERVED_HEAD, manifest_file_name, manifest_text
-from nodl.verb import add_verb, write_documents
+from nodl.verb import write_documents
 
 _HIGHEST_DOMAIN = 232  # beyond, there are no ports (DDS-RTPS 9.6.1)
 
@@ -50,7 +50,7 @@ def domain(text: str) -> int:
     return number
 
 
-RUNS: tuple[Option, ...] = (
+OPTIONS: tuple[Option, ...] = (
     ("runs RUN.json", {**PATH, "nargs": "*"}, "earlier observations, merged with this one"),
 )
 LOOKING: tuple[Option, ...] = (
@@ -74,20 +74,7 @@ WRITING: tuple[Option, ...] = (
     ("--format", {"choices": ("text", "json", "policy", "v2")}, "text (default); with -o: v2, NoDL manifests"),
     ("-o --output DIR", PATH, "write files into DIR"),
 )  # fmt: skip
-
-
-def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add ``secure-nodl observe``."""
-    parser = add_verb(
-        subparsers,
-        "observe",
-        run,
-        RUNS,
-        docstring=__doc__,
-    )
-    add_options(parser.add_argument_group("what to observe"), LOOKING)
-    add_options(parser.add_argument_group("a secured system"), SECURITY)
-    add_options(parser.add_argument_group("what to write"), WRITING)
+SECTIONS = {"what to observe": LOOKING, "a secured system": SECURITY, "what to write": WRITING}
 
 
 def run(arguments: argparse.Namespace) -> int:

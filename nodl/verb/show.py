@@ -13,7 +13,7 @@ from nodl.ament_index import search_prefixes
 from nodl.document import read_document
 from nodl.lookup import ManifestLookup
 from nodl.node_interface import EndpointKind, NodeInterface
-from nodl.verb import PREFIX, add_verb
+from nodl.verb import PREFIX
 
 _LABELS = {
     EndpointKind.PUBLISHER: "publishes",
@@ -31,11 +31,6 @@ OPTIONS: tuple[Option, ...] = (
     ("--format", one_of("text", "json"), "how to print (text)"),
     PREFIX,
 )
-
-
-def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add ``secure-nodl show``."""
-    add_verb(subparsers, "show", run, OPTIONS, docstring=__doc__)
 
 
 def run(arguments: argparse.Namespace) -> int:

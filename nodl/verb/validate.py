@@ -11,17 +11,12 @@ from enclave_common.terminal import printable
 from nodl.ament_index import search_prefixes
 from nodl.document import V1_SUFFIX, read_document
 from nodl.errors import NoDLError
-from nodl.verb import PREFIX, add_verb
+from nodl.verb import PREFIX
 
 OPTIONS: tuple[Option, ...] = (
     ("files FILE", {"nargs": "*"}, "documents (default: all *.nodl.* files of this folder)"),
     PREFIX,
 )
-
-
-def add_parser(subparsers: argparse._SubParsersAction[argparse.ArgumentParser]) -> None:
-    """Add ``secure-nodl validate``."""
-    add_verb(subparsers, "validate", run, OPTIONS, docstring=__doc__)
 
 
 def run(arguments: argparse.Namespace) -> int:

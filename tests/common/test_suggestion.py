@@ -2,7 +2,7 @@
 
 import pytest
 
-from enclave_common.command_line import CommandParser
+from enclave_common.command_line import CommandParser, one_of
 from enclave_common.words import did_you_mean
 
 
@@ -29,9 +29,9 @@ def test_nothing_where_nothing_is_alike(word: str, known: list[str]) -> None:
 
 def parser() -> CommandParser:
     made = CommandParser(prog="tool")
-    verbs = made.add_subparsers(metavar="VERB", required=True)
-    verify = verbs.add_parser("verify")
-    verify.add_argument("--format", choices=("text", "json"))
+    made.add_verbs()
+    verify = made.add_verb("verify", "Verify it.")
+    verify.add_options((("--format", one_of("text", "json"), ""),))
     return made
 
 

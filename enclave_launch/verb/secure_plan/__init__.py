@@ -2,28 +2,22 @@
 
 from __future__ import annotations
 
-import argparse
 from collections.abc import Sequence
-from importlib import import_module
 
 from enclave_common.command_line import (
     CommandParser,
     Option,
-    add_absent_verb,
-    add_options,
     add_verbosity,
     add_version,
     complete,
     guarded,
-    verb_head,
 )
 from enclave_common.terminal import safe_output
 from enclave_launch.errors import EnclaveLaunchError
-from enclave_launch.verb.completion import offer_launches
 from enclave_launch.verb.options import EVALUATION, POLICY
 from enclave_launch.verb.secure_plan.plans import WORDS
 
-PLAN: tuple[Option, ...] = (("words", {"nargs": "+", "metavar": WORDS}, "a plan or what to plan"),)
+PLAN: tuple[Option, ...] = (("words", WORDS, "a plan or what to plan"),)
 RESOLVING = (*POLICY, *EVALUATION)
 """As of ``secure-launch``; without effect on a saved plan."""
 VERBS = ("show", "check", "diff", "drift", "flow", "hosts", "export", "suggest", "report", "evidence")
@@ -35,25 +29,19 @@ A plan is a launch file, given as to secure-launch, or the JSON that secure-laun
 """
 
 
-def build_parser() -> argparse.ArgumentParser:
+def build_parser() -> CommandParser:
     """Build the parser: a subparser for each verb, described by the head of its file."""
     parser = CommandParser(prog="secure-plan", description=DESCRIPTION)
     add_version(parser)
-    verbs = parser.add_subparsers(title="verbs", metavar="VERB", required=True)
-    for name in VERBS:
-        try:
-            verb = import_module(f"enclave_launch.verb.secure_plan.{name}")
-        except ModuleNotFoundError as error:
-            add_absent_verb(verbs, name, error, "verb")
-            continue
-        below = verbs.add_parser(name, **verb_head(verb.__doc__)._asdict())
-        add_options(below, getattr(verb, "WORDS", PLAN))
-        for title, options in verb.OPTIONS.items():
-            add_options(below.add_argument_group(title) if title else below, options)
-        add_options(below, RESOLVING)
-        below.fold(RESOLVING, "secure-launch --help")
+    parser.add_verbs()
+    for verb, module in parser.add_verb_modules("enclave_launch.verb.secure_plan", VERBS):
+        verb.add_options(getattr(module, "WORDS", PLAN))
+        for title, options in module.OPTIONS.items():
+            verb.add_options(options, title)
+        verb.add_options(RESOLVING)
+        verb.fold(RESOLVING, "secure-launch --help")
         # A launch prefix is only of use where something is started.
-        below.set_defaults(verb=verb.run, launch_prefix=None, launch_prefix_filter=None)
+        verb.set_defaults(launch_prefix=None, launch_prefix_filter=None)
     add_verbosity(parser)
     return parser
 
@@ -62,6 +50,6 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line ``argv``. Gives the exit status, never a traceback for what a user can cause."""
     with safe_output():
         parser = build_parser()
-        complete(parser, offer_launches)
+        complete(parser)
         options = parser.parse_args(argv)
-        return guarded("secure-plan", lambda: int(options.verb(options)), EnclaveLaunchError)
+        return guarded("secure-plan", lambda: int(options.run(options)), EnclaveLaunchError)

@@ -35,7 +35,7 @@ from keystore.add_ons import FileDifference
 
 WORDS: tuple[Option, ...] = (
     ("before BEFORE", TEXT, "PLAN.json | PATH | REVISION: | REVISION:PATH | KEYSTORE"),
-    ("words", {"nargs": "+", "metavar": plans.WORDS}, "what it is compared with"),
+    ("words", plans.WORDS, "what it is compared with"),
 )
 OPTIONS = {
     "": (

@@ -10,19 +10,24 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from enclave_common.command_line import Option, one_of
+from enclave_common.command_line import Kind, Option, one_of
 from enclave_common.files import read_text
 from enclave_common.terminal import stdout_is_for_the_plan
 from enclave_launch.dry_run import DryRun
 from enclave_launch.errors import UsageError
 from enclave_launch.flow import resolve
 from enclave_launch.report.plan_json import plan_document
+from enclave_launch.verb.completion import launch_words
 from enclave_launch.verb.options import resolve_options
 from enclave_launch.verb.target import find_target
 from nodl.ament_index import search_prefixes
 
 LARGEST_PLAN = 256 << 20  # bytes
-WORDS = "PLAN.json | PACKAGE LAUNCH_FILE | PATH [name:=value ...]"
+WORDS: Kind = {
+    "nargs": "+",
+    "metavar": "PLAN.json | PACKAGE LAUNCH_FILE | PATH [name:=value ...]",
+    "completer": launch_words,
+}
 FORM: Option = ("--format", one_of("text", "json"), "how to print (text)")
 
 
