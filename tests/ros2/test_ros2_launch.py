@@ -113,7 +113,7 @@ def test_strategy_is_passed_on(demo: Workspace) -> None:
         "demo.launch.xml",
     )
     assert screen.count("strategy=Permissive") == 4
-    assert screen.count("then runs unsecured instead of ending") == 1
+    assert screen.count("then runs unsecured instead of exiting") == 1
 
 
 @pytest.mark.parametrize("words", [("--keystore", "ks"), ("--strategy", "Enforce"), ("--nodl", "x.nodl.xml")])
