@@ -43,7 +43,11 @@ def offered(line: str, folder: Path) -> list[str]:
     ("line", "one", "not_one"),
     [
         ("secure-keystore re", "renew", "create"),
-        ("secure-plan check --acc", "--accept-patterns", "--expect"),  # described by another help, completed here
+        (
+            "secure-plan check --acc",
+            "--accept-patterns",
+            "--expect",
+        ),  # described by another help, completed here
         ("secure-plan check demo", "demo_nodes", "--nodl"),
         ("secure-launch --dry-run demo_nodes talker", "talker_listener.launch.xml", "demo_nodes"),
     ],
