@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ast
 import sys
-from functools import partial
+from functools import cache, partial
 from typing import Any
 
 from nodl.infer.interpreter import imports, loops
@@ -149,7 +149,10 @@ def _jump(run: Run, node: ast.Break | ast.Continue, frame: Frame) -> bool:
 
 
 def _match(run: Run, node: ast.Match, frame: Frame) -> bool:
-    """Run any of the cases, or none unless the last one takes everything; a gap if the subject decides which."""
+    """Decide cases of values as tests; run any of others, or none unless the last one takes everything."""
+    tests = _as_tests(node)
+    if tests is not None:
+        return run.execute(tests, frame)
     subject = run.evaluate(node.subject, frame)
     if not any(isinstance(atom, Unknown | External) for atom in subject):
         run.gap(node, frame, "which case of this match statement is taken is not followed")
@@ -157,6 +160,41 @@ def _match(run: Run, node: ast.Match, frame: Frame) -> bool:
     everything = isinstance(last.pattern, ast.MatchAs) and last.pattern.pattern is None and last.guard is None
     sides = [partial(_case, run, case, subject, frame) for case in node.cases]
     return run.state.branches(sides if everything else [*sides, lambda: True])
+
+
+@cache
+def _as_tests(node: ast.Match) -> list[ast.stmt] | None:
+    """Return the statement as ``if`` and ``elif``, which it is if each case lists values or takes everything.
+
+    None if a case is of another form, or if the subject, which each test reads again, is more than a name.
+    """
+    if not isinstance(node.subject, ast.Name | ast.Attribute | ast.Constant):
+        return None
+    following: list[ast.stmt] = []
+    for case in reversed(node.cases):
+        test = _as_test(case.pattern, node.subject)
+        if test is None:
+            return None
+        if case.guard is not None:
+            test = ast.BoolOp(ast.And(), [test, case.guard])
+        following = [
+            ast.fix_missing_locations(ast.copy_location(ast.If(test, case.body, following), case.pattern))
+        ]
+    return following
+
+
+def _as_test(pattern: ast.pattern, subject: ast.expr) -> ast.expr | None:
+    if isinstance(pattern, ast.MatchValue):
+        return ast.Compare(subject, [ast.Eq()], [pattern.value])
+    if isinstance(pattern, ast.MatchSingleton):
+        return ast.Compare(subject, [ast.Is()], [ast.Constant(pattern.value)])
+    if isinstance(pattern, ast.MatchAs) and pattern.name is None:
+        return ast.Constant(True)
+    if isinstance(pattern, ast.MatchOr):
+        parts = [_as_test(each, subject) for each in pattern.patterns]
+        known = [part for part in parts if part is not None]
+        return ast.BoolOp(ast.Or(), known) if len(known) == len(parts) else None
+    return None
 
 
 def _case(run: Run, case: ast.match_case, subject: Value, frame: Frame) -> bool:

@@ -159,7 +159,8 @@ def _set_parameters(run: Run, record: NodeRecord, call: Call) -> Value:
 
 def assign_parameters(run: Run, record: NodeRecord, listed: Value, call: Call) -> None:
     """Set the node's parameters to what the ``Parameter`` objects hold; unknown entries become a gap."""
-    for entry in _each(run, listed, call):
+    lists = tuple(atom for atom in listed if atom is not None)
+    for entry in _each(run, lists, call) if lists else ():
         for atom in entry:
             if isinstance(atom, Instance):
                 for name in constant_strings(atom.cells.get("name", BOTTOM)):

@@ -111,6 +111,14 @@ CASES: dict[str, tuple[str, list[str]]] = {
     "setattr": ("setattr(self, 'a', 'x')\nself.P(self.a)", ["x"]),
     "walrus": ("if (x := 'a'):\n    self.P(x)", ["a"]),
     "match": ("match sys.argv[1]:\n    case 'x':\n        self.P('a')\n    case _:\n        self.P('b')", ["a", "b"]),
+    "match of what is known": (
+        "x = 2\nmatch x:\n    case 1: self.P('a')\n    case 2 | 3: self.P('b')\n    case _: self.P('c')",
+        ["b"],
+    ),
+    "match with a guard": (
+        "match 'x':\n    case 'x' if sys.argv[1]: self.P('a')\n    case None: self.P('b')\n    case 'x': self.P('c')",
+        ["a", "c"],
+    ),
     "partial": ("import functools\nf = functools.partial(self.P, 'a')\nf()", ["a"]),
     "path join": ("import os\nself.P(os.path.join('a', 'b'))", ["a/b"]),
     "unknown": ("self.P(sys.argv[1])", ["?"]),

@@ -15,10 +15,12 @@ from nodl.infer.cpp.running.machine import NEXT, Frame, Machine, registered
 from nodl.infer.cpp.running.static_types import is_pointer
 from nodl.infer.cpp.running.values import (
     BOTTOM,
+    Atom,
     Bound,
     Group,
     Lambda,
     Obj,
+    Param,
     Seq,
     Text,
     Unknown,
@@ -73,6 +75,45 @@ def _to_string(run: Machine, values: Sequence[Value], node: Node, frame: Frame) 
     if any(isinstance(atom, Text) and plain(atom) is not None for value in values for atom in value):
         return unknown("the number of a letter")
     return concatenated(values[0]) if values else unknown("a text")
+
+
+@_standard("std::format", "fmt::format")
+def _format(run: Machine, values: Sequence[Value], node: Node, frame: Frame) -> Value:
+    """Fill the replacement fields of a format string that is known ([format.string.std])."""
+    patterns = [plain(atom) for atom in values[0]] if values else []
+    if len(patterns) != 1 or patterns[0] is None:
+        return unknown("a text of a format that is not known")
+    pieces, following = [], 1
+    for escaped, number, form, letters in _FORMAT.findall(patterns[0]):
+        if escaped or letters:
+            pieces.append(literal(letters or escaped[0]))
+            continue
+        at = int(number) + 1 if number else following
+        following += 1
+        given = values[at] if at < len(values) else BOTTOM
+        pieces.append(tuple(_formatted(atom, form) for atom in given) or unknown("what is formatted"))
+    return concatenated(*pieces)
+
+
+_FORMAT = re.compile(r"(\{\{|\}\})|\{(\d*):?([^{}]*)\}|([^{}]+)")
+"""An escaped brace; a field, by its number and form; other letters."""
+
+
+def _formatted(atom: Atom, form: str) -> Atom:
+    """Return what stands for one argument; a fraction, and forms beyond width of a number, are not known."""
+    if isinstance(atom, bool) and not form:
+        return literal("true" if atom else "false")[0]
+    if isinstance(atom, int) and not isinstance(atom, bool) and re.fullmatch(r"0?\d*d?", form):
+        return literal(format(atom, form))[0]
+    if isinstance(atom, Text) and form in ("", "s"):
+        return atom
+    if (
+        isinstance(atom, Param)
+        and not form
+        and not any(isinstance(each, bool | float) for each in atom.default)
+    ):
+        return atom
+    return Unknown("a value in a format of its own")
 
 
 @_standard(

@@ -154,10 +154,16 @@ def _changed(run: Machine, name: str, target: Node, frame: Frame) -> None:
 
 
 def _is_iterator(run: Machine, target: Node, frame: Frame) -> bool:
-    """Return whether a local variable is declared as an iterator or pointer into a container, not as one itself."""
+    """Return whether a local variable is declared as an iterator or pointer into a container, not as one itself.
+
+    A parameter that is a pointer is none: what is written to it is written to what the caller gave.
+    """
     name = text(target)
     owner = frame.owner_of(name)
     if owner is None or name in owner.aliases or name not in owner.types or owner.types[name].endswith("&"):
+        return False
+    parameters = owner.function.parameters if owner.function is not None else ()
+    if any(each.name == name and each.written_back for each in parameters):
         return False
     kind = run.type_of(owner.types[name], owner)
     if "auto" not in owner.types[name].split():
