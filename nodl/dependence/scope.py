@@ -210,9 +210,10 @@ class _Filling:
 
 
 def _entries(value: object) -> list[str]:
+    """Return the entries of a list, or the words of a text such as ``a b`` or ``A|B``."""
     if isinstance(value, (list, tuple)):
         return [text for text in map(str, value) if text]
-    return str(value).split() if value is not None else []
+    return str(value).replace("|", " ").split() if value is not None else []
 
 
 def _text(value: object, *, lower: bool = True) -> str:

@@ -100,6 +100,7 @@ def test_a_pattern_of_parameter_names_gives_an_entry_for_each(write_document: Wr
         ("{mode: true}", True, False),
         ("{mode: {set: true}}", "x", ""),
         ("{mode: {contains: x}}", ("w", "x"), ("w",)),
+        ("{mode: {contains: x}}", "w|x", "w|xy"),
         ("[{mode: a}, {mode: b}]", "b", "c"),
     ],
 )
