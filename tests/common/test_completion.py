@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -21,13 +22,15 @@ MODULES = {
 
 
 def offered(line: str, folder: Path) -> list[str]:
-    """Return what follows at the end of ``line``, for a shell in ``folder``."""
+    """Return what follows at the end of ``line``, for a shell in ``folder``.
+
+    argcomplete answers at file descriptor 8, as shells read it; version 1.8 (Ubuntu 22.04) knows no other way.
+    """
     out = folder / "offered"
     environment = {
         **os.environ,
         "_ARGCOMPLETE": "1",
         "_ARGCOMPLETE_IFS": "\n",
-        "_ARGCOMPLETE_STDOUT_FILENAME": str(out),
         "COMP_LINE": line,
         "COMP_POINT": str(len(line)),
         "COMP_TYPE": "9",
@@ -35,7 +38,8 @@ def offered(line: str, folder: Path) -> list[str]:
         "AMENT_PREFIX_PATH": str(DEMO),
     }
     words = [sys.executable, "-m", MODULES[line.split()[0]]]
-    subprocess.run(words, cwd=folder, env=environment, check=True, timeout=60)
+    answered_at_8 = ["sh", "-c", f'exec "$@" 8>{shlex.quote(str(out))}', "sh", *words]
+    subprocess.run(answered_at_8, cwd=folder, env=environment, check=True, timeout=60)
     return [each.strip() for each in out.read_text().splitlines()]
 
 
