@@ -45,8 +45,10 @@ def tools(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """``bin`` of an environment with pipx and colcon."""
     folder = tmp_path_factory.mktemp("tools")
     do("python3", "-m", "venv", str(folder), cwd=folder)
-    locked = str(ROOT / "requirements" / "routes.txt")
-    do(str(folder / "bin" / "pip"), "install", "-q", "--require-hashes", "-r", locked, cwd=folder)
+    pip = str(folder / "bin" / "pip")
+    # Debian 12's pip takes the newest coverage for pytest-cov's ``coverage[toml]``, although another one is locked.
+    do(pip, "install", "-q", "--upgrade", "pip", cwd=folder)
+    do(pip, "install", "-q", "--require-hashes", "-r", str(ROOT / "requirements" / "routes.txt"), cwd=folder)
     return folder / "bin"
 
 
