@@ -80,6 +80,8 @@ def _call_unknown(run: Run, atom: Unknown, call: Call) -> Value:
         run.gap(call.node, call.frame, "the command line is changed in code")
     if isinstance(function, ast.Attribute) and function.attr in _OF_EXECUTORS:
         return (atom,)
+    if isinstance(function, ast.Attribute):
+        foreign.wait(run, function.attr)
     if atom.why == OF_A_NODE:
         run.gap(call.node, call.frame, "a method of the node whose name is made at run time is called here")
     run.escape(call.args)

@@ -196,11 +196,6 @@ class ProgramState:
             if atom is not None and atom is not ABSENT[0]
         )
 
-    def settle(self, mark: int, outcomes: list[Written]) -> None:
-        """Continue from ``mark`` with any of ``outcomes``."""
-        self._undo(mark)
-        self._merge(outcomes)
-
     def join_head(self, mark: int, widen_texts: bool) -> bool:
         """End of one turn of a loop: join with the state at ``mark``. True: nothing new, a fixpoint."""
         stable = True

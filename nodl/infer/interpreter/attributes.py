@@ -210,12 +210,6 @@ def _of_unknown(run: Run, atom: Unknown, name: str, node: ast.AST, frame: Frame)
     return (NativeMethod(atom, name),) if name in foreign.NODE_METHODS else (atom,)
 
 
-def _of_method(run: Run, atom: BoundMethod, name: str, node: ast.AST, frame: Frame) -> Value:
-    if name == "__self__":
-        return (atom.receiver,)
-    return (atom.function,) if name == "__func__" else _of_function(run, atom.function, name, node, frame)
-
-
 ATTRIBUTES: dict[type, AttributeReader] = {
     Instance: _of_instance,
     ClassValue: _of_class,
@@ -223,7 +217,6 @@ ATTRIBUTES: dict[type, AttributeReader] = {
     External: _of_external,
     SuperProxy: _of_super,
     FunctionValue: _of_function,
-    BoundMethod: _of_method,
     Unknown: _of_unknown,
     str: _of_native,
     Text: _of_native,

@@ -144,14 +144,14 @@ def _run_body(run: Run, function: FunctionValue, cells: LocalCells, call: Call) 
     frame.guards = len(run.guards)
     run.entries.setdefault(function.node, {})[call.node] = None
     run.stack.append(function.node)
-    frame.mark = run.state.mark()
+    mark = run.state.mark()
     node = function.node
     if isinstance(node, ast.Lambda):
         frame.returned = run.evaluate(node.body, frame)
     else:
         passes = run.execute(node.body, frame)
         if frame.early:
-            _settle(run, frame, passes)
+            run.state.join_seen(mark, None if frame.captured else cells, mixed=True)
         if passes:
             frame.returned = join(frame.returned, NONE)
     if cells.shared:
@@ -163,15 +163,6 @@ def _run_body(run: Run, function: FunctionValue, cells: LocalCells, call: Call) 
     if frame.yielded is not None:
         return frame.yielded or ANY
     return frame.returned  # nothing, if no path comes back
-
-
-def _settle(run: Run, frame: Frame, passes: bool) -> None:
-    """Some path left early: go on with what each return and the end leave."""
-    ends = [*frame.exits, run.state.written(frame.mark)] if passes else frame.exits
-    if ends and not frame.runs_more:
-        run.state.settle(frame.mark, ends)
-    else:
-        run.state.join_seen(frame.mark, None if frame.captured else frame.cells, mixed=frame.runs_more)
 
 
 def call_bound(run: Run, method: BoundMethod, call: Call) -> Value:

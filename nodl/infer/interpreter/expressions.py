@@ -418,14 +418,12 @@ def _inner(run: Run, node: ast.Await | ast.Starred, frame: Frame) -> Value:
 def _yield(run: Run, node: ast.Yield, frame: Frame) -> Value:
     value = NONE if node.value is None else run.evaluate(node.value, frame)
     frame.yielded = join(frame.yielded or BOTTOM, value)
-    frame.runs_more = True
     return join(NONE, ANY)
 
 
 def _yield_from(run: Run, node: ast.YieldFrom, frame: Frame) -> Value:
     items = elements(run, run.evaluate(node.value, frame), node, frame)
     frame.yielded = join(frame.yielded or BOTTOM, items.any_element())
-    frame.runs_more = True
     return ANY
 
 

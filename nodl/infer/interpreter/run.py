@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 from nodl.infer.findings import Findings, OptionDefaults
 from nodl.infer.packages import find_package
 from nodl.infer.program import Program, SourceModule
-from nodl.infer.state import Allocations, ProgramState, Written
+from nodl.infer.state import Allocations, ProgramState
 from nodl.infer.text import Guard, Text
 from nodl.infer.values import (
     ANY,
@@ -47,9 +47,9 @@ class Frame:
     """The variables of a running function, class body or module."""
 
     __slots__ = (
-        "again", "cells", "closure", "depth", "early", "entry", "exits", "forks", "function", "globals",
-        "guards", "is_class", "is_comprehension", "jump", "loop_forks", "mark", "module", "nonlocals",
-        "returned", "runs_more", "trying", "unsettled", "yielded",
+        "again", "cells", "closure", "depth", "early", "entry", "forks", "function", "globals",
+        "guards", "is_class", "is_comprehension", "jump", "loop_forks", "module", "nonlocals",
+        "returned", "unsettled", "yielded",
     )  # fmt: skip
 
     def __init__(self, module: ModuleValue, cells: dict[object, Value], closure: Frame | None, depth: int):
@@ -62,12 +62,6 @@ class Frame:
         self.returned: Value = BOTTOM
         self.yielded: Value | None = None
         self.early = False  # some path left before the end
-        self.mark = 0  # of the state, when the frame was entered
-        self.exits: list[Written] = []  # what was written since, at each return that leaves early
-        self.trying = 0  # statements around that may go on after a return: ``try``
-        self.runs_more = (
-            False  # something unknown may run after a return, or between two values of a generator
-        )
         self.unsettled = ""  # the break or continue that may have happened, since the loop asked last
         self.jump = ""  # the break or continue that certainly ended the latest statement
         self.forks = 0  # undecided branches when the frame was entered, and when its innermost loop was

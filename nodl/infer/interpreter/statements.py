@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import sys
 from functools import cache, partial
 from typing import Any
 
@@ -117,8 +116,6 @@ def _return(run: Run, node: ast.Return, frame: Frame) -> bool:
         value = tuple(only_if(condition, atom) if isinstance(atom, str | Text) else atom for atom in value)
     frame.returned = join(frame.returned, value)
     _leave(run, frame)
-    if frame.early or frame.trying:
-        frame.exits.append(run.state.written(frame.mark))
     return False
 
 
@@ -234,66 +231,47 @@ def _delete(run: Run, node: ast.Delete, frame: Frame) -> bool:
 
 
 def run_try(run: Run, node: Any, frame: Frame) -> bool:
-    """Run each handler after any part of the body; it sees every value written on the way."""
-    mark, returned, exits = run.state.mark(), frame.returned, len(frame.exits)
-    early, unsettled = frame.early, frame.unsettled
-    frame.early, frame.unsettled = False, ""
+    """Run each handler after any part of the body; it sees every value written on the way, as ``finally`` does."""
+    mark, returned = run.state.mark(), frame.returned
     without_value = any(map(_catches_no_value, node.handlers))
     run.state.depth += 1
-    frame.trying += 1
     run.without_value += without_value
     passes = run.execute(node.body, frame)
     run.without_value -= without_value
     run.state.depth -= 1
-    if passes and node.orelse:
+    if node.handlers:
+        passes = _perhaps_handled(run, node, passes, mark, frame)
+    elif passes:
         passes = run.execute(node.orelse, frame)
-    if node.handlers and not all(_cannot_fail(statement) for statement in node.body):
-        passes = _perhaps_handled(run, node.handlers, passes, mark, frame)
-    frame.trying -= 1
-    left = frame.early or bool(frame.unsettled) or not passes
-    frame.early = frame.early or early
-    frame.unsettled = unsettled if unsettled == "continue" else frame.unsettled or unsettled
     if not node.finalbody:
         return passes
     jump, within = frame.jump, frame.returned
-    frame.returned = (
-        returned  # where ``finally`` returns itself, what the statement returned is replaced by that
-    )
-    done = True
-    if left:
-        done = _finally_left(run, node.finalbody, mark, exits, passes, frame)
-    if passes and done:
-        done = run.execute(node.finalbody, frame)
+    frame.returned = returned  # where ``finally`` returns, what the statement returned is replaced by that
+    run.state.join_seen(mark, mixed=True)
+    done = run.execute(node.finalbody, frame)
     if done:
         frame.returned = join(within, frame.returned)
-        frame.jump = frame.jump if passes else jump
+        frame.jump = jump
     return done and passes
 
 
-def _finally_left(run: Run, body: list[ast.stmt], mark: int, exits: int, passes: bool, frame: Frame) -> bool:
-    """Run ``finally`` for the paths that left the statement; return False if control cannot reach its end.
+def _perhaps_handled(run: Run, node: Any, passes: bool, mark: int, frame: Frame) -> bool:
+    """Run a handler, or what follows the body (``passes``: if control reaches its end)."""
 
-    ``passes``: others did not leave it, and go on from the present state.
-    """
-    done = True
+    def handle(handler: ast.ExceptHandler) -> bool:
+        run.state.join_seen(mark)
+        if handler.type is not None:
+            run.evaluate(handler.type, frame)
+        if handler.name:
+            run.assign_name(handler.name, ANY, frame)
+        return run.execute(handler.body, frame)
 
-    def left() -> bool:
-        nonlocal done
-        before = len(frame.exits)
-        run.state.join_seen(mark, mixed=True)
-        start = run.state.mark()
-        done = run.execute(body, frame)
-        written = run.state.written(start)
-        frame.exits[exits:before] = (
-            [{**each, **written} for each in frame.exits[exits:before]] if done else []
-        )
-        return False
-
-    if passes:
-        run.state.branches((left,))
-    else:
-        left()
-    return done
+    if not passes and frame.jump:
+        frame.unsettled = frame.jump  # the jump of the body may happen, or a handler runs instead
+    elif not passes:
+        frame.early = True
+    handled = [partial(handle, handler) for handler in node.handlers]
+    return run.state.branches([*handled, lambda: passes and run.execute(node.orelse, frame)])
 
 
 def _catches_no_value(handler: ast.ExceptHandler) -> bool:
@@ -304,38 +282,6 @@ def _catches_no_value(handler: ast.ExceptHandler) -> bool:
 
 _NO_VALUE = frozenset({"ParameterUninitializedException", "ParameterException", "Exception", "BaseException"})
 """What rclpy's ``get_parameter`` raises then, and what it is derived from (rclpy/exceptions.py)."""
-
-
-def _cannot_fail(statement: ast.stmt) -> bool:
-    """Return True for an import of Python's own library, or a constant that is given a name."""
-    if isinstance(statement, ast.Import):
-        return all(alias.name.partition(".")[0] in _ALWAYS_THERE for alias in statement.names)
-    constant = isinstance(statement, ast.Assign) and isinstance(statement.value, ast.Constant)
-    return constant and all(isinstance(target, ast.Name) for target in getattr(statement, "targets", ()))
-
-
-_ALWAYS_THERE = sys.stdlib_module_names | {"rclpy"}
-
-
-def _perhaps_handled(
-    run: Run, handlers: list[ast.ExceptHandler], passes: bool, mark: int, frame: Frame
-) -> bool:
-    def handle(handler: ast.ExceptHandler) -> bool:
-        run.state.join_seen(mark)
-        if handler.type is not None:
-            run.evaluate(handler.type, frame)
-        if handler.name:
-            run.assign_name(handler.name, ANY, frame)
-        return run.execute(handler.body, frame)
-
-    jump = frame.jump
-    result = run.state.branches([lambda: passes, *(partial(handle, handler) for handler in handlers)])
-    if not passes:
-        if jump:
-            frame.unsettled = jump  # the jump of the body may happen, or a handler runs instead
-        else:
-            frame.early = True
-    return result
 
 
 def run_with(run: Run, node: ast.With | ast.AsyncWith, frame: Frame) -> bool:
@@ -353,7 +299,7 @@ def run_with(run: Run, node: ast.With | ast.AsyncWith, frame: Frame) -> bool:
     run.state.depth -= 1
     if not all(isinstance(atom, External) and run.tables.lets_through(atom.path) for atom in managers):
         run.state.join_seen(mark, mixed=True)  # after any part of the body
-        passes = frame.runs_more = True
+        passes = True
     for atom in reversed(managers):
         if isinstance(atom, Instance) and isinstance(atom.cls, ClassValue):
             leave = run.attribute((atom,), "__exit__", node, frame)

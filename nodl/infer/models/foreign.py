@@ -79,6 +79,16 @@ _CALLS_NOW = frozenset({"functools", "re", "itertools", "builtins", "bisect", "h
 _WAITS = frozenset({
     "spin", "spin_once", "spin_until_future_complete", "spin_once_until_future_complete", "sleep", "wait_for_message",
 })  # fmt: skip
+_WAITS_FOR_ONE = frozenset({"join", "wait", "result"})  # of threads, events and futures
+
+
+def wait(run: Run, name: str) -> None:
+    """Run the callbacks, and what other threads do, if a method of this name waits for them."""
+    if (name in _WAITS or name in _WAITS_FOR_ONE) and run.callbacks:
+        mark = run.state.mark()
+        run.settle(run)
+        if name in _WAITS_FOR_ONE:  # others have run, or not yet
+            run.state.join_seen(mark, mixed=True)
 
 
 def call_external(run: Run, atom: External, call: Call) -> Value:
@@ -103,8 +113,7 @@ def call_external(run: Run, atom: External, call: Call) -> Value:
         return call_native(run, NativeMethod(unknown(f"the result of {owner}")[0], name), call)
     if "(" not in path:  # a function of a library that does not make interfaces, whatever its name
         run.understood.add(call.node)
-    if name in _WAITS and run.callbacks:
-        run.settle(run)
+    wait(run, name)
     if not ros.interface_type(path) and not keeps_off(path):
         _note_unknown_package(run, path, call)
     _hand_over(run, path, call)
@@ -125,7 +134,7 @@ def _is_exception(path: str) -> bool:
 
 def is_asked_of(name: str) -> bool:
     """Return True for a method that matters even on an object that a library made."""
-    return name in NODE_METHODS or name in _WAITS
+    return name in NODE_METHODS or name in _WAITS or name in _WAITS_FOR_ONE
 
 
 @functools.lru_cache(maxsize=4096)
@@ -230,6 +239,7 @@ def call_foreign_method(run: Run, method: ForeignMethod, call: Call) -> Value:
     if name in COMMON_CALLBACKS:
         ros.register(run, COMMON_CALLBACKS[name], call, at_any_time=True)
         return ANY
+    wait(run, name)
     _escape_to(run, path, call)
     return unknown(f"the result of {path.rpartition('.')[2] or 'an unknown class'}.{name}()")
 
@@ -301,6 +311,8 @@ def instance_attribute(run: Run, obj: Instance, path: str, name: str) -> Value:
 
 def inherited(obj: Instance, path: str, name: str) -> Value | None:
     """Return what an analysed class inherits from the foreign class ``path``; ``None``: ask the next one."""
+    if path == "builtins.object" and not name.startswith("__"):
+        return None
     if is_node_class(path):
         return (ForeignMethod(path, obj, name),)
     if (path, name) in stdlib.METHODS or name == "__init__":

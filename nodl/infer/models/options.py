@@ -64,24 +64,14 @@ def _place(run: Run, parser: Instance, name: str, call: Call) -> str:
     before = sole(parser.cells.get(_COUNT, BOTTOM))
     nargs = sole(call.args.keywords.get("nargs", NONE))
     if type(before) is not int:
-        _forget_places(run, parser)
+        run.gap(
+            call.node, call.frame, "which word of the command line a positional argument takes is not known"
+        )
     elif nargs in (None, "?"):
         run.state.store(parser, _COUNT, (before + 1,) if nargs is None else _NOT_TOLD)
         return f"<{before + 1}>"
     run.state.store(parser, _COUNT, _NOT_TOLD)
     return f"<{name}>"
-
-
-def _forget_places(run: Run, parser: Instance) -> None:
-    for cell, value in list(parser.cells.items()):
-        found = input_of(sole(value))
-        if (
-            isinstance(cell, str)
-            and cell.startswith("dest ")
-            and found is not None
-            and found.name.startswith("<")
-        ):
-            run.state.store(parser, cell, _NOT_TOLD)
 
 
 def _parsed(run: Run, name: str, call: Call) -> Value:

@@ -224,7 +224,6 @@ def chosen(run: Run, call: Call) -> Value:
 def _getattr(run: Run, call: Call) -> Value:
     """Return the attribute, the default or either."""
     owner, names = call.args.at(0) or ANY, call.args.at(1) or ANY
-    there = _has(run, sole(owner), sole(names))
     known = constant_strings(names)
     found = join_all(run.attribute(owner, name, call.node, call.frame) for name in known)
     if len(known) < len(names):
@@ -242,7 +241,7 @@ def _getattr(run: Run, call: Call) -> Value:
         is_node = any(isinstance(atom, Instance) and atom.node is not None for atom in owner)
         found = join(found, unknown(OF_A_NODE if is_node else "an attribute whose name is made at run time"))
     default = call.args.at(2)
-    return found if default is None or there else join(found, default)
+    return found if default is None else join(found, default)
 
 
 def _setattr(run: Run, call: Call) -> Value:
@@ -259,47 +258,6 @@ def _setattr(run: Run, call: Call) -> Value:
         if any(isinstance(atom, HeapObject) for atom in owner):
             run.gap(call.node, call.frame, "an attribute whose name is made at run time is set")
     return NONE
-
-
-def _hasattr(run: Run, call: Call) -> Value:
-    return (True,) if _has(run, sole(call.args.at(0)), sole(call.args.at(1))) else BOOLEAN
-
-
-def _has(run: Run, owner: object, name: object) -> bool:
-    """Return True if the attribute is certainly there."""
-    if not isinstance(name, str) or not isinstance(owner, Instance | ClassValue | ModuleValue):
-        return False
-    held = owner.cells.get(name)
-    if held:
-        return present(held) is held and not owner.summary
-    cls = owner.cls if isinstance(owner, Instance) else owner
-    return isinstance(cls, ClassValue) and any(base.cells.get(name) for base in program_classes(cls))
-
-
-_CLASSES: dict[type, str] = {str: "str", bool: "bool", int: "int", float: "float", Dictionary: "dict"}
-
-
-def _isinstance(run: Run, call: Call) -> Value:
-    """Tell texts, numbers and containers apart; of all others nobody knows."""
-    given, classes = call.args.at(0) or ANY, call.args.at(1) or ANY
-    asked = {
-        atom.path if isinstance(atom, External) else "" for cls in classes for atom in _alternatives(cls)
-    }
-    if not all(
-        path in {f"builtins.{name}" for name in (*_CLASSES.values(), "list", "tuple", "set")}
-        for path in asked
-    ):
-        return BOOLEAN
-    kinds = {atom.kind if isinstance(atom, Sequence) else _CLASSES.get(type(atom), "") for atom in given}
-    if not kinds <= {*_CLASSES.values(), "list", "tuple", "set"}:
-        return BOOLEAN
-    outcomes = {f"builtins.{kind}" in asked or (kind == "bool" and "builtins.int" in asked) for kind in kinds}
-    return tuple(outcomes)
-
-
-def _alternatives(cls: object) -> Value:
-    exact = cls.items.exact if isinstance(cls, Sequence) else None
-    return (cls,) if exact is None else tuple(atom for element in exact for atom in element)
 
 
 def _type(run: Run, call: Call) -> Value:
@@ -369,10 +327,8 @@ _BUILT_IN: dict[str, Callable[[Run, Call], Value]] = {
         **dict.fromkeys(("min", "max"), _extreme),
         "getattr": _getattr,
         "setattr": _setattr,
-        "hasattr": _hasattr,
         "type": _type,
-        **dict.fromkeys(("any", "all", "callable"), lambda run, call: BOOLEAN),
-        "isinstance": _isinstance,
+        **dict.fromkeys(("any", "all", "callable", "isinstance", "hasattr"), lambda run, call: BOOLEAN),
         **dict.fromkeys(("eval", "exec", "compile"), _dynamic_code),
         "__import__": import_dynamic,
         **dict.fromkeys(("vars", "globals", "locals"), _variables),
@@ -478,13 +434,6 @@ def _default_dict(run: Run, call: Call) -> Value:
     return (obj,)
 
 
-def _namespace(run: Run, call: Call) -> Value:
-    made = run.library_object(call, "types.SimpleNamespace")
-    for name, value in call.args.keywords.items():
-        run.state.store(made, name, value)
-    return (made,)
-
-
 def _loaded(run: Run, call: Call) -> Value:
     call_now(run, call)
     return unknown(CONTENTS)
@@ -520,7 +469,6 @@ FUNCTIONS: dict[str, Model] = {
     "multiprocessing.Process": _thread,
     "collections.defaultdict": _default_dict,
     "collections.OrderedDict": _BUILT_IN["builtins.dict"],
-    "types.SimpleNamespace": _namespace,
     "collections.deque": _BUILT_IN["builtins.list"],
     **dict.fromkeys(("copy.copy", "copy.deepcopy"), _copy),
     "random.choice": _BUILT_IN["builtins.next"],
