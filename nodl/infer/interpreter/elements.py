@@ -260,7 +260,7 @@ def _in_order(obj: Dictionary, known: tuple[Value, ...], others: Value) -> Items
     return Items(known) if certain else Items(None, join_all(known))
 
 
-EDITED = unknown("an element of a list that is edited")
+EDITED = unknown("an element of a list that is edited while that is undecided")
 
 
 def assign(run: Run, target: ast.expr, value: Value, frame: Frame) -> None:
@@ -358,7 +358,7 @@ def _store_subscript(run: Run, target: ast.Subscript, value: Value, frame: Frame
         added = elements(run, value, target.slice, frame).any_element()
         for owner in owners:
             if isinstance(owner, Sequence):
-                _edited(run, owner, added)
+                change(run, owner, added)
             else:
                 run.escape_value(value)
         return
@@ -394,7 +394,7 @@ def _store_element(run: Run, owner: Sequence, key: Value, value: Value) -> None:
     items = owner.items
     exact = items.exact
     if exact is None:
-        _edited(run, owner, value)
+        change(run, owner, value)
         return
     index = key[0] if len(key) == 1 else None
     if isinstance(index, int) and -len(exact) <= index < len(exact):
@@ -447,18 +447,22 @@ def _delete_attribute(run: Run, owner: object, name: str, certain: bool, node: a
 
 def _delete_item(run: Run, owner: object, key: Value, certain: bool) -> None:
     if isinstance(owner, Sequence):
-        _edited(run, owner, BOTTOM)
+        change(run, owner, BOTTOM)
     elif isinstance(owner, Dictionary):
         strong = certain and len(key) == 1 and not owner.summary
         if strong and is_constant(key[0]):
             run.state.write(owner.cells, Key(key[0]), ABSENT)
 
 
-def _edited(run: Run, owner: Sequence, added: Value) -> None:
-    """Let some elements go and ``added`` come: each may be any."""
-    run.state.store(
-        owner, ITEMS, (Items(None, join(_any_of(join(owner.items.any_element(), added)), EDITED)),)
-    )
+def change(run: Run, owner: Sequence, added: Value, taken: bool = True) -> None:
+    """Let ``added`` come to the elements; in which order they are is not kept.
+
+    ``taken``: something was taken away, nobody knows what; a text among the elements may be the one.
+    """
+    others = join(owner.items.any_element(), added)
+    if taken and any(isinstance(atom, str | Text) for atom in others):
+        others = join(tuple(atom for atom in others if not isinstance(atom, str | Text)), EDITED)
+    run.state.store(owner, ITEMS, (Items(None, others),))
 
 
 def _any_of(found: Value) -> Value:

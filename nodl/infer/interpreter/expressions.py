@@ -147,15 +147,7 @@ def _add(run: Run, node: ast.AST, left: Value, right: Value) -> Value:
     if any(type(atom) in _NUMBERS for atom in (*left, *right)):
         return _arithmetic(run, node, left, ast.Add(), right)
     # One side is a text, so the sum is only defined where the other one is too.
-    return tuple(
-        concatenations([texts_left or as_texts(left), texts_right or as_texts(right)])
-        if _pure(left) and _pure(right)
-        else concatenations([_text_side(left), _text_side(right)])
-    )
-
-
-def _pure(value: Value) -> bool:
-    return not any(isinstance(atom, Unknown) for atom in value)
+    return tuple(concatenations([_text_side(left), _text_side(right)]))
 
 
 def _text_side(value: Value) -> list[TextAtom]:

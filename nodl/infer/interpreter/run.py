@@ -139,7 +139,7 @@ class Call:  # its fields are read so often that those of a named tuple would co
 
 # What one run may cost, counted and not timed so that it ends at the same statement on every machine: expressions
 # evaluated, values and elements looked at, cells joined after branches. One takes 2 to 6 microseconds.
-MAX_STEPS = 800_000
+MAX_STEPS = 1_000_000
 MAX_STEPS_IN_VAIN = 200_000  # for a program of which something stays unknown, whatever else is found
 MAX_DEPTH = 120  # analysed calls inside calls
 

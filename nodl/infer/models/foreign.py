@@ -14,7 +14,6 @@ from nodl.infer.interpreter.run import Call, Run
 from nodl.infer.models import (
     native,
     ros,
-    ros_parameters,
     stdlib,
 )
 from nodl.infer.models.signatures import (
@@ -219,7 +218,7 @@ def call_foreign_method(run: Run, method: ForeignMethod, call: Call) -> Value:
         return model(run, receiver, call)
     if path in ros.ENDPOINT_CLASSES:
         return ros.call_endpoint(run, receiver, name, call)
-    if path == ros_parameters.PARAMETER_CLASS:
+    if path == ros.PARAMETER_CLASS:
         return (receiver,) if name == "get_parameter_value" else ANY
     if name == "__init__":
         if ros.makes_interfaces(path):
@@ -300,7 +299,7 @@ _PARAMETER_VALUES = frozenset({
 
 def instance_attribute(run: Run, obj: Instance, path: str, name: str) -> Value:
     """Return an attribute of an object whose class is foreign."""
-    if path == ros_parameters.PARAMETER_CLASS and name in _PARAMETER_VALUES:
+    if path == ros.PARAMETER_CLASS and name in _PARAMETER_VALUES:
         return obj.cells.get("value", ANY)
     if path in ros.ENDPOINT_CLASSES and name in ros.ENDPOINT_NAMES:
         return obj.cells.get("name", ANY)

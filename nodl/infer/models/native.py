@@ -6,6 +6,7 @@ from collections.abc import Callable
 
 from nodl.infer.interpreter.define import is_constant
 from nodl.infer.interpreter.elements import (
+    change,
     chosen_by_parameter,
     copy_dictionary,
     elements,
@@ -16,17 +17,15 @@ from nodl.infer.interpreter.elements import (
 )
 from nodl.infer.interpreter.formatting import joined, str_format, text_value
 from nodl.infer.interpreter.run import Call, Run
-from nodl.infer.models.stdlib import call_each, store_pairs
+from nodl.infer.models.stdlib import call_each, fill
 from nodl.infer.text import MAX_LENGTH, Text, TextAtom, constant_text, edited, input_of, make_text, with_edit
 from nodl.infer.values import (
     ABSENT,
     ANY,
     BOOLEAN,
     BOTTOM,
-    ITEMS,
     LAZY,
     NONE,
-    OTHER,
     OTHER_KEYS,
     Dictionary,
     Items,
@@ -120,33 +119,20 @@ def _constant_method(run: Run, text: str, name: str, arguments: tuple[object, ..
 # --- sequences ----------------------------------------------------------------------------------------------
 
 
-EDITED = "an element of a list that is edited while that is undecided"
-
-
-def _changed(run: Run, owner: Sequence, added: Value, edited: bool = False) -> Value:
-    """Note that ``added`` came to the elements; in which order they are is not kept.
-
-    ``edited``: something was taken away, nobody knows what; a text among the elements may be the one.
-    """
-    others = join(owner.items.any_element(), added)
-    if edited and any(isinstance(atom, str | Text) for atom in others):
-        others = join(tuple(atom for atom in others if not isinstance(atom, str | Text)), unknown(EDITED))
-    run.state.store(owner, ITEMS, (Items(None, others),))
-    return NONE
-
-
 def _append(run: Run, owner: Sequence, call: Call) -> Value:
-    return _changed(run, owner, call.args.at(0) or ANY)
+    change(run, owner, call.args.at(0) or ANY, taken=False)
+    return NONE
 
 
 def _extend(run: Run, owner: Sequence, call: Call) -> Value:
     added = (elements(run, value, call.node, call.frame).any_element() for value in call.args.positional)
-    return _changed(run, owner, join_all(added) if call.args.positional else ANY)
+    change(run, owner, join_all(added) if call.args.positional else ANY, taken=False)
+    return NONE
 
 
 def _pop(run: Run, owner: Sequence, call: Call) -> Value:
     element = owner.items.any_element()
-    _changed(run, owner, BOTTOM, edited=True)
+    change(run, owner, BOTTOM)
     return element or ANY
 
 
@@ -157,7 +143,8 @@ def _copy_sequence(run: Run, owner: Sequence, call: Call) -> Value:
 def _edited(run: Run, owner: Sequence, call: Call) -> Value:
     """Handle ``insert``, ``remove``, ``sort`` ...: what is left, in which order, is not known."""
     call_each(run, call.args.keywords.get("key", NONE), owner.items.any_element(), call)
-    return _changed(run, owner, join_all(call.args.positional), edited=True)
+    change(run, owner, join_all(call.args.positional))
+    return NONE
 
 
 SequenceMethod = Callable[[Run, Sequence, Call], Value]
@@ -211,16 +198,7 @@ def _pairs(run: Run, owner: Dictionary, call: Call) -> Value:
 
 
 def _update(run: Run, owner: Dictionary, call: Call) -> Value:
-    given = call.args.at(0)
-    for atom in given or BOTTOM:
-        if isinstance(atom, Sequence):
-            store_pairs(run, owner, elements(run, (atom,), call.node, call.frame), call)
-        else:
-            copy_dictionary(run, owner, (atom,))
-    for name, value in call.args.keywords.items():
-        run.state.store(owner, Key(name), value)
-    if call.args.more_keywords:
-        run.state.store(owner, OTHER, join(owner.cells.get(OTHER, BOTTOM), call.args.more_keywords))
+    fill(run, owner, call)
     return NONE
 
 

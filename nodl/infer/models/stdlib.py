@@ -187,20 +187,24 @@ def _extreme(run: Run, call: Call) -> Value:
 def _dict(run: Run, call: Call) -> Value:
     """Make a dictionary of dictionaries, pairs and keywords; keys that are not constant go under ``OTHER``."""
     obj = run.allocate(call.node, "dict", Dictionary)
+    fill(run, obj, call)
+    return (obj,)
+
+
+def fill(run: Run, obj: Dictionary, call: Call) -> None:
+    """Add what ``dict`` and ``dict.update`` are given to ``obj``."""
     for atom in call.args.at(0) or BOTTOM:
-        if isinstance(atom, Dictionary):
-            copy_dictionary(run, obj, (atom,))
+        if isinstance(atom, Sequence):
+            _store_pairs(run, obj, elements(run, (atom,), call.node, call.frame), call)
         else:
-            store_pairs(run, obj, elements(run, (atom,), call.node, call.frame), call)
+            copy_dictionary(run, obj, (atom,))
     for name, value in call.args.keywords.items():
         run.state.store(obj, Key(name), value)
     if call.args.more_keywords:
         run.state.store(obj, OTHER, join(obj.cells.get(OTHER, BOTTOM), call.args.more_keywords))
-    return (obj,)
 
 
-def store_pairs(run: Run, obj: Dictionary, items: Items, call: Call) -> None:
-    """Store what ``dict`` and ``dict.update`` make of pairs."""
+def _store_pairs(run: Run, obj: Dictionary, items: Items, call: Call) -> None:
     for pair in items.exact if items.exact is not None else (items.any_element(),):
         parts = elements(run, pair, call.node, call.frame).exact
         key = sole(parts[0]) if parts and len(parts) == 2 else None
