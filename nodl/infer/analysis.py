@@ -81,7 +81,7 @@ def _call_unknown(run: Run, atom: Unknown, call: Call) -> Value:
     if isinstance(function, ast.Attribute) and function.attr in _OF_EXECUTORS:
         return (atom,)
     if isinstance(function, ast.Attribute):
-        foreign.wait(run, function.attr)
+        foreign.wait(run, function.attr, atom)
     if atom.why == OF_A_NODE:
         run.gap(call.node, call.frame, "a method of the node whose name is made at run time is called here")
     run.escape(call.args)

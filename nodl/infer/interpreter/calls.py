@@ -59,12 +59,22 @@ def call_function(run: Run, function: FunctionValue, call: Call) -> Value:
         return _recursive(run, function, cells, call)
     mark = run.state.mark()
     result = _run_body(run, function, cells, call)
-    if is_generator(function):  # its body may go on at any time, when somebody asks for the next value
+    if is_generator(function) or _runs_later(run, function, call):  # its body may go on at any time
         later = Partial((function,), tuple(call.args.positional), tuple(call.args.keywords.items()))
         run.register_callback((later,), 0, mark)
         run.state.join_seen(mark, mixed=True)
+    if is_generator(function):
         result = run.sequence(call.node, "generator", Items(None, join(result, LATER)))
     return join(result, EARLIER) if function.cached else result
+
+
+def _runs_later(run: Run, function: FunctionValue, call: Call) -> bool:
+    """Return True for a coroutine that is not awaited where it is called."""
+    return (
+        isinstance(function.node, ast.AsyncFunctionDef)
+        and isinstance(call.node, ast.Call)
+        and call.node not in run.awaited
+    )
 
 
 def is_generator(function: FunctionValue) -> bool:

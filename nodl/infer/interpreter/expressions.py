@@ -200,12 +200,17 @@ def _attribute(run: Run, node: ast.Attribute, frame: Frame) -> Value:
     return run.attribute(run.evaluate(node.value, frame), node.attr, node, frame)
 
 
+_RUNS_COROUTINES = frozenset({"run", "run_until_complete"})  # of asyncio and its event loops
+
+
 def _call(run: Run, node: ast.Call, frame: Frame) -> Value:
     function = node.func
     if type(function) is ast.Name and function.id == "super" and "super" not in frame.module.cells:
         return _super(run, node, frame)
     run.evaluated.add((node, frame.entry))
     callee = run.evaluate(function, frame)
+    if type(function) is ast.Attribute and function.attr in _RUNS_COROUTINES:
+        run.awaited.update(node.args)
     if any(type(atom) is Unknown for atom in callee):
         run.doubtful.add(node)
     args = arguments_of(run, node, frame)
@@ -404,6 +409,7 @@ def _walrus(run: Run, node: ast.NamedExpr, frame: Frame) -> Value:
 
 
 def _inner(run: Run, node: ast.Await | ast.Starred, frame: Frame) -> Value:
+    run.awaited.add(node.value)
     return run.evaluate(node.value, frame)
 
 

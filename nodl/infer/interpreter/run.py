@@ -140,7 +140,7 @@ class Call:  # its fields are read so often that those of a named tuple would co
 # What one run may cost, counted and not timed so that it ends at the same statement on every machine: expressions
 # evaluated, values and elements looked at, cells joined after branches. One takes 2 to 6 microseconds.
 MAX_STEPS = 1_000_000
-MAX_STEPS_IN_VAIN = 200_000  # for a program of which something stays unknown, whatever else is found
+MAX_STEPS_IN_VAIN = 300_000  # for a program of which something stays unknown, whatever else is found
 MAX_DEPTH = 120  # analysed calls inside calls
 
 
@@ -218,6 +218,7 @@ class Run(Allocations):
         self.answers: dict[ast.expr, Value] = {}  # what the calls in tests gave the last time
         self.environment = FieldCells()  # variables that the program sets itself
         self.unrolled = 1  # turns of the unrolled loops around, multiplied
+        self.awaited: set[ast.AST] = set()  # calls whose coroutine runs where it is called
         self.repeated = 0  # inside a loop or callback: one allocation may stand for many objects
         self.steps = 0
         self.limit = min(MAX_STEPS, MAX_STEPS_IN_VAIN)

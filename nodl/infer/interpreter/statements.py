@@ -20,6 +20,7 @@ from nodl.infer.interpreter.define import define_class, define_function, program
 from nodl.infer.interpreter.elements import assign, delete
 from nodl.infer.interpreter.expressions import binary_operation
 from nodl.infer.interpreter.run import Arguments, Executor, Frame, Run
+from nodl.infer.models import foreign
 from nodl.infer.text import Guard, Text
 from nodl.infer.values import (
     ANY,
@@ -298,6 +299,8 @@ def run_with(run: Run, node: ast.With | ast.AsyncWith, frame: Frame) -> bool:
     passes = run.execute(node.body, frame)
     run.state.depth -= 1
     if not all(isinstance(atom, External) and run.tables.lets_through(atom.path) for atom in managers):
+        for atom in managers:
+            foreign.wait(run, "__exit__", atom)
         run.state.join_seen(mark, mixed=True)  # after any part of the body
         passes = True
     for atom in reversed(managers):

@@ -79,15 +79,23 @@ _WAITS = frozenset({
     "spin", "spin_once", "spin_until_future_complete", "spin_once_until_future_complete", "sleep", "wait_for_message",
 })  # fmt: skip
 _WAITS_FOR_ONE = frozenset({"join", "wait", "result"})  # of threads, events and futures
+_WAITS_IN_POOLS = frozenset({"get", "shutdown", "__exit__"})
+_POOLS = ("the result of queue.", "the result of concurrent.", "the result of multiprocessing.")
 
 
-def wait(run: Run, name: str) -> None:
-    """Run the callbacks, and what other threads do, if a method of this name waits for them."""
-    if (name in _WAITS or name in _WAITS_FOR_ONE) and run.callbacks:
+def wait(run: Run, name: str, receiver: object = None) -> None:
+    """Run the callbacks, and what other threads do, if a method of this name (of ``receiver``) waits for them."""
+    for_one = name in _WAITS_FOR_ONE or (name in _WAITS_IN_POOLS and is_pool(receiver))
+    if (for_one or name in _WAITS) and run.callbacks:
         mark = run.state.mark()
         run.settle(run)
-        if name in _WAITS_FOR_ONE:  # others have run, or not yet
+        if for_one:  # others have run, or not yet
             run.state.join_seen(mark, mixed=True)
+
+
+def is_pool(atom: object) -> bool:
+    """Return True for a queue or a pool of threads, made by Python's own library."""
+    return isinstance(atom, Unknown) and atom.why.startswith(_POOLS)
 
 
 def call_external(run: Run, atom: External, call: Call) -> Value:
