@@ -213,14 +213,7 @@ def edited(text: Text, method: str, arguments: tuple[str, ...]) -> TextAtom | No
         return (
             with_edit(piece, method, arguments) if isinstance(piece, Input) and len(piece.edits) < 8 else None
         )
-    first, last = pieces[0], pieces[-1]
-    if method in ("lstrip", "strip"):
-        first = first.lstrip(*arguments) if isinstance(first, str) else ""
-    if method in ("rstrip", "strip"):
-        last = last.rstrip(*arguments) if isinstance(last, str) else ""
-    if method not in ("lstrip", "rstrip", "strip") or not first or not last:
-        return None
-    return text_of((first, *pieces[1:-1], last))
+    return None
 
 
 def constant_text(atom: object) -> object:

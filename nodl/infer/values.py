@@ -173,12 +173,11 @@ class Key(NamedTuple):
 class Dictionary(HeapObject):
     """A dictionary of any kind: a cell for each constant key, and ``OTHER`` for all other keys."""
 
-    __slots__ = ("default", "kind")
+    __slots__ = ("kind",)
 
     def __init__(self) -> None:
         super().__init__()
         self.cells = FieldCells()
-        self.default: Value = BOTTOM  # defaultdict's factory
         self.kind = "dict"
 
     @property

@@ -202,7 +202,7 @@ def _whole_numbers(defaults: Value) -> bool:
 
 def _texts_in(value: Value) -> tuple[str, ...] | None:
     container = value[0] if len(value) == 1 else None
-    if isinstance(container, Dictionary) and not container.is_open and not container.default:
+    if isinstance(container, Dictionary) and not container.is_open:
         keys = [cell.constant for cell, _, certain in container.entries() if certain]
         texts = tuple(each for each in keys if isinstance(each, str))
         return texts if len(texts) == len(container.entries()) else None
@@ -342,9 +342,7 @@ def _compare_atoms(op: ast.cmpop, left: object, right: object) -> bool | None:
     if isinstance(op, ast.In | ast.NotIn):
         found = _is_among(left, right)
         return None if found is None else found is isinstance(op, ast.In)
-    if not isinstance(op, ast.Is | ast.IsNot):
-        left, right = _plain_tuple(left), _plain_tuple(right)
-    if isinstance(left, (*CONSTANTS, tuple)) and isinstance(right, (*CONSTANTS, tuple)):
+    if isinstance(left, CONSTANTS) and isinstance(right, CONSTANTS):
         return _compare_constants(op, left, right)
     if not isinstance(op, ast.Is | ast.IsNot | ast.Eq | ast.NotEq):
         return None
@@ -361,13 +359,6 @@ def _compare_atoms(op: ast.cmpop, left: object, right: object) -> bool | None:
     return None
 
 
-def _plain_tuple(atom: object) -> object:
-    """Return a tuple of constants as itself."""
-    exact = atom.items.exact if isinstance(atom, Sequence) and atom.kind == "tuple" else None
-    values = tuple(map(sole, exact or ()))
-    return atom if exact is None or not all(isinstance(each, CONSTANTS) for each in values) else values
-
-
 def _is_among(constant: object, container: object) -> bool | None:
     """Return whether a constant is in a text, or in a sequence or dictionary of constants."""
     if not isinstance(constant, CONSTANTS):
@@ -378,7 +369,7 @@ def _is_among(constant: object, container: object) -> bool | None:
         known = [item[0] for item in container.items.exact if len(item) == 1]
         certain = len(known) == len(container.items.exact) and all(isinstance(k, CONSTANTS) for k in known)
         return constant in known if certain else None
-    if isinstance(container, Dictionary) and not container.is_open and not container.default:
+    if isinstance(container, Dictionary) and not container.is_open:
         held, certain = container.held(constant)
         return True if certain else None if held or container.summary else False
     return None

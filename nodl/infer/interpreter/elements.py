@@ -118,7 +118,7 @@ def _certain_entries(obj: Dictionary | Sequence) -> list[tuple[object, Value]] |
         if exact is None:
             return None
         return [pair for start in (0, -len(exact)) for pair in enumerate(exact, start)]
-    if obj.is_open or obj.default or not all(certain for _, _, certain in obj.entries()):
+    if obj.is_open or not all(certain for _, _, certain in obj.entries()):
         return None
     return [(cell.constant, value) for cell, value, _ in obj.entries()]
 
@@ -142,13 +142,6 @@ def dictionary_item(run: Run, obj: Dictionary, key: Value, node: ast.AST, frame:
         result = join(result, values_of(obj).any_element())
         everywhere = False
     result = with_other_entries(obj, result)
-    if obj.default and not everywhere:
-        made = run.call(obj.default, Arguments(), node, frame)
-        for atom in key:
-            if is_constant(atom):
-                old = obj.held(atom)[0]
-                run.state.write(obj.cells, Key(atom), join(old, made))
-        result = join(result, made)
     if obj.escaped or not result:
         result = join(result, unknown("an element of a dictionary that is filled elsewhere"))
     return result

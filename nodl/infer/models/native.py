@@ -8,10 +8,8 @@ from nodl.infer.interpreter.define import is_constant
 from nodl.infer.interpreter.elements import (
     change,
     chosen_by_parameter,
-    copy_dictionary,
     elements,
     keys_of,
-    store_item,
     values_of,
     with_other_entries,
 )
@@ -136,10 +134,6 @@ def _pop(run: Run, owner: Sequence, call: Call) -> Value:
     return element or ANY
 
 
-def _copy_sequence(run: Run, owner: Sequence, call: Call) -> Value:
-    return run.sequence(call.node, owner.kind, owner.items)
-
-
 def _edited(run: Run, owner: Sequence, call: Call) -> Value:
     """Handle ``insert``, ``remove``, ``sort`` ...: what is left, in which order, is not known."""
     call_each(run, call.args.keywords.get("key", NONE), owner.items.any_element(), call)
@@ -153,7 +147,6 @@ _SEQUENCE: dict[str, SequenceMethod] = {
     **dict.fromkeys(("extend", "update"), _extend),
     **dict.fromkeys(("insert", "remove", "discard", "sort", "reverse", "clear"), _edited),
     **dict.fromkeys(("pop", "popleft"), _pop),
-    "copy": _copy_sequence,
 }
 
 
@@ -180,12 +173,6 @@ def _get(run: Run, owner: Dictionary, call: Call) -> Value:
     return join(found, ANY) if owner.escaped else found
 
 
-def _setdefault(run: Run, owner: Dictionary, call: Call) -> Value:
-    value = _get(run, owner, call)
-    store_item(run, owner, call.args.at(0) or ANY, value)
-    return value
-
-
 def _pairs(run: Run, owner: Dictionary, call: Call) -> Value:
     keys, values = keys_of(owner), values_of(owner)
     if keys.exact is not None and values.exact is not None:
@@ -210,24 +197,12 @@ def _pop_item(run: Run, owner: Dictionary, call: Call) -> Value:
     return found
 
 
-def _copy_dictionary(run: Run, owner: Dictionary, call: Call) -> Value:
-    copied = run.allocate(call.node, "dict", Dictionary)
-    copied.default = join(copied.default, owner.default)
-    copy_dictionary(run, copied, (owner,))
-    if owner.escaped and not copied.escaped:
-        copied.escaped = True
-        run.state.learned += 1
-    return (copied,)
-
-
 DictionaryMethod = Callable[[Run, Dictionary, Call], Value]
 _DICTIONARY: dict[str, DictionaryMethod] = {
     "get": _get,
-    "setdefault": _setdefault,
     "keys": lambda run, owner, call: run.sequence(call.node, LAZY, keys_of(owner)),
     "values": lambda run, owner, call: run.sequence(call.node, LAZY, values_of(owner)),
     "items": _pairs,
     "update": _update,
     "pop": _pop_item,
-    "copy": _copy_dictionary,
 }

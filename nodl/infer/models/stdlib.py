@@ -6,9 +6,8 @@ import os.path
 from collections.abc import Callable
 from functools import partial
 
-from nodl.infer.interpreter.conditions import truth
-from nodl.infer.interpreter.define import expect_methods, is_constant, new_instance, program_classes
-from nodl.infer.interpreter.elements import copy_dictionary, elements, keys_of, store_attribute
+from nodl.infer.interpreter.define import expect_methods, new_instance, program_classes
+from nodl.infer.interpreter.elements import copy_dictionary, elements, store_attribute
 from nodl.infer.interpreter.formatting import as_texts, is_whole_number, text_value
 from nodl.infer.interpreter.imports import import_module
 from nodl.infer.interpreter.run import Arguments, Call, Model, Run
@@ -35,9 +34,7 @@ from nodl.infer.values import (
     Key,
     ModuleValue,
     Partial,
-    Sequence,
     Value,
-    boolean,
     constant_strings,
     join,
     join_all,
@@ -58,25 +55,11 @@ def _str(run: Run, call: Call) -> Value:
     return ("",) if value is None else text_value(as_texts(value))
 
 
-def _bool(run: Run, call: Call) -> Value:
-    return boolean(truth(call.args.at(0) or (False,)))
-
-
 def _int(run: Run, call: Call) -> Value:
     atom = sole(call.args.at(0))
     if type(atom) is int or is_whole_number(atom):
         return (atom,)
     return ANY
-
-
-def _len(run: Run, call: Call) -> Value:
-    atom = sole(call.args.at(0))
-    if isinstance(atom, str):
-        return (len(atom),)
-    if isinstance(atom, Sequence) and atom.items.exact is not None:
-        return (len(atom.items.exact),)
-    keys = keys_of(atom).exact if isinstance(atom, Dictionary) else None
-    return ANY if keys is None else (len(keys),)
 
 
 # --- containers ---------------------------------------------------------------------------------------------
@@ -194,25 +177,11 @@ def _dict(run: Run, call: Call) -> Value:
 def fill(run: Run, obj: Dictionary, call: Call) -> None:
     """Add what ``dict`` and ``dict.update`` are given to ``obj``."""
     for atom in call.args.at(0) or BOTTOM:
-        if isinstance(atom, Sequence):
-            _store_pairs(run, obj, elements(run, (atom,), call.node, call.frame), call)
-        else:
-            copy_dictionary(run, obj, (atom,))
+        copy_dictionary(run, obj, (atom,))
     for name, value in call.args.keywords.items():
         run.state.store(obj, Key(name), value)
     if call.args.more_keywords:
         run.state.store(obj, OTHER, join(obj.cells.get(OTHER, BOTTOM), call.args.more_keywords))
-
-
-def _store_pairs(run: Run, obj: Dictionary, items: Items, call: Call) -> None:
-    for pair in items.exact if items.exact is not None else (items.any_element(),):
-        parts = elements(run, pair, call.node, call.frame).exact
-        key = sole(parts[0]) if parts and len(parts) == 2 else None
-        if parts and len(parts) == 2 and is_constant(key) and items.exact is not None:
-            run.state.store(obj, Key(key), parts[1])
-        else:
-            value = parts[1] if parts and len(parts) == 2 else ANY
-            run.state.store(obj, OTHER, join(obj.cells.get(OTHER, BOTTOM), value))
 
 
 def chosen(run: Run, call: Call) -> Value:
@@ -310,9 +279,7 @@ _BUILT_IN: dict[str, Callable[[Run, Call], Value]] = {
     f"builtins.{name}": model
     for name, model in {
         "str": _str,
-        "bool": _bool,
         "int": _int,
-        "len": _len,
         "range": _range,
         "list": _made("list"),
         "tuple": _made("tuple"),
@@ -432,12 +399,6 @@ def _thread_init(run: Run, thread: Instance, call: Call) -> Value:
 # --- containers ---------------------------------------------------------------------------------------------
 
 
-def _default_dict(run: Run, call: Call) -> Value:
-    obj = run.allocate(call.node, "dict", Dictionary)
-    obj.default = join(obj.default, tuple(atom for atom in call.args.at(0) or BOTTOM if atom is not None))
-    return (obj,)
-
-
 def _loaded(run: Run, call: Call) -> Value:
     call_now(run, call)
     return unknown(CONTENTS)
@@ -471,7 +432,6 @@ FUNCTIONS: dict[str, Model] = {
     "threading.Thread": _thread,
     "threading.Timer": _timer,
     "multiprocessing.Process": _thread,
-    "collections.defaultdict": _default_dict,
     "collections.OrderedDict": _BUILT_IN["builtins.dict"],
     "collections.deque": _BUILT_IN["builtins.list"],
     **dict.fromkeys(("copy.copy", "copy.deepcopy"), _copy),

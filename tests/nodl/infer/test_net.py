@@ -42,7 +42,7 @@ def test_what_literals_forbid_is_no_gap(body: str, infer: Infer) -> None:
 @pytest.mark.parametrize(
     ("body", "main"),
     [
-        ("self.make('a') if loud else None", "N(loud=bool(0))"),
+        ("self.make('a') if loud else None", "N(loud=0 * 1)"),
         ("self.make('a') if loud else None", "N(**{'loud': False})"),
         ("self.make('a') if loud else None", "N('plain', False)"),
         ("loud = not True; self.make('a') if loud else None", "N()"),
@@ -72,7 +72,7 @@ def test_what_a_parameter_that_is_a_literal_forbids_is_no_gap(body: str, main: s
 def test_a_literal_of_one_caller_says_nothing_of_another(infer: Infer) -> None:
     """The second caller's value is unknown to the text, and False."""
     body = "self.make('a') if loud else None"
-    gaps = _gaps(infer, body, "N(loud=False)\n        N(loud=bool(0))")
+    gaps = _gaps(infer, body, "N(loud=False)\n        N(loud=0 * 1)")
     (why,) = [each for each in gaps if "was not reached" in each]
     first = 1 + next(at for at, text in enumerate(PROGRAM.split("\n")) if "{main}" in text)
     assert f"where __init__ is called at main.py:{first + 1}" in why
