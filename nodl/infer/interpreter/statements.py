@@ -260,7 +260,7 @@ def _perhaps_handled(run: Run, node: Any, passes: bool, mark: int, frame: Frame)
     """Run a handler, or what follows the body (``passes``: if control reaches its end)."""
 
     def handle(handler: ast.ExceptHandler) -> bool:
-        run.state.join_seen(mark)
+        run.state.join_seen(mark, mixed=True)
         if handler.type is not None:
             run.evaluate(handler.type, frame)
         if handler.name:
