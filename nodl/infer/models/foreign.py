@@ -78,7 +78,10 @@ _CALLS_NOW = frozenset({"functools", "re", "itertools", "builtins", "bisect", "h
 _WAITS = frozenset({
     "spin", "spin_once", "spin_until_future_complete", "spin_once_until_future_complete", "sleep", "wait_for_message",
 })  # fmt: skip
-_WAITS_FOR_ONE = frozenset({"join", "wait", "result"})  # of threads, events and futures
+_WAITS_FOR_ONE = frozenset({
+    "join", "wait", "result",  # of threads, events and futures
+    "run", "run_forever", "run_until_complete", "serve_forever", "mainloop", "exec_",  # of loops of events
+})  # fmt: skip
 _WAITS_IN_POOLS = frozenset({"get", "shutdown", "__exit__"})
 _POOLS = ("the result of queue.", "the result of concurrent.", "the result of multiprocessing.")
 
