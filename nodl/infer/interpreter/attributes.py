@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 
 from nodl.infer.interpreter import imports
-from nodl.infer.interpreter.define import enumeration_member, is_enumeration, linearized
+from nodl.infer.interpreter.define import enumeration_member, is_enumeration, linearized, program_classes
 from nodl.infer.interpreter.run import Arguments, AttributeReader, Frame, Run
 from nodl.infer.models import foreign
 from nodl.infer.text import Text
@@ -58,6 +58,11 @@ def _of_instance(run: Run, obj: Instance, name: str, node: ast.AST, frame: Frame
     found = _class_attribute(run, obj, linearized(obj.cls), name, node, frame)
     if found is not None:
         return found
+    getter = next(
+        (c.cells["__getattr__"] for c in program_classes(obj.cls) if "__getattr__" in c.cells), BOTTOM
+    )
+    if getter:
+        return run.call(getter, Arguments([(obj,), (name,)]), node, frame)
     return unknown(f"attribute {name}, which nothing analysed sets")
 
 

@@ -136,7 +136,7 @@ def define_class(run: Run, node: ast.ClassDef, frame: Frame) -> bool:
 
 
 _HOOKS = frozenset({
-    "__setattr__", "__getattr__", "__getattribute__", "__delattr__", "__get__", "__set__", "__set_name__",
+    "__setattr__", "__getattribute__", "__delattr__", "__get__", "__set__", "__set_name__",
     "__init_subclass__", "__class_getitem__", "__prepare__", "__instancecheck__",
 })  # fmt: skip
 
