@@ -111,6 +111,79 @@ def test_a_behavior_tree_says_what_bt_navigator_calls(launch: Launch, tmp_path: 
     )
 
 
+def test_a_tree_of_nav2s_own_is_known_where_nav2_is_not_installed(launch: Launch) -> None:
+    node = (
+        '<node pkg="nav2_bt_navigator" exec="bt_navigator" name="bt_navigator">'
+        '<param name="navigators" value="[navigate_to_pose]"/>'
+        '<param name="default_nav_to_pose_bt_xml" value="/nowhere/{}"/></node>'
+    )
+    own = "share/nav2_bt_navigator/behavior_trees/{}.xml"
+    plan = launch(node.format(own.format("navigate_w_replanning_time")))
+    assert not plan.problems
+    assert allowed(plan, "call_actions") == ["/compute_path_to_pose", "/follow_path", "/navigate_to_pose"]
+    assert {"/controller_selector", "/planner_selector"} <= set(allowed(plan, "subscribe"))
+    plan = launch(node.format(own.format("navigate_w_replanning_time")), "humble")
+    assert "/controller_selector" not in allowed(plan, "subscribe")
+    for other in (own.format("mine"), "my_trees/navigate_w_replanning_time.xml"):
+        assert "the behavior tree cannot be read" in problems(launch(node.format(other)))
+
+
+LUA = """include "map_builder.lua"
+include "trajectory_builder.lua"
+options = {{
+  map_builder = MAP_BUILDER,  -- num_laser_scans = 5
+  use_odometry = true, use_nav_sat = false, use_landmarks = false,
+  num_laser_scans = 2, num_multi_echo_laser_scans = 0, num_point_clouds = 1,
+}}
+MAP_BUILDER.use_trajectory_builder_2d = true
+{}
+return options
+"""
+
+
+def test_cartographer_subscribes_the_sensors_of_its_configuration(launch: Launch, tmp_path: Path) -> None:
+    node = (
+        '<node pkg="cartographer_ros" exec="cartographer_node" name="cartographer_node" '
+        f'args="-configuration_directory {tmp_path} -configuration_basename robot.lua"/>'
+    )
+    file = tmp_path / "robot.lua"
+
+    def sensors() -> list[str]:
+        plan = launch(node)
+        assert not plan.problems
+        every = {"/scan", "/scan_1", "/scan_2", "/scan_3", "/echoes", "/points2", "/imu", "/odom", "/fix"}
+        return sorted(every & set(allowed(plan, "subscribe")))
+
+    file.write_text(LUA.format(""))
+    assert sensors() == ["/imu", "/odom", "/points2", "/scan_1", "/scan_2"]
+    assert "/tracked_pose" not in allowed(launch(node), "publish")
+    file.write_text(LUA.format("TRAJECTORY_BUILDER_2D.use_imu_data = false\noptions.num_laser_scans = 1"))
+    assert sensors() == ["/odom", "/points2", "/scan"]
+    (tmp_path / "base.lua").write_text(LUA.format("options.publish_tracked_pose = true"))
+    file.write_text('include "base.lua"\noptions.use_odometry = false\nreturn options')
+    assert sensors() == ["/imu", "/points2", "/scan_1", "/scan_2"]
+    assert "/tracked_pose" in allowed(launch(node), "publish")
+
+
+@pytest.mark.parametrize(
+    ("written", "why"),
+    [
+        (LUA.format("if true then options.num_laser_scans = 1 end"), "it computes its values"),
+        (LUA.format("options.num_laser_scans = lasers"), "num_laser_scans is 'lasers', which is computed"),
+        ("return options", "it does not say num_laser_scans"),
+        ('include "mine.lua"', "mine.lua cannot be read"),
+        ('include "robot.lua"', "include each other without end"),
+    ],
+)
+def test_sensors_of_cartographer_that_lua_computes_are_a_gap(
+    launch: Launch, tmp_path: Path, written: str, why: str
+) -> None:
+    (tmp_path / "robot.lua").write_text(written)
+    arguments = f"-configuration_directory {tmp_path} -configuration_basename robot.lua"
+    node = f'<node pkg="cartographer_ros" exec="cartographer_node" name="c" args="{arguments}"/>'
+    assert why in problems(launch(node))
+
+
 TWIST_MUX = '<node pkg="twist_mux" exec="twist_mux" name="twist_mux"><param from="{}"/></node>'
 
 

@@ -12,6 +12,7 @@ from nodl.ament_index import MISSING_PREFIX
 from nodl.dependence import Situation
 from nodl.dependence.configuration import rviz
 from nodl.dependence.configuration.behavior_tree import of_tree
+from nodl.dependence.configuration.cartographer import of_lua
 from nodl.dependence.configuration.configured import Configured
 from nodl.dependence.configuration.ros2_control import of_robot_description
 from nodl.dependence.configuration.ros_gz_bridge import of_arguments, of_configuration
@@ -43,6 +44,8 @@ def read_configuration(kind: str, file: str, situation: Situation, place: Source
         )
     if kind == "behavior_tree":
         return of_tree(file, situation)
+    if kind == "cartographer":
+        return of_lua(file)
     if kind == "rviz" and not os.path.isfile(file) and not file.startswith(f"{MISSING_PREFIX}/"):
         return rviz.default(SourceRef(file))
     try:

@@ -8,6 +8,7 @@ tables is a gap unless it belongs to BehaviorTree.CPP itself.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from pathlib import Path
 
 from enclave_common.files import read_bytes
 from enclave_common.xml_tree import XmlElement
@@ -83,6 +84,39 @@ AlwaysSuccess AlwaysFailure KeepRunningUntilFailure SetBlackboard UnsetBlackboar
 Precondition SequenceWithMemory AsyncSequence AsyncFallback Sleep
 """
 _SILENT = frozenset((*_OF_NAV2.split(), *_OF_BEHAVIOR_TREE_CPP.split()))
+# What Nav2's own trees use, which a machine without Nav2 has not; the same in humble, jazzy and kilted but for the
+# selectors. Source: nav2_bt_navigator/behavior_trees of humble 3c3db59d6, jazzy f4108e5b1, kilted 71a1d84f4.
+_TO_POSE = "<ComputePathToPose/><FollowPath/>"
+_RECOVERIES = """<BackUp/><Spin/><Wait/>
+<ClearEntireCostmap service_name="global_costmap/clear_entirely_global_costmap"/>
+<ClearEntireCostmap service_name="local_costmap/clear_entirely_local_costmap"/>"""
+_TREES_OF_NAV2 = {
+    "follow_point.xml": f"{_TO_POSE}<GoalUpdater/>",
+    "nav_to_pose_with_consistent_replanning_and_if_path_becomes_invalid.xml": (
+        f"{_TO_POSE}{_RECOVERIES}<IsPathValid/>"
+    ),
+    "navigate_through_poses_w_replanning_and_recovery.xml": (
+        f"<ComputePathThroughPoses/><FollowPath/>{_RECOVERIES}"
+    ),
+    "navigate_to_pose_w_replanning_and_recovery.xml": f"{_TO_POSE}{_RECOVERIES}",
+    "navigate_to_pose_w_replanning_goal_patience_and_recovery.xml": f"{_TO_POSE}{_RECOVERIES}",
+    "navigate_w_recovery_and_replanning_only_if_path_becomes_invalid.xml": (
+        f"{_TO_POSE}{_RECOVERIES}<IsPathValid/>"
+    ),
+    "navigate_w_replanning_distance.xml": _TO_POSE,
+    "navigate_w_replanning_only_if_goal_is_updated.xml": _TO_POSE,
+    "navigate_w_replanning_only_if_path_becomes_invalid.xml": f"{_TO_POSE}<IsPathValid/>",
+    "navigate_w_replanning_speed.xml": _TO_POSE,
+    "navigate_w_replanning_time.xml": _TO_POSE,
+}
+_SELECTORS = {
+    "humble": "",
+    "jazzy": "<ControllerSelector/><PlannerSelector/>",
+    "kilted": "<ControllerSelector/><PlannerSelector/>",
+}
+_ALSO_IN_KILTED = {
+    "navigate_through_poses_w_replanning_and_recovery.xml": "<GoalCheckerSelector/><ProgressCheckerSelector/>",
+}
 _MODELS = ("Action", "Condition", "Decorator", "Control")  # elements whose attribute ID is the node
 
 
@@ -90,10 +124,21 @@ def of_tree(file: str, situation: Situation) -> Configured:
     """Return what the tree in ``file`` uses in ``situation``, that of its navigator."""
     place = SourceRef(file)
     try:
-        root = parse_xml(read_bytes(file, _MAX_BYTES), file)
+        root = parse_xml(_of_nav2(file, situation.distro) or read_bytes(file, _MAX_BYTES), file)
     except (OSError, InvalidXMLError) as error:
         return Configured(gaps=(Gap(place, f"the behavior tree cannot be read: {error}"),))
     return collected(_used(root, place, situation))
+
+
+def _of_nav2(file: str, distro: str) -> str:
+    """Return what Nav2's own tree of that name uses if this machine lacks it; empty for any other file."""
+    path = Path(file)
+    tree = _TREES_OF_NAV2.get(path.name)
+    installed = path.parts[-4:-1] == ("share", "nav2_bt_navigator", "behavior_trees")
+    if tree is None or not installed or distro not in _SELECTORS or path.exists():
+        return ""
+    later = _ALSO_IN_KILTED.get(path.name, "") if distro == "kilted" else ""
+    return f"<root>{tree}{_SELECTORS[distro]}{later}</root>"
 
 
 def _used(root: XmlElement, place: SourceRef, situation: Situation) -> Iterator[Endpoint | Gap]:

@@ -157,8 +157,7 @@ class _Collector:
         named = written_name(node, declarator)
         full = _plain_name(named)
         owner, _, name = full.rpartition("::")
-        if cls is not None:
-            owner = cls.qualified
+        owner = cls.qualified if cls is not None else self._used(owner, scope)
         inner = scope if cls is not None else (*scope, *(step for step in owner.split("::") if step))
         made = Function(name, node, self.index, inner, owner, templates=templates)
         made.specialises = _specialised(named, templates) if cls is None else None
@@ -176,6 +175,12 @@ class _Collector:
         )
         made.static = "static" in words
         return made
+
+    def _used(self, owner: str, scope: Scope) -> str:
+        """Return the class before ``::`` as a using-declaration above has it: ``using ns::Foo; Foo::Foo() {}``."""
+        first, separator, rest = owner.partition("::")
+        target = self.index.aliases.get("::".join((*scope, first)), ("", ()))[0]
+        return f"{target}{separator}{rest}" if target.endswith(f"::{first}") else owner
 
     def _declare(self, made: Function, cls: Class | None) -> None:
         table = cls.declared if cls is not None else self.index.declared
@@ -217,7 +222,7 @@ class _Collector:
             cls.fields[name] = Field(name, written, value, static, pointer, node)
             return
         owner, _, last = name.rpartition("::")
-        inner = (*scope, *(step for step in owner.split("::") if step))
+        inner = (*scope, *(step for step in self._used(owner, scope).split("::") if step))
         made = Global(last, written, value, node, inner, self.index, pointer, specialises)
         self.index.globals.setdefault(last, []).append(made)
 

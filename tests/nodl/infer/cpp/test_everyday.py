@@ -504,3 +504,24 @@ def test_a_macro_of_a_header(name: str, tmp_path: Path) -> None:
         "src/main.cpp": in_class("\n  GUARD(x > 0);\n", before='#include "g.hpp"\n'),
     }
     assert sorted(set(gaps(infer_paths([package(tmp_path / "demo", files)])))) == told
+
+
+def test_members_may_be_defined_under_a_name_that_a_using_declaration_brings_in(tmp_path: Path) -> None:
+    files = {
+        "include/wrapper.hpp": "#pragma once\n"
+        + HEAD
+        + "namespace drivers { class Wrapper : public rclcpp::Node {"
+        " public: Wrapper(); void more(); static const char * topic; };"
+        " class Other { public: void more(); }; }",
+        "src/wrapper.cpp": '#include "wrapper.hpp"\nusing drivers::Wrapper;\n'
+        'const char * Wrapper::topic = "b";\n'
+        f'Wrapper::Wrapper() : Node("wrapper") {{ {PUB}("a", 1); more(); }}\n'
+        f"void Wrapper::more() {{ {PUB}(topic, 1); }}",
+        "src/main.cpp": '#include "wrapper.hpp"\nint main(int argc, char ** argv) { rclcpp::init(argc, argv);'
+        " rclcpp::spin(std::make_shared<drivers::Wrapper>()); }",
+    }
+    cmake = "include_directories(include)\nadd_executable(node src/main.cpp src/wrapper.cpp)"
+    system = infer_paths([package(tmp_path / "demo", files, cmake, ("rclcpp",))])
+    assert gaps(system) == []
+    assert [str(node.name) for node in system.nodes] == ["wrapper"]
+    assert sorted(names(system)) == ["a", "b"]
