@@ -19,7 +19,7 @@ from enclave_launch.ros_rules.parameter_file import sections_of_text
 from enclave_launch.ros_rules.rcl_parameters import section_applies
 from keystore.formats.governance_yaml import parse_governance_yaml
 from keystore.formats.policy_xml import parse_policy
-from keystore.verification.contents import holds_private_key
+from keystore.verification.files import holds_private_key
 from nodl.document.v1 import parse_v1
 
 Case = tuple[str, Callable[[Any], object], Callable[[int], Any], int]

@@ -24,7 +24,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
-from enclave_launch.drift.steady import SettlingTimes
+from enclave_launch.drift_watch import SettlingTimes
 
 ROOT = Path(__file__).resolve().parent.parent
 DEMO_WS = ROOT / "fixtures" / "demo_ws"

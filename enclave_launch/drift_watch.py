@@ -2,6 +2,10 @@
 
 The domain is observed by a process of its own (``nodl.graph.follow``): DDS stays out of the supervisor. Its graphs come
 as lines; once a second they are held against the plan (``enclave_launch.drift``).
+
+What was announced is a fact at once. What discovery could still take back has to stand for ``settle`` seconds. What is
+missing may still come: it is reported after ``absence`` seconds. As long as findings of one kind go by themselves the
+system is still starting, and the time of those that are left begins again.
 """
 
 from __future__ import annotations
@@ -15,21 +19,79 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import NamedTuple
 
 from enclave_launch.drift.compare import Circumstances, Security, compare
 from enclave_launch.drift.expected import expected_in
-from enclave_launch.drift.finding import DriftFinding, Level, finding_document, finding_text
-from enclave_launch.drift.steady import SettlingTimes, Steady
+from enclave_launch.drift.finding import DriftFinding, FindingCertainty, Level, finding_document, finding_text
 from enclave_launch.dry_run import DryRun
 from enclave_launch.errors import RuntimeFailure
 from enclave_launch.runtime.companion import LaunchCompanion, LaunchControl
 from enclave_launch.runtime.run_events import ProcessStarted, RunEvent
 from nodl.graph.json_form import graph_from_document
 from nodl.graph.model import Graph
+
+Key = tuple[str, str, str, str]
+
+
+class SettlingTimes(NamedTuple):
+    """Seconds; ``longest``: reported then, whatever others of its kind do.
+
+    50 secured processes that started at once on two cores with a load of 140 took more than two minutes to authenticate
+    each other, one after another."""
+
+    settle: float = 30.0
+    absence: float = 120.0
+    longest: float = 600.0
+
+    def of(self, certainty: FindingCertainty) -> float:
+        return {
+            FindingCertainty.FACT: 0.0,
+            FindingCertainty.WHEN_SETTLED: self.settle,
+            FindingCertainty.ABSENCE: self.absence,
+        }[certainty]
+
+
+class Change(NamedTuple):
+    """``over``: what was reported and is no longer so."""
+
+    new: tuple[DriftFinding, ...] = ()
+    over: tuple[DriftFinding, ...] = ()
+
+    def __bool__(self) -> bool:
+        return bool(self.new or self.over)
+
+
+class Steady:
+    """Takes all findings of each point in time, in order."""
+
+    def __init__(self, patience: SettlingTimes | None = None) -> None:
+        self._patience = patience or SettlingTimes()
+        self._since: dict[Key, float] = {}
+        self._reported: dict[Key, DriftFinding] = {}
+        self._went: dict[str, float] = {}
+        """Kind → when one of it was last over."""
+
+    def at(self, now: float, findings: Iterable[DriftFinding]) -> Change:
+        """Return what is to be reported at ``now``."""
+        found = {each.key: each for each in findings}
+        self._went.update({key[0]: now for key in self._since if key not in found})
+        self._since = {key: self._since.get(key, now) for key in found}
+        new = {
+            key: each for key, each in found.items() if key not in self._reported and self._stands(now, each)
+        }
+        over = [self._reported.pop(key) for key in list(self._reported) if key not in found]
+        self._reported.update(new)
+        return Change(tuple(new.values()), tuple(over))
+
+    def _stands(self, now: float, finding: DriftFinding) -> bool:
+        wait, since = self._patience.of(finding.certainty), self._since[finding.key]
+        begins = max(since, self._went.get(finding.kind.value, since))
+        return now - begins >= wait or now - since >= max(wait, self._patience.longest)
+
 
 _INTERVAL = 1.0  # seconds between two comparisons
 _LONGEST_START = 60.0  # of an observer, on a machine that does much else

@@ -30,7 +30,6 @@ from enclave_launch.planner import Planner
 from enclave_launch.prefixes import ament_prefixes
 from enclave_launch.process import Evaluation
 from enclave_launch.security_environment import SecuritySettings
-from enclave_launch.served_domains import with_domains
 from keystore.disk.share_files import LaunchHold
 from keystore.steps.options import ProvisionOptions
 from nodl.ament_index import MISSING_PREFIX, launch_file_path, search_prefixes
@@ -149,6 +148,7 @@ def provision(
         ProvisionedLaunch,
         launch_owner,
         provision_plan,
+        with_domains,
     )
 
     if plan.problems:

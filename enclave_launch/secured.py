@@ -4,17 +4,22 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import NamedTuple
 
 from enclave_launch.add_ons import LaunchRouter, zenoh_start
 from enclave_launch.admission.middleware import failing, middleware_of
-from enclave_launch.diagnostics import Diagnostic
-from enclave_launch.diagnostics.enclaves import enclave_of_several_launches, handshake_fails
-from enclave_launch.errors import ProvisionError, keystore_errors
-from enclave_launch.plan import LaunchPlan, PlannedProcess, mixed_enclaves, on_zenoh
+from enclave_launch.admission.variables import domain_of
+from enclave_launch.diagnostics import Diagnostic, refusal
+from enclave_launch.diagnostics.enclaves import (
+    domain_not_served,
+    enclave_of_several_launches,
+    handshake_fails,
+)
+from enclave_launch.errors import ManifestError, ProvisionError, keystore_errors
+from enclave_launch.plan import LaunchPlan, PlannedProcess, enclave_domains, mixed_enclaves, on_zenoh
 from enclave_launch.process import ResolvedProcess
 from enclave_launch.runtime.gate import StartAdditions, identity
 from enclave_launch.security_environment import (
@@ -24,9 +29,9 @@ from enclave_launch.security_environment import (
     enclave_environment,
     secured_environment,
 )
-from enclave_launch.served_domains import places, with_domains
 from keystore.disk.view import KeystoreView
 from keystore.errors import KeystoreError
+from keystore.formats.domains import Domains
 from keystore.formats.governance import NoGovernanceRuleError
 from keystore.formats.policy import EnclavePolicy
 from keystore.steps.comparison import differences
@@ -223,3 +228,43 @@ class PlanProvider:
         if planned.enclave is not None and (OVERRIDE in environment or OVERRIDE in os.environ):
             variables[OVERRIDE] = planned.enclave.path
         return StartAdditions(enclave_arguments(planned), variables)
+
+
+def with_domains(
+    plan: LaunchPlan, options: ProvisionOptions, environment: Mapping[str, str]
+) -> ProvisionOptions:
+    """Return ``options`` with the domains of ``plan``; raises ManifestError for one that was not chosen."""
+    if options.domains is not None:
+        refused = list(not_served(plan, options.domains))
+        if refused:
+            raise ManifestError(refusal(refused))
+        return options
+    by_enclave = {path: set(domains) for path, domains in enclave_domains(plan.processes).items()}
+    if plan.launcher is not None:
+        by_enclave.setdefault(plan.launcher.enclave, set()).add(domain_of(environment))
+    every = set().union(*by_enclave.values()) or {domain_of(environment)}
+    return options._replace(
+        domains=_domains(every), enclave_domains={path: _domains(ids) for path, ids in by_enclave.items()}
+    )
+
+
+def not_served(plan: LaunchPlan, domains: Domains) -> Iterator[Diagnostic]:
+    """Report each process with an enclave whose domain is not among ``domains``."""
+    for item in plan.processes:
+        if item.enclave is not None and not domains.covers(Domains.single(item.domain)):
+            process = item.process
+            yield domain_not_served(process.process_name, item.domain, str(domains), process.location)
+
+
+def places(plan: LaunchPlan, domains: Domains) -> str:
+    """Describe for a reader where ``domains`` come from."""
+    asking = (
+        f"{item.process.process_name} at {item.process.location} is in domain {item.domain}"
+        for item in plan.processes
+        if item.enclave is not None and domains.covers(Domains.single(item.domain))
+    )
+    return "; ".join(asking)
+
+
+def _domains(ids: set[int]) -> Domains:
+    return Domains((number, number) for number in ids)

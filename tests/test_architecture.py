@@ -42,7 +42,7 @@ FLOORS: dict[str, tuple[set[str], ...]] = {
         {"plan"},
         {"plan_diagnostics"},
         {"planner"},
-        {"options", "prefixes", "security_environment", "served_domains"},
+        {"options", "prefixes", "security_environment"},
         {"interfaces"},
         {"review"},
         {"deployment"},

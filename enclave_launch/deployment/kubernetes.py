@@ -13,8 +13,7 @@ import hashlib
 from collections.abc import Iterator
 from typing import Any
 
-from enclave_launch.deployment.deployment import Deployment, File
-from enclave_launch.deployment.material import EnclaveMaterial
+from enclave_launch.deployment.deployment import Deployment, EnclaveMaterial, File
 from enclave_launch.deployment.processes import DeployedProcess, label
 from enclave_launch.deployment.yaml_text import yaml_documents
 from keystore.disk import layout

@@ -181,7 +181,7 @@ PATHS: dict[str, dict[str, str]] = {
         "visit_all_entities_and_collect_futures_impl": "visit: visit_all_entities_and_collect_futures",
     },
     "launch_ros": {
-        "node_action_extension": "actions.node_extensions: | NodeActionExtension",
+        "node_action_extension": "actions.nodes: | NodeActionExtension",
         "parameter_descriptions": "parameters.descriptions: | Parameter ParameterFile ParameterValue",
         "parameters_type": "parameters.types: | *",
         "remap_rule_type": "node_names: | RemapRule RemapRules SomeRemapRule SomeRemapRules",
@@ -233,8 +233,8 @@ PATHS: dict[str, dict[str, str]] = {
         ),
         "normalize_parameters": "parameters.normalize: normalize_parameters | normalize_parameter_dict",
         "normalize_remap_rule": "node_names: normalize_remap_rule normalize_remap_rules",
-        "plugin_support": "actions.node_extensions: | PluginException satisfies_version",
-        "to_parameters_list": "parameters.of_component: to_parameters_list",
+        "plugin_support": "actions.nodes: | PluginException satisfies_version",
+        "to_parameters_list": "parameters.of_node: to_parameters_list",
         "track_node_names": "node_names: add_node_name get_node_name_count",
     },
     "launch_xml": {

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import yaml
 
-from enclave_common.new_file import write_bytes
+from enclave_common.files import write_bytes
 from enclave_launch.errors import ManifestError, translated
 from enclave_launch.recording.listeners import Listener
 from enclave_launch.recording.recording import Recording

@@ -15,8 +15,7 @@ from typing import Literal, NamedTuple
 
 from enclave_launch.errors import RuntimeFailure
 from enclave_launch.runtime.survivors import Survivors
-from enclave_launch.runtime.warden_channel import Message, WardenChannel
-from enclave_launch.runtime.warden_process import WardenProcess
+from enclave_launch.runtime.warden_process import Message, WardenChannel, WardenProcess
 
 Stream = Literal["stdout", "stderr"]
 Hold = Literal["files", "screen", "screen only"]  # why a stream may have to wait (back_pressure)

@@ -33,11 +33,11 @@ from keystore.formats.validity import utc_now
 def launch_target(target: LaunchTarget, options: argparse.Namespace, keystore: str | None) -> int:
     """Learn from, audit or start ``target``, as the options say. Return the exit status."""
     if options.learn is not None:
-        from enclave_launch.verb.learn import learn_launch  # an add-on: recording
+        from enclave_launch.verb.recorded import learn_launch  # an add-on: recording
 
         return learn_launch(target, options, lambda companion: start(target, options, keystore, companion))
     if options.audit:
-        from enclave_launch.verb.audit import audit_launch  # an add-on: recording
+        from enclave_launch.verb.recorded import audit_launch  # an add-on: recording
 
         return audit_launch(resolve_target(target, options), options, _run_settings(options))
     return start(target, options, keystore)

@@ -1,38 +1,51 @@
-"""Enclaves brought to exactly the wanted state: what a launch calls before it starts anything.
+"""Bring enclaves to exactly the wanted state: what a launch calls before it starts anything.
 
-Compared without the lock, reconciled under it. Keys are never replaced unless asked; an interrupted run is completed by
-the next one, because the comparison finds every missing step again.
+Compared without the lock, reconciled under it, in batches. Keys are never replaced unless requested; an
+interrupted run is completed by the next one, because the comparison finds every missing step again.
 """
 
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterable, Mapping
-from datetime import timedelta
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import replace
+from datetime import datetime, timedelta
 from pathlib import Path
 
+from enclave_common.dependencies import require
 from enclave_common.words import counted, some_of
 from keystore.add_ons import follow
 from keystore.disk import layout, store
+from keystore.disk.authorities import refuse_foreign_authorities
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.share_files import read_shares
+from keystore.disk.signed_documents import governance_domains
+from keystore.disk.store import Store
 from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import InvalidInputError, printable
-from keystore.formats.enclave_name import validate_enclave_name
+from keystore.formats.enclave_name import check_distinct, validate_enclave_name
 from keystore.formats.policy import EnclavePolicy, Operation, Policy, Profile, Qualifier, Rule
-from keystore.formats.validity import Validity, utc_now
+from keystore.formats.validity import DEFAULT_LIFETIME, Validity, utc_now
 from keystore.steps.comparison import (
     WantedEnclave,
+    as_found,
     asked_end,
     compare,
+    inspect_wanted,
     permissions_source,
     wanted_enclave,
     with_domains,
 )
-from keystore.steps.enclave_state import PermissionsSource
-from keystore.steps.options import ProvisionOptions, ProvisionReport
-from keystore.steps.reconciliation import reconcile
-from keystore.steps.sharing import given_up, left_over, refuse_running
+from keystore.steps.creation import CreateOptions, complete
+from keystore.steps.crl import publish_crl, restore_crl
+from keystore.steps.enclave_state import EnclaveState, PermissionsSource
+from keystore.steps.enclave_writing import EnclaveWriter
+from keystore.steps.governance import renew_governance
+from keystore.steps.opening import opened_for_change
+from keystore.steps.options import EnclaveReport, Progress, ProvisionOptions, ProvisionReport
+from keystore.steps.sharing import given_up, kept_shares, left_over, refuse_running
+from keystore.steps.signing_here import refuse_without_keys
 from keystore.verification.before_launch import exposures
 
 
@@ -174,3 +187,104 @@ def drop_shares(
     chosen = with_domains(root, (options or ProvisionOptions())._replace(create=False))
     wanted = {one.enclave: WantedEnclave(one.document, share=one) for one in given_up(root, owner)}
     return bring_about(root, wanted, chosen)
+
+
+# Bounds what an interrupted run loses, and how often the disk is waited for.
+_BATCH = 250
+_CRL_MARGIN = timedelta(days=30)
+"""A longer margin is meant for certificates: a CRL lives for a year only."""
+
+
+def reconcile(
+    root: Path, wanted: Mapping[str, WantedEnclave], options: ProvisionOptions, now: datetime
+) -> ProvisionReport:
+    """Complete the keystore, then every enclave that is not as wanted."""
+    require("cryptography", "asn1crypto", "lxml")
+    # An impossible validity is refused before a keystore is made for it.
+    lifetime = DEFAULT_LIFETIME if options.lifetime is None else options.lifetime
+    Validity.starting(now, lifetime, until=options.valid_until, backdate=options.backdate)
+    with _locked(root, options, now) as opened:
+        done, warnings = _complete_keystore(opened, options, now)
+        done = [*opened.notes, *done]
+        view = KeystoreView(root)
+        register = opened.register if opened.has_register else None
+        refuse_foreign_authorities(view, register)
+        check_distinct(dict.fromkeys((*view.enclaves(), *wanted)))
+        writer = EnclaveWriter(opened, view, options, now)
+        wanted = {name: _as_it_is_now(one) for name, one in wanted.items()}
+        states = [inspect_wanted(view, register, name, one, options, now) for name, one in wanted.items()]
+        refuse_without_keys(view, states, wanted)
+        writer.check_subjects(states)
+        _record_shares(opened, wanted)
+        reports = _write_all(opened, writer, states, wanted, options.progress)
+        if writer.has_revoked:
+            publish_crl(opened, opened.register, options.access, now)
+            warnings.append(
+                "certificates were revoked: deploy crl.pem to every host and restart what runs there; participants "
+                "read it when they start"
+            )
+    warnings += kept_shares(one.share for one in wanted.values() if one.share is not None)
+    return ProvisionReport(root, tuple(done), reports, (*warnings, *writer.warnings))
+
+
+def _as_it_is_now(one: WantedEnclave) -> WantedEnclave:
+    """Compare again under the lock: shares that others wrote since the comparison count."""
+    if one.share is None:
+        return one
+    share = replace(one.share)
+    return one._replace(share=share, permissions=share.document)
+
+
+def _record_shares(opened: Store, wanted: Mapping[str, WantedEnclave]) -> None:
+    with opened.batch() as batch:
+        for one in wanted.values():
+            if one.share is not None and not one.share.is_recorded():
+                one.share.record(opened, batch)
+
+
+@contextmanager
+def _locked(root: Path, options: ProvisionOptions, now: datetime) -> Iterator[Store]:
+    if options.create:
+        store.create_root(root)
+    with opened_for_change(root, now, options) as opened:
+        yield opened
+
+
+def _complete_keystore(
+    opened: Store, options: ProvisionOptions, now: datetime
+) -> tuple[list[str], list[str]]:
+    domains = options.domains or governance_domains(KeystoreView(opened.root))
+    creation = replace(
+        options.creation or CreateOptions(),
+        domains=domains,
+        access=options.access,
+        durable=options.durable,
+        now=now,
+    )
+    report = complete(opened, creation)
+    done = list(report.actions)
+    if renew_governance(opened, domains, options.access, now):
+        done.append(f"governance signed for domains {domains}")
+    done += restore_crl(opened, options.access, now, min(options.renew_within, _CRL_MARGIN))
+    return done, list(report.warnings)
+
+
+def _write_all(
+    opened: Store,
+    writer: EnclaveWriter,
+    states: list[EnclaveState],
+    wanted: Mapping[str, WantedEnclave],
+    progress: Progress | None,
+) -> tuple[EnclaveReport, ...]:
+    """Write in batches: bounded loss if interrupted, few calls to make it durable."""
+    reports = {state.enclave: as_found(state) for state in states}
+    todo = [state for state in states if not state.is_good]
+    for start in range(0, len(todo), _BATCH):
+        part = todo[start : start + _BATCH]
+        with opened.batch() as batch:
+            for position, state in enumerate(part, start + 1):
+                reports[state.enclave] = writer.write(batch, state, wanted[state.enclave].permissions)
+                if progress is not None:
+                    progress(position, len(todo))
+            writer.record(batch)
+    return tuple(reports.values())

@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 
 from enclave_common.command_line import PATH, TEXT
-from enclave_common.new_file import write_bytes
+from enclave_common.files import write_bytes
 from keystore.errors import StorageError
 from keystore.steps.host_keys import RequestOptions, request, requests_text
 from keystore.verb import common

@@ -21,7 +21,7 @@ from enclave_common.command_line import (
     complete,
     guarded,
 )
-from enclave_common.new_file import write_text
+from enclave_common.files import write_text
 from enclave_common.terminal import printable, safe_output
 from nodl.errors import NoDLError
 

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from enclave_common.command_line import PATH, Option
-from enclave_common.new_file import write_text
+from enclave_common.files import write_text
 from nodl.ament_index import search_prefixes
 from nodl.document import read_document
 from nodl.document.write import Written, v1_xml, v2_yaml

@@ -10,8 +10,7 @@ from enclave_common.command_line import FLAG, TEXT, TEXTS, Option
 from enclave_common.terminal import printable
 from nodl.ament_index import package_version, search_prefixes
 from nodl.library import SHIPPED, Hit, Library
-from nodl.library.agreement import keep_agreements, read_agreements
-from nodl.library.contents import contents_text
+from nodl.library.contents import contents_text, keep_agreements, read_agreements
 from nodl.library.document import LibraryDocument
 from nodl.library.index import write_index
 from nodl.verb import PREFIX, Verb

@@ -23,7 +23,7 @@ from typing import Any
 
 from enclave_common.command_line import FLAG, PATH, TEXT, TIME, Option, one_of
 from enclave_common.environment import domain_id
-from enclave_common.new_file import write_text
+from enclave_common.files import write_text
 from enclave_common.terminal import json_text, printable
 from enclave_common.words import counted
 from nodl.errors import NoDLError

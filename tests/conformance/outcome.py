@@ -17,7 +17,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
-from enclave_launch.description.public_modules import upstream_name
+from enclave_launch.description.install import upstream_name
 
 # Messages that come from the parsing library or from Python, not from launch: the type is what counts.
 _TYPE_ONLY = {

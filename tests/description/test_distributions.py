@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from enclave_launch.description.public_modules import public_module
+from enclave_launch.description.install import public_module
 from enclave_launch.evaluation.evaluate import EvaluationError, evaluate
 from enclave_launch.host.current import active_host
 from enclave_launch.host.plan_host import PlanHost

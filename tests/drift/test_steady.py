@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from enclave_launch.drift.finding import DriftFinding, Kind, finding
-from enclave_launch.drift.steady import Change, SettlingTimes, Steady
+from enclave_launch.drift_watch import Change, SettlingTimes, Steady
 
 FACT = finding(Kind.UNPLANNED_NODE, "/x", "there")
 SETTLED = finding(Kind.UNPLANNED_PROCESS, "p", "there")

@@ -33,7 +33,7 @@ from keystore.formats.shares import parse_shares
 from keystore.formats.validity import parse_duration, parse_time
 from keystore.signing import smime
 from keystore.steps.host_keys import parse_requests, request, requests_text
-from keystore.verification.contents import holds_private_key
+from keystore.verification.files import holds_private_key
 from nodl.document.v1 import parse_v1
 from nodl.document.v2 import parse_v2
 from nodl.errors import InvalidNoDLError

@@ -15,10 +15,8 @@ import pytest
 
 from enclave_launch.flow import provision, resolve
 from enclave_launch.options import ResolveOptions
-from enclave_launch.report.evidence.documents import PAYLOAD_TYPE
-from enclave_launch.report.evidence.matrix import csv_text, rows
+from enclave_launch.report.evidence.documents import PAYLOAD_TYPE, csv_text, matrix_rows, surface_document
 from enclave_launch.report.evidence.requirements import DISCLAIMER, PARTS
-from enclave_launch.report.evidence.surface import surface_document
 from enclave_launch.report.graph import plan_graph
 from enclave_launch.verb.secure_plan import main
 from keystore.signing.dsse import signed_bytes
@@ -85,7 +83,7 @@ def test_the_matrix_has_each_permission_with_its_reason(evidence: Path) -> None:
 
 def test_no_cell_of_the_matrix_is_a_formula() -> None:
     plan = hostile([f"{start}cmd|'/C calc'!A0" for start in "=+-@"])
-    cells = [cell for row in csv.reader(io.StringIO(csv_text(rows(plan_graph(plan))))) for cell in row]
+    cells = [cell for row in csv.reader(io.StringIO(csv_text(matrix_rows(plan_graph(plan))))) for cell in row]
     assert not [cell for cell in cells if cell.startswith(("=", "+", "-", "@"))]
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import copy
 
-from enclave_launch.report.changes import changes_document, changes_markdown, changes_text
 from enclave_launch.review.changes import changes
+from enclave_launch.verb.secure_plan.diff import changes_document, changes_markdown, changes_text
 from tests.review.conftest import ROBOT, plan
 
 

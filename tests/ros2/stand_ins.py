@@ -17,7 +17,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from enclave_launch.description.public_modules import public_module
+from enclave_launch.description.install import public_module
 from nodl.names import validate_namespace, validate_node_name
 
 

@@ -16,9 +16,8 @@ from hypothesis import strategies as st
 
 from keystore import RenewOptions, renew
 from keystore.verb import main
-from keystore.zenoh.denials import Explanation, RouterLogExplainer
+from keystore.zenoh.denials import RUST_LOG, Explanation, RouterLog, RouterLogExplainer
 from keystore.zenoh.meaning import meaning
-from keystore.zenoh.trace import RUST_LOG, RouterLog
 from tests.keystore.kit import filled, options
 from tests.zenoh import kit
 from tests.zenoh.conftest import Grants, keystore_of

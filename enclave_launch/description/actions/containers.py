@@ -23,7 +23,7 @@ from enclave_launch.description.node_names import performed_remaps, placed, warn
 from enclave_launch.description.parameters.descriptions import ParameterFile
 from enclave_launch.description.parameters.evaluate import evaluate_parameters
 from enclave_launch.description.parameters.normalize import normalize_parameter_dict
-from enclave_launch.description.parameters.of_component import to_parameters_list
+from enclave_launch.description.parameters.of_node import to_parameters_list
 from enclave_launch.description.substitution import (
     SomeSubstitutionsType,
     SomeSubstitutionsType_types_tuple,

@@ -6,21 +6,32 @@ its predicate ``test-result`` v0.1: the files are the subjects, the checks the t
 
 from __future__ import annotations
 
+import csv
 import hashlib
-from collections.abc import Iterator, Mapping
+import io
+from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
-from enclave_common.terminal import json_text
+from enclave_common.terminal import json_text, printable
 from enclave_launch import __version__
 from enclave_launch.dry_run import DryRun
 from enclave_launch.report.contents import ReportContents
-from enclave_launch.report.evidence import matrix
 from enclave_launch.report.evidence.requirements import DISCLAIMER, PARTS
-from enclave_launch.report.evidence.surface import surface_document
+from enclave_launch.report.graph import (
+    NO_ENCLAVE,
+    OUTWARD,
+    ChannelUse,
+    EnclaveGraph,
+    evidence_text,
+    plan_graph,
+)
 from enclave_launch.report.html.page import html_report
 from enclave_launch.report.markdown import code, escaped
 from enclave_launch.report.review_text import Judged, findings_document
 from enclave_launch.report.sarif import sarif_document
+from enclave_launch.review.document import plan_from_document
+from enclave_launch.review.information_flow import flow_graph, opened_by_sharing, reached_from
+from keystore.formats.permissions_patterns import can_meet
 
 PAYLOAD_TYPE = "application/vnd.in-toto+json"
 STATEMENT = "https://in-toto.io/Statement/v1"
@@ -45,7 +56,7 @@ class Examined(NamedTuple):
 def evidence_files(examined: Examined) -> dict[str, bytes]:
     """Return the files without the statement, which names them."""
     contents, graph = examined.contents, examined.contents.graph
-    rows = list(matrix.rows(graph))
+    rows = list(matrix_rows(graph))
     documents: dict[str, Any] = {
         "plan.json": examined.document,
         "access-control.json": {"version": 1, "permissions": [row._asdict() for row in rows]},
@@ -64,7 +75,7 @@ def evidence_files(examined: Examined) -> dict[str, bytes]:
         "requirements.json": {"version": 1, "claim": DISCLAIMER, "parts": [part._asdict() for part in PARTS]},
     }
     files = {name: f"{json_text(content, indent=2)}\n".encode() for name, content in documents.items()}
-    files["access-control.csv"] = matrix.csv_text(rows).encode()
+    files["access-control.csv"] = csv_text(rows).encode()
     files["report.html"] = html_report(contents).encode()
     files["README.md"] = summary(contents, documents["scope.json"], examined.at).encode()
     return dict(sorted(files.items()))
@@ -186,3 +197,107 @@ def _codes(judged: Judged, severity: str) -> set[str]:
 
 def _resource(name: str, data: bytes) -> dict[str, Any]:
     return {"name": name, "digest": {"sha256": hashlib.sha256(data).hexdigest()}}
+
+
+class Row(NamedTuple):
+    """``node`` is empty where only a policy file says so. ``built_in``: every node has it. ``enforced_by``: ``DDS`` by
+    each participant, ``Zenoh`` by the router."""
+
+    enclave: str
+    node: str
+    operation: str
+    name: str
+    types: str
+    built_in: bool
+    evidence: str
+    enforced_by: str
+
+
+def matrix_rows(graph: EnclaveGraph) -> Iterator[Row]:
+    """Yield the rows in the graph's order."""
+    for use in graph.uses:
+        channel = graph.channels[use.channel]
+        yield Row(
+            use.enclave,
+            "" if use.member is None else graph.members[use.member].name,
+            use.operation,
+            channel.name,
+            " ".join(channel.types),
+            use.built_in,
+            " | ".join(dict.fromkeys(evidence_text(reason) for reason in use.reasons)) or "a policy file",
+            graph.middlewares[use.enclave],
+        )
+
+
+def csv_text(found: Iterable[Row]) -> str:
+    """Render with a heading; no cell begins like a formula (OWASP, "CSV Injection")."""
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(Row._fields)
+    writer.writerows([_cell(value) for value in row] for row in found)
+    return stream.getvalue()
+
+
+def _cell(value: object) -> str:
+    text = ("yes" if value else "no") if isinstance(value, bool) else printable(str(value))
+    return f"'{text}" if text.startswith(("=", "+", "-", "@")) else text
+
+
+def surface_document(document: DryRun) -> dict[str, Any]:
+    """Describe what each enclave exposes, from a dry run; interfaces that every node has are left out."""
+    graph, plan = plan_graph(document), plan_from_document(document)
+    flows = flow_graph(plan)
+    return {
+        "version": 1,
+        "enclaves": {path: _enclave(graph, path) for path in graph.enclaves},
+        "influences": {path: sorted(reached_from(flows, path)) for path in graph.enclaves},
+        "only_by_sharing": [
+            {"enclave": enclave, "from": one, "to": two} for enclave, one, two in opened_by_sharing(plan)
+        ],
+        "without_an_enclave": [
+            {"program": member.name, "place": member.launched_at}
+            for member in graph.members
+            if member.enclave == NO_ENCLAVE
+        ],
+        "interfaces_unknown": [
+            {"program": member.name, "enclave": member.enclave, "place": member.launched_at}
+            for member in graph.members
+            if not member.known and member.enclave != NO_ENCLAVE
+        ],
+        "domains": sorted({process.domain_id for process in document.processes}),
+    }
+
+
+def _enclave(graph: EnclaveGraph, enclave: str) -> dict[str, Any]:
+    held = [use for use in graph.uses if use.enclave == enclave and not use.built_in]
+    patterns = {graph.channels[use.channel].name for use in held if graph.channels[use.channel].is_pattern}
+    return {"accepts": _incoming(graph, enclave, held), "wildcards": sorted(patterns)}
+
+
+def _incoming(graph: EnclaveGraph, enclave: str, held: list[ChannelUse]) -> list[dict[str, Any]]:
+    # ``sent_by``: enclaves of this launch that may send it; if empty, only processes outside of it could.
+    coming_in = sorted({(use.operation, use.channel) for use in held if use.operation not in OUTWARD})
+    return [
+        {
+            "operation": operation,
+            "name": graph.channels[channel].name,
+            "types": list(graph.channels[channel].types),
+            "sent_by": sorted(_senders(graph, operation, graph.channels[channel].name) - {enclave}),
+        }
+        for operation, channel in coming_in
+    ]
+
+
+def _senders(graph: EnclaveGraph, operation: str, name: str) -> set[str]:
+    return {
+        use.enclave
+        for use in graph.uses
+        if use.operation == _SENT_BY[operation] and can_meet(graph.channels[use.channel].name, name)
+    }
+
+
+_SENT_BY: Mapping[str, str] = {
+    "subscribe": "publish",
+    "serve_services": "call_services",
+    "serve_actions": "call_actions",
+}

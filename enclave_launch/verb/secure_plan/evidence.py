@@ -19,8 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from enclave_common.command_line import PATH, TEXT
-from enclave_common.files import read_bytes
-from enclave_common.new_file import write_bytes
+from enclave_common.files import read_bytes, write_bytes
 from enclave_launch.dry_run import DryRun
 from enclave_launch.errors import UsageError, keystore_errors, translated
 from enclave_launch.report.contents import report_contents

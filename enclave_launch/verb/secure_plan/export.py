@@ -19,10 +19,9 @@ from enclave_common.command_line import FLAG, PATH, TEXT, TEXTS
 from enclave_common.terminal import message, printable
 from enclave_launch.admission.middleware import ZENOH
 from enclave_launch.deployment.compose import compose_files
-from enclave_launch.deployment.deployment import Deployment, File
+from enclave_launch.deployment.deployment import Deployment, File, read_material
 from enclave_launch.deployment.folder import write_folder
 from enclave_launch.deployment.kubernetes import kubernetes_files
-from enclave_launch.deployment.material import read_material
 from enclave_launch.deployment.placement import ONLY_HOST, Placement, in_restart_order, place
 from enclave_launch.deployment.processes import DeployedProcess, deployed_processes, label
 from enclave_launch.deployment.semantics import (

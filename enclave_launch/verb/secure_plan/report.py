@@ -15,7 +15,7 @@ import sys
 from pathlib import Path
 
 from enclave_common.command_line import PATH, one_of
-from enclave_common.new_file import write_text
+from enclave_common.files import write_text
 from enclave_launch.dry_run import DryRun
 from enclave_launch.errors import UsageError, translated
 from enclave_launch.report.contents import report_contents

@@ -9,7 +9,7 @@ import pytest
 
 from nodl.dependence import Dependence
 from nodl.library import SHIPPED, Library, fits
-from nodl.library.agreement import read_agreements
+from nodl.library.contents import read_agreements
 from nodl.library.document import LibraryDocument, read_library_document
 from nodl.library.index import INDEX, index_text, read_index
 from nodl.node_interface import EndpointKind

@@ -1,4 +1,6 @@
-"""``secure-launch --learn DIR``: run a launch to learn what its nodes ask for, and write their manifests."""
+"""``secure-launch --learn DIR`` and ``--audit``: run a launch recorded, to write manifests of its nodes, or to compare
+what they request with its plan.
+"""
 
 from __future__ import annotations
 
@@ -9,8 +11,14 @@ from collections.abc import Callable
 from pathlib import Path
 
 from enclave_common.dependencies import installed
+from enclave_common.files import write_text
+from enclave_common.terminal import warn
 from enclave_common.words import counted, some_of
-from enclave_launch.errors import ManifestError, translated
+from enclave_launch.errors import ManifestError, RuntimeFailure, translated
+from enclave_launch.flow import run
+from enclave_launch.options import RunSettings
+from enclave_launch.plan import LaunchPlan
+from enclave_launch.recording.audit import Audit, audit_json, audit_text
 from enclave_launch.recording.isolation import DEVICES_STAY_REAL, isolate
 from enclave_launch.recording.learning import (
     RECORDS,
@@ -91,3 +99,19 @@ def _report(learnt: LearntFolder, folder: Path) -> None:
 
 def _say(text: str) -> None:
     print(f"secure-launch: {text}", file=sys.stderr)
+
+
+def audit_launch(plan: LaunchPlan, options: argparse.Namespace, settings: RunSettings) -> int:
+    """Run the launch and report what the plan would refuse; return 1 then, or if not everything was visible."""
+    warn(*plan.problems)
+    audit = Audit(plan)
+    recording = Recording(new_run(plan.launch_file, plan.distro, "none"), [audit])
+    status = run(plan, options=settings._replace(companion=recording))
+    report = audit.report()
+    sys.stdout.write(audit_text(report))
+    if options.audit_report is not None:
+        with translated(
+            OSError, RuntimeFailure, f"--audit-report {options.audit_report}: cannot be written: "
+        ):
+            write_text(options.audit_report, audit_json(report))
+    return status or report.exit_status
