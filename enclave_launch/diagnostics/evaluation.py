@@ -109,6 +109,12 @@ def program_not_installed(program: str) -> Diagnostic:
     return Diagnostic(Code.PROGRAM_NOT_INSTALLED, program, text)
 
 
+def command_without_its_file(program: str, path: str) -> Diagnostic:
+    """Warn, with ``--allow-missing-packages``, for a ``$(command ...)`` that failed on a file of an absent package."""
+    text = f"'{program}' failed, as {path} is not installed; a placeholder replaces its output"
+    return Diagnostic(Code.PROGRAM_NOT_INSTALLED, program, text)
+
+
 def program_not_executable(program: str, text: str, location: SourceLocation | None) -> Diagnostic:
     """Report a process whose start will fail."""
     return Diagnostic(Code.PROGRAM_NOT_EXECUTABLE, program, text, location)

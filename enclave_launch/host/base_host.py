@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.diagnostics.evaluation import (
+    command_without_its_file,
     executable_not_built,
     package_not_installed,
     program_not_installed,
@@ -104,12 +105,19 @@ class BaseHost:
     def run_command(
         self, command: Sequence[str], *, merge_stderr: bool = False, at_event: bool = False
     ) -> CommandResult:
-        """Run it; with ``--allow-missing-packages`` a program that is not there "writes" a marked placeholder."""
+        """Run it; with ``--allow-missing-packages`` a marked placeholder stands for what it would write if the program,
+        or a package with a file that it is given, is not installed."""
         if self.allow_missing_packages and command and shutil.which(command[0]) is None:
             program = os.path.basename(command[0])
             self.warn(program_not_installed(program))
             return CommandResult(0, f"<output of {program}, which is not installed>", "")
-        return self._run_command(command, merge_stderr, at_event)
+        result = self._run_command(command, merge_stderr, at_event)
+        absent = [word for word in command if self.allow_missing_packages and f"{MISSING_PREFIX}/" in word]
+        if result.returncode != 0 and absent:
+            program = os.path.basename(command[0])
+            self.warn(command_without_its_file(program, absent[0]))
+            return CommandResult(0, f"<output of {program}, whose {absent[0]} is not installed>", "")
+        return result
 
     def _run_command(self, command: Sequence[str], merge_stderr: bool, at_event: bool) -> CommandResult:
         if self.user_code_results is None:

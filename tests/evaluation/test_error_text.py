@@ -128,3 +128,25 @@ def test_a_program_that_is_not_installed_is_a_placeholder_when_packages_may_be_m
     assert tuple(map(str, found.warnings)) == (
         "program 'no-such-xacro' is not installed; a placeholder replaces its output",
     )
+
+
+def test_a_command_that_fails_on_a_file_of_a_missing_package_gives_a_placeholder_when_packages_may_be_missing(
+    tmp_path: Path,
+) -> None:
+    command = "$(command 'cat $(find-pkg-share no_such_arm)/arm.urdf')"
+    text = XML.format(f'<executable cmd="talker {command}"/>')
+    assert "'no_such_arm'" in message(tmp_path, "a.launch.xml", text)
+    found = evaluate(tmp_path / "a.launch.xml", host=PlanHost(allow_missing_packages=True))
+    assert (
+        "<output of cat, whose /missing/no_such_arm/share/no_such_arm/arm.urdf is not installed>"
+        in " ".join(found.processes[0].cmd)
+    )
+    assert str(found.warnings[-1]) == (
+        "'cat' failed, as /missing/no_such_arm/share/no_such_arm/arm.urdf is not installed; "
+        "a placeholder replaces its output"
+    )
+
+
+def test_a_command_that_fails_otherwise_is_an_error_when_packages_may_be_missing(tmp_path: Path) -> None:
+    text = XML.format("<executable cmd=\"talker $(command 'cat /no/such/arm.urdf')\"/>")
+    assert "executed command failed" in message(tmp_path, "a.launch.xml", text, allow_missing_packages=True)
