@@ -280,8 +280,9 @@ class Names:
         return [d for each in self.ancestry(cls) for d in each.declared.get(name, ())]
 
     def foreign_header(self, name: str, file: FileIndex) -> str:
-        """Return the header, of a ROS library nobody has reviewed, that a class may come from; empty if there is
-        none.
+        """Return the header, of a library that was not reviewed, that a class may come from; empty if there is none.
+
+        A class in a namespace comes from a folder of that name, or else from a package that ``package.xml`` names.
         """
         found = ""
         for each in sorted(self.visible(file.file)):
@@ -292,7 +293,8 @@ class Names:
                 if "/" in header and is_foreign and not _INTERFACES.search(header):
                     if name.partition("::")[0] == folder:
                         return header
-                    found = found or ("" if "::" in name else header)
+                    is_possible = "::" not in name or folder in self.depends
+                    found = found or (header if is_possible else "")
         if not found and "::" in name and name.partition("::")[0] in self.depends:
             return f"package {name.partition('::')[0]}"
         if not found and re.search(r"(?:^|::)\w*Node$", name):

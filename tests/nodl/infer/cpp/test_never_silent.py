@@ -317,6 +317,17 @@ def test_a_structure_that_holds_something_else_is_one(tmp_path: Path) -> None:
     ]
 
 
+@pytest.mark.parametrize(("depends", "is_gap"), [(("rclcpp", "acme_ros"), True), (("rclcpp",), False)])
+def test_a_class_whose_namespace_is_not_its_package_may_make_a_node(
+    depends: tuple[str, ...], is_gap: bool, tmp_path: Path
+) -> None:
+    """Only a package that ``package.xml`` names can be the one that has it."""
+    source = in_class("acme::Other other;", before="#include <acme_ros/other.hpp>\n")
+    made = package(tmp_path / "demo", {"src/main.cpp": source}, depends=depends)
+    expected = "the class acme::Other is not in reach (acme_ros/other.hpp): it may be a node or make one"
+    assert gaps(infer_paths([made])) == ([expected] if is_gap else [])
+
+
 UNFOLLOWED = {
     "a fold over a pack": (
         'each("b", "c");',
