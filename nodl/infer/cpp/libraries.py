@@ -69,6 +69,7 @@ _HARMLESS_CLASSES = re.compile(
     r"mavconn|mavlink|zbar|open3d|tbb|Magick|xt|Ogre|libcamera|GeographicLib|proj|osqp|autoware_utils_(?:geometry|math|system)|"
     r"cartographer|mcap|tl|gsl|CLI|toml|rtabmap|bosdyn)::.*"
     r"|controller_interface::(?!\w*ControllerInterface).*|hardware_interface::.*|semantic_components::.*"
+    r"|BT::(?:Tree|Blackboard|NodeConfig(?:uration)?)"
     r"|moveit::core::.*|moveit::planning_interface::MoveGroupInterface::\w+|robot_trajectory::.*|trajectory_processing::.*"
     r"|rclcpp::(?:Rate|WallRate|GenericRate|GenericTimer|WallTimer|\w*Handle|\w*Guard|Event|Clock|TimeSource|Time|Duration|QoS|\w*QoS|QoSInitialization|KeepLast|KeepAll|Logger|Parameter|"
     r"ParameterValue|NodeOptions|\w*Options|Context|TimerBase|CallbackGroup|MessageInfo|SerializedMessage|Serialization|"
