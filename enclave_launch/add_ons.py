@@ -7,7 +7,7 @@ from contextlib import AbstractContextManager
 from importlib import import_module
 from typing import TYPE_CHECKING, NamedTuple, Protocol
 
-from enclave_common.dependencies import absence
+from enclave_launch.admission.middleware import zenoh_absence
 
 if TYPE_CHECKING:
     from enclave_launch.plan import LaunchPlan
@@ -52,11 +52,6 @@ class ZenohStart(NamedTuple):
     check: Callable[[LaunchPlan, str], None]
     types: Callable[[LaunchPlan, Collection[str]], Mapping[str, tuple[tuple[str, tuple[str, ...]], ...]]]
     configure: Callable[[LaunchPlan, str, Collection[str], ProvisionOptions], LaunchRouter]
-
-
-def zenoh_absence() -> str:
-    """Return what to do if the add-on is not installed, empty if it is."""
-    return absence(_ROOM) or absence("keystore.zenoh")
 
 
 def zenoh_planning() -> ZenohPlanning | None:

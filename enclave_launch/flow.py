@@ -25,8 +25,15 @@ from enclave_launch.host.plan_host import PlanHost
 from enclave_launch.host.user_code_results import RecordedResults
 from enclave_launch.interfaces import InterfaceFinder
 from enclave_launch.options import ResolveOptions, RunSettings, SecurityOptions
-from enclave_launch.plan import EvaluatedLaunch, LaunchPlan, LaunchSource, mixed_enclaves, on_zenoh
-from enclave_launch.planner import Planner
+from enclave_launch.plan import (
+    EvaluatedLaunch,
+    LaunchPlan,
+    LaunchSource,
+    PlanInputs,
+    mixed_enclaves,
+    on_zenoh,
+)
+from enclave_launch.planner import make_plan
 from enclave_launch.prefixes import ament_prefixes
 from enclave_launch.process import Evaluation
 from enclave_launch.security_environment import SecuritySettings
@@ -66,7 +73,7 @@ def resolve(
     source, evaluation = evaluated.source, evaluated.evaluation
     prefixes = search_prefixes(source.prefixes)
     finder = InterfaceFinder(prefixes, chosen, evaluation.distro, evaluation)
-    plan = Planner(source, finder, chosen.plan_options()).plan(evaluation)
+    plan = make_plan(evaluation, PlanInputs(source, finder, chosen.plan_options()))
     plan = plan._replace(
         problems=(*plan.problems, *_launcher_refusals(plan)),
         warnings=(*plan.warnings, *_missing_programs(evaluated.evaluation)),
@@ -81,7 +88,7 @@ def _launcher_refusals(plan: LaunchPlan) -> list[Diagnostic]:
     if plan.launcher is None:
         return []
     middleware = middleware_of(os.environ, plan.distro)
-    why = why_not(middleware, plan.planner.options.admission.middlewares)
+    why = why_not(middleware, plan.inputs.options.admission.middlewares)
     if why is None:
         return []
     place = plan.launcher.location

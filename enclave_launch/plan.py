@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from enum import Enum
 from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from enclave_launch.admission import AdmissionOptions
 from enclave_launch.admission.middleware import DEFAULT as DEFAULT_MIDDLEWARE
@@ -27,9 +27,6 @@ from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.source_location import SourceLocation
 from keystore.formats.policy import Operation
 from nodl.node_interface import NodeInterface
-
-if TYPE_CHECKING:
-    from enclave_launch.planner import Planner
 
 
 class InterfaceOrigin(str, Enum):
@@ -196,7 +193,7 @@ class LaunchPlan(NamedTuple):
     """
 
     evaluation: Evaluation
-    planner: Planner
+    inputs: PlanInputs
     processes: tuple[PlannedProcess, ...]
     components: tuple[PlannedComponent, ...]
     launcher: RunningNode | None
@@ -206,11 +203,11 @@ class LaunchPlan(NamedTuple):
 
     @property
     def evaluated(self) -> EvaluatedLaunch:
-        return EvaluatedLaunch(self.planner.source, self.evaluation)
+        return EvaluatedLaunch(self.inputs.source, self.evaluation)
 
     @property
     def launch_file(self) -> str:
-        return self.planner.source.launch_file
+        return self.inputs.source.launch_file
 
     @property
     def distro(self) -> str:
@@ -245,6 +242,14 @@ class LaunchSource(NamedTuple):
     launch_configurations: Mapping[str, str] = MappingProxyType({})
     host_options: HostOptions = HostOptions()
     user_code_results: RecordedResults | None = None
+
+
+class PlanInputs(NamedTuple):
+    """What a launch is planned from, beside its evaluation; enough to plan it again with a further process."""
+
+    source: LaunchSource
+    lookup: InterfaceLookup
+    options: PlanOptions
 
 
 class EvaluatedLaunch(NamedTuple):

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import NamedTuple
 
 import enclave_launch.plan_diagnostics as plan_diagnostics
-from enclave_launch.admission import notes, prefix_refusals, refusals
+from enclave_launch.admission import AdmissionOptions, notes, prefix_refusals, refusals
 from enclave_launch.admission.middleware import middleware_of
 from enclave_launch.admission.variables import domain_of
 from enclave_launch.diagnostics import Code
@@ -15,11 +14,10 @@ from enclave_launch.enclave import EnclaveScope, assign_enclave
 from enclave_launch.plan import (
     InterfaceLookup,
     LaunchPlan,
-    LaunchSource,
     Missing,
+    PlanInputs,
     PlannedComponent,
     PlannedProcess,
-    PlanOptions,
     nodes_of,
 )
 from enclave_launch.policy import derive_policy
@@ -29,64 +27,58 @@ from enclave_launch.process import UNSPECIFIED_NODE_NAME, Evaluation, ResolvedCo
 from nodl.node_interface import RANDOM_ENDING
 
 
-class Planner(NamedTuple):
-    """Makes the plan of one launch: assign enclaves, join interfaces with final names, derive the policy."""
+def make_plan(evaluation: Evaluation, inputs: PlanInputs) -> LaunchPlan:
+    """Make the plan of an evaluated launch.
 
-    source: LaunchSource
-    lookup: InterfaceLookup
-    options: PlanOptions
+    Raises ``LaunchFileError`` for an enclave name or remap rule that the started process would refuse.
+    """
+    distro, options = evaluation.distro, inputs.options
+    processes = tuple(
+        _admitted(_plan_process(process, inputs.lookup, options.enclave_scope), distro, options.admission)
+        for process in evaluation.processes
+    )
+    containers = _containers(processes)
+    components = tuple(_plan_component(item, containers, inputs.lookup) for item in evaluation.components)
+    launcher = launcher_node(evaluation.launcher_calls) if evaluation.launcher_calls else None
+    derived = derive_policy(
+        nodes_of(processes, components, launcher),
+        distro=distro,
+        options=options.policy,
+        # Enclaves of which no node is known: of executables to which the launch file gives one, and of processes
+        # without a manifest, which must not be missing from what a person looks at.
+        also=tuple(item.enclave.path for item in processes if item.enclave and not item.nodes),
+    )
+    return LaunchPlan(
+        evaluation=evaluation,
+        inputs=inputs,
+        processes=processes,
+        components=components,
+        launcher=launcher,
+        derived=derived,
+        problems=(*plan_diagnostics.problems(processes, components), *derived.problems),
+        warnings=(
+            *evaluation.warnings,
+            *(not_foreseeable(action.what, action.location) for action in evaluation.unforeseeable),
+            *plan_diagnostics.notes(processes, components, launcher),
+            *(note for item in processes for note in notes(item.process, distro)),
+            *plan_diagnostics.shared_domains(processes),
+            *plan_diagnostics.ungranted_enclaves(processes, derived),
+            *plan_diagnostics.failing_handshakes(processes),
+            *derived.warnings,
+        ),
+    )
 
-    def plan(self, evaluation: Evaluation) -> LaunchPlan:
-        """Make the plan of an evaluated launch.
 
-        Raises ``LaunchFileError`` for an enclave name or remap rule that the started process would refuse.
-        """
-        scope = self.options.enclave_scope
-        processes = tuple(
-            self._admitted(_plan_process(process, self.lookup, scope), evaluation.distro)
-            for process in evaluation.processes
-        )
-        containers = _containers(processes)
-        components = tuple(_plan_component(item, containers, self.lookup) for item in evaluation.components)
-        launcher = launcher_node(evaluation.launcher_calls) if evaluation.launcher_calls else None
-        derived = derive_policy(
-            nodes_of(processes, components, launcher),
-            distro=evaluation.distro,
-            options=self.options.policy,
-            # Enclaves of which no node is known: of executables to which the launch file gives one, and of processes
-            # without a manifest, which must not be missing from what a person looks at.
-            also=tuple(item.enclave.path for item in processes if item.enclave and not item.nodes),
-        )
-        return LaunchPlan(
-            evaluation=evaluation,
-            planner=self,
-            processes=processes,
-            components=components,
-            launcher=launcher,
-            derived=derived,
-            problems=(*plan_diagnostics.problems(processes, components), *derived.problems),
-            warnings=(
-                *evaluation.warnings,
-                *(not_foreseeable(action.what, action.location) for action in evaluation.unforeseeable),
-                *plan_diagnostics.notes(processes, components, launcher),
-                *(note for item in processes for note in notes(item.process, evaluation.distro)),
-                *plan_diagnostics.shared_domains(processes),
-                *plan_diagnostics.ungranted_enclaves(processes, derived),
-                *plan_diagnostics.failing_handshakes(processes),
-                *derived.warnings,
-            ),
-        )
-
-    def _admitted(self, planned: PlannedProcess, distro: str) -> PlannedProcess:
-        process = planned.process
-        middleware = middleware_of(process.final_environment, distro)
-        if planned.enclave is None and process.kind == "executable":
-            unkept = tuple(prefix_refusals(process, self.options.admission))
-            return planned._replace(refusals=unkept, middleware=middleware)
-        refused = tuple(refusals(process, distro, self.options.admission))
-        bad = any(refusal.code is Code.DOMAIN_INVALID for refusal in refused)
-        domain = 0 if bad else domain_of(process.final_environment)
-        return planned._replace(refusals=refused, domain=domain, middleware=middleware)
+def _admitted(planned: PlannedProcess, distro: str, options: AdmissionOptions) -> PlannedProcess:
+    process = planned.process
+    middleware = middleware_of(process.final_environment, distro)
+    if planned.enclave is None and process.kind == "executable":
+        unkept = tuple(prefix_refusals(process, options))
+        return planned._replace(refusals=unkept, middleware=middleware)
+    refused = tuple(refusals(process, distro, options))
+    bad = any(refusal.code is Code.DOMAIN_INVALID for refusal in refused)
+    domain = 0 if bad else domain_of(process.final_environment)
+    return planned._replace(refusals=refused, domain=domain, middleware=middleware)
 
 
 def _plan_process(process: ResolvedProcess, lookup: InterfaceLookup, scope: EnclaveScope) -> PlannedProcess:

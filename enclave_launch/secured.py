@@ -20,6 +20,7 @@ from enclave_launch.diagnostics.enclaves import (
 )
 from enclave_launch.errors import ManifestError, ProvisionError, keystore_errors
 from enclave_launch.plan import LaunchPlan, PlannedProcess, enclave_domains, mixed_enclaves, on_zenoh
+from enclave_launch.planner import make_plan
 from enclave_launch.process import ResolvedProcess
 from enclave_launch.runtime.gate import StartAdditions, identity
 from enclave_launch.security_environment import (
@@ -169,7 +170,8 @@ class PlanProvider:
         if (process.process_name, identity(process)) in self._by_name:
             return self.ensure(process)
         evaluation = self._plan.evaluation
-        extended = self._plan.planner.plan(evaluation._replace(processes=(*evaluation.processes, process)))
+        with_it = evaluation._replace(processes=(*evaluation.processes, process))
+        extended = make_plan(with_it, self._plan.inputs)
         new = [problem for problem in extended.problems if problem not in self._plan.problems]
         if new:
             raise ProvisionError("\n".join(map(str, new)))

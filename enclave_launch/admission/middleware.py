@@ -17,7 +17,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from enum import Enum
 from typing import NamedTuple
 
-from enclave_launch.add_ons import zenoh_absence
+from enclave_common.dependencies import absence
 from keystore.formats.subject import Half, guid_prefix
 
 VARIABLE = "RMW_IMPLEMENTATION"
@@ -56,6 +56,11 @@ def middleware_of(environment: Mapping[str, str], distro: str) -> str:
 def vendor_of(middleware: str) -> Vendor | None:
     """Return the DDS vendor of an ``RMW_IMPLEMENTATION`` that honours enclaves, None for any other."""
     return HONOURS_ENCLAVES.get(middleware)
+
+
+def zenoh_absence() -> str:
+    """Return what to do if the add-on that secures Zenoh is not installed, empty if it is."""
+    return absence("enclave_launch.zenoh") or absence("keystore.zenoh")
 
 
 def why_not(middleware: str, accepted: Collection[str] = ()) -> str | None:

@@ -20,8 +20,7 @@ from collections.abc import Iterable, Iterator, Sequence, Set
 from typing import NamedTuple
 
 from enclave_launch.plan import Described, Found, InterfaceOrigin, Named
-from enclave_launch.policy.derivation import PolicyOptions
-from enclave_launch.policy.node_permissions import node_permissions
+from enclave_launch.policy.node_permissions import PolicyOptions, node_permissions
 from enclave_launch.policy.running_node import (
     RunningNode,
     UnknownNodeName,

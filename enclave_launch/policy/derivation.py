@@ -12,7 +12,7 @@ the enclaves of this launch are taken. Names become absolute: ``chatter`` and a 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.diagnostics.permissions import (
@@ -22,7 +22,7 @@ from enclave_launch.diagnostics.permissions import (
     policy_enclave_unused,
     policy_file,
 )
-from enclave_launch.policy.node_permissions import NodePermissions, Reason, node_permissions
+from enclave_launch.policy.node_permissions import NodePermissions, PolicyOptions, Reason, node_permissions
 from enclave_launch.policy.running_node import RunningNode
 from enclave_launch.source_location import SourceLocation
 from keystore.formats.permissions import dds_rules
@@ -32,8 +32,7 @@ from keystore.formats.permissions_size import expected_concern
 from keystore.formats.policy import EnclavePolicy, Operation, Policy, Profile, Qualifier, Rule
 from keystore.formats.policy_xml import PolicyDocument
 
-if TYPE_CHECKING:
-    Reasons = dict[Rule, list[Reason]]
+Reasons = dict[Rule, list[Reason]]
 
 ListName = Literal["publish", "subscribe", "call_services", "serve_services", "call_actions", "serve_actions"]
 LIST_NAMES: dict[Operation, ListName] = {
@@ -61,20 +60,6 @@ def allowed_names(enclave: EnclavePolicy) -> dict[str, list[str]]:
 _MANY_RULES = 20
 
 ProfileKey = tuple[str, str]  # namespace and node name
-
-
-class PolicyOptions(NamedTuple):
-    """``accept_patterns``: partly known names become wildcards, each with a warning.
-
-    ``also``: what every node gets beyond what it has by itself (``node_permissions.ALSO``).
-    ``policy_file``: merged over the derived policy. ``actions_as_a_whole``: rcl remaps action names, in
-    any distribution.
-    """
-
-    accept_patterns: bool = False
-    policy_file: PolicyDocument | None = None
-    actions_as_a_whole: bool = False
-    also: frozenset[str] = frozenset()
 
 
 class DerivedPolicy(NamedTuple):

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from functools import lru_cache
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.diagnostics.permissions import (
@@ -21,6 +21,7 @@ from enclave_launch.policy.running_node import RunningNode
 from enclave_launch.ros_rules.distro import REMAPS_WHOLE_ACTIONS
 from enclave_launch.source_location import SourceLocation
 from keystore.formats.policy import Operation
+from keystore.formats.policy_xml import PolicyDocument
 from nodl.builtin_interfaces import BuiltinCondition, built_in_interfaces
 from nodl.name_template import NameTemplate, ParameterPart, UnknownPart
 from nodl.names import (
@@ -33,9 +34,6 @@ from nodl.names import (
 )
 from nodl.node_interface import Certainty, ClientLibrary, Endpoint, EndpointKind, NodeInterface
 from nodl.remap import ACTION_SERVICES, NodeNames, ParsedRule, Resolved
-
-if TYPE_CHECKING:
-    from enclave_launch.policy.derivation import PolicyOptions
 
 Origin = Literal["declared", "built-in", "policy file"]
 
@@ -67,6 +65,20 @@ ALSO: dict[str, frozenset[BuiltinCondition]] = {
 """What ``--also`` grants every node beyond what it has by itself: ``/clock``, which a node needs once somebody sets
 ``use_sim_time`` while it runs; the logger services; ``<service>/_service_event`` of service introspection; of a
 recorded node the names that only its other descriptions have (``interfaces.descriptions``)."""
+
+
+class PolicyOptions(NamedTuple):
+    """``accept_patterns``: partly known names become wildcards, each with a warning.
+
+    ``also``: what every node gets beyond what it has by itself (``ALSO``).
+    ``policy_file``: merged over the derived policy. ``actions_as_a_whole``: rcl remaps action names, in
+    any distribution.
+    """
+
+    accept_patterns: bool = False
+    policy_file: PolicyDocument | None = None
+    actions_as_a_whole: bool = False
+    also: frozenset[str] = frozenset()
 
 
 class Reason(NamedTuple):

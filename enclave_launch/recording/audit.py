@@ -12,8 +12,7 @@ from typing import NamedTuple
 from enclave_common.terminal import printable
 from enclave_launch.plan import LaunchPlan
 from enclave_launch.recording.grants import WORDS, Need, PlannedGrants
-from enclave_launch.recording.listeners import Listener
-from enclave_launch.recording.recording import Unrecorded
+from enclave_launch.recording.recording import Listener, Unrecorded
 from keystore.formats.permissions_patterns import covers, has_wildcard
 from keystore.formats.policy import Operation, Rule
 from nodl.record.lines import EndpointMade, Line

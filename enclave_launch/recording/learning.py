@@ -19,8 +19,7 @@ import yaml
 
 from enclave_common.files import write_bytes
 from enclave_launch.errors import ManifestError, translated
-from enclave_launch.recording.listeners import Listener
-from enclave_launch.recording.recording import Recording
+from enclave_launch.recording.recording import Listener, Recording
 from enclave_launch.runtime.companion import LaunchControl
 from nodl.record.assembly import Record, read_record
 from nodl.record.learning import Learnt, LearntNode, learn

@@ -21,16 +21,24 @@ from enclave_launch.errors import RuntimeFailure
 from enclave_launch.policy.program_inputs import own_words
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
 from enclave_launch.recording.build import RECORD_VARIABLE, recorder_library, with_recorder
-from enclave_launch.recording.listeners import EndpointEvents, Listener
 from enclave_launch.recording.markers import Marked, MarkerRun
 from enclave_launch.recording.programs import look_at_command
 from enclave_launch.recording.record_files import RecordFiles
 from enclave_launch.runtime.companion import LaunchControl
 from enclave_launch.runtime.process_tree import ProcessSpec
-from enclave_launch.runtime.run_events import LaunchOver, ProcessExited, ProcessStarted, RunEvent
-from nodl.record.assembly import Record
+from enclave_launch.runtime.run_events import (
+    EndpointCreated,
+    EndpointRefused,
+    EndpointRequested,
+    LaunchOver,
+    ProcessExited,
+    ProcessStarted,
+    RunEvent,
+)
+from nodl.record.assembly import Record, RecordedNode
 from nodl.record.lines import (
     Complaint,
+    EndpointMade,
     Line,
     LineReader,
     LoadedComponent,
@@ -38,6 +46,7 @@ from nodl.record.lines import (
     StartedProcess,
     line_text,
 )
+from nodl.record.requested import RequestedEndpoint, requested_endpoint
 from nodl.ros_arguments import parse_ros_arguments
 
 INTERVAL = 0.1
@@ -51,6 +60,28 @@ class Unrecorded(NamedTuple):
 
     process: str
     why: str
+
+
+class Listener:
+    """Told in the event loop, ``opened`` first, and does nothing of it: each overrides what it is interested in."""
+
+    _launch: LaunchControl
+    _recording: Recording
+
+    def opened(self, launch: LaunchControl, recording: Recording) -> None:
+        self._launch, self._recording = launch, recording
+
+    def added(self, line: Line) -> None:
+        """Receive ``line``, which is in the record already."""
+
+    def happened(self, event: RunEvent) -> None:
+        """Receive an event of the launch."""
+
+    def looked(self) -> None:
+        """Receive notice that the record was read again."""
+
+    def closed(self) -> None:
+        """Receive notice that every process has ended and every line was added."""
 
 
 class Recording:
@@ -312,3 +343,32 @@ def _plain(parameters: Mapping[str, object]) -> dict[str, object]:
     """Return the values as JSON has them; byte strings, which are not names, are left out."""
     values = {name: value if isinstance(value, tuple) else (value,) for name, value in parameters.items()}
     return {name: parameters[name] for name in values if not any(isinstance(v, bytes) for v in values[name])}
+
+
+class EndpointEvents(Listener):
+    """Recorded endpoints as events of the launch, each with the process and component that requested it."""
+
+    def added(self, line: Line) -> None:
+        if not isinstance(line, EndpointMade):
+            return
+        process, node = self._recording.record.node_of(line)
+        requested = requested_endpoint(process, node, line)
+        if requested is None or process.started is None:
+            return
+        name, pid, endpoint = process.started.process, process.started.pid, _endpoint(requested, node, line)
+        if requested.granted:
+            self._launch.tell(EndpointCreated(name, pid, endpoint))
+        else:
+            self._launch.tell(EndpointRefused(name, pid, endpoint, requested.error))
+
+
+def _endpoint(requested: RequestedEndpoint, node: RecordedNode, line: EndpointMade) -> EndpointRequested:
+    component = f"{node.component.package}/{node.component.plugin}" if node.component else ""
+    return EndpointRequested(
+        node.fqn or line.fqn,
+        requested.kind,
+        requested.final or requested.written,
+        requested.written,
+        requested.type,
+        component,
+    )

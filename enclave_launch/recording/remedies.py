@@ -69,7 +69,7 @@ class Remedies:
             yield changed, self._policy_cures(changed, need)
 
     def _policy_file(self) -> str:
-        given = self._plan.planner.options.policy.policy_file
+        given = self._plan.inputs.options.policy.policy_file
         if given is not None and given.file:
             return given.file
         names = (f"allow{f'-{number}' if number else ''}.policy.xml" for number in count())
@@ -86,7 +86,7 @@ class Remedies:
     def _manifest_cures(self, patch: Patch, need: Need, described: Description) -> bool:
         assert described.node is not None
         before = described.node.interface
-        prefixes = search_prefixes(self._plan.planner.source.prefixes)
+        prefixes = search_prefixes(self._plan.inputs.source.prefixes)
         try:
             nodes = parse_document(patch.text.encode(), patch.file, package=before.package, prefixes=prefixes)
         except NoDLError:

@@ -24,7 +24,8 @@ from launch.descriptions import Executable
 from launch.frontend import expose
 from launch.utilities import normalize_to_list_of_substitutions, perform_substitutions
 
-from enclave_launch.ros2.observation import ATTRIBUTE, enclave_attribute, observe_executable, session_of
+from enclave_launch.ros2.observation import ATTRIBUTE, enclave_attribute, observe_executable
+from enclave_launch.ros2.session import session_of
 from enclave_launch.ros_rules.namespaces import push_enclave_scope
 
 GRANT = "_enclave_launch_grant"

@@ -9,7 +9,8 @@ from typing import Any
 from launch_ros.actions.node import NodeActionExtension
 
 from enclave_launch.ros2 import attributes  # accepted by the time a node is executed, too
-from enclave_launch.ros2.observation import loads_components, observe_node, session_of
+from enclave_launch.ros2.observation import loads_components, observe_node
+from enclave_launch.ros2.session import session_of
 
 
 class EnclaveNodeActionExtension(NodeActionExtension):  # type: ignore[misc]  # untyped without ROS

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import launch_ros.actions
 from launch.descriptions import executable as executable_description
@@ -25,19 +25,8 @@ from enclave_launch.ros_rules.rcl_parameters import resolve_parameters
 from enclave_launch.source_location import SourceLocation
 from nodl.ros_arguments import parse_ros_arguments, words_after_program
 
-if TYPE_CHECKING:
-    from enclave_launch.ros2.session import EnclaveSession
-
-KEY = "enclave_launch_session"
-"""The place of a secured launch in launch's own context, so that several launches in one program stay apart."""
 ATTRIBUTE = "_enclave_launch_enclave"
 """The attribute of an action that holds its ``enclave=`` (``attributes``)."""
-
-
-def session_of(context: Any) -> EnclaveSession | None:
-    """Return the session of a launch that we secure, None for any other."""
-    session: EnclaveSession | None = context.get_locals_as_dict().get(KEY)
-    return session
 
 
 def enclave_attribute(action: Any, context: Any) -> str | None:

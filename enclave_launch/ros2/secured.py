@@ -25,8 +25,8 @@ from enclave_launch import flow
 from enclave_launch.errors import UsageError
 from enclave_launch.interfaces import InterfaceFinder
 from enclave_launch.options import ResolveOptions, SecurityOptions
-from enclave_launch.plan import LaunchSource
-from enclave_launch.planner import Planner
+from enclave_launch.plan import LaunchSource, PlanInputs
+from enclave_launch.planner import make_plan
 from enclave_launch.process import Evaluation
 from enclave_launch.ros2 import attributes  # noqa: F401  # ``enclave=`` in the caller's own nodes
 from enclave_launch.ros2.session import EnclaveSession
@@ -52,9 +52,9 @@ def secured(
     check_installed()
     release = choose_release(options.distro, os.environ.get("ROS_DISTRO"), search_prefixes())
     finder = InterfaceFinder(search_prefixes(), options, release.distro.value)
-    planner = Planner(LaunchSource("<program>"), finder, options.plan_options())
+    inputs = PlanInputs(LaunchSource("<program>"), finder, options.plan_options())
     nothing_yet = Evaluation((), (), distro=release.distro.value)
-    launch = flow.provision(planner.plan(nothing_yet), keystore, options=security_options)
+    launch = flow.provision(make_plan(nothing_yet, inputs), keystore, options=security_options)
     return _enclosed(description, EnclaveSession(launch), launch)
 
 

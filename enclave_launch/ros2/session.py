@@ -6,9 +6,11 @@ from typing import Any, NoReturn
 
 from enclave_launch.errors import ProvisionError
 from enclave_launch.process import ResolvedProcess
-from enclave_launch.ros2.observation import KEY
 from enclave_launch.runtime.gate import StartAdditions
 from enclave_launch.secured import PlanProvider, ProvisionedLaunch
+
+KEY = "enclave_launch_session"
+"""The place of a secured launch in launch's own context, so that several launches in one program stay apart."""
 
 
 class EnclaveSession:
@@ -26,6 +28,12 @@ class EnclaveSession:
         if loads_components:
             raise ProvisionError(f"{process.location}: {process.fqn} loads components; {_NEEDS_PLAN}")
         return self._provider.ensure_late(process)
+
+
+def session_of(context: Any) -> EnclaveSession | None:
+    """Return the session of a launch that we secure, None for any other."""
+    session: EnclaveSession | None = context.get_locals_as_dict().get(KEY)
+    return session
 
 
 _NEEDS_PLAN = (

@@ -19,7 +19,6 @@ from keystore.formats.domains import Domains
 from keystore.formats.subject import SubjectScheme
 from keystore.formats.validity import later, parse_duration, parse_end, utc_now
 from keystore.signing.ca_access import CaAccess, Secret
-from keystore.steps.creation import CreateOptions
 from keystore.steps.expiry import expires_soon
 from keystore.steps.options import ProvisionOptions
 from keystore.steps.signing_process import SigningProcess
@@ -37,20 +36,16 @@ def security_options(options: argparse.Namespace) -> SecurityOptions:
 
 
 def _provision_options(options: argparse.Namespace) -> ProvisionOptions:
-    subjects, creation = None, None
-    if options.compatible_subjects:
-        subjects, creation = SubjectScheme.COMPATIBLE, CreateOptions(subjects=SubjectScheme.COMPATIBLE)
     now = utc_now()
     until = parse_end(options.valid_for, now) if options.valid_for else None
     return ProvisionOptions(
         # None: those that the plan finds in the environments of the processes.
         domains=Domains.parse(options.domain_id) if options.domain_id else None,
         create=not options.no_create_keystore,
-        creation=creation,
         valid_until=until,
         # With short lives each start renews in time: when two thirds are over.
         renew_within=(until - now) / 3 if until is not None else timedelta(0),
-        subjects=subjects,
+        subjects=SubjectScheme.COMPATIBLE if options.compatible_subjects else None,
         revoke=not options.no_revoke,
         access=CaAccess(passphrase=_passphrase(options)),
         signing=vars(options).get("signing"),

@@ -89,7 +89,7 @@ def check(plan: LaunchPlan, keystore: str) -> None:
 
 
 def _program(plan: LaunchPlan) -> str | None:
-    return find_router(search_prefixes(plan.planner.source.prefixes))
+    return find_router(search_prefixes(plan.inputs.source.prefixes))
 
 
 def _explained(

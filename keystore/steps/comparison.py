@@ -29,11 +29,11 @@ from keystore.steps.enclave_state import (
     EnclaveState,
     PermissionsSource,
     Reissue,
+    beyond_and_missing,
     inspect,
 )
 from keystore.steps.options import EnclaveReport, ProvisionOptions, ProvisionReport
 from keystore.steps.sharing import EnclaveShare, kept_shares
-from keystore.steps.signing_here import beyond_and_missing
 
 
 class WantedEnclave(NamedTuple):
@@ -156,7 +156,7 @@ def asked_end(options: ProvisionOptions) -> datetime | None:
 
 def _with_shares_of_others(view: KeystoreView, state: EnclaveState, wanted: WantedEnclave) -> EnclaveState:
     """Take permissions that hold all of ours as a union: a bundle does not say whose share is whose."""
-    beyond, missing = beyond_and_missing(view, state, wanted)
+    beyond, missing = beyond_and_missing(view, state, wanted.permissions)
     if missing or not beyond:
         return state
     some = f"{', '.join(beyond[:4])}{' ...' if len(beyond) > 4 else ''}"

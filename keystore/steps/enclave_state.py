@@ -16,8 +16,15 @@ from typing import NamedTuple
 
 from keystore.disk import layout, safe_files
 from keystore.disk.view import KeystoreView
-from keystore.errors import DamagedKeystoreError, SigningUnavailableError, UnsafeKeystoreError, printable
+from keystore.errors import (
+    DamagedKeystoreError,
+    KeystoreError,
+    SigningUnavailableError,
+    UnsafeKeystoreError,
+    printable,
+)
 from keystore.formats.certificate import CertificateFacts, read_certificate
+from keystore.formats.permissions_document import grant_for, taken_away
 from keystore.formats.register import Register
 from keystore.formats.role import Role
 from keystore.formats.subject import names_enclave, subject_name
@@ -107,6 +114,25 @@ def inspect(
     if links and reasons != [NEW]:
         reasons.append(f"{', '.join(links)} missing or out of step")
     return EnclaveState(name, reissue, facts, permissions, links, tuple(reasons), validity, incident)
+
+
+def beyond_and_missing(
+    view: KeystoreView, state: EnclaveState, wanted: PermissionsSource
+) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Return what the signed permissions grant beyond what is wanted, and what they lack; nothing if unreadable."""
+    if state.facts is None or state.facts.common_name is None:
+        return (), ()
+    subject, place = subject_name(state.facts.common_name), layout.PERMISSIONS
+    try:
+        signed = safe_files.read(view.root, f"{layout.enclave_directory(state.enclave)}/{layout.PERMISSIONS}")
+        present = grant_for(smime.read(signed, place).document, subject, place)
+        document = wanted(subject, state.facts.validity)
+        requested = grant_for(document, subject, place) if document is not None else None
+    except KeystoreError:
+        return (), ()
+    if present is None or requested is None:
+        return (), ()
+    return taken_away(present, requested), taken_away(requested, present)
 
 
 def granted_lifetime(view: KeystoreView, register: Register | None, enclave: str) -> timedelta | None:

@@ -8,7 +8,6 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from enclave_common.words import counted
 from keystore.disk import layout, lock, safe_files, store
@@ -25,9 +24,7 @@ from keystore.formats.validity import iso
 from keystore.signing.ca_access import CaAccess
 from keystore.signing.public_key import fingerprint, issued_by
 from keystore.signing.records import certificate_record, permissions_record
-
-if TYPE_CHECKING:
-    from keystore.steps.options import ProvisionOptions
+from keystore.steps.options import ProvisionOptions
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -2,27 +2,32 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from datetime import datetime, timedelta
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 from keystore.disk.lock import DEFAULT_TIMEOUT
 from keystore.disk.share_files import LaunchHold
 from keystore.formats.domains import Domains
-from keystore.formats.subject import Half
-from keystore.formats.validity import DEFAULT_BACKDATE, Validity
+from keystore.formats.policy import EnclavePolicy
+from keystore.formats.subject import Half, SubjectScheme
+from keystore.formats.validity import DEFAULT_BACKDATE, DEFAULT_LIFETIME, Validity
 from keystore.signing.ca_access import CaAccess
-
-if TYPE_CHECKING:
-    from keystore.formats.subject import SubjectScheme
-    from keystore.steps.creation import CreateOptions
-    from keystore.steps.signing_process import SigningProcess
-
 
 Progress = Callable[[int, int], None]
 """Called with (enclaves done, enclaves to do)."""
+
+
+class Signing(Protocol):
+    """A process that signs in place of this one (``signing_process``)."""
+
+    def provision(self, enclaves: Iterable[EnclavePolicy], options: ProvisionOptions) -> ProvisionReport:
+        """Call ``provisioning.provision`` there; raises what that raises."""
+
+    def request(self, action: str, content: dict[str, Any], options: ProvisionOptions) -> Any:
+        """Request another ``action`` and return its result; raises what that raises."""
 
 
 class ProvisionOptions(NamedTuple):
@@ -30,12 +35,12 @@ class ProvisionOptions(NamedTuple):
 
     ``domains`` None: those of the keystore's governance, 0 for a new one. ``lifetime``, ``subjects`` None:
     what the keystore was created with. ``renew_within``: certificates that end sooner are re-issued, by
-    default only the expired. ``creation``: for a new keystore; its domains, access, clock and durability are
-    taken from here."""
+    default only the expired. ``ca_lifetime``: of CAs that are made. A keystore that is made on the way gets
+    ``subjects`` as its own; ``create_keystore`` has more to choose."""
 
     domains: Domains | None = None
     create: bool = True
-    creation: CreateOptions | None = None
+    ca_lifetime: timedelta = DEFAULT_LIFETIME
     lifetime: timedelta | None = None
     valid_until: datetime | None = None
     backdate: timedelta = DEFAULT_BACKDATE
@@ -57,7 +62,7 @@ class ProvisionOptions(NamedTuple):
     types: Mapping[str, tuple[tuple[str, tuple[str, ...]], ...]] = MappingProxyType({})
     """By enclave, of those on Zenoh: the types of what the launch asks for (``zenoh.types.types_text``)."""
     enclave_domains: Mapping[str, Domains] = MappingProxyType({})
-    signing: SigningProcess | None = None
+    signing: Signing | None = None
     """Where signing is done by a process of its own; it has the ``access``, and everything that was asked for."""
     guid_halves: Mapping[str, Half] = MappingProxyType({})
     """Where the participants of enclaves without a certificate yet should sort; their subjects are chosen so."""

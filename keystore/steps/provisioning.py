@@ -26,6 +26,7 @@ from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import InvalidInputError, printable
 from keystore.formats.enclave_name import check_distinct, validate_enclave_name
 from keystore.formats.policy import EnclavePolicy, Operation, Policy, Profile, Qualifier, Rule
+from keystore.formats.subject import SubjectScheme
 from keystore.formats.validity import DEFAULT_LIFETIME, Validity, utc_now
 from keystore.steps.comparison import (
     WantedEnclave,
@@ -213,7 +214,7 @@ def reconcile(
         writer = EnclaveWriter(opened, view, options, now)
         wanted = {name: _as_it_is_now(one) for name, one in wanted.items()}
         states = [inspect_wanted(view, register, name, one, options, now) for name, one in wanted.items()]
-        refuse_without_keys(view, states, wanted)
+        refuse_without_keys(view, states, {name: one.permissions for name, one in wanted.items()})
         writer.check_subjects(states)
         _record_shares(opened, wanted)
         reports = _write_all(opened, writer, states, wanted, options.progress)
@@ -254,9 +255,10 @@ def _complete_keystore(
     opened: Store, options: ProvisionOptions, now: datetime
 ) -> tuple[list[str], list[str]]:
     domains = options.domains or governance_domains(KeystoreView(opened.root))
-    creation = replace(
-        options.creation or CreateOptions(),
+    creation = CreateOptions(
         domains=domains,
+        subjects=options.subjects or SubjectScheme.EXACT,
+        ca_lifetime=options.ca_lifetime,
         access=options.access,
         durable=options.durable,
         now=now,

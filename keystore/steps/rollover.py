@@ -18,7 +18,6 @@ from __future__ import annotations
 import os
 from collections.abc import Collection
 from contextlib import suppress
-from dataclasses import replace
 from datetime import datetime
 from enum import Enum
 from pathlib import Path
@@ -68,8 +67,7 @@ def roll_over(
 ) -> ProvisionReport:
     """Do one step of replacing CAs; repeating an interrupted step completes it.
 
-    ``options.creation`` gives curve, lifetime and names of the new CAs. Raises InvalidInputError for a step out of
-    order.
+    Raises InvalidInputError for a step out of order.
     """
     chosen = (options or ProvisionOptions())._replace(create=False)
     root = keystore_at(keystore).root
@@ -97,8 +95,13 @@ def roll_over(
 
 
 def _creation(options: ProvisionOptions, now: datetime, encrypt: bool) -> CreateOptions:
-    given = options.creation or CreateOptions()
-    return replace(given, backdate=options.backdate, access=options.access, encrypt_ca_keys=encrypt, now=now)
+    return CreateOptions(
+        ca_lifetime=options.ca_lifetime,
+        backdate=options.backdate,
+        access=options.access,
+        encrypt_ca_keys=encrypt,
+        now=now,
+    )
 
 
 def _start(opened: Store, role: Role, creation: CreateOptions) -> str:

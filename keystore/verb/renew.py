@@ -15,7 +15,6 @@ from enclave_common.command_line import FLAG
 from keystore.errors import InvalidInputError
 from keystore.formats.role import Role
 from keystore.formats.validity import parse_duration, parse_end, utc_now
-from keystore.steps.creation import CreateOptions
 from keystore.steps.renewal import RenewOptions, renew
 from keystore.steps.rollover import Step, roll_over
 from keystore.verb import common
@@ -43,8 +42,7 @@ OPTIONS: common.Table = (
 def run(arguments: argparse.Namespace) -> int:
     """Renew, repair or replace, and print what was done. Returns 0."""
     now = utc_now()
-    creation = CreateOptions(ca_lifetime=parse_end(arguments.ca_valid_for, now) - now)
-    options = common.provision_options(arguments, creation=creation)
+    options = common.provision_options(arguments, ca_lifetime=parse_end(arguments.ca_valid_for, now) - now)
     report = _roll_over(arguments, options) if arguments.ca else _renew(arguments, options)
     common.print_report(report, arguments)
     return 0

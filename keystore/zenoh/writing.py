@@ -29,8 +29,7 @@ from keystore.signing.identity import public_half
 from keystore.signing.records import certificate_record
 from keystore.signing.signer import key_pem
 from keystore.steps.opening import opened_for_change
-from keystore.steps.options import ProvisionOptions
-from keystore.steps.signing_process import SigningProcess
+from keystore.steps.options import ProvisionOptions, Signing
 from keystore.zenoh.configuration import ROUTER_NAME, RouterAddress
 from keystore.zenoh.files import (
     RouterFile,
@@ -110,7 +109,7 @@ def sign(root: Path, options: ProvisionOptions, request: Any) -> Any:
 
 
 def _signed_elsewhere(
-    signing: SigningProcess, enclaves: Iterable[str], router: str | None, options: ProvisionOptions
+    signing: Signing, enclaves: Iterable[str], router: str | None, options: ProvisionOptions
 ) -> ZenohReport:
     done = signing.request("zenoh", {"enclaves": list(enclaves), "router": router}, options)
     return ZenohReport(

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
-from nodl.node_interface import EndpointKind
+from nodl.endpoint_kind import EndpointKind
 
 CONTROLLER = "controller"
 """The name in sources of a controller of ros2_control, until somebody loads it."""

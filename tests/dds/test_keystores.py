@@ -130,7 +130,8 @@ def test_governance_of_ones_own(dds: Probe, domain_id: int, tmp_path: Path, rule
     domains = Domains.single(domain_id)
     governance = Governance((replace(rule, domains=domains),))
     creation = keystore.CreateOptions(domains=domains, governance=governance, durable=False)
-    options = keystore.ProvisionOptions(domains=domains, creation=creation, durable=False)
+    keystore.create_keystore(tmp_path / "ks", creation)
+    options = keystore.ProvisionOptions(domains=domains, durable=False)
     keystore.provision(tmp_path / "ks", our_keystore.policies(GRANTS), options=options)
     assert heard(dds, domain_id, tmp_path / "ks", tmp_path / "ks")
 

@@ -27,7 +27,6 @@ from keystore.formats.role import Role
 from keystore.formats.validity import later, utc_now
 from keystore.steps.bundle import export
 from keystore.steps.comparison import differences
-from keystore.steps.creation import CreateOptions
 from keystore.steps.options import ProvisionOptions, ProvisionReport
 from keystore.steps.provisioning import apply_policy, create_enclaves, provision
 from keystore.steps.removal import RemoveOptions, remove
@@ -234,9 +233,7 @@ class TestTheFirstEnd:
 
     @pytest.mark.parametrize(("days", "first"), [(20, "enclave"), (200, "CA")])
     def test_is_that_of_a_certificate_or_of_a_ca(self, tmp_path: Path, days: int, first: str) -> None:
-        options = kit.options(
-            creation=CreateOptions(ca_lifetime=100 * DAY), lifetime=min(days, 99) * DAY, revoke=False
-        )
+        options = kit.options(ca_lifetime=100 * DAY, lifetime=min(days, 99) * DAY, revoke=False)
         provision(tmp_path / "ks", [kit.policy("/a")], options=options)
         if first == "CA":
             shutil.rmtree(tmp_path / "ks/enclaves/a")

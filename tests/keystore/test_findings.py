@@ -28,7 +28,6 @@ from keystore.signing.ca_access import CaAccess
 from keystore.signing.identity import public_half
 from keystore.signing.public_key import fingerprint
 from keystore.signing.smime import sign_document
-from keystore.steps.creation import CreateOptions
 from keystore.steps.provisioning import provision
 from keystore.steps.removal import RemoveOptions, remove
 from keystore.steps.renewal import RenewOptions, renew
@@ -111,7 +110,7 @@ def test_what_somebody_decided_it_must_be(root: Path) -> None:
 
 
 def test_keys_that_cyclone_dds_refuses(root: Path, tmp_path: Path) -> None:
-    other = kit.filled(tmp_path / "other", ["/a"], creation=CreateOptions(curve=Curve.P384))
+    other = kit.filled(kit.created(tmp_path / "other", curve=Curve.P384), ["/a"])
     assert of_enclave_without_repair(other, "key-kind") is Severity.WARNING
     kinds = found(other, "ca-key-kind")
     assert [one.place for one in kinds] == sorted(layout.ca_cert(role) for role in Role)

@@ -14,7 +14,6 @@ from keystore.errors import DamagedKeystoreError, InvalidInputError
 from keystore.formats.certificate import read_certificates
 from keystore.formats.permissions_document import parse_permissions
 from keystore.formats.role import Role
-from keystore.steps.creation import CreateOptions
 from keystore.steps.expiry import expires_soon, status
 from keystore.steps.provisioning import create_enclave, list_enclaves, provision
 from keystore.steps.removal import RemoveOptions, remove
@@ -161,8 +160,7 @@ def test_renewed_permissions_are_those_a_launch_expects(tmp_path: Path) -> None:
 
 
 def test_status_lists_the_earliest_first(tmp_path: Path) -> None:
-    creation = CreateOptions(ca_lifetime=200 * DAY)
-    root = filled(tmp_path / "ks", ["/a"], now=NOW, lifetime=50 * DAY, creation=creation)
+    root = filled(tmp_path / "ks", ["/a"], now=NOW, lifetime=50 * DAY, ca_lifetime=200 * DAY)
     report = status(root, now=NOW)
     assert [(one.subject, (one.not_after - NOW).days) for one in report.expiries] == [
         ("certificate of /a", 50), ("permissions of /a", 50), ("identity CA", 200), ("permissions CA", 200),
@@ -172,8 +170,7 @@ def test_status_lists_the_earliest_first(tmp_path: Path) -> None:
 
 
 def test_an_expired_ca_is_said_and_rolled_over(tmp_path: Path) -> None:
-    creation = CreateOptions(ca_lifetime=50 * DAY)
-    root = filled(tmp_path / "ks", ["/a"], now=NOW, creation=creation)
+    root = filled(tmp_path / "ks", ["/a"], now=NOW, ca_lifetime=50 * DAY)
     late = NOW + 60 * DAY
     with pytest.raises(DamagedKeystoreError, match=r"renew \S+ --ca start"):
         renew(root, options=renewing(now=late))

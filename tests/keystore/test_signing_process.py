@@ -104,7 +104,7 @@ def test_errors_are_those_of_the_keystore(root: Path, monkeypatch: pytest.Monkey
 )
 def test_what_is_no_plan_is_refused_and_the_next_is_signed(root: Path, sent: object) -> None:
     chosen = started(root)
-    assert chosen.signing is not None
+    assert isinstance(chosen.signing, SigningProcess)
     channel: socket.socket = chosen.signing._channel
     signing_process._send(channel, sent, None)
     answer, _ = signing_process._receive(channel)
@@ -114,7 +114,7 @@ def test_what_is_no_plan_is_refused_and_the_next_is_signed(root: Path, sent: obj
 
 def test_it_ends_with_its_launcher(root: Path) -> None:
     chosen = started(root)
-    assert chosen.signing is not None
+    assert isinstance(chosen.signing, SigningProcess)
     chosen.signing._channel.close()
     with pytest.raises(SigningUnavailableError, match="has ended"):
         provision(root, [policy("/a")], options=chosen)

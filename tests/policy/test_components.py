@@ -11,8 +11,8 @@ import pytest
 from enclave_launch.evaluation.evaluate import evaluate
 from enclave_launch.host.plan_host import PlanHost
 from enclave_launch.interfaces import InterfaceFinder
-from enclave_launch.plan import Found, LaunchPlan, LaunchSource, Missing, PlanOptions
-from enclave_launch.planner import Planner
+from enclave_launch.plan import Found, LaunchPlan, LaunchSource, Missing, PlanInputs, PlanOptions
+from enclave_launch.planner import make_plan
 from enclave_launch.policy import PolicyOptions
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
 from nodl.name_template import NameTemplate, ParameterPart
@@ -54,7 +54,8 @@ def box(tmp_path: Path) -> Box:
         )
         file.write_text(text)
         evaluation = evaluate(file, host=PlanHost(allow_missing_packages=True, distro="jazzy"))
-        return Planner(LaunchSource(str(file)), lookup, PlanOptions(policy=options)).plan(evaluation)
+        inputs = PlanInputs(LaunchSource(str(file)), lookup, PlanOptions(policy=options))
+        return make_plan(evaluation, inputs)
 
     return plan
 

@@ -18,9 +18,10 @@ from enclave_launch.plan import (
     LaunchPlan,
     LaunchSource,
     Missing,
+    PlanInputs,
     PlanOptions,
 )
-from enclave_launch.planner import Planner
+from enclave_launch.planner import make_plan
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
 from keystore.formats.policy import Operation
 from nodl.node_interface import RANDOM_ENDING, Gap
@@ -55,7 +56,8 @@ def plan(tmp_path: Path) -> Plan:
         file = tmp_path / "test.launch.xml"
         file.write_text(f"<launch>{text}</launch>")
         evaluation = evaluate(file, host=PlanHost(allow_missing_packages=True, distro="jazzy"))
-        return Planner(LaunchSource(str(file)), lookup, PlanOptions(enclave_scope=scope)).plan(evaluation)
+        inputs = PlanInputs(LaunchSource(str(file)), lookup, PlanOptions(enclave_scope=scope))
+        return make_plan(evaluation, inputs)
 
     return run
 

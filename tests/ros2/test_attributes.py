@@ -20,7 +20,7 @@ stand_ins.install()
 import launch, launch.actions
 from launch.launch_description_sources import AnyLaunchDescriptionSource
 import enclave_launch.ros2.attributes as attributes
-from enclave_launch.ros2.observation import KEY
+from enclave_launch.ros2.session import KEY
 from enclave_launch.ros2.node_action import EnclaveNodeActionExtension
 from enclave_launch.ros2.observation import observe_node
 from enclave_launch.runtime.gate import StartAdditions
@@ -223,7 +223,7 @@ import launch
 from launch_ros.actions import ComposableNodeContainer
 from launch_ros.descriptions import ComposableNode
 import enclave_launch.ros2.attributes
-from enclave_launch.ros2.observation import KEY
+from enclave_launch.ros2.session import KEY
 from enclave_launch.ros2.node_action import EnclaveNodeActionExtension
 from enclave_launch.runtime.gate import StartAdditions
 
