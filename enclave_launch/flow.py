@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from enclave_launch.add_ons import zenoh_planning
-from enclave_launch.admission.middleware import halves, middleware_of, why_not
+from enclave_launch.admission.middleware import middleware_of, why_not
 from enclave_launch.diagnostics import Diagnostic, refusal
 from enclave_launch.diagnostics.enclaves import middleware_refused
 from enclave_launch.diagnostics.evaluation import program_not_executable
@@ -30,14 +30,12 @@ from enclave_launch.plan import (
     LaunchPlan,
     LaunchSource,
     PlanInputs,
-    mixed_enclaves,
     on_zenoh,
 )
 from enclave_launch.planner import make_plan
 from enclave_launch.prefixes import ament_prefixes
 from enclave_launch.process import Evaluation
 from enclave_launch.security_environment import SecuritySettings
-from keystore.disk.share_files import LaunchHold
 from keystore.steps.options import ProvisionOptions
 from nodl.ament_index import MISSING_PREFIX, launch_file_path, search_prefixes
 
@@ -151,24 +149,13 @@ def provision(
     while the result lives. Raises ``ManifestError`` for a plan with problems (nothing is written then) and
     ``ProvisionError``.
     """
-    from enclave_launch.secured import (  # cryptography
-        ProvisionedLaunch,
-        launch_owner,
-        provision_plan,
-        with_domains,
-    )
+    from enclave_launch.secured import provision_plan  # cryptography
 
     if plan.problems:
         raise ManifestError(refusal(plan.problems))
     chosen = options or SecurityOptions()
     settings = SecuritySettings(os.path.abspath(keystore), chosen.strategy)
-    requested = chosen.keystore or ProvisionOptions()
-    requested = requested._replace(
-        launch=requested.launch or LaunchHold(settings.keystore, launch_owner(plan))
-    )
-    requested = requested._replace(guid_halves=halves(mixed_enclaves(plan.processes)))
-    wanted, report, zenoh = provision_plan(settings, plan, with_domains(plan, requested, os.environ))
-    return ProvisionedLaunch(plan, settings, report, wanted, requested, zenoh)
+    return provision_plan(plan, settings, chosen.keystore or ProvisionOptions())
 
 
 def run(launch: Launch, *, options: RunSettings | None = None) -> int:

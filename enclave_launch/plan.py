@@ -12,9 +12,7 @@ from enclave_launch.admission.middleware import DEFAULT as DEFAULT_MIDDLEWARE
 from enclave_launch.admission.middleware import (
     ZENOH,
     EnclaveProcess,
-    Pair,
     middleware_of,
-    mixed_pairs,
     vendor_of,
 )
 from enclave_launch.diagnostics import Diagnostic
@@ -268,9 +266,9 @@ def enclave_domains(processes: Iterable[PlannedProcess]) -> dict[str, dict[int, 
     return found
 
 
-def mixed_enclaves(processes: Iterable[PlannedProcess]) -> tuple[Pair, ...]:
-    """Return enclaves on Fast DDS with those on Cyclone DDS that could meet them."""
-    return mixed_pairs(
+def enclave_processes(processes: Iterable[PlannedProcess]) -> tuple[EnclaveProcess, ...]:
+    """Return each process with an enclave as what decides whom it can authenticate."""
+    return tuple(
         EnclaveProcess(item.enclave.path, item.domain, vendor_of(item.middleware))
         for item in processes
         if item.enclave

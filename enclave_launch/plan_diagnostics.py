@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 
-from enclave_launch.admission.middleware import failing
+from enclave_launch.admission.middleware import failing, mixed_pairs
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.diagnostics.enclaves import (
     container_elsewhere,
@@ -34,7 +34,7 @@ from enclave_launch.plan import (
     PlannedComponent,
     PlannedProcess,
     enclave_domains,
-    mixed_enclaves,
+    enclave_processes,
     nodes_of,
 )
 from enclave_launch.policy import DerivedPolicy, RunningNode
@@ -156,7 +156,7 @@ def shared_domains(processes: Iterable[PlannedProcess]) -> Iterator[Diagnostic]:
 
 def failing_handshakes(processes: Iterable[PlannedProcess]) -> Iterator[Diagnostic]:
     """Warn about enclaves on two DDS implementations that cannot authenticate each other under their subjects."""
-    pairs = mixed_enclaves(processes)
+    pairs = mixed_pairs(enclave_processes(processes))
     if not pairs:
         return
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from enclave_launch.add_ons import LaunchRouter, zenoh_start
-from enclave_launch.admission.middleware import failing, middleware_of
+from enclave_launch.admission.middleware import failing, guid_halves, middleware_of, mixed_pairs
 from enclave_launch.admission.variables import domain_of
 from enclave_launch.diagnostics import Diagnostic, refusal
 from enclave_launch.diagnostics.enclaves import (
@@ -19,7 +19,13 @@ from enclave_launch.diagnostics.enclaves import (
     handshake_fails,
 )
 from enclave_launch.errors import ManifestError, ProvisionError, keystore_errors
-from enclave_launch.plan import LaunchPlan, PlannedProcess, enclave_domains, mixed_enclaves, on_zenoh
+from enclave_launch.plan import (
+    LaunchPlan,
+    PlannedProcess,
+    enclave_domains,
+    enclave_processes,
+    on_zenoh,
+)
 from enclave_launch.planner import make_plan
 from enclave_launch.process import ResolvedProcess
 from enclave_launch.runtime.gate import StartAdditions, identity
@@ -30,6 +36,7 @@ from enclave_launch.security_environment import (
     enclave_environment,
     secured_environment,
 )
+from keystore.disk.share_files import LaunchHold
 from keystore.disk.view import KeystoreView
 from keystore.errors import KeystoreError
 from keystore.formats.domains import Domains
@@ -58,7 +65,7 @@ class ProvisionedLaunch(NamedTuple):
     @property
     def handshakes(self) -> tuple[Diagnostic, ...]:
         """Report processes on two DDS whose present certificates cannot authenticate each other."""
-        pairs = mixed_enclaves(self.plan.processes)
+        pairs = mixed_pairs(enclave_processes(self.plan.processes))
         view = KeystoreView(Path(self.settings.keystore))
         subjects = {path: view.common_name(path) for pair in pairs for path in pair}
         known = {path: name for path, name in subjects.items() if name}
@@ -91,15 +98,28 @@ def provision_policies(
 
 
 def provision_plan(
-    settings: SecuritySettings, plan: LaunchPlan, options: ProvisionOptions
-) -> tuple[ProvisionOptions, ProvisionReport, LaunchRouter | None]:
-    """Provision all enclaves of ``plan``, and the router of those on Zenoh; return the options used, too.
+    plan: LaunchPlan, settings: SecuritySettings, requested: ProvisionOptions
+) -> ProvisionedLaunch:
+    """Provision all enclaves of ``plan`` as ``requested``, with what the plan decides of it.
 
-    Raises ``ProvisionError`` as ``provision_policies``.
+    Raises ``ManifestError`` for a domain that was not chosen, ``ProvisionError`` as ``provision_policies``.
     """
-    enclaves = on_zenoh(plan, os.environ)
-    if not enclaves:
-        return options, provision_policies(settings, plan, options), None
+    requested = requested._replace(
+        launch=requested.launch or LaunchHold(settings.keystore, launch_owner(plan)),
+        guid_halves=guid_halves(enclave_processes(plan.processes)),
+    )
+    options = with_domains(plan, requested, os.environ)
+    if enclaves := on_zenoh(plan, os.environ):
+        options, report, router = _provision_on_zenoh(settings, plan, options, enclaves)
+        return ProvisionedLaunch(plan, settings, report, options, requested, router)
+    report = provision_policies(settings, plan, options)
+    return ProvisionedLaunch(plan, settings, report, options, requested)
+
+
+def _provision_on_zenoh(
+    settings: SecuritySettings, plan: LaunchPlan, options: ProvisionOptions, enclaves: frozenset[str]
+) -> tuple[ProvisionOptions, ProvisionReport, LaunchRouter]:
+    """Provision all enclaves of ``plan``, and the router of those on Zenoh; return the options used, too."""
     zenoh = zenoh_start()
     options = options._replace(types=zenoh.types(plan, enclaves))
     report = provision_policies(settings, plan, options)
@@ -184,7 +204,7 @@ class PlanProvider:
                 self._check(before[policy.path])
             # What came late may be in another domain.
             self._options = with_domains(self._plan, self._launch.requested, os.environ)
-            if on_zenoh(self._plan, os.environ):
+            if self._on_zenoh:
                 self._extend_zenoh(process)
             else:
                 provision_policies(self._launch.settings, self._plan, self._options, policy)
@@ -195,8 +215,7 @@ class PlanProvider:
             raise ProvisionError(
                 f"{process.process_name} is the first process on Zenoh, and no router was started: the plan had none"
             )
-        _, _, router = provision_plan(self._launch.settings, self._plan, self._options)
-        assert router is not None, "the process is on Zenoh"
+        _, _, router = _provision_on_zenoh(self._launch.settings, self._plan, self._options, self._on_zenoh)
         router.wait()
 
     def launcher(self) -> StartAdditions | None:

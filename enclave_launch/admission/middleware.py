@@ -112,8 +112,8 @@ def failing(pairs: Iterable[Pair], subjects: Mapping[str, str]) -> Iterator[Pair
             yield pair
 
 
-def halves(pairs: Iterable[Pair]) -> dict[str, Half]:
+def guid_halves(members: Iterable[EnclaveProcess]) -> dict[str, Half]:
     """Return where each enclave should sort so that Cyclone begins every handshake; none for enclaves of both."""
-    found = tuple(pair for pair in pairs if pair.fast != pair.cyclone)
+    found = tuple(pair for pair in mixed_pairs(members) if pair.fast != pair.cyclone)
     fast, cyclone = {pair.fast for pair in found}, {pair.cyclone for pair in found}
     return {**dict.fromkeys(fast - cyclone, Half.HIGH), **dict.fromkeys(cyclone - fast, Half.LOW)}

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import NamedTuple
 
 from keystore.disk import layout
 from keystore.disk.authorities import refuse_foreign_authorities
@@ -14,15 +13,12 @@ from keystore.disk.crl_file import crl_problem, crl_validity
 from keystore.disk.deployed import deployment_problem, refuse_changed_deployment
 from keystore.disk.register_file import needs_register, read_register
 from keystore.disk.safe_files import resolve_root
-from keystore.disk.signed_documents import governance_domains, governance_stands
+from keystore.disk.signed_documents import governance_stands
 from keystore.disk.view import KeystoreView
-from keystore.errors import NotAKeystoreError, printable
-from keystore.formats.domains import Domains
-from keystore.formats.permissions import permissions_document
+from keystore.errors import NotAKeystoreError, SigningUnavailableError, printable
 from keystore.formats.policy import EnclavePolicy
 from keystore.formats.register import Register
 from keystore.formats.role import Role
-from keystore.formats.shares import Share
 from keystore.formats.validity import Validity, iso, later, utc_now
 from keystore.steps.enclave_state import (
     OTHER_PERMISSIONS,
@@ -33,18 +29,8 @@ from keystore.steps.enclave_state import (
     inspect,
 )
 from keystore.steps.options import EnclaveReport, ProvisionOptions, ProvisionReport
-from keystore.steps.sharing import EnclaveShare, kept_shares
-
-
-class WantedEnclave(NamedTuple):
-    """The permissions that one enclave should have, and the least that must be issued again of its identity."""
-
-    permissions: PermissionsSource
-    reissue: Reissue = Reissue.NOTHING
-    share: EnclaveShare | None = None
-    """Where ``permissions`` are those of several launches."""
-    ends_by: datetime | None = None
-    """When a life was asked for: a certificate that ends later does not do."""
+from keystore.steps.sharing import kept_shares
+from keystore.steps.wanted import WantedEnclave, wanted_enclave, with_domains
 
 
 def compare(
@@ -113,47 +99,6 @@ def differences(
     return tuple(reasons)
 
 
-def with_domains(root: Path, options: ProvisionOptions) -> ProvisionOptions:
-    """Return the same options with the domains decided."""
-    if options.domains is not None:
-        return options
-    view = KeystoreView(root)
-    return options._replace(domains=governance_domains(view) if view.is_complete else Domains.single(0))
-
-
-def domains_of(enclave: str, options: ProvisionOptions) -> Domains:
-    """Return the domains that the permissions of one enclave are for."""
-    return options.enclave_domains.get(enclave) or options.domains or Domains.single(0)
-
-
-def permissions_source(policy: EnclavePolicy, options: ProvisionOptions) -> PermissionsSource:
-    """Makes the document of exactly this policy."""
-    domains = domains_of(policy.path, options)
-
-    def document(subject: str, validity: Validity) -> bytes:
-        return permissions_document(subject, policy, validity=validity, domains=domains, rmw=options.rmw)
-
-    return document
-
-
-def wanted_enclave(root: Path, policy: EnclavePolicy, options: ProvisionOptions) -> WantedEnclave:
-    """Return the enclave with exactly this policy; of a launch, its share beside those of others."""
-    ends_by = asked_end(options)
-    if options.launch is None:
-        return WantedEnclave(permissions_source(policy, options), ends_by=ends_by)
-    owner, domains = options.launch.owner, domains_of(policy.path, options)
-    mine = Share(owner, domains, policy.profiles, options.types.get(policy.path, ()))
-    share = EnclaveShare(root, policy.path, owner, mine, options.rmw, options.launch)
-    return WantedEnclave(share.document, share=share, ends_by=ends_by)
-
-
-def asked_end(options: ProvisionOptions) -> datetime | None:
-    """Return when new certificates are to expire, if the caller said so."""
-    if options.valid_until is not None or options.lifetime is None:
-        return options.valid_until
-    return later(options.now or utc_now(), options.lifetime)
-
-
 def _with_shares_of_others(view: KeystoreView, state: EnclaveState, wanted: WantedEnclave) -> EnclaveState:
     """Take permissions that hold all of ours as a union: a bundle does not say whose share is whose."""
     beyond, missing = beyond_and_missing(view, state, wanted.permissions)
@@ -200,3 +145,42 @@ def inspect_wanted(
     if wanted.reissue is Reissue.NOTHING or state.reissue is Reissue.KEY_PAIR:
         return state
     return state._replace(reissue=wanted.reissue, permissions=True, reasons=(*state.reasons, "requested"))
+
+
+_SHOWN = 10
+
+
+def refuse_without_keys(
+    view: KeystoreView, states: list[EnclaveState], wanted: Mapping[str, PermissionsSource]
+) -> None:
+    """Raise SigningUnavailableError with every enclave that differs, and how, if the key it needs is not here."""
+    lines = []
+    for state in states:
+        needs = {Role.IDENTITY: state.reissue is not Reissue.NOTHING, Role.PERMISSIONS: state.permissions}
+        if any(needed and view.key_file(role) is None for role, needed in needs.items()):
+            lines.append(f"{state.enclave}: {'; '.join(_reasons(view, state, wanted[state.enclave]))}")
+    if not lines:
+        return
+    more = f"\n  and {len(lines) - _SHOWN} more" if len(lines) > _SHOWN else ""
+    listed = "".join(f"\n  {line}" for line in lines[:_SHOWN]) + more
+    raise SigningUnavailableError(
+        f"{printable(view.root)} has no CA keys, so nothing can be signed here, but these enclaves differ from what "
+        f"is needed:{listed}\nBring them up to date where the CA keys are (start or apply-policy there), "
+        "then export again"
+    )
+
+
+def _reasons(view: KeystoreView, state: EnclaveState, wanted: PermissionsSource) -> Iterator[str]:
+    for reason in state.reasons:
+        yield reason
+        if reason == OTHER_PERMISSIONS:
+            yield from _permission_differences(view, state, wanted)
+
+
+def _permission_differences(
+    view: KeystoreView, state: EnclaveState, wanted: PermissionsSource
+) -> Iterator[str]:
+    beyond, missing = beyond_and_missing(view, state, wanted)
+    for words, found in (("lacks", missing), ("has beyond it", beyond)):
+        if found:
+            yield f"{words} {', '.join(found[:4])}{' ...' if len(found) > 4 else ''}"

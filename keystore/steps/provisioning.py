@@ -28,16 +28,7 @@ from keystore.formats.enclave_name import check_distinct, validate_enclave_name
 from keystore.formats.policy import EnclavePolicy, Operation, Policy, Profile, Qualifier, Rule
 from keystore.formats.subject import SubjectScheme
 from keystore.formats.validity import DEFAULT_LIFETIME, Validity, utc_now
-from keystore.steps.comparison import (
-    WantedEnclave,
-    as_found,
-    asked_end,
-    compare,
-    inspect_wanted,
-    permissions_source,
-    wanted_enclave,
-    with_domains,
-)
+from keystore.steps.comparison import as_found, compare, inspect_wanted, refuse_without_keys
 from keystore.steps.creation import CreateOptions, complete
 from keystore.steps.crl import publish_crl, restore_crl
 from keystore.steps.enclave_state import EnclaveState, PermissionsSource
@@ -46,7 +37,13 @@ from keystore.steps.governance import renew_governance
 from keystore.steps.opening import opened_for_change
 from keystore.steps.options import EnclaveReport, Progress, ProvisionOptions, ProvisionReport
 from keystore.steps.sharing import given_up, kept_shares, left_over, refuse_running
-from keystore.steps.signing_here import refuse_without_keys
+from keystore.steps.wanted import (
+    WantedEnclave,
+    permissions_source,
+    requested_end,
+    wanted_enclave,
+    with_domains,
+)
 from keystore.verification.before_launch import exposures
 
 
@@ -130,10 +127,10 @@ def create_enclaves(
 ) -> ProvisionReport:
     """Create enclaves in a keystore that exists: without ``allow_all`` new ones may do nothing, others as before."""
     root = resolve_root(keystore)
-    chosen = with_domains(root, _as_long_as_asked(options or ProvisionOptions()))
+    chosen = with_domains(root, _lasting_as_requested(options or ProvisionOptions()))
     ordered = sorted({validate_enclave_name(name) for name in names})
     wanted = {
-        name: WantedEnclave(_allow_all(name, chosen) if allow_all else keep, ends_by=asked_end(chosen))
+        name: WantedEnclave(_allow_all(name, chosen) if allow_all else keep, ends_by=requested_end(chosen))
         for name in ordered
     }
     return bring_about(root, wanted, chosen)
@@ -160,13 +157,13 @@ def apply_policy(
     keystore: Path | str, policy: Policy, *, options: ProvisionOptions | None = None
 ) -> ProvisionReport:
     """Give exactly the policy's permissions to the policy's enclaves, created if missing, in a keystore that exists."""
-    chosen = _as_long_as_asked(options or ProvisionOptions())
+    chosen = _lasting_as_requested(options or ProvisionOptions())
     return provision(keystore, policy.enclaves, options=chosen)
 
 
-def _as_long_as_asked(options: ProvisionOptions) -> ProvisionOptions:
+def _lasting_as_requested(options: ProvisionOptions) -> ProvisionOptions:
     """Give a requested life to existing enclaves too: what expires an hour sooner or later is issued again."""
-    end = asked_end(options)
+    end = requested_end(options)
     within = options.renew_within if end is None else end - (options.now or utc_now()) - timedelta(hours=1)
     return options._replace(create=False, renew_within=max(options.renew_within, within))
 

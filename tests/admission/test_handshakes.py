@@ -9,7 +9,14 @@ import pytest
 from cryptography import x509
 
 from enclave_launch import provision
-from enclave_launch.admission.middleware import EnclaveProcess, Pair, Vendor, failing, halves, mixed_pairs
+from enclave_launch.admission.middleware import (
+    EnclaveProcess,
+    Pair,
+    Vendor,
+    failing,
+    guid_halves,
+    mixed_pairs,
+)
 from enclave_launch.diagnostics import Code
 from keystore.formats.subject import Half, common_name, guid_prefix, half_of
 from keystore.verification import verify
@@ -102,5 +109,5 @@ def test_pairs_and_halves() -> None:
     ]
     pairs = mixed_pairs(members)
     assert pairs == (Pair("/f", "/c"), Pair("/f", "/m"), Pair("/m", "/c"), Pair("/m", "/m"))
-    assert halves(pairs) == {"/f": Half.HIGH, "/c": Half.LOW}
+    assert guid_halves(members) == {"/f": Half.HIGH, "/c": Half.LOW}
     assert list(failing(pairs, {})) == [Pair("/m", "/m")]
