@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from datetime import datetime
 from importlib import import_module
 from pathlib import Path
@@ -12,7 +12,6 @@ from enclave_common.dependencies import absence
 from keystore.disk import layout
 from keystore.disk.view import KeystoreView
 from keystore.errors import KeystoreError, NotInstalledError
-from keystore.formats.policy import Rule
 
 if TYPE_CHECKING:
     from keystore.steps.options import ProvisionOptions
@@ -21,27 +20,16 @@ if TYPE_CHECKING:
 _ROOM = "keystore.zenoh"
 
 
-class FileDifference(NamedTuple):
-    """A difference between one file of two keystores; ``more``: it lets somebody do more, or protects less."""
-
-    file: str
-    more: bool
-    text: str
-
-
 class ZenohFiles(NamedTuple):
     """The functions of the add-on.
 
     ``follow`` writes the files again after a change and returns what to report; ``check`` is its part of ``verify``;
-    ``sign`` answers a request in the signing process; ``enforced`` reads what the router's file lets each enclave do;
-    ``compare`` lists the differences of two keystores. All but ``sign`` need a keystore with a router's file.
+    ``sign`` answers a request in the signing process. All but ``sign`` need a keystore with a router's file.
     """
 
     follow: Callable[[Path, ProvisionOptions], list[str]]
     check: Callable[[KeystoreView, datetime], Iterator[Finding]]
     sign: Callable[[Path, ProvisionOptions, Any], Any]
-    enforced: Callable[[KeystoreView], Mapping[str, frozenset[Rule]]]
-    compare: Callable[[KeystoreView, KeystoreView], list[FileDifference]]
 
 
 def zenoh_files() -> ZenohFiles:

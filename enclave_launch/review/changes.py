@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 from enclave_launch.review.document import GrantedName, PlanDocument
 from enclave_launch.review.information_flow import FlowGraph, flow_graph
-from keystore.add_ons import FileDifference
 
 
 class EnclaveChange(NamedTuple):
@@ -37,7 +36,7 @@ class Move(NamedTuple):
 
 class Changes(NamedTuple):
     """Everything sorted. ``flows_*``: pairs of enclaves of which the first can influence the second directly;
-    ``middlewares``: enclaves that moved from DDS to Zenoh or back; ``files``: of two keystores, for Zenoh;
+    ``middlewares``: enclaves that moved from DDS to Zenoh or back;
     ``as_installed``: packages that were not compared, since both plans took them as they are installed;
     ``unknown``: programs and nodes whose interfaces one of the plans does not wholly know."""
 
@@ -48,14 +47,13 @@ class Changes(NamedTuple):
     flows_added: tuple[tuple[str, str], ...]
     flows_removed: tuple[tuple[str, str], ...]
     middlewares: tuple[Move, ...] = ()
-    files: tuple[FileDifference, ...] = ()
     as_installed: tuple[str, ...] = ()
     unknown: tuple[str, ...] = ()
 
     @property
     def rights_grew(self) -> bool:
         """Return True if some enclave may do something that it could not do before; a new enclave is all new rights."""
-        return any(change.added for change in self.enclaves) or any(change.more for change in self.files)
+        return any(change.added for change in self.enclaves)
 
     @property
     def is_empty(self) -> bool:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from keystore.add_ons import ZenohFiles
-from keystore.zenoh.inventory import compare, enforced
 from keystore.zenoh.verification import check_zenoh
 from keystore.zenoh.writing import follow, sign
 
-ADD_ON = ZenohFiles(follow, check_zenoh, sign, enforced, compare)
+ADD_ON = ZenohFiles(follow, check_zenoh, sign)

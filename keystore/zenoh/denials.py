@@ -15,14 +15,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from keystore.disk import layout
 from keystore.disk.register_file import read_register
 from keystore.disk.view import keystore_at
 from keystore.errors import KeystoreError
 from keystore.formats.permissions_patterns import can_meet
 from keystore.formats.policy import EnclavePolicy, Operation, Policy, PolicyError, Profile, Qualifier, Rule
 from keystore.formats.policy_xml import policy_xml
-from keystore.zenoh.comparison import read_configuration
 from keystore.zenoh.configuration import RouterAddress
 from keystore.zenoh.files import present_address, router_file
 from keystore.zenoh.meaning import Meaning, meaning, operation_of
@@ -214,11 +212,16 @@ class RouterLogExplainer:
         if enclave not in self._granted:
             try:
                 address = present_address(self._view) or RouterAddress()
-                content = router_file(self._view, [enclave], address).content
+                subjects = router_file(self._view, [enclave], address).subjects
             except KeystoreError:
                 return frozenset()  # verify reports it
-            admitted = read_configuration(content, layout.ZENOH_ROUTER).admitted
-            found = (meaning(*one[:3]) for permissions in admitted.values() for one in permissions)
+            found = (
+                meaning(rule.flow, message, key)
+                for subject in subjects
+                for rule in subject.rules
+                for message in rule.messages
+                for key in rule.keys
+            )
             self._granted[enclave] = frozenset(one for one in found if one is not None)
         return self._granted[enclave]
 

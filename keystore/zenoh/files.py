@@ -47,12 +47,17 @@ _WRITTEN_BY = "secure-keystore"
 
 
 class RouterFile(NamedTuple):
-    """``served``: enclaves with rules. ``gaps``: what of their permissions Zenoh cannot grant, and enclaves that are
-    shut out, in words."""
+    """``subjects``: the enclaves that the router lets in. ``gaps``: what of their permissions Zenoh cannot grant, and
+    enclaves that are shut out, in words."""
 
     content: bytes
-    served: tuple[str, ...]
+    subjects: tuple[Subject, ...]
     gaps: tuple[str, ...]
+
+    @property
+    def served(self) -> tuple[str, ...]:
+        """Return the enclaves with rules."""
+        return tuple(one.enclave for one in self.subjects if one.rules)
 
 
 def session_content(view: KeystoreView, enclave: str, address: RouterAddress) -> bytes:
@@ -100,7 +105,7 @@ def router_file(view: KeystoreView, enclaves: Iterable[str], address: RouterAddr
     )  # fmt: skip
     metadata = {"written_by": _WRITTEN_BY, "address": str(address), "trusts": _trust(view)}
     content = router_configuration([address.listens], files, subjects, metadata)
-    return RouterFile(content, tuple(one.enclave for one in subjects if one.rules), tuple(gaps))
+    return RouterFile(content, tuple(subjects), tuple(gaps))
 
 
 def identity_problem(view: KeystoreView, due: datetime) -> str | None:

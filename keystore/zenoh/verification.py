@@ -1,23 +1,19 @@
 """The files for Zenoh: whether the router enforces what is signed, and whether it is who it says it is.
 
-If a file is not what follows from the keystore, each difference is reported: settings, who is admitted, and in
-ROS words who may do more or less than was signed.
+A file that is not what follows from the keystore is an error, whatever differs: nobody needs to edit one.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from datetime import datetime
-from itertools import islice
 
-from enclave_common.words import counted
 from keystore.disk import layout, safe_files
 from keystore.disk.view import KeystoreView
 from keystore.errors import KeystoreError
 from keystore.formats.certificate import read_certificate
 from keystore.verification import repair
 from keystore.verification.finding import Finding, Severity
-from keystore.zenoh.comparison import ZenohDifference, differences, read_configuration
 from keystore.zenoh.configuration import RouterAddress
 from keystore.zenoh.files import (
     identity_problem,
@@ -25,9 +21,6 @@ from keystore.zenoh.files import (
     router_file,
     session_content,
 )
-
-_TOLD = 40
-"""Differences of one file, beyond which only their number is reported."""
 
 
 def check_zenoh(view: KeystoreView, now: datetime) -> Iterator[Finding]:
@@ -54,7 +47,6 @@ def _router(view: KeystoreView, address: RouterAddress, now: datetime) -> Iterat
             Severity.ERROR, "zenoh-rules", layout.ZENOH_ROUTER,
             "does not enforce what is signed: it was edited, or is older than the last change", _again(view),
         )  # fmt: skip
-        yield from _told(view, layout.ZENOH_ROUTER, wanted.content, found or b"")
     for gap in wanted.gaps:
         yield Finding(Severity.WARNING, "zenoh-gap", layout.ZENOH_ROUTER, gap)
     if (problem := identity_problem(view, now)) is not None:
@@ -70,7 +62,6 @@ def _sessions(view: KeystoreView, address: RouterAddress) -> Iterator[Finding]:
                 Severity.ERROR, "zenoh-session", file,
                 "not what was written for it: its processes may talk past the router, or not find it", _again(view),
             )  # fmt: skip
-            yield from _told(view, file, wanted, found or b"")
     for enclave in view.enclaves():
         pem = view.enclave_file(enclave, layout.CERT)
         if pem is not None and read_certificate(pem, enclave).names_hosts:
@@ -78,22 +69,3 @@ def _sessions(view: KeystoreView, address: RouterAddress) -> Iterator[Finding]:
                 Severity.EXPOSURE, "zenoh-impostor", f"{layout.enclave_directory(enclave)}/{layout.CERT}",
                 "names hosts, so that its holder could play the router there", repair.run(view.root, "renew", enclave),
             )  # fmt: skip
-
-
-def _told(view: KeystoreView, file: str, wanted: bytes, found: bytes) -> Iterator[Finding]:
-    all_of = differences(read_configuration(wanted, file), read_configuration(found, file))
-    for one in islice(all_of, _TOLD):
-        severity = Severity.ERROR if one.more else Severity.WARNING
-        yield Finding(severity, f"zenoh-{one.code}", file, _sentence(one), _again(view))
-    if rest := sum(1 for _ in all_of):
-        yield Finding(Severity.NOTE, "zenoh-more", file, f"differs in {counted(rest, 'more place')}")
-
-
-def _sentence(one: ZenohDifference) -> str:
-    if one.code == "setting":
-        return one.text
-    if one.code == "subject":
-        return f"admits {one.who}: not signed" if one.more else f"does not admit {one.who}: signed"
-    return (
-        f"lets {one.who} {one.text}: not signed" if one.more else f"does not let {one.who} {one.text}: signed"
-    )

@@ -126,108 +126,87 @@ def test_verify_knows_the_files_and_finds_what_was_changed(keystore: Path) -> No
     file = keystore / "zenoh/router.json5"
     good = file.read_text()
     file.write_text(good.replace("ros.a", "ros.b"))
-    assert codes(keystore) == {"zenoh-rules", "zenoh-subject", "zenoh-rights"}
+    assert codes(keystore) == {"zenoh-rules"}
     file.write_text("{}")
     assert codes(keystore) == {"zenoh-router"}
     file.write_text(good)
     session = keystore / "enclaves/a/zenoh.json5"
     session.write_text(session.read_text().replace('"client"', '"peer"'))
-    assert codes(keystore) == {"zenoh-session", "zenoh-setting"}
+    assert codes(keystore) == {"zenoh-session"}
 
 
 EDITS = {
-    "a wider name": ("0/chatter/*/*", "0/*/*/*", "lets enclave /a publish /* (any type): not signed"),
-    "everything": ("0/chatter/*/*", "0/**", "lets enclave /a publish /* (any type): not signed"),
-    "another name": ("0/chatter/*/*", "0/other/*/*", "does not let enclave /a publish /chatter (any type)"),
-    "another domain": ("0/chatter/*/*", "7/chatter/*/*", "publish /chatter (any type) in domain 7: not signed"),
-    "all domains": ("0/chatter/*/*", "*/chatter/*/*", "publish /chatter (any type) in all domains: not signed"),
-    "one message more": (
-        '["put", "reply"]', '["put", "reply", "delete"]', "publish /chatter (any type) (of that delete ingress): not",
-    ),
-    "one message less": (
-        '["put", "reply"]', '["put"]', "does not let enclave /a publish /chatter (any type) (of that reply ingress)",
-    ),
+    "a wider name": ("0/chatter/*/*", "0/*/*/*"),
+    "everything": ("0/chatter/*/*", "0/**"),
+    "another name": ("0/chatter/*/*", "0/other/*/*"),
+    "another domain": ("0/chatter/*/*", "7/chatter/*/*"),
+    "all domains": ("0/chatter/*/*", "*/chatter/*/*"),
+    "one message more": ('["put", "reply"]', '["put", "reply", "delete"]'),
+    "one message less": ('["put", "reply"]', '["put"]'),
     "the other direction": (
-        '["egress"], "messages": ["declare_subscriber"]', '["ingress"], "messages": ["declare_subscriber"]',
-        "lets enclave /a subscribe /chatter",
+        '["egress"], "messages": ["declare_subscriber"]',
+        '["ingress"], "messages": ["declare_subscriber"]',
     ),
-    "the name of a stranger": ("ros.a", "ros.zz", "admits the certificate name ros.zz (enclave /a): not signed"),
-    "one name more": ('["ros.a"]', '["ros.a", "ros.zz"]', "admits the certificate name ros.zz"),
-    "everybody": (', "cert_common_names": ["ros.a"]', "", "admits every client, whatever its certificate"),
-    "nobody": ('"ros.a"', '"ros.b"', "does not admit the certificate name ros.a (enclave /a): signed"),
-    "tokens in another's name": ("/NN/%a/", "/NN/%b/", "say that nodes of enclave /b are there: not signed"),
-    "a denial": ('"permission": "allow"', '"permission": "deny"', "enclave /a a denial: "),
-    "allowed unless denied": ('"deny"', '"allow"', 'default_permission is "allow" instead of "deny"'),
-    "no access control": ('"enabled": true,\n"default', '"enabled": false,\n"default', "enforces nothing"),
-    "gossip": ('"gossip": {"enabled": false}', '"gossip": {"enabled": true}', "ways past the router"),
-    "multicast": ('"multicast": {"enabled": false}', '"multicast": {"enabled": true}', "ways past the router"),
-    "no client certificates": ('"enable_mtls": true', '"enable_mtls": false', "without a certificate are let in"),
-    "links for ever": ('"close_link_on_expiration": true', '"close_link_on_expiration": false', "outlive their cert"),
-    "plain TCP": ('"protocols": ["tls"]', '"protocols": ["tls", "tcp"]', "connections without TLS"),
-    "another CA": ("identity_ca.cert.pem", "permissions_ca.cert.pem", "root_ca_certificate is"),
-    "an admin space": ('"adminspace": {\n"enabled": false', '"adminspace": {\n"enabled": true', "change the router"),
-    "a listener more": ('"endpoints": ["tls/', '"endpoints": ["tcp/[::]:7448", "tls/', "listen/endpoints is"),
-    "a router to follow": ('"connect": {\n"endpoints": []', '"connect": {\n"endpoints": ["tcp/evil:7447"]', "led to"),
-}  # fmt: skip
+    "the name of a stranger": ("ros.a", "ros.zz"),
+    "one name more": ('["ros.a"]', '["ros.a", "ros.zz"]'),
+    "everybody": (', "cert_common_names": ["ros.a"]', ""),
+    "nobody": ('"ros.a"', '"ros.b"'),
+    "tokens in another's name": ("/NN/%a/", "/NN/%b/"),
+    "a denial": ('"permission": "allow"', '"permission": "deny"'),
+    "allowed unless denied": ('"deny"', '"allow"'),
+    "no access control": ('"enabled": true,\n"default', '"enabled": false,\n"default'),
+    "gossip": ('"gossip": {"enabled": false}', '"gossip": {"enabled": true}'),
+    "multicast": ('"multicast": {"enabled": false}', '"multicast": {"enabled": true}'),
+    "no client certificates": ('"enable_mtls": true', '"enable_mtls": false'),
+    "links for ever": ('"close_link_on_expiration": true', '"close_link_on_expiration": false'),
+    "plain TCP": ('"protocols": ["tls"]', '"protocols": ["tls", "tcp"]'),
+    "another CA": ("identity_ca.cert.pem", "permissions_ca.cert.pem"),
+    "an admin space": ('"adminspace": {\n"enabled": false', '"adminspace": {\n"enabled": true'),
+    "a listener more": ('"endpoints": ["tls/', '"endpoints": ["tcp/[::]:7448", "tls/'),
+    "a router to follow": ('"connect": {\n"endpoints": []', '"connect": {\n"endpoints": ["tcp/evil:7447"]'),
+}
 
 
 @pytest.mark.parametrize("what", EDITS)
-def test_verify_tells_what_an_edited_router_does_otherwise(tmp_path: Path, what: str) -> None:
-    """In ROS words; the file as it was before is beside it, and good."""
-    keystore, (old, new, said) = filled(tmp_path / "ks", ("/a",)), EDITS[what]
+def test_verify_finds_a_router_that_was_edited(tmp_path: Path, what: str) -> None:
+    """The file as it was before is beside it, and good."""
+    keystore, (old, new) = filled(tmp_path / "ks", ("/a",)), EDITS[what]
     write_zenoh(keystore, ["/a"], options=FAST)
     assert codes(keystore) == set()
     file = keystore / "zenoh/router.json5"
     text = file.read_text()
-    edited = json.dumps(json.loads(text.replace(old, new)))
-    assert edited != json.dumps(json.loads(text)), "nothing was edited"
-    file.write_text(edited)
-    assert said in "\n".join(finding.message for finding in verify(keystore).findings)
+    assert old in text
+    file.write_text(text.replace(old, new))
+    (found,) = verify(keystore).findings
+    assert found.code == "zenoh-rules" and "does not enforce what is signed" in found.message
 
 
-def test_verify_tells_what_an_edited_session_does_otherwise(keystore: Path) -> None:
+def test_verify_finds_a_session_that_was_edited(keystore: Path) -> None:
     file = keystore / "enclaves/a/zenoh.json5"
     good = file.read_text()
-    for old, new, said in (
-        ('"client"', '"peer"', 'mode is "peer" instead of "client": its traffic may go past the router'),
-        (
-            '"verify_name_on_connect": true',
-            '"verify_name_on_connect": false',
-            "any enclave could play the router",
-        ),
-        ('"endpoints": []', '"endpoints": ["tcp/[::]:0"]', "can be reached without the router"),
-        ("enclaves/a/key.pem", "enclaves/b/key.pem", "another identity"),
-        ("tls/localhost", "tls/evil", "connect/endpoints is"),
-        ('"shared_memory": {"enabled": false}', '"shared_memory": {"enabled": true}', "past access control"),
+    for old, new in (
+        ('"client"', '"peer"'),
+        ('"verify_name_on_connect": true', '"verify_name_on_connect": false'),
+        ('"endpoints": []', '"endpoints": ["tcp/[::]:0"]'),
+        ("enclaves/a/key.pem", "enclaves/b/key.pem"),
+        ("tls/localhost", "tls/evil"),
+        ('"shared_memory": {"enabled": false}', '"shared_memory": {"enabled": true}'),
     ):
         assert old in good
         file.write_text(good.replace(old, new))
-        assert said in "\n".join(finding.message for finding in verify(keystore).findings)
+        assert codes(keystore) == {"zenoh-session"}
     file.write_text(good)
     assert codes(keystore) == set()
 
 
-def test_verify_tells_of_a_router_that_still_admits_a_revoked_certificate(keystore: Path) -> None:
+def test_verify_finds_a_router_that_still_admits_a_revoked_certificate(keystore: Path) -> None:
     file = keystore / "zenoh/router.json5"
     before = file.read_text()
     renew(keystore, ["/a"], options=RenewOptions(revoke_old=True, provisioning=options()))
     file.write_text(before)
-    told = [finding.message for finding in verify(keystore).findings]
-    assert "admits the certificate name ros.a (enclave /a): not signed" in told
-    assert "does not admit the certificate name ros.a-2 (enclave /a): signed" in told
+    assert codes(keystore) == {"zenoh-rules"}
     write_zenoh(keystore, [], options=FAST)
     assert codes(keystore) == set()
-
-
-def test_a_file_that_means_the_same_and_a_huge_difference_are_told_briefly(keystore: Path) -> None:
-    file = keystore / "zenoh/router.json5"
-    good = file.read_text()
-    file.write_text(json.dumps(json.loads(good)))
-    assert codes(keystore) == {"zenoh-rules"}
-    names = ", ".join(f'"0/extra_{number}/*/*"' for number in range(500))
-    file.write_text(good.replace('["0/chatter/*/*"]', f'["0/chatter/*/*", {names}]'))
-    found = verify(keystore).findings
-    assert len(found) < 60 and any(finding.code == "zenoh-more" for finding in found)
 
 
 def test_verify_finds_a_router_key_that_others_could_read_and_a_second_run_replaces_it(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import NamedTuple
 
 from enclave_common.words import counted, some_of
@@ -12,6 +12,7 @@ from enclave_launch.review.signed import as_signed
 from keystore.verification.finding import Finding
 
 _NAMED = 4
+_MISSING = "the {} has no permissions for enclave {}"
 
 
 class Ending(NamedTuple):
@@ -30,24 +31,21 @@ def against_keystore(
     """Compare the plan with a keystore.
 
     :param endings: what expires soon in the whole keystore; enclaves of other plans are ignored"""
-    found = [
-        diagnostic
-        for path in sorted(plan.enclaves)
-        for diagnostic in _enclave(plan, path, signed, "keystore")
-    ]
+    found = [diagnostic for path in sorted(plan.enclaves) for diagnostic in _enclave(plan, path, signed)]
     return [*found, *_expiring(plan, endings)]
 
 
 def against_router(
-    plan: PlanDocument, enforced: Mapping[str, frozenset[GrantedName]], findings: Iterable[Finding]
+    plan: PlanDocument, served: Collection[str], findings: Iterable[Finding]
 ) -> list[PlanFinding]:
     """Compare the enclaves on Zenoh with the configuration of the keystore's router.
 
+    :param served: the enclaves that the keystore has on Zenoh
     :param findings: of the files for Zenoh, which all enclaves on Zenoh share"""
     found = [
-        diagnostic
+        finding("keystore-enclave-missing", enclave, _MISSING.format("keystore's Zenoh router", enclave))
         for enclave in sorted(plan.on_zenoh & plan.enclaves.keys())
-        for diagnostic in _enclave(plan, enclave, enforced, "keystore's Zenoh router")
+        if enclave not in served
     ]
     for one in findings:
         diagnostic = finding("keystore-zenoh", one.place, f"{one.place}: {one.message}")
@@ -58,16 +56,15 @@ def against_router(
 
 
 def _enclave(
-    plan: PlanDocument, enclave: str, signed: Mapping[str, frozenset[GrantedName]], who: str
+    plan: PlanDocument, enclave: str, signed: Mapping[str, frozenset[GrantedName]]
 ) -> Iterator[PlanFinding]:
     if enclave not in signed:
-        text = f"the {who} has no permissions for enclave {enclave}"
-        yield finding("keystore-enclave-missing", enclave, text)
+        yield finding("keystore-enclave-missing", enclave, _MISSING.format("keystore", enclave))
         return
     wanted = as_signed(plan.enclaves[enclave])
     for code, grants, words in (
-        ("keystore-grants-more", signed[enclave] - wanted, f"beyond the plan the {who} lets"),
-        ("keystore-grants-less", wanted - signed[enclave], f"the {who} does not let"),
+        ("keystore-grants-more", signed[enclave] - wanted, "beyond the plan the keystore lets"),
+        ("keystore-grants-less", wanted - signed[enclave], "the keystore does not let"),
     ):
         if grants:
             text = f"{words} enclave {enclave} {some_of(sorted(grants), _NAMED)}"

@@ -19,18 +19,17 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 
 from enclave_common.command_line import TEXT, Option, one_of
-from enclave_common.terminal import json_text
+from enclave_common.terminal import json_text, warn
 from enclave_launch.errors import UsageError
 from enclave_launch.review.changes import Changes, EnclaveChange, changes
-from enclave_launch.review.document import GrantedName, PlanDocument, plan_from_document
+from enclave_launch.review.document import PlanDocument, plan_from_document
 from enclave_launch.review.signed import keystore_as_plan, plan_as_signed
 from enclave_launch.verb.secure_plan import plans, revisions
-from enclave_launch.verb.secure_plan.keystores import enforced_grants, signed_grants, zenoh_changes
+from enclave_launch.verb.secure_plan.keystores import on_zenoh, refuse_edited_files, signed_grants
 from enclave_launch.verb.secure_plan.plans import read_plan
-from keystore.add_ons import FileDifference
 
 WORDS: tuple[Option, ...] = (
     ("before BEFORE", TEXT, "PLAN.json | PATH | REVISION: | REVISION:PATH | KEYSTORE"),
@@ -47,7 +46,7 @@ OPTIONS = {
 def run(options: argparse.Namespace) -> int:
     """Print the difference. Returns 1 when rights grew."""
     before, after, as_installed = _both(options)
-    changed = changes(before, after)._replace(files=_files(options), as_installed=as_installed)
+    changed = changes(before, after)._replace(as_installed=as_installed)
     if options.format == "json":
         sys.stdout.write(json_text(changes_document(changed), indent=2) + "\n")
     else:
@@ -56,8 +55,11 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _both(options: argparse.Namespace) -> tuple[PlanDocument, PlanDocument, tuple[str, ...]]:
-    if _two_keystores(options):
-        return _keystore(options.before), _keystore(options.words[0]), ()
+    if len(options.words) == 1 and os.path.isdir(options.before) and os.path.isdir(options.words[0]):
+        before, after = _keystore(options.before), _keystore(options.words[0])
+        if before.on_zenoh or after.on_zenoh:
+            warn("files for Zenoh are not compared: secure-keystore verify finds those that were edited")
+        return before, after, ()
     if not os.path.isdir(options.before) and revisions.names_revision(options.before):
         both = revisions.plans_of(options.before, options.words, options)
         return plan_from_document(both.before), plan_from_document(both.after), both.as_installed
@@ -71,36 +73,14 @@ def _both(options: argparse.Namespace) -> tuple[PlanDocument, PlanDocument, tupl
 
 def _keystore_and(plan: PlanDocument, keystore: str) -> tuple[PlanDocument, PlanDocument]:
     """Return the keystore's plan and the wanted one; enclaves of other launches are none of this plan's business."""
+    refuse_edited_files(keystore)
     before, wanted = _keystore(keystore), plan_as_signed(plan)
     signed = {path: grants for path, grants in before.enclaves.items() if path in plan.enclaves}
-    if plan.on_zenoh:
-        signed.update(_enforced(signed, wanted, keystore))
     return keystore_as_plan(signed, plan, before.on_zenoh), wanted
 
 
-def _enforced(
-    signed: Mapping[str, frozenset[GrantedName]], wanted: PlanDocument, keystore: str
-) -> Iterator[tuple[str, frozenset[GrantedName]]]:
-    """Yield the grants of enclaves on Zenoh: those that both the signed permissions and the router's file have,
-    and those that only one has but the plan does not."""
-    enforced = enforced_grants(keystore)
-    for path in wanted.on_zenoh & signed.keys():
-        one, other = signed[path], enforced.get(path, frozenset())
-        yield path, (one & other) | ((one | other) - wanted.enclaves[path])
-
-
-def _two_keystores(options: argparse.Namespace) -> bool:
-    return len(options.words) == 1 and os.path.isdir(options.before) and os.path.isdir(options.words[0])
-
-
 def _keystore(keystore: str) -> PlanDocument:
-    return PlanDocument(signed_grants(keystore), (), (), frozenset(enforced_grants(keystore)))
-
-
-def _files(options: argparse.Namespace) -> tuple[FileDifference, ...]:
-    """Return changes of the files for Zenoh of two keystores, which hold more than names (types, domains,
-    protections)."""
-    return zenoh_changes(options.before, options.words[0]) if _two_keystores(options) else ()
+    return PlanDocument(signed_grants(keystore), (), (), on_zenoh(keystore))
 
 
 _NONE = "no enclave, node, permission or flow differs"
@@ -144,7 +124,6 @@ def changes_document(changed: Changes) -> dict[str, object]:
         "middlewares": [
             {"enclave": move.node, "before": move.before, "after": move.after} for move in changed.middlewares
         ],
-        "files": [each._asdict() for each in changed.files],
         "as_installed": list(changed.as_installed),
         "unknown": list(changed.unknown),
     }
@@ -170,7 +149,6 @@ def _lines(changed: Changes) -> Iterator[str]:
         yield from _enclave(change)
     yield from (f"+ flow {source} -> {target}" for source, target in changed.flows_added)
     yield from (f"- flow {source} -> {target}" for source, target in changed.flows_removed)
-    yield from (f"{'+' if each.more else '-'} {each.file}: {each.text}" for each in changed.files)
 
 
 def _enclave(change: EnclaveChange) -> Iterator[str]:

@@ -20,7 +20,7 @@ from enclave_launch.review.expectations import Expectations, read_expectations, 
 from enclave_launch.verb.secure_plan.keystores import (
     DEFAULT_MARGIN,
     endings,
-    enforced_grants,
+    on_zenoh,
     signed_grants,
     zenoh_findings,
 )
@@ -54,7 +54,7 @@ def _of_keystore(
     plan = plan_from_document(document)
     found = against_keystore(plan, signed_grants(keystore), endings(keystore, within, now))
     if plan.on_zenoh:
-        found += against_router(plan, enforced_grants(keystore), zenoh_findings(keystore, now))
+        found += against_router(plan, on_zenoh(keystore), zenoh_findings(keystore, now))
     return found
 
 

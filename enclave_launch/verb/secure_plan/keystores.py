@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from datetime import datetime
 from pathlib import Path
 
-from enclave_launch.errors import keystore_errors
+from enclave_launch.errors import ProvisionError, keystore_errors
 from enclave_launch.review.checks.keystore import Ending
 from enclave_launch.review.document import GrantedName
 from enclave_launch.review.signed import grants_of_rules
-from keystore.add_ons import FileDifference, zenoh_files
+from keystore.add_ons import zenoh_files
 from keystore.disk.view import keystore_at
 from keystore.formats.validity import iso, parse_duration, utc_now
 from keystore.steps.expiry import status
@@ -26,12 +26,10 @@ def signed_grants(keystore: Path | str) -> Mapping[str, frozenset[GrantedName]]:
         return {enclave: grants_of_rules(found.allowed) for enclave, found in granted(keystore).items()}
 
 
-def enforced_grants(keystore: Path | str) -> Mapping[str, frozenset[GrantedName]]:
-    """Map each enclave to what the configuration of the keystore's Zenoh router allows; empty without one."""
+def on_zenoh(keystore: Path | str) -> frozenset[str]:
+    """Return the enclaves that are on Zenoh."""
     with keystore_errors():
-        view = keystore_at(keystore)
-        found = zenoh_files().enforced(view) if view.has_zenoh_router else {}
-        return {enclave: grants_of_rules(rules) for enclave, rules in found.items()}
+        return frozenset(keystore_at(keystore).zenoh_enclaves())
 
 
 def zenoh_findings(keystore: Path | str, now: datetime | None = None) -> tuple[Finding, ...]:
@@ -41,13 +39,11 @@ def zenoh_findings(keystore: Path | str, now: datetime | None = None) -> tuple[F
         return tuple(zenoh_files().check(view, now or utc_now())) if view.has_zenoh_router else ()
 
 
-def zenoh_changes(before: Path | str, after: Path | str) -> tuple[FileDifference, ...]:
-    """Compare the files for Zenoh of two keystores."""
-    with keystore_errors():
-        views = keystore_at(before), keystore_at(after)
-        if not any(view.has_zenoh_router or view.zenoh_enclaves() for view in views):
-            return ()
-        return tuple(zenoh_files().compare(*views))
+def refuse_edited_files(keystore: Path | str) -> None:
+    """Raise ``ProvisionError`` if a file for Zenoh is not what follows from what is signed."""
+    for found in zenoh_findings(keystore):
+        if found.severity.fails:
+            raise ProvisionError(f"{keystore}: {found.place} {found.message}. {found.repair}")
 
 
 def endings(
