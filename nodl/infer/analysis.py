@@ -24,11 +24,11 @@ from nodl.infer.interpreter.calls import call_bound, call_function, instantiate
 from nodl.infer.interpreter.define import expect_methods, linearized
 from nodl.infer.interpreter.expressions import EXPRESSIONS
 from nodl.infer.interpreter.imports import execute_module
-from nodl.infer.interpreter.run import Arguments, BudgetExceeded, Call, Caller, Frame, Run, Tables
+from nodl.infer.interpreter.run import Arguments, BudgetExceeded, Call, Called, Caller, Frame, Run, Tables
 from nodl.infer.interpreter.statements import STATEMENTS
 from nodl.infer.models import foreign
 from nodl.infer.models.foreign import is_node_class
-from nodl.infer.net import unsettled_places
+from nodl.infer.net import unsettled_places, words_read
 from nodl.infer.program import Program, ProgramTarget, SourceModule
 from nodl.infer.results import interfaces_of
 from nodl.infer.start import LaunchKey
@@ -43,6 +43,7 @@ from nodl.infer.values import (
     External,
     ForeignMethod,
     FunctionValue,
+    HeapObject,
     Instance,
     ModuleValue,
     NativeMethod,
@@ -119,6 +120,7 @@ def settle(run: Run, at_end: bool = True) -> None:
     """Call all callbacks until neither state nor findings change; ``at_end``: the program itself has ended."""
     run.repeated += 1
     guards, run.guards = run.guards, ()
+    base, run.state.base = run.state.base, run.state.forks
     outermost = run.settle is not _no_settling
     run.settle = _no_settling
     expected: set[object] = set()
@@ -129,7 +131,7 @@ def settle(run: Run, at_end: bool = True) -> None:
         _expect_escaped(run, expected)
         before = run.state.version(), dict(run.callbacks)
         for callback, arity in before[1].items():
-            if run.called_back.get((callback, arity)) != run.state.version():
+            if _may_find_more(run, callback, arity):
                 if at_end:
                     run.state.forget()
                 _call_back(run, callback, arity, turn >= WIDEN_TEXTS_FROM)
@@ -138,6 +140,7 @@ def settle(run: Run, at_end: bool = True) -> None:
     else:
         run.findings.gap(SourceRef(run.main.path), "the callbacks do not settle; names may be missing")
     run.repeated -= 1
+    run.state.base = base
     run.guards = guards
     run.settle = settle_meanwhile if outermost else _no_settling
 
@@ -151,10 +154,33 @@ def _no_settling(run: Run) -> None:
     """Do nothing: callbacks are running already."""
 
 
+def _may_find_more(run: Run, callback: object, arity: int | None) -> bool:
+    """Return True unless nothing has changed that the functions in the latest call of this callback read."""
+    previous = run.called_back.get((callback, arity))
+    if previous is None:
+        return True
+    changed = run.state.changes(previous.stamp)
+    if not changed.isdisjoint(previous.containers) or not changed.isdisjoint(_unnamed_cells(run)):
+        return True
+    words = [words_read(each.module.source)[each.node] for each in previous.functions]
+    return bool(changed) and any(_READ_UNNAMED & each or not changed.isdisjoint(each) for each in words)
+
+
+def _unnamed_cells(run: Run) -> set[str | int]:
+    """Return what models read where the text does not name it."""
+    return {id(run.environment), *(id(node.cells) for node in run.findings.nodes)}
+
+
+_READ_UNNAMED = frozenset({"getattr", "vars", "globals", "locals", "__dict__"})
+
+
 def _call_back(run: Run, callback: object, arity: int | None, widen_texts: bool) -> None:
     """Call it once. What it made stands for what each of its calls makes."""
     run.born = []
-    run.called_back[callback, arity] = run.state.version()
+    run.state.fresh.clear()
+    HeapObject.looked_into = set()
+    run.running = set()
+    run.called_back[callback, arity] = Called(run.state.stamp, run.running, HeapObject.looked_into)
     run.state.repeatedly(_called_from_outside(run, callback, arity), widen_texts)
     for made in run.born:
         made.summary = True

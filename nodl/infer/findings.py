@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from nodl.infer.values import BOTTOM, FieldCells, Unknown, Value, join
+from nodl.infer.values import BOTTOM, ContentCells, Unknown, Value, join
 from nodl.node_interface import EndpointKind, QosPolicies
 from nodl.source_ref import SourceRef
 
@@ -39,7 +39,7 @@ class NodeRecord:
         self.arguments: Value = BOTTOM  # cli_args of the node
         self.use_global_arguments: Value = (True,)
         self.gaps: dict[tuple[SourceRef, str], None] = {}
-        self.cells = FieldCells()  # parameters that the program sets itself
+        self.cells = ContentCells()  # parameters that the program sets itself
 
     def __repr__(self) -> str:
         return f"NodeRecord({self.source})"

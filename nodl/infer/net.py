@@ -113,6 +113,15 @@ def _text_of(module: SourceModule) -> _Text:
     return _Text(reader.scopes, reader.classes, reader.imported)
 
 
+@functools.lru_cache(maxsize=256)
+def words_read(module: SourceModule) -> dict[ast.AST | None, frozenset[str]]:
+    """Return what each function of a module reads or calls, by the last names in its text."""
+    return {
+        scope.node: frozenset({*scope.names, *scope.attributes, *(place.name for place in scope.calls)})
+        for scope in _text_of(module).scopes
+    }
+
+
 class _Reader:
     """Walks a module's tree once."""
 
@@ -169,6 +178,8 @@ class _Reader:
         elif isinstance(node, ast.If) and last_name(node.test) == "TYPE_CHECKING":
             self.block(node.orelse, scope, (*around, node))
             return
+        elif isinstance(node, ast.AugAssign):
+            scope.attributes.add(last_name(node.target))
         elif isinstance(node, ast.AnnAssign):
             self._each([node.target, *([node.value] if node.value else [])], scope, (*around, node))
             return

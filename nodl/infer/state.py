@@ -10,13 +10,16 @@ from __future__ import annotations
 
 import ast
 import itertools
+import sys
 from collections.abc import Callable, Iterable
 from typing import Any, TypeVar
 
 from nodl.infer.values import (
     ABSENT,
     BOTTOM,
+    ITEMS,
     Cells,
+    ContentCells,
     FieldCells,
     HeapObject,
     Items,
@@ -41,6 +44,10 @@ class ProgramState:
         self.stamp = 0  # of the latest write; a branch that is undone takes it back
         self._stamps = itertools.count(1)
         self.learned = 0  # containers opened to foreign code, which no branch takes back
+        # Stamps of the latest writes: by name of a variable or field, and by ``id`` of the cells of a container.
+        self.changed: dict[str | int, int] = {}
+        self.base = sys.maxsize  # how many undecided branches surround a write that stays
+        self.fresh: set[int] = set()  # cells of objects made by the running callback: no other one has read them
         self.work = 0  # trail entries looked at
         self.depth = 0  # how many branches or loops surround the current point
         self.forks = 0  # how many of them are undecided: what happens there may not happen
@@ -54,12 +61,22 @@ class ProgramState:
         cells[key] = value
         if not local:
             self.stamp = next(self._stamps)
+            if self.forks <= self.base and id(cells) not in self.fresh:
+                by_name = isinstance(key, str) and key != ITEMS and type(cells) is not ContentCells
+                self.changed[str(key) if by_name else id(cells)] = self.stamp
 
     def store(self, obj: HeapObject, key: object, value: Value) -> None:
         """Write to an object: strong if it is one concrete object, else weak."""
         if obj.summary:
             value = join(obj.cells.get(key, BOTTOM), value)
         self.write(obj.cells, key, value)
+
+    def open(self, obj: HeapObject) -> None:
+        """Note that code which is not analysed got a container; no branch takes that back."""
+        obj.escaped = True
+        self.learned += 1
+        if id(obj.cells) not in self.fresh:
+            self.changed[id(obj.cells)] = next(self._stamps)
 
     def forget(self) -> None:
         """Drop the trail; only between top-level steps, when nobody holds a mark."""
@@ -68,6 +85,10 @@ class ProgramState:
     def version(self) -> tuple[int, int]:
         """Return the version: equal versions, equal state."""
         return self.stamp, self.learned
+
+    def changes(self, since: int) -> set[str | int]:
+        """Return what was written after the stamp ``since``, as in ``changed``."""
+        return {key for key, stamp in self.changed.items() if stamp > since}
 
     def mark(self) -> int:
         return len(self._trail)
@@ -302,6 +323,7 @@ class Allocations:
         if found is None:
             found = self._allocated[key] = make()
             self.born.append(found)
+            self.state.fresh.add(id(found.cells))
         else:
             found.summary = True  # what was stored before is still there: weak updates only add to it
         return found

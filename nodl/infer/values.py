@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Iterable
-from typing import TYPE_CHECKING, NamedTuple, TypeAlias
+from typing import TYPE_CHECKING, ClassVar, NamedTuple, TypeAlias
 
 from nodl.infer.text import Guard, Text, common_text, constant_text
 
@@ -72,6 +72,10 @@ class FieldCells(dict[object, Value]):
     """The cells of an instance; the state notes when one may be absent."""
 
 
+class ContentCells(FieldCells):
+    """The cells of a dictionary, or of something of a library: the program's text does not name their keys."""
+
+
 class External:
     """Something of a library that is not analysed, by its dotted path: ``rclpy.node.Node``."""
 
@@ -122,6 +126,8 @@ class HeapObject:
 
     __slots__ = ("cells", "escaped", "summary")
 
+    looked_into: ClassVar[set[int]] = set()  # cells of containers whose contents were asked for, by ``id``
+
     def __init__(self) -> None:
         self.cells: Cells = {}
         self.summary = False
@@ -159,6 +165,7 @@ class Sequence(HeapObject):
     @property
     def items(self) -> Items:
         """The contents; others may have changed what they were handed."""
+        HeapObject.looked_into.add(id(self.cells))
         items = self.cells[ITEMS][0]
         assert isinstance(items, Items)
         return Items(None, join(items.any_element(), ANY)) if self.escaped else items
@@ -177,16 +184,18 @@ class Dictionary(HeapObject):
 
     def __init__(self) -> None:
         super().__init__()
-        self.cells = FieldCells()
+        self.cells = ContentCells()
         self.kind = "dict"
 
     @property
     def is_open(self) -> bool:
         """It may hold keys that are not known."""
+        HeapObject.looked_into.add(id(self.cells))
         return self.escaped or bool(present(self.cells.get(OTHER, BOTTOM)))
 
     def entries(self) -> list[tuple[Key, Value, bool]]:
         """Return known keys in order, with their values and whether they are certainly there."""
+        HeapObject.looked_into.add(id(self.cells))
         return [
             (cell, present(value), not self.summary and ABSENT[0] not in value)
             for cell, value in self.cells.items()
@@ -195,6 +204,7 @@ class Dictionary(HeapObject):
 
     def held(self, constant: object) -> tuple[Value, bool]:
         """Return what a key may hold, and whether it is certainly there."""
+        HeapObject.looked_into.add(id(self.cells))
         value = self.cells.get(Key(constant), BOTTOM)
         return present(value), bool(value) and not self.summary and ABSENT[0] not in value
 
@@ -259,7 +269,7 @@ class Instance(HeapObject):
 
     def __init__(self, cls: ClassValue | External):
         super().__init__()
-        self.cells = FieldCells()
+        self.cells = FieldCells() if isinstance(cls, ClassValue) else ContentCells()
         self.cls = cls
         self.guards: tuple[Guard, ...] = ()
         self.node: NodeRecord | None = None

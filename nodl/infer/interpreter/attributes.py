@@ -21,6 +21,7 @@ from nodl.infer.values import (
     External,
     ForeignMethod,
     FunctionValue,
+    HeapObject,
     Instance,
     ModuleValue,
     NativeMethod,
@@ -44,6 +45,7 @@ def _of_instance(run: Run, obj: Instance, name: str, node: ast.AST, frame: Frame
     if name == "__dict__":
         return run.variables_of(node, frame)
     if isinstance(obj.cls, External):
+        HeapObject.looked_into.add(id(obj.cells))
         return present(foreign.instance_attribute(run, obj, obj.cls.path, name) if held is None else held)
     if held is not None:
         if not obj.summary and ABSENT[0] not in held:

@@ -153,6 +153,7 @@ def _run_body(run: Run, function: FunctionValue, cells: LocalCells, call: Call) 
     frame.forks = frame.loop_forks = run.state.forks
     frame.guards = len(run.guards)
     run.entries.setdefault(function.node, {})[call.node] = None
+    run.running.add(function)
     run.stack.append(function.node)
     mark = run.state.mark()
     node = function.node

@@ -22,11 +22,12 @@ from nodl.infer.values import (
     BoundMethod,
     ClassMethod,
     ClassValue,
+    ContentCells,
     Dictionary,
     External,
-    FieldCells,
     ForeignMethod,
     FunctionValue,
+    HeapObject,
     Instance,
     Items,
     LocalCells,
@@ -137,6 +138,14 @@ class Call:  # its fields are read so often that those of a named tuple would co
         return SourceRef(self.frame.module.source.path, getattr(self.node, "lineno", 0))
 
 
+class Called(NamedTuple):
+    """The latest call of a callback: the stamp of the state before it, what ran in it, the containers it looked into."""
+
+    stamp: int
+    functions: set[FunctionValue]
+    containers: set[int]
+
+
 # What one run may cost, counted and not timed so that it ends at the same statement on every machine: expressions
 # evaluated, values and elements looked at, cells joined after branches. One takes 2 to 6 microseconds.
 MAX_STEPS = 1_000_000
@@ -216,14 +225,15 @@ class Run(Allocations):
         self.guards: tuple[Guard, ...] = ()  # of parameters, that hold at the current point
         self.guards_at_end: tuple[Guard, ...] = ()  # of the latest block
         self.answers: dict[ast.expr, Value] = {}  # what the calls in tests gave the last time
-        self.environment = FieldCells()  # variables that the program sets itself
+        self.environment = ContentCells()  # variables that the program sets itself
         self.unrolled = 1  # turns of the unrolled loops around, multiplied
         self.awaited: set[ast.AST] = set()  # calls whose coroutine runs where it is called
         self.repeated = 0  # inside a loop or callback: one allocation may stand for many objects
         self.steps = 0
         self.limit = min(MAX_STEPS, MAX_STEPS_IN_VAIN)
         self.gave_up = False
-        self.called_back: dict[tuple[object, int | None], object] = {}  # the state before the latest call
+        self.called_back: dict[tuple[object, int | None], Called] = {}
+        self.running: set[FunctionValue] = set()  # functions that ran since the latest callback began
         self.without_value = 0  # inside bodies whose handlers catch a parameter that has no value
 
     # --- syntax -----------------------------------------------------------------------------------------
@@ -376,13 +386,12 @@ class Run(Allocations):
             return
         if atom not in self.escaped:
             self.escaped[atom] = self.state.mark()
-            self.state.learned += 1
 
     def _escape_container(self, obj: Sequence | Dictionary, opened: bool, objects: bool, depth: int) -> None:
         if opened and not obj.escaped and not (isinstance(obj, Sequence) and obj.kind == "tuple"):
-            obj.escaped = True
-            self.state.learned += 1
+            self.state.open(obj)
         if depth < 3 and len(obj.cells) < 64:
+            HeapObject.looked_into.add(id(obj.cells))
             for value in list(obj.cells.values()):
                 for atom in value:
                     inner = atom.any_element() if isinstance(atom, Items) else (atom,)
