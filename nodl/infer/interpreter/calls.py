@@ -41,7 +41,6 @@ from nodl.infer.values import (
 )
 
 MISSING = unknown("an argument that the caller does not give")
-MAX_ROUNDS = 8
 EARLIER = unknown("what a cached function gave before")
 LATER = unknown("what a generator gives later")
 
@@ -55,7 +54,7 @@ def call_function(run: Run, function: FunctionValue, call: Call) -> Value:
     cells = bind(run, function, call)
     run.called.setdefault(node)
     run.understood.add(call.node)
-    if node in run.stack:
+    if node in run.recursions or node in run.stack[run.since_recursion :]:
         return _recursive(run, function, cells, call)
     mark = run.state.mark()
     result = _run_body(run, function, cells, call)
@@ -115,8 +114,10 @@ def _recursive(run: Run, function: FunctionValue, cells: LocalCells, call: Call)
         return result_so_far  # nothing yet: this path ends in a call that has not come back so far
     recursion = run.recursions[function.node] = Recursion(cells)
     mark = run.state.mark()
+    before, run.since_recursion = run.since_recursion, len(run.stack)
 
     def turn() -> bool:
+        recursion.grew = False
         inner = LocalCells()
         inner.update(recursion.parameters)
         result = join(recursion.result, _run_body(run, function, inner, call))
@@ -124,13 +125,8 @@ def _recursive(run: Run, function: FunctionValue, cells: LocalCells, call: Call)
         recursion.result = result
         return True
 
-    for _ in range(MAX_ROUNDS):
-        recursion.grew = False
-        fixpoint(run, call.frame, turn)
-        if not recursion.grew:
-            break
-    else:
-        run.gap(call.node, call.frame, f"the recursion of {function.name} does not settle")
+    fixpoint(run, call.frame, turn, lambda: not recursion.grew)
+    run.since_recursion = before
     del run.recursions[function.node]
     run.state.join_seen(mark, mixed=True)
     return recursion.result

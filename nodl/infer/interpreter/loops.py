@@ -143,8 +143,10 @@ def _while(run: Run, node: ast.While, frame: Frame) -> _Turns:
     return _Turns(broken or not endless, not endless, _breaks(node))
 
 
-def fixpoint(run: Run, frame: Frame, turn: Callable[[], bool]) -> None:
-    """Run ``turn`` as something that happens any number of times, until it changes nothing."""
+def fixpoint(
+    run: Run, frame: Frame, turn: Callable[[], bool], settled: Callable[[], bool] = lambda: True
+) -> None:
+    """Run ``turn`` as something that happens any number of times, until it changes nothing and all is ``settled``."""
     run.repeated += 1
     run.state.depth += 1
     run.state.forks += 1
@@ -157,7 +159,7 @@ def fixpoint(run: Run, frame: Frame, turn: Callable[[], bool]) -> None:
             jumped = True
             frame.unsettled = ""
             run.state.join_seen(mark, mixed=True)
-        if run.state.join_head(mark, count >= WIDEN_TEXTS_FROM):
+        if run.state.join_head(mark, count >= WIDEN_TEXTS_FROM) and settled():
             break
     else:
         frame_source = frame.function.node if frame.function else frame.module.source.tree

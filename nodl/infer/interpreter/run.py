@@ -220,6 +220,7 @@ class Run(Allocations):
         self.functions: dict[tuple[object, ...], FunctionValue] = {}
         self.members: dict[tuple[ClassValue, str], Instance] = {}  # of enumerations
         self.recursions: dict[ast.AST, Any] = {}  # functions that are calling themselves
+        self.since_recursion = 0  # how many calls surround the innermost of these
         self.options = OptionDefaults()
         self.settle: Callable[[Run], None] = lambda run: None  # runs the callbacks; set by who drives the run
         self.guards: tuple[Guard, ...] = ()  # of parameters, that hold at the current point
