@@ -112,6 +112,8 @@ def _edit(text: str, method: str, arguments: tuple[str, ...]) -> Sequence[str]:
     if method == "part":
         index, parts = int(arguments[0]), text.split(arguments[1] if len(arguments) > 1 else None)
         return (parts[index],) if -len(parts) <= index < len(parts) else ()
+    if method == "after":
+        return (text.partition(arguments[0])[2],)
     if method == "range":
         first = int(arguments[0]) if arguments else 0
         return [str(number) for number in range(first, int(text))] if is_whole_number(text) else ()

@@ -198,6 +198,12 @@ def _common_prefix(texts: Sequence[str]) -> str:
     return low[:length]
 
 
+def may_be(text: Text, name: str) -> bool:
+    """Return True if the text, as far as it is known, can be ``name``."""
+    head, tail = _literal_end(text, 0), _literal_end(text, -1)
+    return name.startswith(head) and name.endswith(tail) and len(name) >= len(head) + len(tail)
+
+
 def _literal_end(text: TextAtom, index: int) -> str:
     piece = pieces_of(text)[index] if text else ""
     return piece if isinstance(piece, str) else ""

@@ -67,9 +67,11 @@ _HARMLESS_CLASSES = re.compile(
     r"|(?:std|Eigen|cv|boost|pcl|YAML|nlohmann|fmt|spdlog|tinyxml2|urdf|KDL|angles|grid_map|urcl|gtsam|ouster|dai|rs2|sl|asio|"
     r"websocketpp|gz|ignition|sdf|octomap|octomath|fcl|ceres|g2o|Sophus|torch|nvinfer1|zmq|google|absl|casadi|pinocchio|ompl|"
     r"mavconn|mavlink|zbar|open3d|tbb|Magick|xt|Ogre|libcamera|GeographicLib|proj|osqp|autoware_utils_(?:geometry|math|system)|"
-    r"cartographer|mcap|tl|gsl|CLI|toml|rtabmap|bosdyn)::.*"
+    r"cartographer|mcap|tl|gsl|CLI|toml|rtabmap|bosdyn|lcm)::.*"
     r"|controller_interface::(?!\w*ControllerInterface).*|hardware_interface::.*|semantic_components::.*"
-    r"|BT::(?:Tree|Blackboard|NodeConfig(?:uration)?)"
+    r"|BT::(?:Tree|Blackboard|NodeConfig(?:uration)?|StatusChangeLogger|StdCoutLogger|FileLogger2?|MinitraceLogger|"
+    r"SqliteLogger|TreeObserver|Groot2Publisher|PublisherZMQ)"
+    r"|nav2_util::LifecycleNode::(?:integer|floating_point)_range"
     r"|moveit::core::.*|moveit::planning_interface::MoveGroupInterface::\w+|robot_trajectory::.*|trajectory_processing::.*"
     r"|rclcpp::(?:Rate|WallRate|GenericRate|GenericTimer|WallTimer|\w*Handle|\w*Guard|Event|Clock|TimeSource|Time|Duration|QoS|\w*QoS|QoSInitialization|KeepLast|KeepAll|Logger|Parameter|"
     r"ParameterValue|NodeOptions|\w*Options|Context|TimerBase|CallbackGroup|MessageInfo|SerializedMessage|Serialization|"
@@ -83,6 +85,9 @@ _HARMLESS_CLASSES = re.compile(
     r"|\w+::(?:msg|srv|action)::.*|Q[A-Z]\w*|qreal|emit|Ui::.*|U(?:Mutex|ScopeMutex|Timer|Semaphore|Directory|File)"
     r"|(?:unsigned |signed |long |short )*(?:bool|int|float|double|char|void|long|short|unsigned|size_t|auto)?(?:\[\])?"
     r"|u?int(?:8|16|32|64)_t|uint|byte|va_list|FILE|pthread_\w+|timespec|timeval|sigset_t|[A-Z]"
+    r"|sockaddr(?:_\w+)?|in6?_addr|hostent|addrinfo|iovec|msghdr|pollfd|fd_set|termios2?|stat|dirent|epoll_event|itimerspec|"
+    r"rusage|passwd|ifreq|ifaddrs|can(?:fd)?_frame|can_filter|v4l2_\w+|input_event|js_event|tm|winsize|utsname|cpu_set_t"
+    r"|cu(?:da|blas|solver|rand|fft|sparse|dnn)[A-Z]\w*|(?:u?(?:char|short|int|long)|float|double|dim)[1-4]"
 )
 _HARMLESS_FUNCTIONS = re.compile(
     r"(?:std|Eigen|cv|boost|tf2|fmt|angles|YAML|nlohmann|pcl|rcpputils|rcutils|ament_index_cpp|KDL|cv_bridge|__builtin)::.*"

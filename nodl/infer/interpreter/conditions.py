@@ -21,6 +21,7 @@ from nodl.infer.text import (
     TextAtom,
     constant_text,
     input_of,
+    is_condition,
     is_one_of_several,
     make_text,
     pieces_of,
@@ -84,6 +85,59 @@ def truth(value: Value) -> bool | None:
     """Return ``bool(value)`` if all alternatives agree; ``None`` if they differ or one of them is open."""
     seen = {truth_of(atom) for atom in value}
     return seen.pop() if len(seen) == 1 else None
+
+
+_BUILT_IN: dict[str, type] = {
+    f"builtins.{kind.__name__}": kind for kind in (str, int, float, bool, bytes, list, tuple, set, dict)
+}
+_SEQUENCES: dict[str, type] = {kind.__name__: kind for kind in (list, tuple, set)}
+_GIVE_TEXT = EDITS | {"split", "part", "after", "key"}
+
+
+def is_instance(value: Value, classes: Value) -> bool | None:
+    """Return the outcome of ``isinstance`` for built-in classes; ``None``: not known."""
+    listed = classes[0] if len(classes) == 1 else None
+    items = listed.items.exact if isinstance(listed, Sequence) else (classes,)
+    wanted = tuple(
+        _BUILT_IN.get(each[0].path if len(each) == 1 and isinstance(each[0], External) else "")
+        for each in items or ()
+    )
+    kinds = {_kind_of(atom) for atom in value}
+    if not wanted or None in wanted or not kinds or None in kinds:
+        return None
+    outcomes = {issubclass(kind, tuple(filter(None, wanted))) for kind in kinds if kind is not None}
+    return outcomes.pop() if len(outcomes) == 1 else None
+
+
+def _kind_of(atom: object) -> type | None:
+    """Return the built-in class of a value; ``None``: not known. A parameter has the type that it is declared with."""
+    atom = constant_text(atom)
+    if isinstance(atom, CONSTANTS):
+        return type(atom)
+    if isinstance(atom, Sequence):
+        return _SEQUENCES.get(atom.kind)
+    if isinstance(atom, Dictionary):
+        return dict if atom.kind == "dict" else None
+    if not isinstance(atom, Text):
+        return None
+    pieces = [piece for piece in atom.pieces if not (isinstance(piece, Input) and is_condition(piece))]
+    asked = pieces[0] if len(pieces) == 1 else None
+    if not isinstance(asked, Input) or (asked.edits and asked.edits[-1][0] in _GIVE_TEXT):
+        return str if asked is None or isinstance(asked, Input) else None
+    if asked.edits or not isinstance(asked.owner, NodeRecord) or asked.name in asked.owner.loose:
+        return None
+    kinds = {_kind_of_default(default, asked.item) for default in asked.owner.default(asked.name)}
+    return kinds.pop() if len(kinds) == 1 else None
+
+
+def _kind_of_default(default: object, item: int | str | None) -> type | None:
+    """Return the class of a parameter with this default, or of an element of it. rclpy gives only texts as a list."""
+    if not isinstance(default, Sequence):
+        return _kind_of(default) if item is None else None
+    elements = default.items.any_element()
+    if default.kind != "list" or not elements or any(_kind_of(each) is not str for each in elements):
+        return None
+    return list if item is None else str
 
 
 def decide(run: Run, test: ast.expr, frame: Frame) -> bool | None:

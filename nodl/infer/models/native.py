@@ -95,6 +95,11 @@ def _text_method(run: Run, text: TextAtom, name: str, call: Call) -> Value:
     if name == "split" and divided is not None and all(isinstance(each, str) for each in arguments):
         part = with_edit(divided, "split", tuple(str(each) for each in arguments))
         return run.sequence(call.node, "list", Items(None, (part,)))
+    if name == "partition" and divided is not None and len(arguments) == 1 and isinstance(arguments[0], str):
+        separator = arguments[0]
+        before = with_edit(divided, "part", ("0", separator))
+        after = with_edit(divided, "after", (separator,))
+        return run.tuple_of(((before,), (separator, ""), (after,)))
     symbolic = edited(text, name, tuple(argument for argument in arguments if isinstance(argument, str)))
     return unknown(f"the result of str.{name}()") if symbolic is None else (symbolic,)
 

@@ -5,14 +5,16 @@ from __future__ import annotations
 import os.path
 from collections.abc import Callable
 from functools import partial
+from itertools import chain
 
-from nodl.infer.interpreter.define import expect_methods, new_instance, program_classes
+from nodl.infer.interpreter.conditions import is_instance
+from nodl.infer.interpreter.define import expect_methods, linearized, new_instance, program_classes
 from nodl.infer.interpreter.elements import copy_dictionary, elements, store_attribute
 from nodl.infer.interpreter.formatting import as_texts, is_whole_number, text_value
 from nodl.infer.interpreter.imports import import_module
 from nodl.infer.interpreter.run import Arguments, Call, Model, Run
 from nodl.infer.models import options
-from nodl.infer.text import Input, concatenations, input_of, make_text, with_edit
+from nodl.infer.text import Input, Text, concatenations, input_of, make_text, may_be, with_edit
 from nodl.infer.values import (
     ABSENT,
     ANY,
@@ -34,7 +36,9 @@ from nodl.infer.values import (
     Key,
     ModuleValue,
     Partial,
+    PropertyValue,
     Value,
+    boolean,
     constant_strings,
     join,
     join_all,
@@ -228,9 +232,39 @@ def _setattr(run: Run, call: Call) -> Value:
         store_attribute(run, owner, name, value, call.node, call.frame)
     if len(known) < len(names):
         run.escape_value(value)
-        if any(isinstance(atom, HeapObject) for atom in owner):
-            run.gap(call.node, call.frame, "an attribute whose name is made at run time is set")
+        for atom in owner:
+            if isinstance(atom, Instance) and _only_holds(atom):
+                _set_any(run, atom, names, value)
+            elif isinstance(atom, HeapObject):
+                run.gap(call.node, call.frame, "an attribute whose name is made at run time is set")
     return NONE
+
+
+def _only_holds(obj: Instance) -> bool:
+    """Return True for an object of the program alone, that is no node and says nothing of how attributes are set."""
+    if not isinstance(obj.cls, ClassValue) or obj.node is not None:
+        return False
+    bases = linearized(obj.cls)
+    return all(
+        "__setattr__" not in base.cells
+        and not any(isinstance(each, PropertyValue) for each in chain(*base.cells.values()))
+        if isinstance(base, ClassValue)
+        else isinstance(base, External) and base.path == "builtins.object"
+        for base in bases
+    )
+
+
+def _set_any(run: Run, obj: Instance, names: Value, value: Value) -> None:
+    """Let each attribute of ``obj``, and what its class has, be ``value``, whose name may be one of ``names``."""
+    assert isinstance(obj.cls, ClassValue)
+    patterns = [atom for atom in names if isinstance(atom, Text)]
+    unknown_names = any(not isinstance(atom, str | Text) for atom in names)
+    of_class = (name for base in program_classes(obj.cls) for name in base.cells)
+    for name in dict.fromkeys((*obj.cells, *of_class)):
+        if not isinstance(name, str) or name.startswith(("[", "__")):
+            continue
+        if unknown_names or any(may_be(pattern, name) for pattern in patterns):
+            run.state.store(obj, name, join(obj.cells.get(name, ABSENT), value))
 
 
 def _type(run: Run, call: Call) -> Value:
@@ -299,7 +333,8 @@ _BUILT_IN: dict[str, Callable[[Run, Call], Value]] = {
         "getattr": _getattr,
         "setattr": _setattr,
         "type": _type,
-        **dict.fromkeys(("any", "all", "callable", "isinstance", "hasattr"), lambda run, call: BOOLEAN),
+        **dict.fromkeys(("any", "all", "callable", "hasattr"), lambda run, call: BOOLEAN),
+        "isinstance": lambda run, call: boolean(is_instance(call.args.at(0) or ANY, call.args.at(1) or ANY)),
         **dict.fromkeys(("eval", "exec", "compile"), _dynamic_code),
         "__import__": import_dynamic,
         **dict.fromkeys(("vars", "globals", "locals"), _variables),

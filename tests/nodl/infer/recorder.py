@@ -26,6 +26,10 @@ ROUNDS = 3  # how often a spin calls every callback
 _STATE_SERVICES = ("get_logger_levels", "set_logger_levels")
 
 
+class InvalidParameterTypeError(Exception):
+    """rclpy's ``InvalidParameterTypeException``: a parameter keeps the type that it is declared with."""
+
+
 class EndOfRun(BaseException):
     """The program would go on for ever."""
 
@@ -183,8 +187,14 @@ def _node_class(recorder: Recorder) -> type:
         def add_on_set_parameters_callback(self, callback: Any) -> None:
             recorder.callbacks.append(lambda: callback([]))
 
-        def declare_parameter(self, name: str, value: object = None, *_: object, **__: object) -> Parameter:
-            self._parameters[name] = Parameter(name, None, self._overrides.get(name, value))
+        def declare_parameter(
+            self, name: str, value: object = None, descriptor: object = None, **_: object
+        ) -> Parameter:
+            given = self._overrides.get(name, value)
+            typed = type(value) in (bool, int, float, str, list) and descriptor is None
+            if typed and type(given) is not type(value):
+                raise InvalidParameterTypeError
+            self._parameters[name] = Parameter(name, None, given)
             return self._parameters[name]
 
         def declare_parameters(self, namespace: str, parameters: Any, *_: object) -> list[Parameter]:
@@ -311,7 +321,7 @@ def record(program: Path, parameters: dict[str, object], seed: int = 0) -> set[F
         sys.modules["__main__"] = main
         try:
             exec(compile(program.read_text(), str(program), "exec"), vars(main))
-        except (EndOfRun, SystemExit):
+        except (EndOfRun, SystemExit, InvalidParameterTypeError):
             pass
         finally:
             sys.modules["__main__"] = before

@@ -108,6 +108,39 @@ CASES: dict[str, tuple[str, list[str]]] = {
     "recursion": ("def f(n):\n    return 'a' if n == 0 else f(n - 1)\nself.P(f(3))", ["a"]),
     "generator": ("def f():\n    yield 'a'\n    yield 'b'\nfor x in f():\n    self.P(x)", ["?", "a", "b"]),
     "getattr": ("self.a = 'x'\nself.P(getattr(self, 'a'))", ["x"]),
+    "setattr by a name known in part": (
+        "class S:\n    a_error = 'a'\n    topic = 'b'\n    def run(self): return 'c'\ns = S()\n"
+        "setattr(s, sys.argv[1] + '_error', 'x')\nself.P(s.a_error); self.P(s.topic + s.run())",
+        ["a", "bc", "x"],
+    ),
+    "setattr by any name": (
+        "class S:\n    def __init__(self): self.topic = 'b'\ns = S()\nsetattr(s, sys.argv[1], 'x')\nself.P(s.topic)",
+        ["b", "x"],
+    ),
+    "a copy of __dict__": (
+        "class S:\n    def __init__(self): self.topic = 'b'\ns = S()\nd = dict(s.__dict__)\n"
+        "self.P(s.topic); self.P(d['topic'])",
+        ["?", "b"],
+    ),
+    "isinstance": ("x = ['a']\nself.P('a' if isinstance(x, (list, tuple)) else 'b')", ["a"]),
+    "isinstance of a parameter": (
+        "x = self.declare_parameter('x', ['a']).value\nself.P('a' if isinstance(x, str) else 'b')", ["b"]
+    ),
+    "isinstance of an element of a parameter": (
+        "for x in self.declare_parameter('x', ['a']).value:\n    self.P('a' if isinstance(x, str) else 'b')", ["a"]
+    ),
+    "isinstance of a parameter without a type": (
+        "x = self.declare_parameter('x').value\nself.P('a' if isinstance(x, str) else 'b')", ["a", "b"]
+    ),
+    "isinstance of a parameter whose descriptor may leave its type open": (
+        "x = self.declare_parameter('x', 'a', D(dynamic_typing=True)).value\n"
+        "self.P('a' if isinstance(x, str) else 'b')",
+        ["a", "b"],
+    ),
+    "isinstance of a class of another library": (
+        "import numpy\nx = ['a']\nself.P('a' if isinstance(x, (list, numpy.ndarray)) else 'b')", ["a", "b"]
+    ),
+    "partition": ("self.P('a:b:c'.partition(':')[2])", ["b:c"]),
     "setattr": ("setattr(self, 'a', 'x')\nself.P(self.a)", ["x"]),
     "walrus": ("if (x := 'a'):\n    self.P(x)", ["a"]),
     "match": ("match sys.argv[1]:\n    case 'x':\n        self.P('a')\n    case _:\n        self.P('b')", ["a", "b"]),
@@ -155,6 +188,21 @@ CASES: dict[str, tuple[str, list[str]]] = {
 def test_names_flow(case: str, node_body: NodeBody) -> None:
     body, expected = CASES[case]
     assert node_body(body) == expected
+
+
+def test_what_partition_makes_of_a_parameter(infer: Infer) -> None:
+    (node,) = infer(
+        """
+        import rclpy
+        from std_msgs.msg import String
+        node = rclpy.create_node('n')
+        a, _, b = node.declare_parameter('x', 'a:b:c').value.partition(':')
+        node.create_publisher(String, a, 1)
+        node.create_publisher(String, b, 1)
+        """
+    ).nodes
+    assert [each.name.fill({}).text for each in node.endpoints] == ["a", "b:c"]
+    assert [each.name.fill({"x": "one"}).text for each in node.endpoints] == ["one", ""]
 
 
 def test_default_of_an_option_is_kept(infer: Callable[..., object], node_body: NodeBody) -> None:

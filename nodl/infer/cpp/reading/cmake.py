@@ -15,7 +15,7 @@ from pathlib import Path
 
 from enclave_common.files import read_text
 
-_SOURCE_SUFFIXES = (".cpp", ".cc", ".cxx", ".c++", ".C")
+_SOURCE_SUFFIXES = (".cpp", ".cc", ".cxx", ".c++", ".C", ".cu")
 _EXECUTABLES = frozenset({
     "add_executable", "ament_auto_add_executable", "rclcpp_add_executable", "qt5_add_executable", "qt6_add_executable",
     "qt_add_executable",

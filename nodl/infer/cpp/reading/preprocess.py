@@ -38,11 +38,14 @@ _BARE_MACRO = re.compile(r"[ \t]*([A-Z][A-Z0-9_]{2,})\s*(\([^()\n]*\))?[ \t]*;?[
 _ATTRIBUTE = re.compile(
     r"\[\[[^\[\]]*\]\]|__attribute__\s*\(\([^()]*(?:\([^()]*\))?[^()]*\)\)|\balignas\s*\([^()]*\)|\b__declspec\s*\([^()]*\)"
 )
+_CUDA = re.compile(
+    r"\b__(?:global|device|host|shared|constant|managed|forceinline|noinline|restrict)__\b|<<<[^;{}]*?>>>"
+)
 _HARMLESS_MACROS = re.compile(
     r"(?:Q_|RCLCPP_|RCUTILS_|RCPPUTILS_|PLUGINLIB_|CLASS_LOADER_|EIGEN_|BOOST_|TEST|CERES_|CREATE_LOGGER|"
     r"GENERATE_|COMPOSITION_|YAML_|TRACETOOLS_|TRACEPOINT|ROSIDL_|DIAGNOSTIC_|NOLINT|POINT_CLOUD_REGISTER|G2O_|PCL_ADD_|"
     r"(?:ROS|U|RVIZ_COMMON_LOG|LOG|SPDLOG)_?(?:DEBUG|INFO|WARN|WARNING|ERROR|FATAL|ASSERT)(?:_STREAM)?(?:_THROTTLE|_ONCE|_COND|_NAMED)?\b|"
-    r"ASSERT_|EXPECT_|MOVEIT_(?:CLASS|STRUCT)_FORWARD)"
+    r"ASSERT_|EXPECT_|MOVEIT_(?:CLASS|STRUCT)_FORWARD|FD_(?:SET|CLR|ZERO)\b|CPU_(?:SET|CLR|ZERO)\b)"
 )  # fmt: skip
 
 
@@ -243,6 +246,7 @@ class _Pass:
         """Expand macros, and blank what only the compiler and linker read, such as export macros."""
         source = _EXPORT.sub(_blank, source)
         source = _ATTRIBUTE.sub(_blank, source)
+        source = _CUDA.sub(_blank, source)
         source = _DISAMBIGUATOR.sub(_blank, source)
         source = _BEFORE_CLASS_NAME.sub(self._class_macro, source)
         return self._bare_macros(source)

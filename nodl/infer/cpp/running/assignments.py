@@ -173,6 +173,13 @@ def _assign_result(run: Machine, call: Node, value: Value, frame: Frame) -> None
         for atom, model in zip(holders, models, strict=True):
             if model is not None:
                 model(run, Call(call, frame, [value], receiver=atom))
+    elif (
+        owner is not None
+        and name == "at"
+        and holders
+        and all(isinstance(atom, Seq | Map) for atom in holders)
+    ):
+        _write_element(run, call, owner, field_of(call, "arguments"), value, frame)
     elif _is_of_numbers(run, owner or function, frame):
         return
     elif any(isinstance(atom, Text | Seq | Map | Param) for atom in value) or _gives_reference(run, function):
@@ -279,9 +286,14 @@ def _assign_field(run: Machine, node: Node, value: Value, frame: Frame) -> None:
 
 def _assign_element(run: Machine, node: Node, value: Value, frame: Frame) -> None:
     container = field_of(node, "argument")
-    keys = [run.evaluate(child, frame) for child in children(field_of(node, "indices"))]
-    if container is None:
-        return
+    if container is not None:
+        _write_element(run, node, container, field_of(node, "indices"), value, frame)
+
+
+def _write_element(
+    run: Machine, node: Node, container: Node, indices: Node | None, value: Value, frame: Frame
+) -> None:
+    keys = [run.evaluate(child, frame) for child in children(indices)]
     found: list[Value] = []
     for atom in run.evaluate(container, frame):
         if run.methods_of(atom, "operator[]"):

@@ -357,10 +357,20 @@ def construct(
 
 
 def _in_used_namespace(run: Machine, kind: Type, frame: Frame) -> Type:
-    """Return the class of the table that ``using namespace`` brings in under a name without one."""
+    """Return the class of the table, or of Eigen, that ``using namespace`` brings in under a name without one."""
     found = (f"{each}::{kind.name}" for each in run.names.used_namespaces(frame.file.file))
-    known = [name for name in found if name in LIBRARY_CLASSES] if "::" not in kind.name else []
+    known = (
+        [name for name in found if name in LIBRARY_CLASSES or _EIGEN.fullmatch(name)]
+        if "::" not in kind.name
+        else []
+    )
     return kind._replace(name=known[0]) if len(known) == 1 else kind
+
+
+_EIGEN = re.compile(
+    r"Eigen::(?:(?:Sparse|Diagonal)?Matrix\w*|(?:Row)?Vector\w*|Array\w*|Quaternion\w*|(?:Affine|Isometry|Translation)\w+|"
+    r"AngleAxis\w*|Transform)"
+)
 
 
 def _unmodelled(run: Machine, kind: Type, node: Node, frame: Frame, deliberate: bool) -> None:

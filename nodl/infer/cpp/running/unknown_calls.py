@@ -65,7 +65,12 @@ def unknown_call(
     """Handle a function of a library that is not modelled."""
     last = name.rpartition("::")[2]
     harmless = is_harmless_function(name) or (receiver is not None and receiver.type.name in LIBRARY_CLASSES)
+    owner = name.rpartition("::")[0]
+    if "::" in owner and is_harmless_class(owner):
+        harmless = True
     if receiver is not None and receiver.foreign_base and is_harmless_class(receiver.foreign_base):
+        harmless = True
+    if receiver is not None and _is_of_qt(run, receiver) and not CREATES.fullmatch(last):
         harmless = True
     if CREATES.fullmatch(last) and not harmless:
         run.handle(node, frame)
@@ -83,6 +88,12 @@ def unknown_call(
     if receiver is None or receiver.cls is not None:
         _may_be_written(run, name, given, frame)
     return unknown(f"the result of {name}()")
+
+
+def _is_of_qt(run: Machine, receiver: Obj) -> bool:
+    """Return whether a class of Qt is among its bases, whose methods know nothing of ROS: ``connect``."""
+    bases = (base for cls in run.names.ancestry(receiver.cls) for base in cls.bases)
+    return any(re.fullmatch(r"Q[A-Z]\w*", base.rpartition("::")[2]) for base in bases)
 
 
 def _may_be_written(run: Machine, name: str, given: Sequence[Node], frame: Frame) -> None:

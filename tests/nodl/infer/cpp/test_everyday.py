@@ -136,6 +136,15 @@ FOUND = {
         f'void go() {{ n->{PUB}("a", 1); }} }};',
         ["a"],
     ),
+    "an element by at": (
+        f'std::vector<std::string> v{{"a", "b"}}; v.at(1) = "c"; std::map<std::string, std::string> m{{{{"k", "d"}}}}; '
+        f'm.at("k") = "e"; {PUB}(v[0], 1); {PUB}(v[1], 1); {PUB}(m["k"], 1);',
+        "", ["a", "c", "e"],
+    ),
+    "structures and macros of POSIX": (
+        f'sockaddr_in address; fd_set set; FD_ZERO(&set);\nFD_SET(1, &set);\n{PUB}("a", 1);', "struct sockaddr_in a_;",
+        ["a"],
+    ),
     "objects in closures": (
         'C a; a.t = "a"; auto copy = [a]() { return a.t; }; auto same = [&a]() { return a.t; }; a.t = "b"; '
         f'{PUB}("copy_" + copy(), 1); {PUB}("same_" + same(), 1);',
@@ -525,3 +534,60 @@ def test_members_may_be_defined_under_a_name_that_a_using_declaration_brings_in(
     assert gaps(system) == []
     assert [str(node.name) for node in system.nodes] == ["wrapper"]
     assert sorted(names(system)) == ["a", "b"]
+
+
+def test_a_class_of_eigen_may_be_named_without_its_namespace(tmp_path: Path) -> None:
+    source = '#include "eigen/all.hpp"\n' + in_class("Vector3d v(1, 2, 3);", "SparseMatrix<double> * m_;")
+    assert not gaps(infer(tmp_path, "using namespace Eigen;\n" + source))
+    assert any("Vector3d is not in reach" in why for why in gaps(infer(tmp_path / "without", source)))
+    strange = "using namespace Eigen;\n" + source.replace("Vector3d", "Strange")
+    assert any("Strange is not in reach" in why for why in gaps(infer(tmp_path / "strange", strange)))
+
+
+def test_kernels_of_cuda_are_read_as_cpp(tmp_path: Path) -> None:
+    kernel = (
+        "__global__ void add(const float * __restrict__ x) {}\n"
+        "Engine::Engine(rclcpp::Node *) { cudaStream_t stream; add<<<1, 256, 0, stream>>>(nullptr); }\n"
+    )
+    files = {
+        "src/main.cpp": '#include "engine.hpp"\n' + in_class(f'{PUB}("a", 1); Engine engine(this);'),
+        "src/engine.hpp": "struct Engine { explicit Engine(rclcpp::Node * n); };\n",
+        "src/engine.cu": '#include "engine.hpp"\n' + kernel,
+    }
+    cmake = "add_executable(node src/main.cpp{})"
+    system = infer_paths([package(tmp_path / "demo", files, cmake.format(" src/engine.cu"))])
+    assert (names(system), gaps(system)) == (["a"], [])
+    without = infer_paths([package(tmp_path / "without", files, cmake.format(""))])
+    assert any("constructor of Engine is not in reach" in why for why in gaps(without))
+
+
+def test_methods_of_qt_know_nothing_of_ros(tmp_path: Path) -> None:
+    source = in_class(f'{PUB}("a", 1); this->connect(1, 2, this); this->strange(this);')
+    both = source.replace("public rclcpp::Node", "public QWidget, public rclcpp::Node")
+    assert not gaps(infer(tmp_path, both))
+    assert any("handed to Demo::strange()" in why for why in gaps(infer(tmp_path / "without", source)))
+
+
+def test_a_loader_in_a_template_loads_the_plugins_that_the_program_names(tmp_path: Path) -> None:
+    """Plugins of another base are not read: they are none of its."""
+    source = in_class(
+        'loader_.load("p::Speaker", this);',
+        "Loader<p::Base> loader_;",
+        '#include "p/base.hpp"\ntemplate <typename T> struct Loader {\n'
+        '  pluginlib::ClassLoader<T> all{"p", "p::Base"};\n'
+        "  void load(std::string name, rclcpp::Node * node) { all.createSharedInstance(name)->start(node); }\n};\n",
+    )
+    package(tmp_path / "demo", {"src/main.cpp": source}, depends=("rclcpp", "p"))
+    speaker = (
+        '#include "p/base.hpp"\nnamespace p { class Speaker : public Base { '
+        f'void start(rclcpp::Node * n) override {{ n->{PUB}("a", 1); }} }}; }}\n'
+        "PLUGINLIB_EXPORT_CLASS(p::Speaker, p::Base)\n"
+    )
+    files = {
+        "include/p/base.hpp": "namespace p { class Base { public: virtual void start(rclcpp::Node * n) = 0; }; }\n",
+        "src/speaker.cpp": HEAD + speaker,
+        "plugins.xml": '<library path="p"><class type="p::Speaker" base_class_type="p::Base"/></library>',
+    }
+    cmake = "add_library(p src/speaker.cpp)\npluginlib_export_plugin_description_file(p plugins.xml)"
+    package(tmp_path / "p", files, cmake)
+    assert endpoints(infer_paths([tmp_path])) == {("publisher", "a")}
