@@ -1,7 +1,7 @@
 """The index of a folder of documents: an index file, or a scan of the folder.
 
 The index of the library that ships with us is ``index.json`` beside the documents; a test holds it to them, and
-``secure-nodl library index`` writes it anew. Folders of users are scanned: they are small, and change.
+``tools/library`` writes it. Folders of users are scanned: they are small, and change.
 """
 
 from __future__ import annotations
@@ -66,17 +66,6 @@ def scanned(folder: str) -> tuple[IndexEntry, ...]:
     return tuple(_entry(folder, document) for document in found.values())
 
 
-def index_text(folder: str) -> str:
-    """Return what the index of ``folder`` must say."""
-    fields = ("programs", "classes", "versions", "transport")
-    entries = {
-        entry.file: {name: getattr(entry, name) for name in fields if getattr(entry, name)}
-        for entry in scanned(folder)
-    }
-    lines = (f"  {json.dumps(file)}: {json.dumps(entry)}" for file, entry in entries.items())
-    return "{\n" + ",\n".join(lines) + "\n}\n"
-
-
 def _entry(folder: str, document: LibraryDocument) -> IndexEntry:
     return IndexEntry(
         os.path.relpath(document.file, folder).replace(os.sep, "/"),
@@ -111,10 +100,3 @@ def _misplaced(folder: str, file: str) -> NoDLError:
         f"{os.path.join(folder, file)}: a library has documents of NoDL v2 as PACKAGE/NAME{SUFFIX}, "
         f"or PACKAGE__NAME{SUFFIX} as --learn writes them; name any other file with --nodl"
     )
-
-
-def write_index(folder: str) -> None:
-    """Write the index file of a library folder anew."""
-    text = index_text(folder)
-    with open(os.path.join(folder, INDEX), "w", encoding="utf-8") as stream:
-        stream.write(text)

@@ -1,4 +1,4 @@
-"""Look into the library of manifests of widely used packages: list, show, find, check."""
+"""Look into the library of manifests of widely used packages: list, show, check."""
 
 from __future__ import annotations
 
@@ -6,13 +6,11 @@ import argparse
 import sys
 from collections.abc import Iterable, Iterator
 
-from enclave_common.command_line import FLAG, TEXT, TEXTS, Option
+from enclave_common.command_line import TEXT, TEXTS, Option
 from enclave_common.terminal import printable
 from nodl.ament_index import package_version, search_prefixes
-from nodl.library import SHIPPED, Hit, Library
-from nodl.library.contents import contents_text, keep_agreements, read_agreements
+from nodl.library import Hit, Library
 from nodl.library.document import LibraryDocument
-from nodl.library.index import write_index
 from nodl.verb import PREFIX, Verb
 from nodl.verb.show import description_lines
 
@@ -27,11 +25,7 @@ PROGRAM: tuple[Option, ...] = (
 )
 CHECK: tuple[Option, ...] = (
     ("sources DIR", TEXT, "a folder with packages, such as a workspace's src"),
-    ("--keep", FLAG, "write the verdicts beside the shipped documents (for maintainers)"),
     LIBRARY,
-)
-INDEX: tuple[Option, ...] = (
-    ("folder DIR", {"nargs": "?", "default": SHIPPED}, "default: the one that ships with us"),
 )
 
 
@@ -63,13 +57,6 @@ def _show(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _where(arguments: argparse.Namespace) -> int:
-    hit = _found(arguments)
-    if hit is not None:
-        print(hit.document.file)
-    return 1 if hit is None else 0
-
-
 def _found(arguments: argparse.Namespace) -> Hit | None:
     library = Library(arguments.library)
     version = package_version(arguments.package, search_prefixes(arguments.prefix))
@@ -86,6 +73,7 @@ def _evidence(document: LibraryDocument) -> Iterable[str]:
     yield f"  {'known from':14} {evidence.how}: {evidence.repository} {evidence.version} ({evidence.commit})"
     if document.versions:
         yield f"  {'holds for':14} {', '.join(f'{d} {series}' for d, series in document.versions.items())}"
+    yield f"  {'file':14} {document.file}"
     for text in evidence.missing:
         yield f"  {'left out':14} {text}"
     for text in evidence.differs:
@@ -101,28 +89,12 @@ def _check(arguments: argparse.Namespace) -> int:
     if not verdicts:
         print(f"no package of the library is in {arguments.sources}", file=sys.stderr)
         return 1
-    if arguments.keep:
-        compared = (verdict for verdict in verdicts if not verdict.of_other_version)
-        keep_agreements(SHIPPED, compared, (each.stem for each in Library().documents()))
     return 1 if any(verdict.is_wrong for verdict in verdicts) else 0
-
-
-def _table(arguments: argparse.Namespace) -> int:
-    print(contents_text(Library().documents(), read_agreements(SHIPPED)), end="")
-    return 0
-
-
-def _index(arguments: argparse.Namespace) -> int:
-    write_index(arguments.folder)
-    return 0
 
 
 OPTIONS = ()
 VERBS: dict[str, Verb] = {
     "list": Verb(_list, LIST, "List the documents: what each describes, for which versions."),
-    "show": Verb(_show, PROGRAM, "Print what a document says, and where that comes from."),
-    "where": Verb(_where, PROGRAM, "Print the path of the document that would be used."),
+    "show": Verb(_show, PROGRAM, "Print what a document says, where that comes from, and its file."),
     "check": Verb(_check, CHECK, "Compare the documents with the sources in a folder."),
-    "table": Verb(_table, (), "Print all documents as a table in Markdown, as in docs/library-contents.md."),
-    "index": Verb(_index, INDEX, "Write the index of a folder of documents again."),
 }
