@@ -107,14 +107,15 @@ class BaseHost:
     ) -> CommandResult:
         """Run it; with ``--allow-missing-packages`` a marked placeholder stands for what it would write if the program,
         or a package with a file that it is given, is not installed."""
-        if self.allow_missing_packages and command and shutil.which(command[0]) is None:
-            program = os.path.basename(command[0])
+        if not self.allow_missing_packages or not command:
+            return self._run_command(command, merge_stderr, at_event)
+        program = os.path.basename(command[0])
+        if shutil.which(command[0]) is None:
             self.warn(program_not_installed(program))
             return CommandResult(0, f"<output of {program}, which is not installed>", "")
         result = self._run_command(command, merge_stderr, at_event)
-        absent = [word for word in command if self.allow_missing_packages and f"{MISSING_PREFIX}/" in word]
+        absent = [word for word in command if f"{MISSING_PREFIX}/" in word]
         if result.returncode != 0 and absent:
-            program = os.path.basename(command[0])
             self.warn(command_without_its_file(program, absent[0]))
             return CommandResult(0, f"<output of {program}, whose {absent[0]} is not installed>", "")
         return result
