@@ -8,8 +8,7 @@ from typing import Any
 
 import pytest
 
-from enclave_launch import ResolveOptions, resolve
-from enclave_launch.plan import LaunchPlan
+from enclave_launch import LaunchPlan, ResolveOptions, resolve
 
 DEMO = Path(__file__).parents[2] / "fixtures" / "demo_ws"
 

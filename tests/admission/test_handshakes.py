@@ -18,8 +18,8 @@ from enclave_launch.admission.middleware import (
     mixed_pairs,
 )
 from enclave_launch.diagnostics import Code
+from keystore import verify
 from keystore.formats.subject import Half, common_name, guid_prefix, half_of
-from keystore.verification import verify
 
 from .conftest import Plan
 

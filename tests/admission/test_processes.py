@@ -6,13 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from enclave_launch import SecurityOptions, provision
+from enclave_launch import EnclaveLaunchError, LaunchPlan, SecurityOptions, provision
 from enclave_launch.diagnostics import Code
-from enclave_launch.errors import EnclaveLaunchError
-from enclave_launch.plan import LaunchPlan
 from enclave_launch.report.tree import plan_tree
+from keystore import ProvisionOptions
 from keystore.formats.domains import Domains
-from keystore.steps.options import ProvisionOptions
 
 from .conftest import Plan
 

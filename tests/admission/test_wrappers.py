@@ -7,8 +7,8 @@ from xml.sax.saxutils import quoteattr
 
 import pytest
 
+from enclave_launch import LaunchPlan
 from enclave_launch.diagnostics import Code
-from enclave_launch.plan import LaunchPlan
 
 from .conftest import Plan
 

@@ -8,9 +8,8 @@ from typing import Any
 
 import pytest
 
+from enclave_launch import LaunchPlan, provision
 from enclave_launch.diagnostics import Code
-from enclave_launch.flow import provision
-from enclave_launch.plan import LaunchPlan
 from enclave_launch.report.explained import explained
 from enclave_launch.security_environment import SecuritySettings, secured_environment
 

@@ -15,9 +15,7 @@ from pathlib import Path
 
 import pytest
 
-from keystore.steps.options import ProvisionOptions
-from keystore.steps.removal import remove
-from keystore.steps.renewal import RenewOptions, renew
+from keystore import ProvisionOptions, RenewOptions, remove, renew
 from tests.dds import attacks, our_keystore, sros2_style
 from tests.dds.attacks import ENCLAVES, GRANTS, HONEST, REVOKED, VICTIM, Attempt, Workshop, borrowed_label
 from tests.dds.probe import Probe

@@ -7,12 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from keystore import CaAccess, RemoveOptions, remove, verify
 from keystore.disk.view import KeystoreView
 from keystore.formats.role import Role
 from keystore.signing import smime
-from keystore.signing.ca_access import CaAccess
-from keystore.steps.removal import RemoveOptions, remove
-from keystore.verification import verify
 from tests.dds import our_keystore
 from tests.dds.probe import Participant, Probe
 from tests.dds.sros2_style import Grant

@@ -14,12 +14,17 @@ from pathlib import Path
 
 import pytest
 
+from keystore import (
+    ImportOptions,
+    ProvisionOptions,
+    SigningOptions,
+    export_hosts,
+    import_bundle,
+    sign_requests,
+)
 from keystore.formats.policy import EnclavePolicy, Operation
-from keystore.steps.host_bundles import export_hosts, pinned
+from keystore.steps.host_bundles import pinned
 from keystore.steps.host_keys import parse_requests
-from keystore.steps.importing import ImportOptions, import_bundle
-from keystore.steps.options import ProvisionOptions
-from keystore.steps.request_signing import SigningOptions, sign_requests
 from tests.dds.conftest import missing
 from tests.dds.our_keystore import allow, node, provision
 from tests.dds.probe import Participant, Probe

@@ -10,11 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from enclave_launch.enclave import EnclaveScope
-from enclave_launch.flow import provision, resolve
-from enclave_launch.options import ResolveOptions, SecurityOptions
+from enclave_launch import EnclaveScope, ResolveOptions, SecurityOptions, provision, resolve
 from enclave_launch.verb.secure_plan import main
-from keystore.steps.options import ProvisionOptions
+from keystore import ProvisionOptions
 
 DEMO_WS = Path(__file__).parents[2] / "fixtures" / "demo_ws"
 

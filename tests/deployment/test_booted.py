@@ -11,11 +11,9 @@ from datetime import timedelta
 
 import pytest
 
+from keystore import RemoveOptions, RenewOptions, Step, remove, renew, roll_over
 from keystore.formats.role import Role
 from keystore.steps.host_bundles import pinned
-from keystore.steps.removal import RemoveOptions, remove
-from keystore.steps.renewal import RenewOptions, renew
-from keystore.steps.rollover import Step, roll_over
 from tests.deployment.booted import booted
 from tests.deployment.robot import KS, Host, node, robot, until, up
 from tests.keystore.kit import options

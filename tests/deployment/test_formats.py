@@ -13,13 +13,20 @@ from typing import Any
 import pytest
 import yaml
 
+from keystore import (
+    ImportOptions,
+    RemoveOptions,
+    RenewOptions,
+    SigningOptions,
+    export_hosts,
+    import_bundle,
+    remove,
+    renew,
+    request,
+    sign_requests,
+)
 from keystore.disk import layout
-from keystore.steps.host_bundles import export_hosts, pinned
-from keystore.steps.host_keys import request
-from keystore.steps.importing import ImportOptions, import_bundle
-from keystore.steps.removal import RemoveOptions, remove
-from keystore.steps.renewal import RenewOptions, renew
-from keystore.steps.request_signing import SigningOptions, sign_requests
+from keystore.steps.host_bundles import pinned
 from tests.deployment.kit import DEMO_WS, TALK, export, fleet_of_fifty, launch_file, made, provisioned, tool
 from tests.deployment.systemd_stand_in import Unit, words
 from tests.keystore.kit import mode, options

@@ -9,8 +9,7 @@ import pytest
 
 from enclave_launch.deployment.placement import restart_order
 from enclave_launch.deployment.processes import engine_names, label
-from keystore.formats.hosts import load_hosts
-from keystore.steps.host_bundles import export_hosts
+from keystore import export_hosts, load_hosts
 from keystore.verb import main as secure_keystore
 from tests.deployment.kit import TALK, export, launch_file, provisioned, secure_plan
 

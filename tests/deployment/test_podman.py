@@ -17,8 +17,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from keystore.steps.host_bundles import BundleOptions, export_hosts, pinned
-from keystore.steps.renewal import RenewOptions, renew
+from keystore import BundleOptions, RenewOptions, export_hosts, renew
+from keystore.steps.host_bundles import pinned
 from tests.deployment.booted import Machine, booted, repository_folders
 from tests.deployment.kit import export, launch_file, provisioned, tool
 from tests.deployment.robot import HEARD, until

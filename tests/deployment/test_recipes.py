@@ -10,13 +10,19 @@ from pathlib import Path
 
 import pytest
 
+from keystore import (
+    BundleOptions,
+    ImportOptions,
+    RenewOptions,
+    export_hosts,
+    import_bundle,
+    renew,
+    request,
+    verify,
+)
 from keystore.formats.policy import Policy
 from keystore.formats.policy_xml import policy_xml
-from keystore.steps.host_bundles import BundleOptions, export_hosts, pinned
-from keystore.steps.host_keys import request
-from keystore.steps.importing import ImportOptions, import_bundle
-from keystore.steps.renewal import RenewOptions, renew
-from keystore.verification import verify
+from keystore.steps.host_bundles import pinned
 from tests.deployment.kit import TALK, made, tool
 from tests.keystore.kit import filled, openssl, options, policy
 from tests.keystore.test_external_ca import ExternalCa

@@ -8,9 +8,8 @@ from pathlib import Path
 
 import pytest
 
+from keystore import RemoveOptions, Step, remove, roll_over
 from keystore.formats.role import Role
-from keystore.steps.removal import RemoveOptions, remove
-from keystore.steps.rollover import Step, roll_over
 from tests.deployment.booted import booted
 from tests.deployment.networks import Network
 from tests.deployment.robot import Host, node, robot, until, up

@@ -14,9 +14,8 @@ from xml.sax.saxutils import quoteattr
 
 import pytest
 
-from keystore.formats.hosts import load_hosts
-from keystore.steps.host_bundles import export_hosts, pinned
-from keystore.steps.importing import ImportOptions, import_bundle
+from keystore import ImportOptions, export_hosts, import_bundle, load_hosts
+from keystore.steps.host_bundles import pinned
 from tests.dds.conftest import cyclone as cyclone
 from tests.dds.conftest import domain_id as domain_id
 from tests.dds.conftest import fastdds as fastdds

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import keystore
-from keystore.steps.options import ProvisionOptions
+from keystore import ProvisionOptions
 from keystore.steps.tool_enclaves import WATCHER, provide_watcher
 from tests.drift.planned import DEMO_WS, ROOT
 

@@ -15,8 +15,8 @@ from typing import Any
 import pytest
 
 import keystore
+from keystore import create_tool_enclave
 from keystore.formats.domains import Domains
-from keystore.steps.tool_enclaves import create_tool_enclave
 from tests.drift.planned import DEMO_WS, ROOT
 from tests.graph.conftest import Start
 from tests.graph.conftest import cyclone as cyclone

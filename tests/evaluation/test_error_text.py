@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from enclave_launch.errors import LaunchFileError
+from enclave_launch import LaunchFileError
 from enclave_launch.evaluation.evaluate import evaluate
 from enclave_launch.host.plan_host import PlanHost
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from enclave_launch.errors import LaunchFileError
+from enclave_launch import LaunchFileError
 from enclave_launch.evaluation.programs import check_programs, missing_programs
 
 

@@ -7,9 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from enclave_launch.flow import resolve
-from enclave_launch.options import ResolveOptions
-from enclave_launch.plan import LaunchPlan
+from enclave_launch import LaunchPlan, ResolveOptions, resolve
 from enclave_launch.policy.derivation import allowed_names
 
 Launch = Callable[..., LaunchPlan]

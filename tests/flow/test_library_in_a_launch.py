@@ -9,10 +9,8 @@ from typing import Any
 
 import pytest
 
-from enclave_launch.errors import ManifestError, UsageError
-from enclave_launch.flow import resolve
-from enclave_launch.options import ResolveOptions
-from enclave_launch.plan import LaunchPlan
+from enclave_launch import LaunchPlan, ManifestError, ResolveOptions, resolve
+from enclave_launch.errors import UsageError
 from enclave_launch.policy.derivation import allowed_names
 from enclave_launch.report.explained import explained
 from enclave_launch.report.plan_json import plan_json

@@ -7,9 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from keystore.signing.ca_access import CaAccess, Secret
-from keystore.steps.creation import CreateOptions, create_keystore
-from keystore.verification import verify
+from keystore import CaAccess, CreateOptions, Secret, create_keystore, verify
 from tests.flow.conftest import SecureLaunch
 
 WORD = "open-sesame"

@@ -8,9 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from enclave_launch import LaunchFileError, ManifestError, ResolveOptions, provision, resolve
+from enclave_launch import LaunchFileError, LaunchPlan, ManifestError, ResolveOptions, provision, resolve
 from enclave_launch.diagnostics import Code
-from enclave_launch.plan import LaunchPlan
 from enclave_launch.report.explained import explain
 from enclave_launch.verb.secure_launch import main
 

@@ -14,10 +14,8 @@ from pathlib import Path
 import pytest
 
 from enclave_common.terminal import progress
+from enclave_launch import LaunchPlan, ResolveOptions, resolve
 from enclave_launch.diagnostics import Code, Diagnostic
-from enclave_launch.flow import resolve
-from enclave_launch.options import ResolveOptions
-from enclave_launch.plan import LaunchPlan
 from enclave_launch.report.terminal_style import TerminalStyle, terminal_style_of
 from enclave_launch.report.tree import plan_tree
 from tests.programs import PYTHON, python_program

@@ -16,9 +16,9 @@ from enclave_common.yaml_reader import load_yaml
 from enclave_launch.frontend.substitution_grammar import TemplateSyntaxError, parse_template
 from enclave_launch.frontend.xml_tree import parse_launch_xml as parse_launch_xml
 from enclave_launch.ros_rules.parameter_file import RefusedParameters, sections_of_text
+from keystore import KeystoreError, request
 from keystore.disk.archive import archive_bytes, read_archive
 from keystore.disk.store import Content
-from keystore.errors import KeystoreError
 from keystore.formats.bundle import parse_manifest
 from keystore.formats.certificate import read_certificates
 from keystore.formats.domains import Domains
@@ -32,7 +32,7 @@ from keystore.formats.register import parse_register
 from keystore.formats.shares import parse_shares
 from keystore.formats.validity import parse_duration, parse_time
 from keystore.signing import smime
-from keystore.steps.host_keys import parse_requests, request, requests_text
+from keystore.steps.host_keys import parse_requests, requests_text
 from keystore.verification.files import holds_private_key
 from nodl.document.v1 import parse_v1
 from nodl.document.v2 import parse_v2

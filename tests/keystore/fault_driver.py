@@ -15,14 +15,20 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
-from keystore.disk.share_files import LaunchHold
-from keystore.errors import KeystoreError
+from keystore import (
+    CreateOptions,
+    KeystoreError,
+    LaunchHold,
+    RemoveOptions,
+    RenewOptions,
+    Step,
+    create_keystore,
+    provision,
+    remove,
+    renew,
+    roll_over,
+)
 from keystore.formats.role import Role
-from keystore.steps.creation import CreateOptions, create_keystore
-from keystore.steps.provisioning import provision
-from keystore.steps.removal import RemoveOptions, remove
-from keystore.steps.renewal import RenewOptions, renew
-from keystore.steps.rollover import Step, roll_over
 from tests.keystore.kit import filled, options, policy
 
 KILLED = 97

@@ -9,10 +9,8 @@ from collections.abc import Iterable
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
+from keystore import CreateOptions, ProvisionOptions, ProvisionReport, create_keystore, provision
 from keystore.formats.policy import EnclavePolicy, Operation, Profile, Qualifier, Rule
-from keystore.steps.creation import CreateOptions, create_keystore
-from keystore.steps.options import ProvisionOptions, ProvisionReport
-from keystore.steps.provisioning import provision
 
 NOW = datetime(2031, 5, 1, 12, tzinfo=timezone.utc)
 DAY = timedelta(days=1)

@@ -9,14 +9,12 @@ from pathlib import Path
 
 import pytest
 
+from keystore import Secret, create_keystore, provision
 from keystore.disk import lock
 from keystore.disk.store import opened
 from keystore.errors import DamagedKeystoreError, InvalidInputError, UnsafeKeystoreError
 from keystore.formats.governance_yaml import parse_governance_yaml
 from keystore.formats.validity import parse_end
-from keystore.signing.ca_access import Secret
-from keystore.steps.creation import create_keystore
-from keystore.steps.provisioning import provision
 from keystore.verb import main
 from tests.keystore.kit import NOW, created, filled, mode, options, policy
 

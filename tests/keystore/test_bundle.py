@@ -10,13 +10,11 @@ from pathlib import Path
 
 import pytest
 
+from keystore import PublicFiles, RemoveOptions, export, remove, verify
 from keystore.disk import layout
 from keystore.errors import DamagedKeystoreError, InvalidInputError
 from keystore.formats.role import Role
-from keystore.steps.bundle import PublicFiles, export
-from keystore.steps.removal import RemoveOptions, remove
 from keystore.verb import main
-from keystore.verification import verify
 from tests.keystore.kit import DAY, NOW, contents, filled, mode, openssl
 
 NAMES = ("/", "/robot1", "/robot1/arm", "/robot1/camera", "/robot2/arm")

@@ -13,8 +13,20 @@ from pathlib import Path
 
 import pytest
 
+from keystore import (
+    LaunchHold,
+    ProvisionOptions,
+    ProvisionReport,
+    RemoveOptions,
+    Step,
+    apply_policy,
+    create_enclaves,
+    export,
+    provision,
+    remove,
+    roll_over,
+)
 from keystore.disk import layout
-from keystore.disk.share_files import LaunchHold
 from keystore.errors import (
     DamagedKeystoreError,
     NotAKeystoreError,
@@ -25,12 +37,7 @@ from keystore.formats.domains import Domains
 from keystore.formats.policy import EnclavePolicy, Policy
 from keystore.formats.role import Role
 from keystore.formats.validity import later, utc_now
-from keystore.steps.bundle import export
 from keystore.steps.comparison import differences
-from keystore.steps.options import ProvisionOptions, ProvisionReport
-from keystore.steps.provisioning import apply_policy, create_enclaves, provision
-from keystore.steps.removal import RemoveOptions, remove
-from keystore.steps.rollover import Step, roll_over
 from tests.dds import sros2_style
 from tests.keystore import kit
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from keystore import CaAccess, CreateOptions, ImportedCa, Secret, create_keystore, provision, verify
 from keystore.disk.view import KeystoreView
 from keystore.errors import InvalidInputError, NotAKeystoreError, SigningUnavailableError
 from keystore.formats.domains import Domains
@@ -17,11 +18,7 @@ from keystore.formats.role import Role
 from keystore.formats.validity import Validity
 from keystore.signing import authority
 from keystore.signing.authority import Authority, Curve
-from keystore.signing.ca_access import CaAccess, Secret
 from keystore.signing.signer import FileSigner, key_pem
-from keystore.steps.creation import CreateOptions, ImportedCa, create_keystore
-from keystore.steps.provisioning import provision
-from keystore.verification import verify
 from tests.keystore.kit import DAY, NOW, actions, created, mode, openssl, options, policy, snapshot
 
 SENTENCE = b"correct horse battery staple"

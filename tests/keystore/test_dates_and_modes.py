@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from keystore import Step, roll_over
 from keystore.formats.role import Role
 from keystore.formats.validity import utc_now
-from keystore.steps.rollover import Step, roll_over
 from tests.keystore import kit
 
 

@@ -7,14 +7,21 @@ from pathlib import Path
 
 import pytest
 
+from keystore import (
+    BundleOptions,
+    ImportOptions,
+    Severity,
+    accept_certificates,
+    export_hosts,
+    import_bundle,
+    provision,
+    request,
+    verify,
+)
 from keystore.errors import InvalidInputError, SigningUnavailableError
-from keystore.steps.host_bundles import BundleOptions, export_hosts, pinned
-from keystore.steps.host_keys import Request, parse_requests, request, requests_text
-from keystore.steps.importing import ImportOptions, import_bundle
-from keystore.steps.provisioning import provision
-from keystore.steps.request_signing import accept_certificates
+from keystore.steps.host_bundles import pinned
+from keystore.steps.host_keys import Request, parse_requests, requests_text
 from keystore.verb import main
-from keystore.verification import Severity, verify
 from tests.keystore.kit import actions, openssl, options, policy
 
 NAMES = ("/arm", "/arm/hand")

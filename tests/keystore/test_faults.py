@@ -14,16 +14,11 @@ from pathlib import Path
 
 import pytest
 
-from keystore import verification
+from keystore import CreateOptions, Finding, LaunchHold, create_keystore, provision, status, verification
 from keystore.disk import layout
 from keystore.disk.register_file import read_register
-from keystore.disk.share_files import LaunchHold
 from keystore.disk.view import KeystoreView
 from keystore.formats.certificate import read_pem
-from keystore.steps.creation import CreateOptions, create_keystore
-from keystore.steps.expiry import status
-from keystore.steps.provisioning import provision
-from keystore.verification import Finding
 from tests.dds import sros2_style
 from tests.keystore.fault_driver import KILLED, NAMES, REPORTED, install_fault, work
 from tests.keystore.kit import contents, filled, options, policy, snapshot

@@ -14,24 +14,31 @@ import asn1crypto.x509
 import pytest
 from asn1crypto import cms
 
+from keystore import (
+    CaAccess,
+    Finding,
+    RemoveOptions,
+    RenewOptions,
+    Requirements,
+    Severity,
+    SubjectScheme,
+    provision,
+    remove,
+    renew,
+    verify,
+)
 from keystore.disk import layout
 from keystore.disk.view import KeystoreView
 from keystore.formats.certificate import read_der, read_pem
 from keystore.formats.domains import Domains
 from keystore.formats.governance import DomainRule, Governance, Protection
 from keystore.formats.role import Role
-from keystore.formats.subject import SubjectScheme
 from keystore.formats.validity import Validity, utc_now
 from keystore.signing import smime
 from keystore.signing.authority import Authority, Curve, IdentityIssuer
-from keystore.signing.ca_access import CaAccess
 from keystore.signing.identity import public_half
 from keystore.signing.public_key import fingerprint
 from keystore.signing.smime import sign_document
-from keystore.steps.provisioning import provision
-from keystore.steps.removal import RemoveOptions, remove
-from keystore.steps.renewal import RenewOptions, renew
-from keystore.verification import Finding, Requirements, Severity, verify
 from keystore.zenoh.writing import write_zenoh
 from tests.keystore import kit
 

@@ -9,15 +9,24 @@ from pathlib import Path
 
 import pytest
 
+from keystore import (
+    BundleOptions,
+    HostBundle,
+    ImportOptions,
+    RemoveOptions,
+    RenewOptions,
+    Step,
+    export_hosts,
+    fleet_status,
+    import_bundle,
+    remove,
+    renew,
+    roll_over,
+)
 from keystore.errors import InvalidInputError
 from keystore.formats.role import Role
 from keystore.formats.validity import utc_now
-from keystore.steps.fleet import fleet_status
-from keystore.steps.host_bundles import BundleOptions, HostBundle, export_hosts, pinned
-from keystore.steps.importing import ImportOptions, import_bundle
-from keystore.steps.removal import RemoveOptions, remove
-from keystore.steps.renewal import RenewOptions, renew
-from keystore.steps.rollover import Step, roll_over
+from keystore.steps.host_bundles import pinned
 from keystore.verb import main
 from tests.keystore.kit import DAY, filled, options
 

@@ -17,24 +17,29 @@ from cryptography.hazmat.primitives import serialization
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from keystore import (
+    CaAccess,
+    KeystoreError,
+    RemoveOptions,
+    RenewOptions,
+    export,
+    export_hosts,
+    provision,
+    remove,
+    renew,
+    verify,
+)
 from keystore.disk import layout
 from keystore.disk.crl_file import is_crl
 from keystore.disk.view import KeystoreView
-from keystore.errors import DamagedKeystoreError, KeystoreError
+from keystore.errors import DamagedKeystoreError
 from keystore.formats.certificate import read_certificate, read_certificates
 from keystore.formats.governance import DomainRule, Governance, Protection, governance_document
 from keystore.formats.role import Role
 from keystore.signing import smime
-from keystore.signing.ca_access import CaAccess
 from keystore.signing.public_key import is_our_form, key_matches
-from keystore.steps.bundle import export
 from keystore.steps.comparison import differences
-from keystore.steps.host_bundles import export_hosts
 from keystore.steps.inventory import governance_facts
-from keystore.steps.provisioning import provision
-from keystore.steps.removal import RemoveOptions, remove
-from keystore.steps.renewal import RenewOptions, renew
-from keystore.verification import verify
 from tests.dds import sros2_style
 from tests.keystore.kit import filled, options, policy
 

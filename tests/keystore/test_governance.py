@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from keystore import GovernanceOptions, Requirements, provision, set_governance, verify
 from keystore.errors import InvalidInputError
 from keystore.formats.domains import Domains
 from keystore.formats.governance import (
@@ -19,9 +20,6 @@ from keystore.formats.governance import (
     parse_governance,
 )
 from keystore.formats.governance_yaml import parse_governance_yaml
-from keystore.steps.governance import GovernanceOptions, set_governance
-from keystore.steps.provisioning import provision
-from keystore.verification import Requirements, verify
 from tests.dds.sros2_style import GOVERNANCE
 from tests.keystore.kit import contents, filled, options, policy, snapshot
 

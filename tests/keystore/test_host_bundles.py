@@ -11,26 +11,32 @@ from pathlib import Path
 
 import pytest
 
+from keystore import (
+    BundleOptions,
+    HostBundle,
+    ImportOptions,
+    ImportReport,
+    KeystoreError,
+    RemoveOptions,
+    RenewOptions,
+    Step,
+    export_hosts,
+    import_bundle,
+    remove,
+    renew,
+    roll_over,
+    verify,
+)
 from keystore.disk import layout
 from keystore.disk.archive import archive_bytes, read_archive
 from keystore.disk.container_copies import ContainerUser
 from keystore.disk.store import Content
-from keystore.errors import (
-    DamagedKeystoreError,
-    InvalidInputError,
-    KeystoreError,
-    NotAKeystoreError,
-    UnsafeKeystoreError,
-)
+from keystore.errors import DamagedKeystoreError, InvalidInputError, NotAKeystoreError, UnsafeKeystoreError
 from keystore.formats.hosts import parse_hosts
 from keystore.formats.role import Role
-from keystore.steps.host_bundles import BundleOptions, HostBundle, enclaves_of_hosts, export_hosts, pinned
-from keystore.steps.importing import ImportOptions, ImportReport, Restart, import_bundle
-from keystore.steps.removal import RemoveOptions, remove
-from keystore.steps.renewal import RenewOptions, renew
-from keystore.steps.rollover import Step, roll_over
+from keystore.steps.host_bundles import enclaves_of_hosts, pinned
+from keystore.steps.importing import Restart
 from keystore.verb import main
-from keystore.verification import verify
 from tests.keystore.fault_driver import KILLED, install_fault
 from tests.keystore.kit import contents, filled, mode, options
 

@@ -7,20 +7,31 @@ from pathlib import Path
 
 import pytest
 
+from keystore import (
+    BundleOptions,
+    HostBundle,
+    ImportOptions,
+    ImportReport,
+    RemoveOptions,
+    RenewOptions,
+    SigningOptions,
+    export,
+    export_hosts,
+    import_bundle,
+    provision,
+    remove,
+    renew,
+    request,
+    sign_requests,
+    verify,
+)
 from keystore.disk import layout
 from keystore.disk.archive import read_archive
 from keystore.errors import DamagedKeystoreError, InvalidInputError, UnsafeKeystoreError
 from keystore.formats.certificate import read_pem
-from keystore.steps.bundle import export
-from keystore.steps.host_bundles import BundleOptions, HostBundle, export_hosts, pinned
-from keystore.steps.host_keys import parse_requests, request, requests_text
-from keystore.steps.importing import ImportOptions, ImportReport, import_bundle
-from keystore.steps.provisioning import provision
-from keystore.steps.removal import RemoveOptions, remove
-from keystore.steps.renewal import RenewOptions, renew
-from keystore.steps.request_signing import SigningOptions, sign_requests
+from keystore.steps.host_bundles import pinned
+from keystore.steps.host_keys import parse_requests, requests_text
 from keystore.verb import main
-from keystore.verification import verify
 from tests.keystore.kit import actions, filled, mode, openssl, options, policy
 
 NAMES = ("/arm", "/arm/hand")

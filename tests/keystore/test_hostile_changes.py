@@ -18,14 +18,11 @@ from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID
 
+from keystore import CaAccess, PublicFiles, RemoveOptions, Requirements, Severity, export, remove, verify
 from keystore.disk.view import KeystoreView
 from keystore.formats.domains import Domains
 from keystore.formats.governance import DomainRule, Governance, Protection, TopicRule, governance_document
 from keystore.formats.role import Role
-from keystore.signing.ca_access import CaAccess
-from keystore.steps.bundle import PublicFiles, export
-from keystore.steps.removal import RemoveOptions, remove
-from keystore.verification import Requirements, Severity, verify
 from tests.dds import sros2_style
 from tests.keystore.kit import filled, options, policy, snapshot
 from tests.keystore.test_verification import resign, sign

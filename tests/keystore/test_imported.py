@@ -10,23 +10,34 @@ from pathlib import Path
 
 import pytest
 
+from keystore import (
+    BundleOptions,
+    GovernanceOptions,
+    HostBundle,
+    ImportOptions,
+    KeystoreError,
+    RemoveOptions,
+    Step,
+    export_hosts,
+    fleet_status,
+    import_bundle,
+    provision,
+    remove,
+    roll_over,
+    set_governance,
+    verify,
+)
 from keystore.disk import layout
 from keystore.disk.archive import archive_bytes, read_archive
 from keystore.disk.store import Content
-from keystore.errors import DamagedKeystoreError, KeystoreError, UnsafeKeystoreError
+from keystore.errors import DamagedKeystoreError, UnsafeKeystoreError
 from keystore.formats.bundle import pin
 from keystore.formats.governance import DomainRule, Governance, Protection
 from keystore.formats.role import Role
 from keystore.steps.comparison import differences
-from keystore.steps.fleet import fleet_status
-from keystore.steps.governance import GovernanceOptions, set_governance
-from keystore.steps.host_bundles import BundleOptions, HostBundle, export_hosts, pinned
-from keystore.steps.importing import ImportOptions, Restart, import_bundle
-from keystore.steps.provisioning import provision
-from keystore.steps.removal import RemoveOptions, remove
-from keystore.steps.rollover import Step, roll_over
+from keystore.steps.host_bundles import pinned
+from keystore.steps.importing import Restart
 from keystore.verb import main
-from keystore.verification import verify
 from tests.keystore.kit import filled, options, policy
 
 

@@ -6,11 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from keystore.disk.share_files import LaunchHold
+from keystore import LaunchHold, create_tool_enclave, list_enclaves, provision
 from keystore.formats.policy import Policy
 from keystore.formats.policy_xml import policy_xml
-from keystore.steps.provisioning import list_enclaves, provision
-from keystore.steps.tool_enclaves import create_tool_enclave
 from keystore.verb import main
 from tests.keystore.kit import filled, options, policy
 

@@ -7,13 +7,12 @@ from pathlib import Path
 
 import pytest
 
+from keystore import apply_policy, create_enclaves, export, provision
 from keystore.disk import layout
 from keystore.formats.certificate import read_pem
 from keystore.formats.permissions_document import parse_permissions
 from keystore.formats.policy import Policy
-from keystore.steps.bundle import export
 from keystore.steps.comparison import differences
-from keystore.steps.provisioning import apply_policy, create_enclaves, provision
 from keystore.verb import main
 from tests.keystore.kit import DAY, NOW, actions, filled, options, policy, snapshot
 

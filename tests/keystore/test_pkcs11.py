@@ -10,21 +10,30 @@ from pathlib import Path
 
 import pytest
 
+from keystore import (
+    CaAccess,
+    ImportedCa,
+    ImportOptions,
+    RemoveOptions,
+    RenewOptions,
+    RequestOptions,
+    Secret,
+    SigningOptions,
+    export_hosts,
+    import_bundle,
+    provision,
+    remove,
+    renew,
+    request,
+    sign_requests,
+    verify,
+)
 from keystore.errors import InvalidInputError, SigningUnavailableError
 from keystore.formats.role import Role
 from keystore.formats.validity import Validity, utc_now
 from keystore.signing import authority
-from keystore.signing.ca_access import CaAccess, Secret
 from keystore.signing.pkcs11_signer import Pkcs11Signer, parse_uri
-from keystore.steps.creation import ImportedCa
-from keystore.steps.host_bundles import export_hosts, pinned
-from keystore.steps.host_keys import RequestOptions, request
-from keystore.steps.importing import ImportOptions, import_bundle
-from keystore.steps.provisioning import provision
-from keystore.steps.removal import RemoveOptions, remove
-from keystore.steps.renewal import RenewOptions, renew
-from keystore.steps.request_signing import SigningOptions, sign_requests
-from keystore.verification import verify
+from keystore.steps.host_bundles import pinned
 from tests.keystore.kit import DAY, created, filled, openssl, options, policy
 
 MODULES = ("/usr/lib/softhsm/libsofthsm2.so", "/usr/lib/x86_64-linux-gnu/softhsm/libsofthsm2.so")

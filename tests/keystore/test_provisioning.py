@@ -12,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from keystore import SubjectScheme, apply_policy, create_enclave, list_enclaves, provision, verify
 from keystore.disk import layout
 from keystore.disk.signed_documents import trusted_document
 from keystore.disk.view import KeystoreView
@@ -20,9 +21,6 @@ from keystore.formats.domains import Domains
 from keystore.formats.permissions_document import parse_permissions
 from keystore.formats.policy import EnclavePolicy, Policy
 from keystore.formats.role import Role
-from keystore.formats.subject import SubjectScheme
-from keystore.steps.provisioning import apply_policy, create_enclave, list_enclaves, provision
-from keystore.verification import verify
 from tests.keystore.kit import (
     ARTICLE,
     DAY,

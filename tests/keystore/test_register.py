@@ -12,6 +12,20 @@ from cryptography import x509
 from hypothesis import given
 from hypothesis import strategies as st
 
+from keystore import (
+    GovernanceOptions,
+    RemoveOptions,
+    RenewOptions,
+    Step,
+    SubjectScheme,
+    create_enclaves,
+    provision,
+    remove,
+    renew,
+    roll_over,
+    set_governance,
+    verify,
+)
 from keystore.disk import layout
 from keystore.disk.register_file import read_register
 from keystore.errors import DamagedKeystoreError, InvalidInputError, UnsafeKeystoreError
@@ -28,13 +42,7 @@ from keystore.formats.register import (
     register_json,
 )
 from keystore.formats.role import Role
-from keystore.formats.subject import SubjectScheme, common_name, generation_of, names_enclave
-from keystore.steps.governance import GovernanceOptions, set_governance
-from keystore.steps.provisioning import create_enclaves, provision
-from keystore.steps.removal import RemoveOptions, remove
-from keystore.steps.renewal import RenewOptions, renew
-from keystore.steps.rollover import Step, roll_over
-from keystore.verification import verify
+from keystore.formats.subject import common_name, generation_of, names_enclave
 from tests.keystore.kit import DAY, NOW, actions, filled, options, policy, snapshot
 
 QUICK = RemoveOptions(durable=False)

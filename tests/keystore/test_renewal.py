@@ -7,6 +7,21 @@ from pathlib import Path
 
 import pytest
 
+from keystore import (
+    RemoveOptions,
+    RenewOptions,
+    Severity,
+    Step,
+    create_enclave,
+    expires_soon,
+    list_enclaves,
+    provision,
+    remove,
+    renew,
+    roll_over,
+    status,
+    verify,
+)
 from keystore.disk import layout
 from keystore.disk.signed_documents import trusted_document
 from keystore.disk.view import KeystoreView
@@ -14,12 +29,6 @@ from keystore.errors import DamagedKeystoreError, InvalidInputError
 from keystore.formats.certificate import read_certificates
 from keystore.formats.permissions_document import parse_permissions
 from keystore.formats.role import Role
-from keystore.steps.expiry import expires_soon, status
-from keystore.steps.provisioning import create_enclave, list_enclaves, provision
-from keystore.steps.removal import RemoveOptions, remove
-from keystore.steps.renewal import RenewOptions, renew
-from keystore.steps.rollover import Step, roll_over
-from keystore.verification import Severity, verify
 from tests.dds import sros2_style
 from tests.keystore.kit import (
     ARTICLE,

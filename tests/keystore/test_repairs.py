@@ -13,10 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from keystore.errors import KeystoreError
-from keystore.steps.removal import RemoveOptions, remove
+from keystore import Finding, KeystoreError, RemoveOptions, remove, verify
 from keystore.verb import main
-from keystore.verification import Finding, verify
 from tests.dds import sros2_style
 from tests.keystore import test_verification as damages
 from tests.keystore.kit import filled

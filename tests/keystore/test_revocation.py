@@ -8,17 +8,22 @@ from pathlib import Path
 import pytest
 from cryptography import x509
 
+from keystore import (
+    RemoveOptions,
+    RenewOptions,
+    export,
+    list_enclaves,
+    provision,
+    remove,
+    renew,
+    status,
+    verify,
+)
 from keystore.disk import layout
 from keystore.disk.crl_file import crl_validity
 from keystore.disk.view import KeystoreView
 from keystore.errors import DamagedKeystoreError, InvalidInputError
 from keystore.formats.certificate import read_pem
-from keystore.steps.bundle import export
-from keystore.steps.expiry import status
-from keystore.steps.provisioning import list_enclaves, provision
-from keystore.steps.removal import RemoveOptions, remove
-from keystore.steps.renewal import RenewOptions, renew
-from keystore.verification import verify
 from tests.keystore.kit import DAY, NOW, filled, openssl, options, policy, snapshot
 
 NAMES = ("/", "/a", "/a/b", "/c")

@@ -11,20 +11,26 @@ from pathlib import Path
 
 import pytest
 
+from keystore import (
+    LaunchHold,
+    ProvisionReport,
+    RemoveOptions,
+    drop_shares,
+    list_shares,
+    provision,
+    remove,
+    verify,
+)
 from keystore.disk import layout
-from keystore.disk.share_files import LaunchHold, is_running, read_shares
+from keystore.disk.share_files import is_running, read_shares
 from keystore.errors import DamagedKeystoreError, InvalidInputError, UnsafeKeystoreError
 from keystore.formats.certificate import read_pem
 from keystore.formats.domains import Domains
 from keystore.formats.permissions_document import parse_permissions
 from keystore.formats.policy import EnclavePolicy, Operation, Profile, Qualifier, Rule
 from keystore.steps.comparison import differences
-from keystore.steps.options import ProvisionReport
-from keystore.steps.provisioning import drop_shares, provision
-from keystore.steps.removal import RemoveOptions, remove
-from keystore.steps.sharing import list_shares, shared_enclaves
+from keystore.steps.sharing import shared_enclaves
 from keystore.verb import main
-from keystore.verification import verify
 from tests.keystore.kit import actions, filled, options, policy, snapshot
 
 BRINGUP, NAVIGATION = "/ws/bringup.launch.xml", "/ws/navigation.launch.py"

@@ -8,16 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from keystore.disk.share_files import LaunchHold
+from keystore import CaAccess, LaunchHold, ProvisionOptions, Secret, provision, verify
 from keystore.errors import InvalidInputError, SigningUnavailableError
 from keystore.formats.domains import Domains
 from keystore.formats.policy import EnclavePolicy
-from keystore.signing.ca_access import CaAccess, Secret
 from keystore.steps import signing_process
-from keystore.steps.options import ProvisionOptions
-from keystore.steps.provisioning import provision
 from keystore.steps.signing_process import SigningProcess
-from keystore.verification import verify
 from tests.keystore.kit import actions, created, options, policy
 
 WORD = "open sesame"

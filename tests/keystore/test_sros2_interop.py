@@ -7,14 +7,20 @@ from pathlib import Path
 
 import pytest
 
+from keystore import (
+    RenewOptions,
+    Severity,
+    SubjectScheme,
+    create_enclave,
+    list_enclaves,
+    provision,
+    renew,
+    verify,
+)
 from keystore.disk import layout
 from keystore.disk.signed_documents import trusted_document
 from keystore.disk.view import KeystoreView
 from keystore.formats.permissions_document import parse_permissions
-from keystore.formats.subject import SubjectScheme
-from keystore.steps.provisioning import create_enclave, list_enclaves, provision
-from keystore.steps.renewal import RenewOptions, renew
-from keystore.verification import Severity, verify
 from tests.keystore import sros2_peer
 from tests.keystore.kit import created, filled, options, policy
 

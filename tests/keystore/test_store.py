@@ -16,16 +16,13 @@ from typing import Any
 
 import pytest
 
+from keystore import CaAccess, ImportedCa, RequestOptions, Secret, Step, request, roll_over
 from keystore.disk import layout, store
 from keystore.disk.store import Content, Link, Store
 from keystore.disk.versions import Versions, make_directories, write_new
 from keystore.errors import StorageError, UnsafeKeystoreError
 from keystore.formats.register import Register
 from keystore.formats.role import Role
-from keystore.signing.ca_access import CaAccess, Secret
-from keystore.steps.creation import ImportedCa
-from keystore.steps.host_keys import RequestOptions, request
-from keystore.steps.rollover import Step, roll_over
 from tests.keystore import kit
 
 UMASKS = (0o000, 0o002, 0o022, 0o027, 0o077)

@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from keystore.formats.subject import SubjectScheme, borrowable, common_name, scheme_of, subject_name
+from keystore import SubjectScheme
+from keystore.formats.subject import borrowable, common_name, scheme_of, subject_name
 from tests.keystore.kit import ARTICLE
 
 segment = st.text(alphabet="ab_Z", min_size=1, max_size=30)

@@ -8,17 +8,22 @@ from pathlib import Path
 import pytest
 from cryptography import x509
 
+from keystore import (
+    RemoveOptions,
+    RenewOptions,
+    Step,
+    apply_policy,
+    create_tool_enclave,
+    remove,
+    renew,
+    roll_over,
+)
 from keystore.disk import layout
 from keystore.errors import DamagedKeystoreError, InvalidInputError
 from keystore.formats.certificate import read_certificate
 from keystore.formats.policy import Policy
 from keystore.formats.validity import utc_now
 from keystore.steps import opening, provisioning, renewal, tool_enclaves
-from keystore.steps.provisioning import apply_policy
-from keystore.steps.removal import RemoveOptions, remove
-from keystore.steps.renewal import RenewOptions, renew
-from keystore.steps.rollover import Step, roll_over
-from keystore.steps.tool_enclaves import create_tool_enclave
 from keystore.verb import main
 from tests.keystore.kit import DAY, contents, filled, options, policy
 

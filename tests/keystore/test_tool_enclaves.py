@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 import keystore
+from keystore import create_tool_enclave
 from keystore.formats.tool_needs import TABLE, TOOLS, ToolTarget, tool_policy, tool_targets
-from keystore.steps.tool_enclaves import create_tool_enclave
 from keystore.verb import main
 
 DOCS = Path(__file__).parents[2] / "docs" / "running-systems.md"

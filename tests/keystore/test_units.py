@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from keystore.steps.host_bundles import BundleOptions, export_hosts, pinned
-from keystore.steps.importing import ImportOptions, import_bundle
+from keystore import BundleOptions, ImportOptions, export_hosts, import_bundle
+from keystore.steps.host_bundles import pinned
 from keystore.verb import main
 from tests.keystore.kit import filled
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from keystore import CaAccess, Severity, provision, verify
 from keystore.disk.view import KeystoreView
 from keystore.errors import NotAKeystoreError
 from keystore.formats.domains import Domains
@@ -16,9 +17,6 @@ from keystore.formats.permissions import permissions_document
 from keystore.formats.role import Role
 from keystore.formats.validity import Validity
 from keystore.signing import smime
-from keystore.signing.ca_access import CaAccess
-from keystore.steps.provisioning import provision
-from keystore.verification import Severity, verify
 from tests.dds import sros2_style
 from tests.keystore.kit import DAY, NOW, filled, options, policy
 

@@ -8,15 +8,22 @@ from pathlib import Path
 
 import pytest
 
-from keystore import RenewOptions, drop_shares, export, renew, roll_over, verify
+from keystore import (
+    LaunchHold,
+    ProvisionOptions,
+    RenewOptions,
+    Step,
+    drop_shares,
+    export,
+    provision,
+    renew,
+    roll_over,
+    verify,
+)
 from keystore.disk.register_file import read_register
-from keystore.disk.share_files import LaunchHold
 from keystore.errors import InvalidInputError
 from keystore.formats.register import UNKNOWN
 from keystore.formats.validity import utc_now
-from keystore.steps.options import ProvisionOptions
-from keystore.steps.provisioning import provision
-from keystore.steps.rollover import Step
 from keystore.verb import main
 from keystore.zenoh.configuration import RouterAddress
 from keystore.zenoh.writing import matching_enclaves, write_zenoh

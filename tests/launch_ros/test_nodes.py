@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from enclave_launch.errors import LaunchFileError
+from enclave_launch import LaunchFileError
 from enclave_launch.policy.running_node import node_of_component, node_of_process
 from enclave_launch.process import Evaluation, ResolvedProcess
 from nodl.ament_index import PackageNotFoundError

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from enclave_launch.enclave import EnclaveScope, assign_enclave
+from enclave_launch import EnclaveScope
+from enclave_launch.enclave import assign_enclave
 from enclave_launch.policy import DerivedPolicy, derive_policy
 from enclave_launch.policy.running_node import node_of_process
 from enclave_launch.process import (

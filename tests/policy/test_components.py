@@ -8,10 +8,11 @@ from pathlib import Path
 
 import pytest
 
+from enclave_launch import LaunchPlan
 from enclave_launch.evaluation.evaluate import evaluate
 from enclave_launch.host.plan_host import PlanHost
 from enclave_launch.interfaces import InterfaceFinder
-from enclave_launch.plan import Found, LaunchPlan, LaunchSource, Missing, PlanInputs, PlanOptions
+from enclave_launch.plan import Found, LaunchSource, Missing, PlanInputs, PlanOptions
 from enclave_launch.planner import make_plan
 from enclave_launch.policy import PolicyOptions
 from enclave_launch.process import ResolvedComponent, ResolvedProcess

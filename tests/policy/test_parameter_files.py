@@ -7,9 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from enclave_launch import ManifestError, ResolveOptions, provision, resolve
+from enclave_launch import LaunchPlan, ManifestError, ResolveOptions, provision, resolve
 from enclave_launch.diagnostics import Code
-from enclave_launch.plan import LaunchPlan
 from enclave_launch.report.params import params_yaml
 
 NODE = """#!/usr/bin/env python3

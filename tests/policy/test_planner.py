@@ -7,15 +7,14 @@ from pathlib import Path
 
 import pytest
 
+from enclave_launch import EnclaveScope, LaunchPlan
 from enclave_launch.diagnostics import Code
-from enclave_launch.enclave import EnclaveScope
 from enclave_launch.evaluation.evaluate import evaluate
 from enclave_launch.host.plan_host import PlanHost
 from enclave_launch.plan import (
     Described,
     Found,
     InterfaceOrigin,
-    LaunchPlan,
     LaunchSource,
     Missing,
     PlanInputs,

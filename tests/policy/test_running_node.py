@@ -7,15 +7,11 @@ from typing import Any
 
 import pytest
 
-from enclave_launch.errors import LaunchFileError
+from enclave_launch import LaunchFileError
 from enclave_launch.evaluation.evaluate import evaluate
 from enclave_launch.host.plan_host import PlanHost
-from enclave_launch.policy.running_node import (
-    RunningNode,
-    UnknownNodeName,
-    node_of_component,
-    node_of_process,
-)
+from enclave_launch.policy import RunningNode
+from enclave_launch.policy.running_node import UnknownNodeName, node_of_component, node_of_process
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
 from nodl.node_interface import RANDOM_ENDING, Gap, NodeInterface
 from nodl.source_ref import SourceRef

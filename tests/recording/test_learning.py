@@ -14,10 +14,8 @@ from typing import NamedTuple
 
 import pytest
 
+from enclave_launch import LaunchPlan, ResolveOptions, resolve
 from enclave_launch.diagnostics import Code
-from enclave_launch.flow import resolve
-from enclave_launch.options import ResolveOptions
-from enclave_launch.plan import LaunchPlan
 from enclave_launch.policy.derivation import LIST_NAMES
 from nodl.document import read_document
 from nodl.name_template import NameTemplate, ParameterPart

@@ -6,10 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from enclave_launch import LaunchPlan, ResolveOptions, resolve
 from enclave_launch.diagnostics import Code
-from enclave_launch.flow import resolve
-from enclave_launch.options import ResolveOptions
-from enclave_launch.plan import InterfaceOrigin, LaunchPlan
+from enclave_launch.plan import InterfaceOrigin
 from enclave_launch.report.explained import explained
 from enclave_launch.report.tree import plan_tree
 from nodl.document import read_document

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from enclave_launch.errors import RuntimeFailure
+from enclave_launch import RuntimeFailure
 from enclave_launch.recording.build import recorder_library
 from enclave_launch.recording.programs import look_at_command
 from nodl.record.requested import RequestedEndpoint, RequestedNode, all_requested

@@ -13,8 +13,7 @@ from typing import Any
 
 import pytest
 
-from enclave_launch.flow import provision, resolve
-from enclave_launch.options import ResolveOptions
+from enclave_launch import ResolveOptions, provision, resolve
 from enclave_launch.report.evidence.documents import PAYLOAD_TYPE, csv_text, matrix_rows, surface_document
 from enclave_launch.report.evidence.requirements import DISCLAIMER, PARTS
 from enclave_launch.report.graph import plan_graph

@@ -8,13 +8,12 @@ from typing import Any
 
 import pytest
 
-from enclave_launch.flow import provision, resolve
-from enclave_launch.options import ResolveOptions, SecurityOptions
+from enclave_launch import ResolveOptions, SecurityOptions, provision, resolve
 from enclave_launch.review.document import GrantedName
 from enclave_launch.review.signed import as_signed
 from enclave_launch.verb.secure_plan import main
+from keystore import ProvisionOptions
 from keystore.formats.validity import utc_now
-from keystore.steps.options import ProvisionOptions
 
 PREFIX = Path(__file__).parent.parent.parent / "fixtures" / "demo_ws"
 LAUNCH = PREFIX / "share" / "demo_nodes" / "launch"

@@ -8,9 +8,8 @@ from typing import Any
 
 import pytest
 
+from enclave_launch import ResolveOptions, resolve
 from enclave_launch.dry_run import DryRun
-from enclave_launch.flow import resolve
-from enclave_launch.options import ResolveOptions
 from enclave_launch.report.plan_json import plan_document
 from enclave_launch.review.checks import check_plan
 from enclave_launch.review.document import PlanFinding

@@ -25,8 +25,7 @@ from enclave_launch import (
 )
 from enclave_launch.process import RemapRule, ResolvedProcess
 from enclave_launch.secured import PlanProvider
-from keystore.signing.ca_access import CaAccess, Secret
-from keystore.steps.options import ProvisionOptions
+from keystore import CaAccess, ProvisionOptions, Secret
 
 DEMO = Path(__file__).parents[2] / "fixtures/demo_ws"
 TALKER = '<node pkg="demo_nodes" exec="talker" name="talker"/>'

@@ -14,9 +14,8 @@ import pytest
 
 from enclave_launch import SecurityOptions, provision, resolve
 from enclave_launch.expiry_watch import deadline_before, notices, watched
+from keystore import Expiry, ProvisionOptions
 from keystore.formats.validity import utc_now
-from keystore.steps.expiry import Expiry
-from keystore.steps.options import ProvisionOptions
 
 NOW = datetime(2031, 5, 1, 12, tzinfo=timezone.utc)
 HOUR, DAY = timedelta(hours=1), timedelta(days=1)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from enclave_launch.errors import RuntimeFailure
+from enclave_launch import RuntimeFailure
 from enclave_launch.runtime.launch_log import log_base_directory, make_log_directory
 
 NOW = datetime(2024, 2, 3, 4, 5, 6, 78)

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from enclave_launch.errors import RuntimeFailure
+from enclave_launch import RuntimeFailure
 from enclave_launch.ros_rules.output import OutputSetting, output_routes
 from enclave_launch.runtime.launch_log import LaunchLog, Writers
 from enclave_launch.runtime.routing import (

@@ -11,8 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from enclave_launch.errors import ProvisionError, RuntimeFailure
-from enclave_launch.options import RunSettings
+from enclave_launch import ProvisionError, RunSettings, RuntimeFailure
 from enclave_launch.plan import LaunchSource
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
 from enclave_launch.runtime.companion import LaunchControl, Together

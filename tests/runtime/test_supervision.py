@@ -13,7 +13,7 @@ from types import MappingProxyType
 
 import pytest
 
-from enclave_launch.errors import ProvisionError
+from enclave_launch import ProvisionError
 from enclave_launch.runtime import supervision
 from enclave_launch.runtime.launch_log import Level
 from enclave_launch.runtime.process_tree import Hold, ProcessSpec, ProcessTree, Stream

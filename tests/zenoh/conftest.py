@@ -9,10 +9,9 @@ from typing import Any
 
 import pytest
 
-from keystore import ProvisionOptions, apply_policy, create_keystore
+from keystore import CreateOptions, ProvisionOptions, apply_policy, create_keystore
 from keystore.formats.domains import Domains
 from keystore.formats.policy import EnclavePolicy, Operation, Policy, Profile, Qualifier, Rule
-from keystore.steps.creation import CreateOptions
 from keystore.zenoh.writing import write_zenoh
 from tests.zenoh import kit
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from enclave_launch.errors import RuntimeFailure
+from enclave_launch import RuntimeFailure
 from enclave_launch.zenoh.router import RouterAnswer, RouterPlace, ZenohRouter, who_answers
 from keystore import ProvisionOptions, RemoveOptions, apply_policy, remove
 from keystore.disk.view import KeystoreView

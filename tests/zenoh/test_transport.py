@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 import zenoh
 
-from keystore import ProvisionOptions, RemoveOptions, RenewOptions, apply_policy, remove, renew
+from keystore import CaAccess, ProvisionOptions, RemoveOptions, RenewOptions, apply_policy, remove, renew
 from keystore.disk.view import KeystoreView
 from keystore.formats.role import Role
 from keystore.formats.validity import Validity, utc_now
@@ -23,7 +23,6 @@ from keystore.signing.authority import (
     new_key,
     self_signed_ca,
 )
-from keystore.signing.ca_access import CaAccess
 from keystore.signing.signer import key_pem
 from tests.zenoh import kit
 from tests.zenoh.conftest import Grants, System, keystore_of, policy_of
