@@ -12,7 +12,7 @@ from cryptography.hazmat.primitives.serialization import Encoding
 from keystore.disk import layout, safe_files
 from keystore.disk.view import KeystoreView
 from keystore.errors import DamagedKeystoreError, printable
-from keystore.formats.certificate import NOT_OUR_FORM, CertificateFacts, time_of
+from keystore.formats.certificate import NOT_OUR_FORM, UNREADABLE, CertificateFacts, time_of
 from keystore.formats.register import Register
 from keystore.formats.role import Role
 from keystore.formats.validity import Validity
@@ -91,7 +91,7 @@ def _parsed(pem: bytes) -> x509.CertificateRevocationList | None:
         crl = x509.load_pem_x509_crl(pem)
         _ = crl.issuer, crl.extensions, time_of(crl, "last_update"), time_of(crl, "next_update")
         _ = [time_of(entry, "revocation_date") for entry in crl]
-    except (ValueError, TypeError, AttributeError, UnsupportedAlgorithm):
+    except (AttributeError, *UNREADABLE):
         return None
     return crl
 

@@ -26,6 +26,16 @@ NOT_OUR_FORM = (
     "it is not in the form that secure-keystore writes, so DDS implementations may read something else"
 )
 
+UNREADABLE = (
+    ValueError,
+    TypeError,
+    UnsupportedAlgorithm,
+    x509.DuplicateExtension,
+    x509.InvalidVersion,
+    x509.UnsupportedGeneralNameType,
+)
+"""What ``cryptography`` raises for a certificate, a request or a CRL that it cannot read."""
+
 
 @dataclass(frozen=True)
 class CertificateFacts:
@@ -115,12 +125,7 @@ def read_der(data: bytes) -> CertificateFacts:
     """Reads a certificate with all its fields; raises ValueError where one cannot be read."""
     try:
         return _complete(x509.load_der_x509_certificate(data))
-    except (
-        TypeError,
-        UnsupportedAlgorithm,
-        x509.UnsupportedGeneralNameType,
-        x509.DuplicateExtension,
-    ) as error:
+    except UNREADABLE as error:
         raise ValueError(str(error)) from error
 
 
@@ -158,15 +163,12 @@ def _read_all(pem: bytes) -> tuple[CertificateFacts, ...]:
     """Read every certificate of ``pem``; none if one of them cannot be read."""
     try:
         return tuple(_read_block(block) for block in _BLOCK.findall(pem))
-    except ValueError:
+    except UNREADABLE:
         return ()
 
 
 def _read_block(block: bytes) -> CertificateFacts:
-    try:
-        certificate = x509.load_pem_x509_certificate(block)
-    except TypeError as error:
-        raise ValueError(str(error)) from error
+    certificate = x509.load_pem_x509_certificate(block)
     return read_der(certificate.public_bytes(Encoding.DER))
 
 

@@ -6,11 +6,10 @@ from dataclasses import dataclass, field
 from typing import NamedTuple, cast
 
 from cryptography import x509
-from cryptography.exceptions import UnsupportedAlgorithm
 from cryptography.hazmat.primitives import hashes, serialization
 
 from keystore.errors import DamagedKeystoreError
-from keystore.formats.certificate import CertificateFacts
+from keystore.formats.certificate import UNREADABLE, CertificateFacts
 from keystore.formats.validity import Validity
 from keystore.signing.authority import Curve, IdentityIssuer, new_key
 from keystore.signing.public_key import key_kind
@@ -82,7 +81,7 @@ def request_key(pem: bytes, place: str) -> RequestedKey:
         names = found.subject.get_attributes_for_oid(x509.NameOID.COMMON_NAME)
         common_name = str(names[0].value) if len(names) == 1 else ""
         der = spki(key)
-    except (ValueError, TypeError, UnsupportedAlgorithm):
+    except UNREADABLE:
         raise DamagedKeystoreError(f"{place} is not a certificate request") from None
     if key_kind(der) not in USABLE_KINDS:
         raise DamagedKeystoreError(

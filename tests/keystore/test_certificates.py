@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+import base64
 from pathlib import Path
 
 import pytest
 from cryptography import x509
 from cryptography.hazmat.primitives import serialization
 from cryptography.hazmat.primitives.asymmetric import ec, rsa
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
-from keystore.errors import InvalidInputError, SigningUnavailableError
+from keystore.disk.crl_file import is_crl
+from keystore.errors import DamagedKeystoreError, InvalidInputError, SigningUnavailableError
 from keystore.formats import certificate
 from keystore.formats.role import Role
 from keystore.formats.validity import Validity
 from keystore.signing import authority
 from keystore.signing.authority import Authority, Curve, IdentityIssuer
-from keystore.signing.identity import new_identity
+from keystore.signing.identity import new_identity, new_request, request_key
 from keystore.signing.public_key import issued_by
 from keystore.signing.signer import spki
 from tests.keystore.kit import DAY, NOW, openssl
@@ -113,14 +115,33 @@ def test_garbage_is_refused_with_one_kind_of_error(data: bytes) -> None:
 
 
 @given(st.integers(0, 400), st.binary(min_size=1, max_size=3))
+@example(12, b"\x01")  # a version that X.509 does not have
 def test_damaged_certificates_are_read_or_refused(position: int, damage: bytes) -> None:
     whole = _SAMPLE.facts.der
     data = whole[:position] + damage + whole[position + len(damage) :]
     try:
         facts = certificate.read_der(data)
     except ValueError:
+        pem = base64.encodebytes(data).decode()
+        with pytest.raises(DamagedKeystoreError):
+            certificate.read_pem(f"-----BEGIN CERTIFICATE-----\n{pem}-----END CERTIFICATE-----\n".encode())
         return
     assert facts.can_sign_mail in (True, False) and issued_by(facts, _SAMPLE.facts) in (True, False)
+
+
+def test_a_request_and_a_crl_of_a_version_that_x509_does_not_have_are_refused() -> None:
+    request = new_request("ros.a", authority.new_key(Curve.P256))
+    assert request_key(request, "it").common_name == "ros.a"
+    with pytest.raises(DamagedKeystoreError, match="it is not a certificate request"):
+        request_key(with_version(request, b"\x00", b"\x07"), "it")
+    crl = IdentityIssuer(_SAMPLE).revocation_list({}, NOW, NOW + DAY, 1)
+    assert is_crl(crl) and not is_crl(with_version(crl, b"\x01", b"\x07"))
+
+
+def with_version(pem: bytes, old: bytes, new: bytes) -> bytes:
+    head, *lines, foot = pem.splitlines()
+    der = base64.b64decode(b"".join(lines)).replace(b"\x02\x01" + old, b"\x02\x01" + new, 1)
+    return b"\n".join((head, base64.b64encode(der), foot, b""))
 
 
 _SAMPLE = ca(Role.IDENTITY)
