@@ -13,7 +13,7 @@ from nodl.name_template import NameTemplate, ParameterPart, Part, UnknownPart, m
 from nodl.node_interface import Certainty, ClientLibrary, Endpoint, Gap, NodeInterface
 from nodl.ros_arguments import parse_ros_arguments
 
-MAX_ALTERNATIVES = 16
+MAX_ALTERNATIVES = 64
 
 
 def interfaces_of(findings: Findings, origin: LaunchKey) -> list[NodeInterface]:
@@ -133,7 +133,7 @@ def templates(name: object) -> list[NameTemplate]:
         return [NameTemplate.literal(name)]
     if isinstance(name, Text):
         results: list[tuple[Part, ...]] = [()]
-        for index, piece in enumerate(name.pieces):
+        for index, piece in enumerate(_without_implied(name.pieces)):
             choices = _parts(piece, first=index == 0)
             results = [(*result, choice) for result in results for choice in choices]
             if len(results) > MAX_ALTERNATIVES:
@@ -141,6 +141,18 @@ def templates(name: object) -> list[NameTemplate]:
         return [NameTemplate(melted(result)) for result in results]
     why = name.why if isinstance(name, Unknown) else "not a text"
     return [NameTemplate((UnknownPart(why),))]
+
+
+def _without_implied(pieces: tuple[Piece, ...]) -> list[Piece]:
+    """Drop conditions on an element of a list that the text has been narrowed by: ``for x in names: if x: f(x)``."""
+    narrowed = {
+        piece._replace(edits=(*piece.edits[:index], (edit[1][0], edit[1][1:])))
+        for piece in pieces
+        if isinstance(piece, Input)
+        for index, edit in enumerate(piece.edits)
+        if edit[0] == "where"
+    }
+    return [piece for piece in pieces if piece not in narrowed]
 
 
 def own_name(what: str, first: bool) -> str:
@@ -187,7 +199,8 @@ def _default_texts(value: Value, item: int | str | None) -> list[str | None]:
             texts.extend(_plain_texts((atom,)) or [None])
         else:
             texts.append(None)
-    return list(dict.fromkeys(texts))[:MAX_ALTERNATIVES]
+    found = list(dict.fromkeys(texts))
+    return found if len(found) <= MAX_ALTERNATIVES else [None]
 
 
 def _default_items(atom: object, item: int | str) -> list[str | None]:

@@ -47,7 +47,9 @@ class ProgramState:
         # Stamps of the latest writes: by name of a variable or field, and by ``id`` of the cells of a container.
         self.changed: dict[str | int, int] = {}
         self.base = sys.maxsize  # how many undecided branches surround a write that stays
-        self.fresh: set[int] = set()  # cells of objects made by the running callback: no other one has read them
+        self.fresh: set[int] = (
+            set()
+        )  # cells of objects made by the running callback: no other one has read them
         self.work = 0  # trail entries looked at
         self.depth = 0  # how many branches or loops surround the current point
         self.forks = 0  # how many of them are undecided: what happens there may not happen

@@ -71,6 +71,7 @@ _HARMLESS_CLASSES = re.compile(
     r"|controller_interface::(?!\w*ControllerInterface).*|hardware_interface::.*|semantic_components::.*"
     r"|BT::(?:Tree|Blackboard|NodeConfig(?:uration)?|StatusChangeLogger|StdCoutLogger|FileLogger2?|MinitraceLogger|"
     r"SqliteLogger|TreeObserver|Groot2Publisher|PublisherZMQ)"
+    r"|rviz_common::properties::.*|rviz_rendering::.*"
     r"|nav2_util::LifecycleNode::(?:integer|floating_point)_range"
     r"|moveit::core::.*|moveit::planning_interface::MoveGroupInterface::\w+|robot_trajectory::.*|trajectory_processing::.*"
     r"|rclcpp::(?:Rate|WallRate|GenericRate|GenericTimer|WallTimer|\w*Handle|\w*Guard|Event|Clock|TimeSource|Time|Duration|QoS|\w*QoS|QoSInitialization|KeepLast|KeepAll|Logger|Parameter|"

@@ -304,7 +304,7 @@ class Answering:
         plugin, package = listed[0]
         entry = _plugin_entry(plugin.type, package, self._workspace)
         if plugin.base not in CONTROLLERS and not plugin.base.startswith("hardware_interface::"):
-            entry = entry._replace(instance=instance)
+            entry = entry._replace(instance=instance or plugin.type)  # rviz gives its plugins no name
         solved = self._solved(LaunchKey(package.name, None, plugin.type), entry, start)
         return _answer(solved) if plugin.base in CONTROLLERS else _on_host(solved, package, plugin.type)
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os.path
 from collections.abc import Callable
 from functools import partial
-from itertools import chain
 
 from nodl.infer.interpreter.conditions import is_instance
 from nodl.infer.interpreter.define import expect_methods, linearized, new_instance, program_classes
@@ -233,38 +232,42 @@ def _setattr(run: Run, call: Call) -> Value:
     if len(known) < len(names):
         run.escape_value(value)
         for atom in owner:
-            if isinstance(atom, Instance) and _only_holds(atom):
-                _set_any(run, atom, names, value)
-            elif isinstance(atom, HeapObject):
+            if isinstance(atom, Instance) and _only_holds(atom) and _set_any(run, atom, names, value):
+                continue
+            if isinstance(atom, HeapObject):
                 run.gap(call.node, call.frame, "an attribute whose name is made at run time is set")
     return NONE
 
 
 def _only_holds(obj: Instance) -> bool:
-    """Return True for an object of the program alone, that is no node and says nothing of how attributes are set."""
+    """Return True for an object of the program alone, that is no node and has no ``__setattr__``."""
     if not isinstance(obj.cls, ClassValue) or obj.node is not None:
         return False
-    bases = linearized(obj.cls)
     return all(
         "__setattr__" not in base.cells
-        and not any(isinstance(each, PropertyValue) for each in chain(*base.cells.values()))
         if isinstance(base, ClassValue)
         else isinstance(base, External) and base.path == "builtins.object"
-        for base in bases
+        for base in linearized(obj.cls)
     )
 
 
-def _set_any(run: Run, obj: Instance, names: Value, value: Value) -> None:
-    """Let each attribute of ``obj``, and what its class has, be ``value``, whose name may be one of ``names``."""
+def _set_any(run: Run, obj: Instance, names: Value, value: Value) -> bool:
+    """Let each attribute of ``obj``, and what its class has, be ``value``, whose name may be one of ``names``.
+
+    Returns False if it may be a property, whose setter decides.
+    """
     assert isinstance(obj.cls, ClassValue)
     patterns = [atom for atom in names if isinstance(atom, Text)]
     unknown_names = any(not isinstance(atom, str | Text) for atom in names)
-    of_class = (name for base in program_classes(obj.cls) for name in base.cells)
+    of_class = {name: held for base in program_classes(obj.cls) for name, held in base.cells.items()}
+    plain = True
     for name in dict.fromkeys((*obj.cells, *of_class)):
         if not isinstance(name, str) or name.startswith(("[", "__")):
             continue
         if unknown_names or any(may_be(pattern, name) for pattern in patterns):
             run.state.store(obj, name, join(obj.cells.get(name, ABSENT), value))
+            plain = plain and not any(isinstance(each, PropertyValue) for each in of_class.get(name, ()))
+    return plain
 
 
 def _type(run: Run, call: Call) -> Value:

@@ -109,7 +109,7 @@ CASES: dict[str, tuple[str, list[str]]] = {
     "generator": ("def f():\n    yield 'a'\n    yield 'b'\nfor x in f():\n    self.P(x)", ["?", "a", "b"]),
     "getattr": ("self.a = 'x'\nself.P(getattr(self, 'a'))", ["x"]),
     "setattr by a name known in part": (
-        "class S:\n    a_error = 'a'\n    topic = 'b'\n    def run(self): return 'c'\ns = S()\n"
+        "class S:\n    a_error = 'a'\n    topic = 'b'\n    def run(self): return 'c'\n    @property\n    def drops(self): return 'd'\ns = S()\n"
         "setattr(s, sys.argv[1] + '_error', 'x')\nself.P(s.a_error); self.P(s.topic + s.run())",
         ["a", "bc", "x"],
     ),
@@ -188,6 +188,22 @@ CASES: dict[str, tuple[str, list[str]]] = {
 def test_names_flow(case: str, node_body: NodeBody) -> None:
     body, expected = CASES[case]
     assert node_body(body) == expected
+
+
+@pytest.mark.parametrize(("count", "known"), [(20, True), (64, True), (65, False)])
+def test_a_long_list_of_defaults_is_kept_whole_or_is_a_gap(count: int, known: bool, infer: Infer) -> None:
+    topics = [f"t{number}" for number in range(count)]
+    system = infer(
+        f"""
+        import rclpy
+        from std_msgs.msg import String
+        node = rclpy.create_node('n')
+        for topic in [str(each).strip() for each in node.declare_parameter('x', {topics}).value if str(each).strip()]:
+            node.create_publisher(String, topic + '/a', 1)
+        """
+    )
+    names = sorted(each.name.fill({}).text for each in system.nodes[0].endpoints)
+    assert names == (sorted(f"{topic}/a" for topic in topics) if known else ["*/a"])
 
 
 def test_what_partition_makes_of_a_parameter(infer: Infer) -> None:

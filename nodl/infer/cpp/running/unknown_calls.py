@@ -82,6 +82,8 @@ def unknown_call(
         called_now(run, values, node, frame)
     if harmless:
         run.resolve(node, frame)
+        if CREATES.fullmatch(last):
+            run.handle(node, frame)
         run.later(values, frame)
         return unknown(f"the result of {name}()")
     handed_over(run, f"{name}()", values, node, frame)

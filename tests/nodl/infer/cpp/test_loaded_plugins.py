@@ -255,3 +255,39 @@ def test_an_installed_header_of_nav2_changes_nothing(
     plan = planned(LAYER, "nav2_costmap_2d::Layer", DRIVE, OF_COSTMAP, body)
     assert not plan.problems
     assert "/ranges" in names(plan)
+
+
+PANEL = (
+    HEAD
+    + """
+#include <rviz_common/panel.hpp>
+namespace own {{
+class It : public rviz_common::Panel {{
+  Q_OBJECT
+public:
+  void onInitialize() override {{
+    node_ = getDisplayContext()->getRosNodeAbstraction().lock()->get_raw_node();
+    stop_ = node_->create_client<std_srvs::srv::Trigger>("stop");
+    {body}
+  }}
+private:
+  rclcpp::Node::SharedPtr node_;
+  rclcpp::Client<std_srvs::srv::Trigger>::SharedPtr stop_;
+}};
+}}
+PLUGINLIB_EXPORT_CLASS(own::It, rviz_common::Panel)
+"""
+)
+RVIZ = '<launch><node pkg="rviz2" exec="rviz2" name="rviz" args="-d {file}"/></launch>'
+
+
+def test_a_panel_of_rviz_makes_interfaces_on_the_node_of_rviz(planned: Planned) -> None:
+    plan = planned(PANEL, "rviz_common::Panel", RVIZ, "Panels: [{Class: NAME, Name: Own}]\n", "")
+    assert not plan.problems
+    assert "/stop" in names(plan)
+
+
+def test_a_panel_of_rviz_that_hands_the_node_on_is_a_gap(planned: Planned) -> None:
+    body = "acme::watch(node_);"
+    plan = planned(PANEL, "rviz_common::Panel", RVIZ, "Panels: [{Class: NAME, Name: Own}]\n", body)
+    assert any("the node is handed to acme::watch()" in str(each) for each in plan.problems)
