@@ -27,7 +27,7 @@ class EnclaveLaunchError(Exception):
 
 
 class UsageError(EnclaveLaunchError):
-    """The command line asks for what it cannot have."""
+    """A request that cannot be carried out as it is written."""
 
     exit_status = 2
 

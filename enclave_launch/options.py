@@ -110,7 +110,7 @@ class SecurityOptions(NamedTuple):
 
 
 class Deadline:
-    """A time at which a launch is ended in order, to be started again by whoever set it.
+    """A time at which a launch is ended in order, to be started again by the caller.
 
     ``reached`` once the launch was ended because of it, and for nothing else."""
 

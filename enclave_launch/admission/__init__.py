@@ -15,7 +15,7 @@ __all__ = ["AdmissionOptions", "notes", "prefix_refusals", "refusals"]
 
 
 class AdmissionOptions(NamedTuple):
-    """Options by which somebody vouches for names: launch prefixes (``shell`` for shells), and middlewares."""
+    """Names that the user vouches for: launch prefixes (``shell`` for shells), and middlewares."""
 
     prefixes: frozenset[str] = frozenset()
     middlewares: frozenset[str] = frozenset()

@@ -34,7 +34,7 @@ def get_resource(resource_type: str, resource_name: str) -> tuple[str, str]:
 
 
 def get_resources(resource_type: str) -> dict[str, str]:
-    """Name to prefix."""
+    """Return the resources of a type: name -> prefix."""
     return ament_index.list_resources(resource_type, get_search_paths())
 
 

@@ -56,7 +56,7 @@ class _Subject(NamedTuple):
 
 
 class _Known(NamedTuple):
-    """The descriptions of a program; ``of_this_start``: another start of it has to be looked up again."""
+    """The descriptions of a program; ``of_this_start``: another start of it needs another lookup."""
 
     descriptions: tuple[ProgramDescription, ...]
     searched: tuple[str, ...] = ()

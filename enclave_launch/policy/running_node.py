@@ -46,7 +46,7 @@ class RunningNode(NamedTuple):
     location: SourceLocation
     role: Role = "node"
     inputs: ProgramInputs = ProgramInputs()
-    process_namespace: str = "/"  # of the nodes that its process makes without being asked
+    process_namespace: str = "/"  # of the nodes that its process makes by itself
 
     @property
     def fqn(self) -> str:

@@ -38,10 +38,10 @@ class Refusal(NamedTuple):
 
 
 class AuditReport(NamedTuple):
-    """``never_asked``: rules by enclave that no recorded endpoint needed. ``complete``: all could be seen."""
+    """``never_requested``: rules by enclave that no recorded endpoint needed. ``complete``: all could be seen."""
 
     refusals: tuple[Refusal, ...]
-    never_asked: dict[str, tuple[Rule, ...]]
+    never_requested: dict[str, tuple[Rule, ...]]
     checked: int
     unrecorded: tuple[Unrecorded, ...]
     complaints: tuple[str, ...]
@@ -57,7 +57,7 @@ class Audit(Listener):
 
     def __init__(self, plan: LaunchPlan) -> None:
         self._grants = PlannedGrants(plan)
-        self._asked: set[Need] = set()
+        self._requested: set[Need] = set()
         self._refusals: dict[Need, Refusal] = {}
         self._checked = 0
 
@@ -70,9 +70,9 @@ class Audit(Listener):
             return
         need, endpoint = found
         self._checked += 1
-        if need not in self._asked:
+        if need not in self._requested:
             granted = self._grants.granted(node, line, need)
-            self._asked.update((need, *granted))
+            self._requested.update((need, *granted))
             if not granted:
                 described = self._grants.described(process, node)
                 short = described.text if described.missing is None else "nobody"
@@ -81,7 +81,7 @@ class Audit(Listener):
                 self._launch.say("WARNING", f"audit: {refusal.text}")
 
     def report(self) -> AuditReport:
-        used = {(need.enclave, need.operation, need.name) for need in self._asked}
+        used = {(need.enclave, need.operation, need.name) for need in self._requested}
         never = {
             enclave: tuple(
                 sorted(rule for rule in self._grants.rules_of(enclave) if not _used(rule, enclave, used))
@@ -120,12 +120,12 @@ def _parts_used(rule: Rule, enclave: str, used: set[tuple[str, Operation, str]])
 def audit_text(report: AuditReport) -> str:
     """Return the report for a person, by enclave."""
     lines = [f"audit: {report.checked} endpoints were requested; {len(report.refusals)} would be refused"]
-    enclaves = sorted({refusal.need.enclave for refusal in report.refusals} | set(report.never_asked))
+    enclaves = sorted({refusal.need.enclave for refusal in report.refusals} | set(report.never_requested))
     for enclave in enclaves:
         lines.append(f"enclave {enclave}")
         refused = [each for each in report.refusals if each.need.enclave == enclave]
         lines += [f"  would be refused: {refusal.text}" for refusal in refused]
-        rules = report.never_asked.get(enclave, ())
+        rules = report.never_requested.get(enclave, ())
         granted = (f"{WORDS[rule.operation]} {printable(rule.expression)}" for rule in rules)
         lines += [f"  granted, never requested: {each}" for each in granted]
     lines += [f"not recorded: {item.process}: {printable(item.why)}" for item in report.unrecorded]
@@ -151,7 +151,7 @@ def audit_json(report: AuditReport) -> str:
         ],
         "never_asked_for": [
             {"enclave": enclave, "operation": rule.operation.value, "name": rule.expression}
-            for enclave, rules in sorted(report.never_asked.items())
+            for enclave, rules in sorted(report.never_requested.items())
             for rule in rules
         ],
         "not_recorded": [item._asdict() for item in report.unrecorded],

@@ -27,7 +27,7 @@ from nodl.record.requested import REFUSED, EndpointRole, RequestedEndpoint, role
 
 _PATIENCE = 0.3
 """Seconds to wait for what a middleware prints about a participant that was not made: it goes another way."""
-_LINES_KEPT = 40
+_LAST_LINES = 40
 _NAMES = 12  # named in an explanation
 
 
@@ -111,7 +111,7 @@ class Explainer(Listener):
         self._on_zenoh = {item.process.process_name for item in plan.processes if item.middleware == ZENOH}
         self._printed: dict[str, deque[str]] = {}
         self._waiting: list[tuple[float, RecordedProcess, str, tuple[str, ...]]] = []
-        self._told: set[Need] = set()
+        self._explained_already: set[Need] = set()
         self._middlewares: set[str] = set()
 
     def added(self, line: Line) -> None:
@@ -131,10 +131,10 @@ class Explainer(Listener):
 
     def happened(self, event: RunEvent) -> None:
         if isinstance(event, ProcessOutput):
-            kept = self._printed.setdefault(event.name, deque(maxlen=_LINES_KEPT))
+            kept = self._printed.setdefault(event.name, deque(maxlen=_LAST_LINES))
             kept.extend(event.data.decode(errors="replace").splitlines())
 
-    def looked(self) -> None:
+    def record_read(self) -> None:
         self._report_waiting(time.monotonic())
 
     def closed(self) -> None:
@@ -154,14 +154,14 @@ class Explainer(Listener):
         if role_of(line) is EndpointRole.PART_OF_ACTION or (silent and name not in self._on_zenoh):
             return  # of an action: its own line follows
         found = self._grants.need(process, node, line)
-        if found is None or found[0] in self._told:
+        if found is None or found[0] in self._explained_already:
             return
         need, endpoint = found
         granted = bool(self._grants.granted(node, line, need))
         described = self._grants.described(process, node)
         if silent and granted:
             return
-        self._told.add(need)
+        self._explained_already.add(need)
         patch = None if granted else self._remedies.patch(need, endpoint, described)
         cause = cause_of((*endpoint.error, *self._printed.get(name, ()))) if granted else None
         unseen = () if granted else self._remedies.unseen(need, described)

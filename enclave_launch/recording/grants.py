@@ -138,8 +138,8 @@ class PlannedGrants:
             return
         built_in = self._plan.derived.built_in_names(enclave)
         for rule in self._plan.derived.reasons.get(enclave, {}):
-            asked_for = (LIST_NAMES[rule.operation], rule.expression) not in built_in
-            if asked_for and rule.qualifier is Qualifier.ALLOW:
+            stated = (LIST_NAMES[rule.operation], rule.expression) not in built_in
+            if stated and rule.qualifier is Qualifier.ALLOW:
                 yield rule
 
     def _planned(

@@ -50,7 +50,7 @@ class QuietWatch(Listener):
             self._known.add(what)
             self._last = time.monotonic()
 
-    def looked(self) -> None:
+    def record_read(self) -> None:
         if self._patience is None or self._over:
             return
         now = time.monotonic()

@@ -28,7 +28,7 @@ class ProgramToRecord(NamedTuple):
     sanitizer: str | None = None
 
 
-def look_at_command(words: Sequence[str], search_path: str = os.defpath) -> ProgramToRecord:
+def inspect_command(words: Sequence[str], search_path: str = os.defpath) -> ProgramToRecord:
     """Return the first program of a command line that cannot be recorded, else the last one that is run."""
     programs = list(_programs(words, search_path))
     hindered = next((program for program in programs if program.obstacle), None)
@@ -48,7 +48,7 @@ def _programs(words: Sequence[str], search_path: str) -> Iterator[ProgramToRecor
         elif place == 0 or os.path.isabs(word):
             path = shutil.which(word, path=search_path)
             if path is not None:
-                yield _looked_at(path, _state(path))
+                yield _inspected(path, _state(path))
 
 
 def _state(path: str) -> tuple[int, int]:
@@ -60,11 +60,11 @@ def _state(path: str) -> tuple[int, int]:
 
 
 @lru_cache(maxsize=1024)
-def _looked_at(path: str, state: tuple[int, int]) -> ProgramToRecord:
-    return look_at_program(path)
+def _inspected(path: str, state: tuple[int, int]) -> ProgramToRecord:
+    return inspect_program(path)
 
 
-def look_at_program(path: str, depth: int = 0) -> ProgramToRecord:
+def inspect_program(path: str, depth: int = 0) -> ProgramToRecord:
     """Return what the head of the file says; a script is what its interpreter is."""
     try:
         with open(path, "rb") as file:
@@ -75,7 +75,7 @@ def look_at_program(path: str, depth: int = 0) -> ProgramToRecord:
             if head[:2] == b"#!":
                 interpreter = head[2:].split(b"\n")[0].split()[:1]
                 if depth < 4 and interpreter:
-                    return look_at_program(os.fsdecode(interpreter[0]), depth + 1)
+                    return inspect_program(os.fsdecode(interpreter[0]), depth + 1)
                 return ProgramToRecord(path)
             gains = _gains_privileges(path, status)
             return ProgramToRecord(path, gains) if gains else _elf(path, head, file)

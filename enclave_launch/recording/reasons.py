@@ -112,10 +112,10 @@ HARMLESS = re.compile(r"Remote secure participant .* not allowed")
 def cause_of(texts: Iterable[str]) -> Cause | None:
     """Return the first cause that one of ``texts`` names."""
     said = tuple(texts)
-    return _told(said, _COMPILED) or _told(said, _COMPILED_AT_LAST)
+    return _first_cause(said, _COMPILED) or _first_cause(said, _COMPILED_AT_LAST)
 
 
-def _told(texts: Iterable[str], causes: Iterable[tuple[re.Pattern[str], str, str]]) -> Cause | None:
+def _first_cause(texts: Iterable[str], causes: Iterable[tuple[re.Pattern[str], str, str]]) -> Cause | None:
     for text in texts:
         for pattern, what, remedy in causes:
             match = pattern.search(text)

@@ -22,7 +22,7 @@ from enclave_launch.policy.program_inputs import own_words
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
 from enclave_launch.recording.build import RECORD_VARIABLE, recorder_library, with_recorder
 from enclave_launch.recording.markers import Marked, MarkerRun
-from enclave_launch.recording.programs import look_at_command
+from enclave_launch.recording.programs import inspect_command
 from enclave_launch.recording.record_files import RecordFiles
 from enclave_launch.runtime.companion import LaunchControl
 from enclave_launch.runtime.process_tree import ProcessSpec
@@ -77,7 +77,7 @@ class Listener:
     def happened(self, event: RunEvent) -> None:
         """Receive an event of the launch."""
 
-    def looked(self) -> None:
+    def record_read(self) -> None:
         """Receive notice that the record was read again."""
 
     def closed(self) -> None:
@@ -153,7 +153,7 @@ class Recording:
         self._processes[process.process_name] = process
         if self._folder is None:
             return spec
-        program = look_at_command(spec.cmd, spec.environment.get("PATH", os.defpath))
+        program = inspect_command(spec.cmd, spec.environment.get("PATH", os.defpath))
         if program.obstacle:
             self._not_recorded(process.process_name, program.obstacle)
         if self._markers is not None:
@@ -179,7 +179,7 @@ class Recording:
         elif isinstance(event, ProcessExited):
             self.running.pop(event.pid, None)
         elif isinstance(event, LaunchOver) and self._folder is not None:
-            self._look_once_more()  # what is reported now is printed before the end
+            self._read_the_rest()  # what is reported now is printed before the end
             self._report(float("inf"))
         for listener in self._listeners:
             listener.happened(event)
@@ -195,7 +195,7 @@ class Recording:
             self._task.cancel()
             await asyncio.gather(self._task, return_exceptions=True)
         try:
-            self._look_once_more()
+            self._read_the_rest()
             self._report(float("inf"))
             self._take(self._files.unfinished())
             self._reader.close()
@@ -240,13 +240,13 @@ class Recording:
         try:
             while True:
                 await asyncio.sleep(INTERVAL)
-                self._look()
+                self._read_new_lines()
                 for listener in self._listeners:
-                    listener.looked()
+                    listener.record_read()
         except OSError as error:
             self._lose(f"the record of this launch cannot be read any more: {error}")
 
-    def _look(self) -> None:
+    def _read_new_lines(self) -> None:
         self._take(self._files.new_lines())
         for report in self._files.reports:
             self._lose(report)
@@ -277,9 +277,9 @@ class Recording:
         process = self.record.process_of(line.pid)
         return process is not None and process.started is not None
 
-    def _look_once_more(self) -> None:
+    def _read_the_rest(self) -> None:
         try:
-            self._look()
+            self._read_new_lines()
         except OSError as error:
             self._lose(f"the end of the record of this launch cannot be read: {error}")
 
@@ -357,9 +357,9 @@ class EndpointEvents(Listener):
             return
         name, pid, endpoint = process.started.process, process.started.pid, _endpoint(requested, node, line)
         if requested.granted:
-            self._launch.tell(EndpointCreated(name, pid, endpoint))
+            self._launch.publish(EndpointCreated(name, pid, endpoint))
         else:
-            self._launch.tell(EndpointRefused(name, pid, endpoint, requested.error))
+            self._launch.publish(EndpointRefused(name, pid, endpoint, requested.error))
 
 
 def _endpoint(requested: RequestedEndpoint, node: RecordedNode, line: EndpointMade) -> EndpointRequested:

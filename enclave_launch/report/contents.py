@@ -32,7 +32,7 @@ class Influence(NamedTuple):
 
 
 class ReportContents(NamedTuple):
-    """``endings`` is ``None`` where no keystore was asked."""
+    """``endings`` is ``None`` without a keystore."""
 
     title: str
     graph: EnclaveGraph

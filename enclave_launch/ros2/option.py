@@ -68,7 +68,7 @@ class EnclaveOption(OptionExtension):  # type: ignore[misc]  # untyped without R
             if not keystore:
                 check_needs_secure(self._ours, given & (FOR_SECURE if looking else FOR_SECURE | FOR_PLAN))
             if looking:
-                raise SystemExit(_looked_at(options))
+                raise SystemExit(_shown(options))
             if not keystore:
                 return (launch_description,)
             raise SystemExit(_launched(launch_description, options))
@@ -92,7 +92,7 @@ def names_keystore(words: Sequence[str]) -> bool:
     return len(named) > 1 or any(os.path.isfile(word) for word in named)
 
 
-def _looked_at(args: argparse.Namespace) -> int:
+def _shown(args: argparse.Namespace) -> int:
     from enclave_launch.flow import resolve
     from enclave_launch.verb.options import resolve_options
     from enclave_launch.verb.secure_launch import show_plan

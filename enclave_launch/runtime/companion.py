@@ -21,7 +21,7 @@ class LaunchControl(Protocol):
     def say(self, level: Level, message: str) -> None:
         """Write a line to the launch log."""
 
-    def tell(self, event: RunEvent) -> None:
+    def publish(self, event: RunEvent) -> None:
         """Publish an event to everything that observes the launch, the companion included."""
 
     def shut_down(self, reason: str) -> None: ...

@@ -19,8 +19,8 @@ from typing import NamedTuple
 from enclave_common.files import read_bytes
 from enclave_launch.runtime.warden import children_by_parent, descendants, proc_is_ours
 
-FIRST_LOOK = 0.25  # seconds after a start; then ever rarer
-RAREST_LOOK = 15.0
+FIRST_INTERVAL = 0.25  # seconds after a start; then ever rarer
+LONGEST_INTERVAL = 15.0
 _SPEAKS_DDS = re.compile(rb"/lib(rcl|rmw|ddsc|fastrtps|fastdds|nddsc|zenoh)[-_.\w]*\.so")
 _VARIABLE = re.compile(rb"[A-Za-z_][A-Za-z0-9_]*=")
 
@@ -86,7 +86,7 @@ class EnvironmentWatch:
 
     async def run(self) -> None:
         """Run until cancelled."""
-        pause = RAREST_LOOK
+        pause = LONGEST_INTERVAL
         while True:
             # Not wait_for: until Python 3.12 it loses a cancellation that comes together with what it waits for.
             started = asyncio.ensure_future(self._started.wait())
@@ -96,10 +96,10 @@ class EnvironmentWatch:
                 started.cancel()
             if self._started.is_set():
                 self._started.clear()
-                pause = FIRST_LOOK
+                pause = FIRST_INTERVAL
                 await asyncio.sleep(pause)
             self.look()
-            pause = min(2 * pause, RAREST_LOOK)
+            pause = min(2 * pause, LONGEST_INTERVAL)
 
     def look(self) -> None:
         watched = self._running()

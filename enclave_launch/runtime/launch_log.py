@@ -99,9 +99,9 @@ class LaunchLog:
         return self._files[name]
 
     def _file_sink(self, name: str) -> FileSink:
-        return FileSink(self.directory / name, self._tell_on_screen, self._limit)
+        return FileSink(self.directory / name, self._report_on_screen, self._limit)
 
-    def _tell_on_screen(self, text: str) -> None:
+    def _report_on_screen(self, text: str) -> None:
         self._writers.screen.write(self.screen, (self._on_screen("ERROR", "launch", text) + "\n").encode())
 
     def close(self) -> None:

@@ -167,7 +167,7 @@ class LiveLaunch:
         """Write a line to the launch log."""
         self._log.log(level, "launch", message)
 
-    def tell(self, event: RunEvent) -> None:
+    def publish(self, event: RunEvent) -> None:
         """Publish an event that a companion has seen."""
         self._observe(event)
 
@@ -191,7 +191,7 @@ class LiveLaunch:
         companion = self._settings.companion
         recorded = companion is not None and companion.records
         self._observe(LaunchStarted(str(self._log.directory), recorded))
-        self._look_at_clock()
+        self._check_deadline()
         with ENVIRONMENT_SWITCH.active(self._environment):
             self._begin()
         if tree.lost is not None:
@@ -214,14 +214,14 @@ class LiveLaunch:
         self._observe(LaunchOver(status))
         return status
 
-    def _look_at_clock(self) -> None:
+    def _check_deadline(self) -> None:
         """Check the deadline every minute, since a clock can be set, and more often shortly before it."""
         deadline = self._settings.deadline
         if deadline is None or self._shutting_down:
             return
         left = (deadline.at - datetime.now(timezone.utc)).total_seconds()
         if left > 0:
-            asyncio.get_running_loop().call_later(min(left, 60.0), self._look_at_clock)
+            asyncio.get_running_loop().call_later(min(left, 60.0), self._check_deadline)
             return
         deadline.reached = True
         self.say("WARNING", deadline.reason)

@@ -51,15 +51,15 @@ class ScreenSink:
 class FileSink:
     """Appends to a file, opened on first use and again after something (logrotate) moved it away.
 
-    ``tell`` gets one line when it cannot be written and one when it can again. At ``limit`` bytes the file becomes
+    ``report`` gets one line when it cannot be written and one when it can again. At ``limit`` bytes the file becomes
     ``<name>.1``, in place of an older one, and a new one is begun; ``None``: no limit.
     """
 
     def __init__(
-        self, path: Path, tell: Callable[[str], None] = lambda text: None, limit: int | None = None
+        self, path: Path, report: Callable[[str], None] = lambda text: None, limit: int | None = None
     ) -> None:
         self.path = path
-        self._tell = tell
+        self._report = report
         self._limit = limit
         self._descriptor = -1
         self._identity: tuple[int, int] | None = None
@@ -75,11 +75,11 @@ class FileSink:
         except OSError as error:  # a full disk must not end the launch
             if not self._broken:
                 lost = "output for it is lost until it can be written"
-                self._tell(f"cannot write {self.path}: {error.strerror}; {lost}")
+                self._report(f"cannot write {self.path}: {error.strerror}; {lost}")
             self._broken = True
             return
         if self._broken:
-            self._tell(f"{self.path} can be written again; output in between is missing")
+            self._report(f"{self.path} can be written again; output in between is missing")
         self._broken = False
 
     def close(self) -> None:

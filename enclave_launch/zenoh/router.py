@@ -28,9 +28,9 @@ from enclave_launch.runtime.warden import PR_SET_PDEATHSIG, load_libc
 PROGRAM = "lib/rmw_zenoh_cpp/rmw_zenohd"
 CONFIGURATION = "ZENOH_ROUTER_CONFIG_URI"
 _PATIENCE = 30.0  # seconds until it answers
-_LOOK = 0.1
+_PROBE = 0.1
 _PAUSE = 1.0  # before one that ended is started again
-_LINES_KEPT = 20
+_LAST_LINES = 20
 _PLAIN = {"ZENOH_CONFIG_OVERRIDE": "", "NO_COLOR": "1"}
 
 
@@ -99,14 +99,14 @@ class ZenohRouter:
         self._environment = {**environment, CONFIGURATION: place.configuration, **_PLAIN}
         self._say, self._heard = say, heard
         self._looks = 0
-        self._printed: deque[str] = deque(maxlen=_LINES_KEPT)
+        self._printed: deque[str] = deque(maxlen=_LAST_LINES)
         self._stop = threading.Event()
         self._answered = threading.Event()
         self._failed = threading.Event()
         self._thread: threading.Thread | None = None
 
     def __enter__(self) -> ZenohRouter:
-        if self._look() is RouterAnswer.NOBODY:
+        if self._probe() is RouterAnswer.NOBODY:
             self._start()
         self.wait()
         return self
@@ -119,17 +119,17 @@ class ZenohRouter:
     def wait(self) -> None:
         """Wait until a router with the present rules answers. :raises RuntimeFailure: none does in time."""
         end = time.monotonic() + _PATIENCE
-        answer = self._look()
+        answer = self._probe()
         while answer is not RouterAnswer.PRESENT:
             stranger = answer is RouterAnswer.STRANGER and not self._thread
             if stranger or self._failed.is_set() or time.monotonic() > end:
                 self._stop.set()
                 raise RuntimeFailure(self._failure(answer))
-            time.sleep(_LOOK)
-            answer = self._look()
+            time.sleep(_PROBE)
+            answer = self._probe()
         self._answered.set()
 
-    def _look(self) -> RouterAnswer:
+    def _probe(self) -> RouterAnswer:
         self._looks += 1  # before the router can say a word of it
         answer = who_answers(self._place)
         self._looks -= answer is RouterAnswer.NOBODY
@@ -187,7 +187,7 @@ class ZenohRouter:
 
     def _follow(self, process: subprocess.Popen[bytes], seen: object) -> None:
         refused = ""
-        while not self._stop.wait(_LOOK):
+        while not self._stop.wait(_PROBE):
             if process.poll() is not None and not self._answered.is_set():
                 return
             if process.poll() is not None:
@@ -207,12 +207,12 @@ class ZenohRouter:
         with process.stdout:
             for line in process.stdout:
                 text = line.decode(errors="replace").rstrip()
-                if self._is_of_our_look(text) or self._heard(text):
+                if self._is_of_our_probe(text) or self._heard(text):
                     continue
                 self._printed.append(text)
                 print(f"[rmw_zenohd] {text}", file=sys.stderr)
 
-    def _is_of_our_look(self, text: str) -> bool:
+    def _is_of_our_probe(self, text: str) -> bool:
         """Return True for the router's warning about a client without a certificate if ``who_answers`` was that
         client."""
         ours = self._looks > 0 and "peer sent no certificates" in text

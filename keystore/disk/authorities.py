@@ -1,4 +1,4 @@
-"""Which CAs a keystore trusts, held against those that its register knows. Cheap: asked before a launch."""
+"""Compare the CAs that a keystore trusts with those that its register knows; cheap enough for each launch."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The register on disk. Cheap: asked before a launch; ``store`` writes it, first of each batch."""
+"""Read the register from disk, cheaply, before each launch; ``store`` writes it, first of each batch."""
 
 from __future__ import annotations
 

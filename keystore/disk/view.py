@@ -181,7 +181,7 @@ class KeystoreView:
         return safe_files.read_if_there(self.root, f"{layout.enclave_directory(enclave)}/{name}")
 
     def enclaves(self) -> list[str]:
-        """Names of all enclaves (directories with a key or a certificate), sorted; links are not followed."""
+        """Return the names of all enclaves (directories with a key or a certificate), sorted; follows no links."""
         found: list[str] = []
         try:
             _collect(self.root / layout.ENCLAVES, "", found)

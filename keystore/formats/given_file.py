@@ -1,4 +1,4 @@
-"""A file that somebody named: a certificate, a key, a request, YAML. Reads only."""
+"""Read a file that the user named: a certificate, a key, a request, YAML."""
 
 from __future__ import annotations
 

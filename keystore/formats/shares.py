@@ -1,4 +1,4 @@
-"""The shares of an enclave's permissions: what each launch asks for, and all of it together. Performs no I/O.
+"""The shares of an enclave's permissions: what each launch requests, and all of it together. Performs no I/O.
 
 Launches may meet in an enclave (with the default scope all use ``/``): each owns its share, by its launch file."""
 
@@ -20,7 +20,7 @@ _VERSION = 1
 
 
 class Share(NamedTuple):
-    """What ``owner`` asks for one enclave, and in which domains. ``types``: as ``zenoh.types`` keeps them; only of
+    """What ``owner`` requests for one enclave, and in which domains. ``types``: as ``zenoh.types`` keeps them; only of
     enclaves that are on Zenoh."""
 
     owner: str

@@ -93,7 +93,7 @@ def borrowable(names: Mapping[str, str]) -> list[tuple[str, str]]:
     return sorted(pairs)
 
 
-def cannot_be_told_apart(pairs: Iterable[tuple[str, str]], limit: int = 3) -> str:
+def indistinguishable(pairs: Iterable[tuple[str, str]], limit: int = 3) -> str:
     """Name the first few pairs in one sentence."""
     listed = list(pairs)
     shown = ", ".join(f"{a} could use the permissions of {b}" for a, b in listed[:limit])

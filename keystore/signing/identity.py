@@ -72,7 +72,7 @@ def new_request(common_name: str, signer: Signer) -> bytes:
 
 
 def request_key(pem: bytes, place: str) -> RequestedKey:
-    """Return the key that a request asks for; raises DamagedKeystoreError unless that very key signed the request."""
+    """Return the key that a request is for; raises DamagedKeystoreError unless that very key signed the request."""
     try:
         found = x509.load_pem_x509_csr(pem)
         if not found.is_signature_valid:

@@ -21,7 +21,7 @@ CYCLONE_KINDS = ("P-256", "RSA-2048")
 
 
 def fingerprints(named: Iterable[str]) -> frozenset[str]:
-    """Returns SHA-256 as somebody wrote them, such as openssl does with colons, in the form of ``fingerprint``."""
+    """Return SHA-256 fingerprints, which openssl writes with colons, in the form of ``fingerprint``."""
     return frozenset(one.replace(":", "").lower() for one in named)
 
 

@@ -16,7 +16,7 @@ from keystore.signing.public_key import fingerprint
 def certificate_record(
     enclave: str, facts: CertificateFacts, issuer: CertificateFacts, lifetime: timedelta | None = None
 ) -> IssuedCertificate:
-    """Returns what is kept of a certificate that ``issuer`` signed for ``lifetime``."""
+    """Return the register's entry for a certificate that ``issuer`` signed for ``lifetime``."""
     return IssuedCertificate(
         facts.serial,
         enclave,

@@ -29,7 +29,7 @@ from keystore.steps.enclave_state import (
     inspect,
 )
 from keystore.steps.options import EnclaveReport, ProvisionOptions, ProvisionReport
-from keystore.steps.sharing import kept_shares
+from keystore.steps.sharing import shares_in_use
 from keystore.steps.wanted import WantedEnclave, wanted_enclave, with_domains
 
 
@@ -62,7 +62,7 @@ def compare(
             return None
     ends = _first_end(view, (state.validity for state in states))
     more = [state.reasons[0] for state in states if state.reasons]
-    more += kept_shares(one.share for one in wanted.values() if one.share is not None)
+    more += shares_in_use(one.share for one in wanted.values() if one.share is not None)
     return ProvisionReport(root, (), tuple(as_found(state) for state in states), tuple(more), ends)
 
 

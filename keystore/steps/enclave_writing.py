@@ -18,9 +18,9 @@ from keystore.formats.role import Role
 from keystore.formats.subject import (
     SubjectScheme,
     borrowable,
-    cannot_be_told_apart,
     common_name,
     half_of,
+    indistinguishable,
     scheme_of,
     subject_name,
 )
@@ -32,7 +32,7 @@ from keystore.signing.smime import sign_document
 from keystore.steps.crl import can_revoke, revocable
 from keystore.steps.enclave_state import NEW, EnclaveState, PermissionsSource, Reissue, granted_lifetime
 from keystore.steps.options import EnclaveReport, ProvisionOptions
-from keystore.steps.past_permissions import kept_permissions, what_is_taken_away
+from keystore.steps.past_permissions import previous_permissions, what_is_taken_away
 
 _DAY = timedelta(days=1)
 
@@ -99,7 +99,7 @@ class EnclaveWriter:
         pairs = [pair for pair in borrowable(names) if fresh & set(pair)]
         if pairs:
             raise InvalidInputError(
-                f"with compatible subjects, on Cyclone DDS {cannot_be_told_apart(pairs)}; use exact "
+                f"with compatible subjects, on Cyclone DDS {indistinguishable(pairs)}; use exact "
                 "subjects, rename the enclaves, or accept it with --allow-subject-overlap"
             )
 
@@ -234,7 +234,7 @@ class EnclaveWriter:
         return name
 
     def _is_revoked_on_zenoh(self, enclave: str, name: str) -> bool:
-        """A Zenoh router knows no CRL and goes by names: the name of a revoked certificate is given to nobody again."""
+        """Return True if the name was of a revoked certificate: a Zenoh router knows no CRL and goes by names."""
         return self._view.has_zenoh_router and any(
             one.subject == name and (one.revoked is not None or one.serial in self._revoked)
             for one in self._register.of_enclave(enclave)
@@ -258,7 +258,7 @@ class EnclaveWriter:
     ) -> None:
         name = facts.common_name or ""
         subject = subject_name(name)
-        document = source(subject, facts.validity) or kept_permissions(
+        document = source(subject, facts.validity) or previous_permissions(
             self._view, self._register, enclave, subject, facts.validity, self._options.rmw
         )
         signed = sign_document(document, self._permissions_ca)

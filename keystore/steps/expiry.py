@@ -1,4 +1,4 @@
-"""What of a keystore ends when. Reads only: a launch asks this every time."""
+"""List what of a keystore expires when. Reads only; each launch does this."""
 
 from __future__ import annotations
 

@@ -76,7 +76,7 @@ class RequestOptions:
 def request(
     keystore: Path | str, enclaves: Iterable[str], *, options: RequestOptions | None = None
 ) -> tuple[Request, ...]:
-    """Make a key for each enclave and ask for its certificate; what waits already is asked for again, unchanged.
+    """Make a key for each enclave and request its certificate; one that waits already is requested again, unchanged.
 
     The present key of an enclave stays in use until a bundle with the certificate of the new one is imported.
     Raises InvalidInputError, StorageError, SigningUnavailableError (a token that refuses).

@@ -60,10 +60,10 @@ class ProvisionOptions(NamedTuple):
     revoke: bool = True
     """Revoke certificates whose rights shrink or whose key is not safe; without it they are usable until they end."""
     types: Mapping[str, tuple[tuple[str, tuple[str, ...]], ...]] = MappingProxyType({})
-    """By enclave, of those on Zenoh: the types of what the launch asks for (``zenoh.types.types_text``)."""
+    """By enclave, of those on Zenoh: the types of what the launch requests (``zenoh.types.types_text``)."""
     enclave_domains: Mapping[str, Domains] = MappingProxyType({})
     signing: Signing | None = None
-    """Where signing is done by a process of its own; it has the ``access``, and everything that was asked for."""
+    """Where signing is done by a process of its own; it has the ``access``, and everything that was requested."""
     guid_halves: Mapping[str, Half] = MappingProxyType({})
     """Where the participants of enclaves without a certificate yet should sort; their subjects are chosen so."""
 

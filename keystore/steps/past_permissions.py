@@ -47,7 +47,7 @@ def what_is_taken_away(
     return taken_away(grant, new) if grant is not None else (UNKNOWN_RIGHTS,)
 
 
-def kept_permissions(
+def previous_permissions(
     view: KeystoreView, register: Register, enclave: str, subject: str, validity: Validity, rmw: str | None
 ) -> bytes:
     """Return what the enclave was granted before, under its new subject and dates; without a past, nothing.

@@ -36,7 +36,7 @@ from keystore.steps.enclave_writing import EnclaveWriter
 from keystore.steps.governance import renew_governance
 from keystore.steps.opening import opened_for_change
 from keystore.steps.options import EnclaveReport, Progress, ProvisionOptions, ProvisionReport
-from keystore.steps.sharing import given_up, kept_shares, left_over, refuse_running
+from keystore.steps.sharing import given_up, left_over, refuse_running, shares_in_use
 from keystore.steps.wanted import (
     WantedEnclave,
     permissions_source,
@@ -177,7 +177,7 @@ def list_enclaves(keystore: Path | str) -> list[str]:
 def drop_shares(
     keystore: Path | str, owner: str, *, options: ProvisionOptions | None = None
 ) -> ProvisionReport:
-    """Take the shares of a launch out of every enclave; what no other launch asks for is taken away for good.
+    """Take the shares of a launch out of every enclave; what no other launch requests is taken away for good.
 
     Raises InvalidInputError when it has none, or while a launch runs on one of these enclaves.
     """
@@ -221,7 +221,7 @@ def reconcile(
                 "certificates were revoked: deploy crl.pem to every host and restart what runs there; participants "
                 "read it when they start"
             )
-    warnings += kept_shares(one.share for one in wanted.values() if one.share is not None)
+    warnings += shares_in_use(one.share for one in wanted.values() if one.share is not None)
     return ProvisionReport(root, tuple(done), reports, (*warnings, *writer.warnings))
 
 

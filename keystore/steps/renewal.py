@@ -52,7 +52,7 @@ class RenewOptions:
     everything: bool = False
     new_keys: bool = False
     revoke_old: bool = False
-    """Also revoke the certificates that these enclaves had before: for keys that somebody copied."""
+    """Also revoke the certificates that these enclaves had before: for keys that may have been copied."""
     encrypt_ca_keys: bool = False
     provisioning: ProvisionOptions = field(default_factory=ProvisionOptions)
 
@@ -104,7 +104,7 @@ def renew(
 
 
 def _still_valid(root: Path, report: ProvisionReport, now: datetime) -> list[str]:
-    """Return what was replaced and can be used by whoever copied it, until it expires or is revoked."""
+    """Return what was replaced and is usable by a copy of its key, until it expires or is revoked."""
     register = read_register(root)
     renewed = [one.enclave for one in report.enclaves if one.actions]
     earlier = [

@@ -24,7 +24,7 @@ from keystore.signing.smime import sign_document
 from keystore.steps.host_keys import Request
 from keystore.steps.opening import opened_for_change
 from keystore.steps.options import ProvisionOptions, ProvisionReport
-from keystore.steps.past_permissions import kept_permissions
+from keystore.steps.past_permissions import previous_permissions
 from keystore.steps.renewal import RenewOptions, renew
 
 
@@ -129,7 +129,7 @@ def _accept(
     both.
     """
     name = facts.common_name or ""
-    document = kept_permissions(view, register, one.enclave, subject_name(name), facts.validity, None)
+    document = previous_permissions(view, register, one.enclave, subject_name(name), facts.validity, None)
     entries: dict[str, Content | Link] = {
         layout.CERT: Content(facts.pem),
         layout.PERMISSIONS_XML: Content(document),

@@ -214,7 +214,7 @@ def _refuse_without_start(opened: Store, roles: Collection[Role]) -> None:
 
 
 def _retire_for_good(opened: Store, role: Role) -> None:
-    """Record the retirement after the trust file is written: whoever puts the old CA back there is found."""
+    """Record the retirement after the trust file is written: an old CA that is put back there is found."""
     retired = opened.register.with_retired([role])
     if retired != opened.register:
         with opened.batch() as batch:

@@ -29,7 +29,7 @@ from keystore.formats.validity import Validity
 
 @dataclass(frozen=True)
 class EnclaveShare:
-    """The share of ``owner`` in one enclave, with those of others as they stand when it is first asked.
+    """The share of ``owner`` in one enclave, with those of others as they stand when they are first read.
 
     ``mine`` None: the owner gives its share up.
     """
@@ -94,7 +94,7 @@ def _loses(before: Share, mine: Share) -> bool:
     return not is_part_of(before.profiles, mine.profiles) or united_domains((before, mine)) != mine.domains
 
 
-def kept_shares(shares: Iterable[EnclaveShare]) -> list[str]:
+def shares_in_use(shares: Iterable[EnclaveShare]) -> list[str]:
     """Return what could not be taken away of each share yet, one sentence an enclave."""
     kept = [(share.enclave, share.kept()) for share in shares]
     return [
@@ -158,7 +158,7 @@ def list_shares(keystore: Path | str) -> tuple[LaunchShares, ...]:
 
 
 def given_up(root: Path, owner: str) -> list[EnclaveShare]:
-    """Return the shares of ``owner``, to be dropped; raises InvalidInputError for none, or while somebody uses them."""
+    """Return the shares of ``owner``, to be dropped; raises InvalidInputError for none, or while they are in use."""
     mine = [
         EnclaveShare(root, enclave, owner, None)
         for enclave in enclaves_with_shares(root)
@@ -173,7 +173,7 @@ def given_up(root: Path, owner: str) -> list[EnclaveShare]:
 
 
 def left_over(root: Path, owner: str, enclaves: Iterable[str]) -> list[str]:
-    """Returns the enclaves in which ``owner`` still has a share, though it asks only for ``enclaves`` now."""
+    """Return the enclaves in which ``owner`` still has a share, though it requests only ``enclaves`` now."""
     present = set(enclaves)
     return [
         name

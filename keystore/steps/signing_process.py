@@ -228,7 +228,7 @@ def _rights(descriptor: int | None) -> list[tuple[int, int, bytes]]:
 
 
 def _receive(channel: socket.socket) -> tuple[Any, int | None]:
-    """Raises EOFError when the other end is gone."""
+    """Read one message and the descriptor that came with it; raises EOFError when the other end is gone."""
     integer = array.array("i")
     head, ancillary, _, _ = channel.recvmsg(_HEAD.size, socket.CMSG_SPACE(integer.itemsize))
     for level, kind, data in ancillary:

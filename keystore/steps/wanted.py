@@ -1,4 +1,4 @@
-"""What is wanted of each enclave, from its policy and the options of provisioning."""
+"""Work out what each enclave should have, from its policy and the options of provisioning."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class WantedEnclave(NamedTuple):
     share: EnclaveShare | None = None
     """Where ``permissions`` are those of several launches."""
     ends_by: datetime | None = None
-    """When a life was asked for: a certificate that ends later does not do."""
+    """The requested end of its certificate; one that expires later is issued again."""
 
 
 def with_domains(root: Path, options: ProvisionOptions) -> ProvisionOptions:
@@ -43,7 +43,7 @@ def domains_of(enclave: str, options: ProvisionOptions) -> Domains:
 
 
 def permissions_source(policy: EnclavePolicy, options: ProvisionOptions) -> PermissionsSource:
-    """Makes the document of exactly this policy."""
+    """Return what makes the document of exactly this policy."""
     domains = domains_of(policy.path, options)
 
     def document(subject: str, validity: Validity) -> bytes:

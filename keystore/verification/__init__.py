@@ -41,7 +41,7 @@ class VerifyReport:
 
 
 class Requirements(NamedTuple):
-    """What somebody decided a keystore must be. ``authorities``: SHA-256 fingerprints of all CAs to trust."""
+    """Requirements of the user for a keystore. ``authorities``: SHA-256 fingerprints of all CAs to trust."""
 
     governance: Governance | None = None
     authorities: tuple[str, ...] = ()

@@ -32,7 +32,7 @@ from keystore.formats.role import Role
 from keystore.formats.subject import (
     SubjectScheme,
     borrowable,
-    cannot_be_told_apart,
+    indistinguishable,
     names_enclave,
     scheme_of,
     subject_name,
@@ -86,7 +86,7 @@ def _check_subjects(view: KeystoreView, names: dict[str, str]) -> Iterator[Findi
     if pairs:
         yield Finding(
             Severity.EXPOSURE, "borrowed-permissions", layout.ENCLAVES,
-            f"on Cyclone DDS (every version so far) {cannot_be_told_apart(pairs)}: it compares subjects as "
+            f"on Cyclone DDS (every version so far) {indistinguishable(pairs)}: it compares subjects as "
             "bags of path segments",
             repair.run(view.root, "renew", "--all", note="gives exact subjects"),
         )  # fmt: skip

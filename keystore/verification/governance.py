@@ -56,7 +56,7 @@ def _shown(value: bool | Protection) -> str:
 
 
 def check_strength(root: Path, governance: Governance, required: Governance | None) -> Iterator[Finding]:
-    """Check the strength, or against ``required``, which may be weaker: what somebody decided it should be."""
+    """Check the strength, or against ``required``, which may be weaker."""
     again = repair.run(root, "governance", "FILE.yaml", note="must reach all participants together")
     if required is not None:
         if governance != required:

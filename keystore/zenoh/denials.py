@@ -153,7 +153,7 @@ class RouterLogExplainer:
     def __init__(self, keystore: Path | str) -> None:
         self._view = keystore_at(keystore)
         self._log = RouterLog()
-        self._told: set[tuple[str, ...]] = set()
+        self._explained_before: set[tuple[str, ...]] = set()
         self._enclaves = {
             name: one for one in self._view.zenoh_enclaves() if (name := self._view.common_name(one))
         }
@@ -170,9 +170,9 @@ class RouterLogExplainer:
         return self._once((found.name, said.what, said.why), said)
 
     def _once(self, key: tuple[str, ...], said: Explanation) -> Explanation | None:
-        if key in self._told:
+        if key in self._explained_before:
             return None
-        self._told.add(key)
+        self._explained_before.add(key)
         return said
 
     def _explained(self, found: Dropped, about: Meaning | None) -> Explanation:

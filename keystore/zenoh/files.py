@@ -146,7 +146,7 @@ def _trust(view: KeystoreView) -> str:
 def _subject(
     view: KeystoreView, register: Register | None, revoked: frozenset[int], enclave: str
 ) -> tuple[Subject, tuple[str, ...]]:
-    """Raises a KeystoreError where the enclave must not be served."""
+    """Return the enclave with its rules and gaps; raises a KeystoreError if it must not be served."""
     directory = layout.enclave_directory(enclave)
     pem = safe_files.read(view.root, f"{directory}/{layout.CERT}")
     facts = read_certificate(pem, printable(view.root / directory / layout.CERT))

@@ -122,5 +122,5 @@ def _read(path: Path, source: SourceRef) -> bytes:
 
 
 def resource_key(package: str, name: str) -> str:
-    """Name in the ament index of the v2 document ``nodl://package/name``."""
+    """Return the name in the ament index of the v2 document ``nodl://package/name``."""
     return f"{package}__{name}"

@@ -17,7 +17,7 @@ from nodl.graph.json_form import graph_document
 from nodl.graph.observing import SOURCES, Where, in_own_process, observer
 
 _BETWEEN = 1.0  # seconds between two lines at least; looks come oftener
-_LOOK = 0.2
+_INTERVAL = 0.2
 
 
 def main() -> int:
@@ -39,7 +39,7 @@ def main() -> int:
 def _follow(where: Where, reader: int) -> int:
     told, last = -1, 0.0
     with observer(where, os.environ) as up:
-        while not select.select([reader], [], [], _LOOK)[0]:
+        while not select.select([reader], [], [], _INTERVAL)[0]:
             changes = up.look()
             if changes != told and time.monotonic() - last >= _BETWEEN:
                 told, last = changes, time.monotonic()

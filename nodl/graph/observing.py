@@ -132,7 +132,7 @@ def _answered(observe: Callable[[], Any], answer: Connection) -> None:
     answer.send(value)
 
 
-def look_until(up: Observer, done: Callable[[], bool]) -> None:
+def observe_until(up: Observer, done: Callable[[], bool]) -> None:
     """Keep looking until ``done`` says so, once after each look."""
     up.look()
     while not done():

@@ -94,7 +94,7 @@ class RclpyObserver:
 
     def _interfaces(self, name: str, namespace: str, fqn: str) -> Iterator[SeenInterface]:
         for kind, ask in self._questions().items():
-            for final, types in _asked(ask, name, namespace):
+            for final, types in _names_and_types(ask, name, namespace):
                 if "/_action/" in final and kind.family != "action":
                     continue
                 endpoints = tuple(self._endpoints(kind, final, fqn)) if kind.family == "topic" else ()
@@ -131,7 +131,7 @@ class RclpyObserver:
                 yield SeenEndpoint(guid, participant, writes, f"rt{final}", info.topic_type, quality)
 
 
-def _asked(ask: Any, name: str, namespace: str) -> Iterable[tuple[str, list[str]]]:
+def _names_and_types(ask: Any, name: str, namespace: str) -> Iterable[tuple[str, list[str]]]:
     from rclpy.node import NodeNameNonExistentError
 
     try:

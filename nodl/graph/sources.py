@@ -48,7 +48,7 @@ def learn_observed(runs: Sequence[Observed]) -> LearntFromGraph:
     for each in placed:
         others = [other for other in placed if _same_program(each, other)]
         _, nodes = by_run.setdefault(each.run.id, (each.run, []))
-        nodes.append(_asked(each, others, left_out))
+        nodes.append(_requested_node(each, others, left_out))
     return LearntFromGraph(learn_from(by_run.values()), tuple(dict.fromkeys(left_out)))
 
 
@@ -96,7 +96,7 @@ def _known_name(placed: _Placed, others: Iterable[_Placed]) -> str:
     return own or (shown.pop() if len(shown) == 1 else "")
 
 
-def _asked(placed: _Placed, others: Sequence[_Placed], left_out: list[str]) -> RequestedNode:
+def _requested_node(placed: _Placed, others: Sequence[_Placed], left_out: list[str]) -> RequestedNode:
     namespace, _ = split_fqn(placed.node.fqn)
     start, rules = placed.start, placed.start.rules
     moved = any(rule.kind.value == "__ns" for rule in (*rules.local, *rules.process))

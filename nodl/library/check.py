@@ -145,7 +145,7 @@ def _shown(names: Iterable[_Name]) -> tuple[str, ...]:
 
 
 def _packages(folder: str) -> Iterator[tuple[str, str]]:
-    """Name and folder of each package; what is inside of one is not searched for others."""
+    """Yield name and folder of each package; does not search inside a package for others."""
     for place, folders, files in os.walk(folder):
         if "package.xml" in files:
             folders.clear()

@@ -68,7 +68,7 @@ def compare(node: RequestedNode, interfaces: Sequence[NodeInterface]) -> Compari
     interface = _matching(node, interfaces)
     if interface is None:
         names = ", ".join(str(each.name) for each in interfaces)
-        missing = [_difference(Verdict.MISSING, node, asked) for asked in _granted(node)]
+        missing = [_difference(Verdict.MISSING, node, requested) for requested in _granted(node)]
         about = Difference(Verdict.WRONG, node.fqn, None, f"node name {node.name}", f"described: {names}")
         return Comparison(0, (about, *missing))
     described = [
@@ -77,15 +77,17 @@ def compare(node: RequestedNode, interfaces: Sequence[NodeInterface]) -> Compari
         for each in _described(node, endpoint)
         if not (node.logger_services and each.shown in _logger_services(node))
     ]
-    asked = _granted(node)
+    requested = _granted(node)
     differences = [*_about_the_node(node, interface)]
-    differences += [_difference(Verdict.MISSING, node, each) for each in asked if not _find(each, described)]
-    differences += _types(node, asked, described)
-    differences += _never_seen(node, asked, described)
+    differences += [
+        _difference(Verdict.MISSING, node, each) for each in requested if not _find(each, described)
+    ]
+    differences += _types(node, requested, described)
+    differences += _never_seen(node, requested, described)
     differences += [
         Difference(Verdict.NOT_KNOWN, node.fqn, None, gap.why, str(gap.source)) for gap in interface.gaps
     ]
-    agreed = sum(1 for each in asked if _find(each, described))
+    agreed = sum(1 for each in requested if _find(each, described))
     return Comparison(agreed, tuple(dict.fromkeys(differences)))
 
 
@@ -109,7 +111,7 @@ def _is_named(node: RequestedNode, described: str | None) -> bool:
 
 
 def _granted(node: RequestedNode) -> list[RequestedEndpoint]:
-    """Return what rcl took, or refused: names that it calls invalid are not asked of anybody."""
+    """Return what rcl took, or refused: a name that it calls invalid needs no permission."""
     seen = {(each.kind, each.final): each for each in node.endpoints if each.rc in (0, 1) and each.final}
     return list(seen.values())
 
@@ -125,14 +127,16 @@ def _about_the_node(node: RequestedNode, interface: NodeInterface) -> Iterable[D
         yield wrong(said, "the record says otherwise")
 
 
-def _difference(verdict: Verdict, node: RequestedNode, asked: RequestedEndpoint) -> Difference:
-    return Difference(verdict, node.fqn, asked.kind, asked.final, f"written {asked.written!r}, {asked.type}")
+def _difference(verdict: Verdict, node: RequestedNode, requested: RequestedEndpoint) -> Difference:
+    return Difference(
+        verdict, node.fqn, requested.kind, requested.final, f"written {requested.written!r}, {requested.type}"
+    )
 
 
 def _types(
-    node: RequestedNode, asked: Iterable[RequestedEndpoint], described: Sequence[_Described]
+    node: RequestedNode, requested: Iterable[RequestedEndpoint], described: Sequence[_Described]
 ) -> Iterable[Difference]:
-    for each in asked:
+    for each in requested:
         found = _find(each, described)
         if found is None or found.is_pattern:
             continue  # what only fits a pattern may be another endpoint than the one described
@@ -142,16 +146,16 @@ def _types(
 
 
 def _never_seen(
-    node: RequestedNode, asked: Sequence[RequestedEndpoint], described: Iterable[_Described]
+    node: RequestedNode, requested: Sequence[RequestedEndpoint], described: Iterable[_Described]
 ) -> Iterable[Difference]:
     for item in described:
-        if not any(item.kind is each.kind and item.pattern.fullmatch(each.final) for each in asked):
+        if not any(item.kind is each.kind and item.pattern.fullmatch(each.final) for each in requested):
             yield Difference(Verdict.NEVER_SEEN, node.fqn, item.kind, item.shown, str(item.endpoint.source))
 
 
-def _find(asked: RequestedEndpoint, described: Iterable[_Described]) -> _Described | None:
+def _find(requested: RequestedEndpoint, described: Iterable[_Described]) -> _Described | None:
     """Return the one that is named so, rather than one whose pattern fits."""
-    fitting = [e for e in described if e.kind is asked.kind and e.pattern.fullmatch(asked.final)]
+    fitting = [e for e in described if e.kind is requested.kind and e.pattern.fullmatch(requested.final)]
     return min(fitting, key=lambda each: each.is_pattern, default=None)
 
 

@@ -212,16 +212,21 @@ def _entries(seen: Sequence[_Seen]) -> Iterable[LearntEndpoint]:
 
 
 def _entry(name: Name, origin: NameOrigin, names: set[Name], seen: Sequence[_Seen]) -> LearntEndpoint:
-    askers = [(asked, each.run.id) for each in seen for asked in each.node.endpoints if _name(asked) in names]
+    askers = [
+        (endpoint, each.run.id)
+        for each in seen
+        for endpoint in each.node.endpoints
+        if _name(endpoint) in names
+    ]
     runs = tuple(dict.fromkeys(run for _, run in askers))
-    first = next(asked for asked, _ in askers if _name(asked) == name)
-    introspected = any(asked.introspected for asked, _ in askers)
+    first = next(endpoint for endpoint, _ in askers if _name(endpoint) == name)
+    introspected = any(endpoint.introspected for endpoint, _ in askers)
     moved_from = first.written if first.moved else ""
     return LearntEndpoint(
         name.kind,
         name.name,
         name.type or f"unknown/{name.kind.type_folder}/Unknown",
-        _common([asked.qos for asked, _ in askers]),
+        _common([endpoint.qos for endpoint, _ in askers]),
         runs,
         origin,
         introspected,
@@ -240,8 +245,8 @@ def _common(qualities: Sequence[tuple[int, ...]]) -> tuple[int, ...]:
 
 
 def observation_of(node: RequestedNode, run: str = "") -> Observation:
-    """Return what ``node`` was given, and the names that it asked for."""
-    names = frozenset(_name(asked) for asked in node.endpoints if asked.rc in (0, 1))
+    """Return what ``node`` was given, and the names that it requested."""
+    names = frozenset(_name(endpoint) for endpoint in node.endpoints if endpoint.rc in (0, 1))
     inputs = {**node.parameters, **arguments_as_inputs(node.arguments)}
     defaults = {
         n: value for n, value in node.declared.items() if n not in inputs and isinstance(value, str | int)
@@ -249,13 +254,13 @@ def observation_of(node: RequestedNode, run: str = "") -> Observation:
     return Observation(inputs, names, run, defaults)
 
 
-def _name(asked: RequestedEndpoint) -> Name:
-    return Name(asked.kind, asked.name, asked.type)
+def _name(endpoint: RequestedEndpoint) -> Name:
+    return Name(endpoint.kind, endpoint.name, endpoint.type)
 
 
 def with_readings(nodes: Sequence[RequestedNode]) -> list[RequestedNode]:
     """Return ``nodes``, all of one program, whose endpoints have the likeliest name and the others as ``readings``."""
-    found = [[_readings(asked, node) for asked in node.endpoints] for node in nodes]
+    found = [[_readings(endpoint, node) for endpoint in node.endpoints] for node in nodes]
     places: dict[str, set[str]] = {}
     for node, of_node in zip(nodes, found, strict=True):
         for reading in (reading for readings in of_node for reading in readings):
@@ -263,30 +268,30 @@ def with_readings(nodes: Sequence[RequestedNode]) -> list[RequestedNode]:
     return [
         node._replace(
             endpoints=tuple(
-                _read_as(asked, _left(readings, node, places))
-                for asked, readings in zip(node.endpoints, of_node, strict=True)
+                _read_as(endpoint, _left(readings, node, places))
+                for endpoint, readings in zip(node.endpoints, of_node, strict=True)
             )
         )
         for node, of_node in zip(nodes, found, strict=True)
     ]
 
 
-def _read_as(asked: RequestedEndpoint, readings: Sequence[str]) -> RequestedEndpoint:
-    return asked._replace(name=readings[0], readings=tuple(readings[1:]))
+def _read_as(endpoint: RequestedEndpoint, readings: Sequence[str]) -> RequestedEndpoint:
+    return endpoint._replace(name=readings[0], readings=tuple(readings[1:]))
 
 
-def _readings(asked: RequestedEndpoint, node: RequestedNode) -> tuple[str, ...]:
+def _readings(endpoint: RequestedEndpoint, node: RequestedNode) -> tuple[str, ...]:
     namespace, own_name = split_fqn(node.fqn)
     texts = set(_texts(node))
-    if asked.moved or asked.spellings or asked.name in texts:
-        return (asked.name,)
-    if asked.name.startswith("~/") and asked.written.startswith(f"{own_name}/") and own_name in texts:
-        return asked.written, asked.name
-    below = asked.name.removeprefix(f"{namespace}/")
-    if namespace == "/" or below == asked.name or asked.name != asked.written or node.namespace:
-        return (asked.name,)
+    if endpoint.moved or endpoint.spellings or endpoint.name in texts:
+        return (endpoint.name,)
+    if endpoint.name.startswith("~/") and endpoint.written.startswith(f"{own_name}/") and own_name in texts:
+        return endpoint.written, endpoint.name
+    below = endpoint.name.removeprefix(f"{namespace}/")
+    if namespace == "/" or below == endpoint.name or endpoint.name != endpoint.written or node.namespace:
+        return (endpoint.name,)
     named_by_a_value = not texts.isdisjoint(namespace.split("/"))
-    return (asked.name, below) if named_by_a_value else (below, asked.name)
+    return (endpoint.name, below) if named_by_a_value else (below, endpoint.name)
 
 
 def _texts(node: RequestedNode) -> Iterable[str]:

@@ -135,7 +135,7 @@ def requested_by(process: RecordedProcess, node: RecordedNode) -> RequestedNode:
     rules = _rules(started, component)
     made = node.made
     roles = [role_of(endpoint) for endpoint in node.endpoints]
-    endpoints = tuple(_asked(node, roles, rules if started else None))
+    endpoints = tuple(_requested_endpoints(node, roles, rules if started else None))
     package, executable, plugin = _program(process, started, component)
     origin = component or started
     return RequestedNode(
@@ -201,7 +201,7 @@ def _rules(started: StartedProcess | None, component: LoadedComponent | None) ->
     return RemapRules(process=valid_rules(started.rules if started else ()))
 
 
-def _asked(
+def _requested_endpoints(
     node: RecordedNode, roles: list[EndpointRole], rules: RemapRules | None
 ) -> Iterable[RequestedEndpoint]:
     introspected = {

@@ -86,7 +86,7 @@ def _add_verbs(parser: CommandParser, verbs: Mapping[str, Verb]) -> None:
 
 
 def encodable(text: str) -> str:
-    """Names of files need not be UTF-8; their odd bytes are shown as escapes."""
+    """Return ``text`` with bytes that are not UTF-8, which file names may hold, as escapes."""
     return text.encode("utf-8", "backslashreplace").decode()
 
 

@@ -30,7 +30,7 @@ from nodl.errors import NoDLError
 from nodl.graph.json_form import graph_document
 from nodl.graph.model import Graph
 from nodl.graph.observation import Observed, command_lines, observed_text, read_observed
-from nodl.graph.observing import Quiet, Where, in_own_process, look_until, observer
+from nodl.graph.observing import Quiet, Where, in_own_process, observe_until, observer
 from nodl.graph.policy import observed_policy
 from nodl.graph.sources import learn_observed
 from nodl.graph.starts import StartedNode, starts_of_plan
@@ -112,7 +112,7 @@ def _observe(arguments: argparse.Namespace, starts: tuple[StartedNode, ...]) -> 
             commands.update(command_lines(up.graph(), socket.gethostname()))
             return quiet()
 
-        look_until(up, done)
+        observe_until(up, done)
         graph = up.graph(past=True)
     date = datetime.now(timezone.utc)
     run = RecordedRun(
@@ -155,7 +155,7 @@ def _manifests(runs: Sequence[Observed], folder: Path | None) -> dict[str, str]:
 
 
 def _starts(words: Sequence[str]) -> tuple[StartedNode, ...]:
-    """Raises ``NoDLError`` for what is not a plan, and with what the dry run says of a launch file."""
+    """Return what a plan or launch file starts; raises ``NoDLError`` for anything else, in the dry run's words."""
     if not words:
         return ()
     try:

@@ -24,11 +24,11 @@ NODES = ROOT / "tests" / "ros_graph" / "nodes"
 ASK_RCLPY = """
 import json, sys
 from nodl.graph.json_form import graph_document
-from nodl.graph.observing import Quiet, look_until
+from nodl.graph.observing import Quiet, observe_until
 from nodl.graph.rclpy_graph import RclpyObserver
 observer = RclpyObserver()
-look_until(observer, lambda: {node.fqn for node in observer.graph().nodes} >= set(sys.argv[1:]))
-look_until(observer, Quiet(observer, 2.0, 30.0))
+observe_until(observer, lambda: {node.fqn for node in observer.graph().nodes} >= set(sys.argv[1:]))
+observe_until(observer, Quiet(observer, 2.0, 30.0))
 print(json.dumps(graph_document(observer.graph())))
 observer.close()
 """

@@ -12,7 +12,7 @@ import pytest
 
 from enclave_launch import RuntimeFailure
 from enclave_launch.recording.build import recorder_library
-from enclave_launch.recording.programs import look_at_command
+from enclave_launch.recording.programs import inspect_command
 from nodl.record.requested import RequestedEndpoint, RequestedNode, all_requested
 from tests.recording.conftest import Recorded, RunRecorded
 
@@ -162,7 +162,7 @@ def test_a_program_with_address_sanitizer_is_recorded(
     run_recorded: RunRecorded, stand_in: Path, tmp_path: Path
 ) -> None:
     program = build_program(stand_in, tmp_path, "-fsanitize=address")
-    sanitizer = look_at_command([str(program)]).sanitizer
+    sanitizer = inspect_command([str(program)]).sanitizer
     assert sanitizer is not None and sanitizer.startswith("libasan.so")
     calm = {"ASAN_OPTIONS": "detect_leaks=0"}
     ran = run_recorded(TALKER, program=program, preload=f"{sanitizer}:{{}}", variables=calm)
@@ -202,9 +202,9 @@ def test_a_static_program_is_known_before_it_starts(tmp_path: Path) -> None:
     source.write_text("int main(void) { return 0; }")
     for flag in ("-static", "-static-pie"):
         subprocess.run(["cc", flag, str(source), "-o", str(program)], check=True)
-        assert "linked statically" in look_at_command(["nice", str(program)], os.environ["PATH"]).obstacle
+        assert "linked statically" in inspect_command(["nice", str(program)], os.environ["PATH"]).obstacle
     subprocess.run(["cc", str(source), "-o", str(program)], check=True)
-    assert look_at_command(["nice", str(program)], os.environ["PATH"]).obstacle == ""
+    assert inspect_command(["nice", str(program)], os.environ["PATH"]).obstacle == ""
 
 
 def test_set_uid_and_cleaned_environments_are_known_before(tmp_path: Path) -> None:
@@ -214,19 +214,19 @@ def test_set_uid_and_cleaned_environments_are_known_before(tmp_path: Path) -> No
     if os.geteuid() == 0:
         os.chown(program, 65534, 65534)
         program.chmod(0o4755)
-        assert "set-uid" in look_at_command([str(program)]).obstacle
+        assert "set-uid" in inspect_command([str(program)]).obstacle
     program.chmod(0o755)
-    assert look_at_command([str(program)]).obstacle == ""
-    assert "empty environment" in look_at_command(["/usr/bin/env", "-i", "/bin/true"]).obstacle
-    assert "environment of its own" in look_at_command(["sudo", "/bin/true"]).obstacle
-    assert look_at_command(["/usr/bin/env", "A=b", "/bin/true"]).obstacle == ""
+    assert inspect_command([str(program)]).obstacle == ""
+    assert "empty environment" in inspect_command(["/usr/bin/env", "-i", "/bin/true"]).obstacle
+    assert "environment of its own" in inspect_command(["sudo", "/bin/true"]).obstacle
+    assert inspect_command(["/usr/bin/env", "A=b", "/bin/true"]).obstacle == ""
 
 
 def test_a_script_is_what_its_interpreter_is(tmp_path: Path) -> None:
     script = tmp_path / "s"
     script.write_text("#!/bin/sh\nexit 0\n")
     script.chmod(0o755)
-    assert look_at_command([str(script)]).obstacle == ""
+    assert inspect_command([str(script)]).obstacle == ""
 
 
 def test_a_machine_without_a_compiler_takes_the_recorder_of_another_one(

@@ -26,7 +26,7 @@ class Entity:
 
     @property
     def type_name(self) -> str:
-        """Name of the element: ``node``, ``arg``, ..."""
+        """Return the name of the element: ``node``, ``arg``, ..."""
         raise NotImplementedError()
 
     @property

@@ -32,7 +32,7 @@ from nodl.errors import NoDLError
 from nodl.graph.cyclone import RANGE_VARIABLES
 from nodl.graph.model import Graph
 from nodl.graph.observation import read_observed
-from nodl.graph.observing import Observer, Quiet, Where, in_own_process, look_until, observer
+from nodl.graph.observing import Observer, Quiet, Where, in_own_process, observe_until, observer
 
 CANNOT_TELL = 4
 """Exit status."""
@@ -76,7 +76,7 @@ def run(options: argparse.Namespace) -> int:
         circumstances = Circumstances(security, tuple(options.accept), forged=forged)
         return compare(expected, graph, circumstances, _enclaves_now(options))
 
-    graph, found = _looked(options, domain, findings)
+    graph, found = _read_or_observed(options, domain, findings)
     if options.format == "json":
         sys.stdout.write(json_text(drift_document(found, graph), indent=2) + "\n")
     else:
@@ -90,7 +90,9 @@ def run(options: argparse.Namespace) -> int:
 Findings = Callable[..., "list[DriftFinding]"]
 
 
-def _looked(options: argparse.Namespace, domain: int, findings: Findings) -> tuple[Graph, list[DriftFinding]]:
+def _read_or_observed(
+    options: argparse.Namespace, domain: int, findings: Findings
+) -> tuple[Graph, list[DriftFinding]]:
     try:
         if options.graph is not None:
             graph = read_observed(options.graph).graph
@@ -131,7 +133,7 @@ def _settled(
     """Wait until nothing changes any more and nothing is missing; what is missing has until the end of ``--for``."""
     end = time.monotonic() + options.longest
     while True:
-        look_until(up, Quiet(up, options.settle, max(options.longest, options.settle)))
+        observe_until(up, Quiet(up, options.settle, max(options.longest, options.settle)))
         graph = up.graph()
         found = findings(graph, up.forged)
         waits = any(

@@ -73,7 +73,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _new_folder(folder: Path) -> Path:
-    """Raises ``UsageError`` for one that holds something: what is old must not pass for evidence."""
+    """Return ``folder`` if it is new or empty; raises ``UsageError`` else: old files must not pass for evidence."""
     with translated(OSError, UsageError, f"{folder}: "):
         if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             raise UsageError(

@@ -82,7 +82,7 @@ def _saved(file: Path) -> tuple[Mapping[str, Any], DryRun]:
 
 
 def _refuse_misfits(plan: DryRun, file: Path) -> None:
-    """Raises ``UsageError`` where a process, component or node is in an enclave that the plan does not have."""
+    """Raise ``UsageError`` if a process, component or node is in an enclave that the plan does not have."""
     named = [(f"process {one.fqn or one.executable}", one.enclave) for one in plan.processes]
     named += [(f"component {one.fqn}", one.enclave) for one in plan.components]
     named += [(f"node {one.fqn}", one.enclave) for one in plan.nodes]
