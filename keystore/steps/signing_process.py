@@ -7,7 +7,6 @@ signs, and answers what it did. The launcher's memory and environment hold no pa
 
 from __future__ import annotations
 
-import array
 import contextlib
 import ctypes
 import json
@@ -217,23 +216,13 @@ def _error(name: str, message: str, domains: str) -> KeystoreError:
 
 def _send(channel: socket.socket, content: Any, descriptor: int | None) -> None:
     data = json.dumps(content).encode()
-    channel.sendmsg([_HEAD.pack(len(data))], _rights(descriptor))
+    socket.send_fds(channel, [_HEAD.pack(len(data))], [] if descriptor is None else [descriptor])
     channel.sendall(data)
-
-
-def _rights(descriptor: int | None) -> list[tuple[int, int, bytes]]:
-    if descriptor is None:
-        return []
-    return [(socket.SOL_SOCKET, socket.SCM_RIGHTS, array.array("i", [descriptor]).tobytes())]
 
 
 def _receive(channel: socket.socket) -> tuple[Any, int | None]:
     """Read one message and the descriptor that came with it; raises EOFError when the other end is gone."""
-    integer = array.array("i")
-    head, ancillary, _, _ = channel.recvmsg(_HEAD.size, socket.CMSG_SPACE(integer.itemsize))
-    for level, kind, data in ancillary:
-        if (level, kind) == (socket.SOL_SOCKET, socket.SCM_RIGHTS):
-            integer.frombytes(data[: integer.itemsize])
+    head, descriptors, _, _ = socket.recv_fds(channel, _HEAD.size, 1)
     if len(head) < _HEAD.size:
         raise EOFError
     (left,) = _HEAD.unpack(head)
@@ -244,7 +233,7 @@ def _receive(channel: socket.socket) -> tuple[Any, int | None]:
             raise EOFError
         pieces.append(piece)
         left -= len(piece)
-    return json.loads(b"".join(pieces)), integer[0] if integer else None
+    return json.loads(b"".join(pieces)), descriptors[0] if descriptors else None
 
 
 def _forget_variable(name: str) -> None:
