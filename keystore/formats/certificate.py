@@ -145,9 +145,6 @@ def read_certificate(pem: bytes, place: str = "the certificate") -> CertificateF
     return found[0]
 
 
-read_pem = read_certificate
-
-
 def read_certificates(pem: bytes, place: str) -> list[CertificateFacts]:
     """Read a file of certificates; raises DamagedKeystoreError for anything that is not exactly their PEM."""
     found = _read_all(pem)

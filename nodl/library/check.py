@@ -44,13 +44,6 @@ class LibraryVerdict(NamedTuple):
         """Return True if they differ and the document does not say why."""
         return bool(self.only_document or self.only_source) and not self.document.evidence.differs
 
-    @property
-    def in_short(self) -> str:
-        """Return the verdict for a table."""
-        if self.not_compared:
-            return self.not_compared.partition(",")[0]
-        return "agrees" if self.agrees else "differs" if self.is_wrong else "differs, explained"
-
     def __str__(self) -> str:
         if self.not_compared:
             return f"{self.document.stem}: not compared: {self.not_compared}"

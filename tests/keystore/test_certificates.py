@@ -124,7 +124,9 @@ def test_damaged_certificates_are_read_or_refused(position: int, damage: bytes) 
     except ValueError:
         pem = base64.encodebytes(data).decode()
         with pytest.raises(DamagedKeystoreError):
-            certificate.read_pem(f"-----BEGIN CERTIFICATE-----\n{pem}-----END CERTIFICATE-----\n".encode())
+            certificate.read_certificate(
+                f"-----BEGIN CERTIFICATE-----\n{pem}-----END CERTIFICATE-----\n".encode()
+            )
         return
     assert facts.can_sign_mail in (True, False) and issued_by(facts, _SAMPLE.facts) in (True, False)
 

@@ -18,7 +18,7 @@ from keystore import CreateOptions, Finding, LaunchHold, create_keystore, provis
 from keystore.disk import layout
 from keystore.disk.register_file import read_register
 from keystore.disk.view import KeystoreView
-from keystore.formats.certificate import read_pem
+from keystore.formats.certificate import read_certificate
 from tests.dds import sros2_style
 from tests.keystore.fault_driver import KILLED, NAMES, REPORTED, install_fault, work
 from tests.keystore.kit import contents, filled, options, policy, snapshot
@@ -140,7 +140,7 @@ def nothing_unrecorded_is_out(root: Path) -> None:
     assert register is not None
     for enclave in KeystoreView(root).enclaves():
         cert = (root / layout.enclave_directory(enclave) / layout.CERT).read_bytes()
-        assert read_pem(cert).serial in register.certificates
+        assert read_certificate(cert).serial in register.certificates
 
 
 def everything_is_on_record(root: Path) -> None:
@@ -150,7 +150,7 @@ def everything_is_on_record(root: Path) -> None:
     for enclave in KeystoreView(root).enclaves():
         cert = (root / layout.enclave_directory(enclave) / layout.CERT).read_bytes()
         held = register.in_force(enclave)
-        assert held is not None and held.serial == read_pem(cert).serial, enclave
+        assert held is not None and held.serial == read_certificate(cert).serial, enclave
 
 
 def _complete(name: str, root: Path) -> None:

@@ -29,7 +29,7 @@ from keystore import (
 )
 from keystore.disk import layout
 from keystore.disk.view import KeystoreView
-from keystore.formats.certificate import read_der, read_pem
+from keystore.formats.certificate import read_certificate, read_der
 from keystore.formats.domains import Domains
 from keystore.formats.governance import DomainRule, Governance, Protection
 from keystore.formats.role import Role
@@ -141,7 +141,7 @@ def test_a_ca_that_is_not_valid_now(root: Path) -> None:
 
 def test_a_ca_whose_own_signature_is_wrong(root: Path) -> None:
     place = root / layout.ca_cert(Role.IDENTITY)
-    der = read_pem(place.read_bytes()).der
+    der = read_certificate(place.read_bytes()).der
     place.write_bytes(read_der(der[:-1] + bytes((der[-1] ^ 1,))).pem)
     (one,) = found(root, "ca-signature")
     assert one.severity is Severity.ERROR and one.place == layout.ca_cert(Role.IDENTITY)

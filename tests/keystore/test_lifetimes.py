@@ -9,7 +9,7 @@ import pytest
 
 from keystore import apply_policy, create_enclaves, export, provision
 from keystore.disk import layout
-from keystore.formats.certificate import read_pem
+from keystore.formats.certificate import read_certificate
 from keystore.formats.permissions_document import parse_permissions
 from keystore.formats.policy import Policy
 from keystore.steps.comparison import differences
@@ -24,7 +24,7 @@ def root(tmp_path: Path) -> Path:
 
 def left(root: Path, name: str = "/a") -> timedelta:
     cert = (root / layout.enclave_directory(name) / "cert.pem").read_bytes()
-    return read_pem(cert).validity.not_after - NOW
+    return read_certificate(cert).validity.not_after - NOW
 
 
 @pytest.mark.parametrize("days", [1, 30, 98, 101, 300])

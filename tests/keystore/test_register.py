@@ -29,7 +29,7 @@ from keystore import (
 from keystore.disk import layout
 from keystore.disk.register_file import read_register
 from keystore.errors import DamagedKeystoreError, InvalidInputError, UnsafeKeystoreError
-from keystore.formats.certificate import read_pem
+from keystore.formats.certificate import read_certificate
 from keystore.formats.domains import Domains
 from keystore.formats.governance import DomainRule, Governance, Protection
 from keystore.formats.permissions_document import Grant, parse_permissions
@@ -68,11 +68,11 @@ def number(root: Path) -> int:
 
 
 def serial(root: Path, name: str) -> int:
-    return read_pem((root / layout.enclave_directory(name) / "cert.pem").read_bytes()).serial
+    return read_certificate((root / layout.enclave_directory(name) / "cert.pem").read_bytes()).serial
 
 
 def common_name_of(root: Path, name: str) -> str | None:
-    return read_pem((root / layout.enclave_directory(name) / "cert.pem").read_bytes()).common_name
+    return read_certificate((root / layout.enclave_directory(name) / "cert.pem").read_bytes()).common_name
 
 
 def is_revoked(root: Path, number: int) -> bool:
@@ -238,7 +238,7 @@ class TestRightsThatAreTakenAway:
     def test_a_new_subject_and_the_old_certificate_revoked(self, tmp_path: Path) -> None:
         root = self.reduced(tmp_path)
         assert common_name_of(root, "/a") == "ros.a-2" and grant(root, "/a").subject_name == "CN=ros.a-2"
-        assert is_revoked(root, read_pem((tmp_path / "before/cert.pem").read_bytes()).serial)
+        assert is_revoked(root, read_certificate((tmp_path / "before/cert.pem").read_bytes()).serial)
         assert (root / "enclaves/a/key.pem").read_bytes() == (tmp_path / "before/key.pem").read_bytes()
         assert common_name_of(root, "/b") == "ros.b" and codes(root) == set()
 

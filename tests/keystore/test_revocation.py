@@ -23,7 +23,7 @@ from keystore.disk import layout
 from keystore.disk.crl_file import crl_validity
 from keystore.disk.view import KeystoreView
 from keystore.errors import DamagedKeystoreError, InvalidInputError
-from keystore.formats.certificate import read_pem
+from keystore.formats.certificate import read_certificate
 from tests.keystore.kit import DAY, NOW, filled, openssl, options, policy, snapshot
 
 NAMES = ("/", "/a", "/a/b", "/c")
@@ -48,7 +48,7 @@ def crl(root: Path) -> x509.CertificateRevocationList:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_the_enclave_is_gone_and_those_around_it_stay(root: Path, name: str) -> None:
-    serial = read_pem((root / layout.enclave_directory(name) / "cert.pem").read_bytes()).serial
+    serial = read_certificate((root / layout.enclave_directory(name) / "cert.pem").read_bytes()).serial
     report = remove(root, [name], options=quick())
     assert report.removed == (name,) and report.revoked == 1
     assert list_enclaves(root) == [other for other in NAMES if other != name]
@@ -87,18 +87,18 @@ def test_what_an_enclave_had_before_is_revoked_with_it(root: Path, tmp_path: Pat
     assert not (root / "public/crl.pem").exists()
     assert remove(root, ["/c"], options=quick()).revoked == 3
     assert crl(root).get_revoked_certificate_by_serial_number(
-        read_pem((tmp_path / "first.pem").read_bytes()).serial
+        read_certificate((tmp_path / "first.pem").read_bytes()).serial
     )
     assert codes(root) == set()
 
 
 def test_a_key_that_was_copied_is_replaced_and_its_certificate_revoked(root: Path) -> None:
-    stolen = read_pem((root / "enclaves/c/cert.pem").read_bytes()).serial
+    stolen = read_certificate((root / "enclaves/c/cert.pem").read_bytes()).serial
     for _ in range(2):
         renew(root, ["/c"], options=RenewOptions(new_keys=True, revoke_old=True, provisioning=options()))
     revoked = {entry.serial_number for entry in crl(root)}
     assert stolen in revoked and len(revoked) == 2
-    assert read_pem((root / "enclaves/c/cert.pem").read_bytes()).serial not in revoked
+    assert read_certificate((root / "enclaves/c/cert.pem").read_bytes()).serial not in revoked
     assert codes(root) == set()
 
 

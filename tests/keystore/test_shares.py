@@ -24,7 +24,7 @@ from keystore import (
 from keystore.disk import layout
 from keystore.disk.share_files import is_running, read_shares
 from keystore.errors import DamagedKeystoreError, InvalidInputError, UnsafeKeystoreError
-from keystore.formats.certificate import read_pem
+from keystore.formats.certificate import read_certificate
 from keystore.formats.domains import Domains
 from keystore.formats.permissions_document import parse_permissions
 from keystore.formats.policy import EnclavePolicy, Operation, Profile, Qualifier, Rule
@@ -66,7 +66,7 @@ def granted(root: Path, name: str = "/") -> set[str]:
 
 
 def serial(root: Path, name: str = "/") -> int:
-    return read_pem((root / layout.enclave_directory(name) / "cert.pem").read_bytes()).serial
+    return read_certificate((root / layout.enclave_directory(name) / "cert.pem").read_bytes()).serial
 
 
 def codes(root: Path) -> set[str]:

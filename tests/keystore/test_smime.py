@@ -135,7 +135,7 @@ def test_a_certificate_below_the_ca_is_refused() -> None:
     """CVE-2023-24010 and -24011: it chains to the CA, and that is not enough."""
     made = new_identity(IdentityIssuer(CA), "ros.a", VALIDITY)
     enclave = Authority(
-        certificate.read_pem(made.cert), FileSigner(load_private_key(made.key or b"", None, "key"))
+        certificate.read_certificate(made.cert), FileSigner(load_private_key(made.key or b"", None, "key"))
     )
     with pytest.raises(DamagedKeystoreError, match="not the permissions CA"):
         check(sign(DOCUMENT, enclave))
