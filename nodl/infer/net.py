@@ -17,9 +17,9 @@ import ast
 import functools
 import itertools
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from nodl.infer.interpreter.imports import absolute_name
 from nodl.infer.interpreter.run import Run
@@ -30,6 +30,7 @@ from nodl.node_interface import Gap
 from nodl.source_ref import SourceRef
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda
+Import = ast.Import | ast.ImportFrom
 CREATING_NAMES = frozenset(NODE_ENDPOINTS) | ros.CREATING_NAMES
 _CREATING_TEXT = re.compile("|".join(sorted(map(re.escape, CREATING_NAMES))))
 _ELSEWHERE = re.compile(r"rclpy|\b(?:importlib|__import__|eval|exec|runpy|pickle)\b")
@@ -91,7 +92,8 @@ class FunctionText:
         self.names: set[str] = set()  # that are read, and not just called
         self.attributes: set[str] = set()  # the same, with identifiers in texts
         self.inner: list[FunctionText] = []  # lambdas and decorated functions, whose use needs no name
-        self.imports: list[ast.Import | ast.ImportFrom] = []
+        self.stored: set[str] = set()  # variables
+        self.imports: list[Import] = []
 
     @property
     def name(self) -> str:
@@ -135,67 +137,83 @@ class _Reader:
         """Read statements in order, up to one that control cannot pass."""
         for statement in body:
             self.visit(statement, scope, around)
-            if isinstance(statement, ast.Return | ast.Raise | ast.Continue | ast.Break):
+            if isinstance(statement, (ast.Return, ast.Raise, ast.Continue, ast.Break)):
                 return
 
     def visit(self, node: ast.AST, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
-        if isinstance(node, ast.Name):
-            if isinstance(node.ctx, ast.Load):
-                scope.names.add(node.id)
-            return
-        if isinstance(node, ast.Attribute):
-            if isinstance(node.ctx, ast.Load):
-                scope.attributes.add(node.attr)
-            self.visit(node.value, scope, (*around, node))
-            return
-        if isinstance(node, ast.Constant):
-            if isinstance(node.value, str) and node.value.isidentifier():
-                scope.attributes.add(node.value)
-            return
-        if isinstance(node, Function):
-            self._function(node, scope, around)
-            return
-        if isinstance(node, ast.ClassDef):
-            self._class(node, scope, around)
-            return
-        if isinstance(node, ast.Import | ast.ImportFrom):
-            scope.imports.append(node)
-            if isinstance(node, ast.ImportFrom):
-                scope.attributes.update(alias.name for alias in node.names if alias.asname)
-                self.imported.update(alias.name for alias in node.names)
-        elif isinstance(node, ast.Call):
-            name = last_name(node.func)
-            scope.calls.append(CallPlace(node, name, (*around, node)))
-            if name in ("isinstance", "issubclass"):
-                self._each(node.args[:1], scope, (*around, node))
-                return
-            inside = [node.func.value] if isinstance(node.func, ast.Attribute) else []
-            inside += [node.func] if not isinstance(node.func, ast.Attribute | ast.Name) else []
-            self._each([*inside, *node.args, *node.keywords], scope, (*around, node))
-            return
-        elif isinstance(node, ast.Assign) and any(last_name(each) == "__all__" for each in node.targets):
-            return
-        elif isinstance(node, ast.If) and last_name(node.test) == "TYPE_CHECKING":
-            self.block(node.orelse, scope, (*around, node))
-            return
-        elif isinstance(node, ast.AugAssign):
-            scope.attributes.add(last_name(node.target))
-        elif isinstance(node, ast.AnnAssign):
-            self._each([node.target, *([node.value] if node.value else [])], scope, (*around, node))
-            return
-        for _, value in ast.iter_fields(node):
+        _VISITORS.get(type(node), _Reader.inside)(self, node, scope, around)
+
+    def inside(self, node: ast.AST, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
+        """Read what ``node`` consists of."""
+        around = (*around, node)
+        for field in node._fields:
+            value = getattr(node, field, None)
             if isinstance(value, list) and value and isinstance(value[0], ast.stmt):
-                self.block(value, scope, (*around, node))
+                self.block(value, scope, around)
             elif isinstance(value, list):
-                self._each([each for each in value if isinstance(each, ast.AST)], scope, (*around, node))
-            elif isinstance(value, ast.AST):
-                self.visit(value, scope, (*around, node))
+                self._each([each for each in value if isinstance(each, ast.AST)], scope, around)
+            elif isinstance(value, ast.AST) and value._fields:
+                self.visit(value, scope, around)
+
+    def name(self, node: ast.Name, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
+        if isinstance(node.ctx, ast.Load):
+            scope.names.add(node.id)
+        else:
+            scope.stored.add(node.id)
+
+    def attribute(self, node: ast.Attribute, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
+        if isinstance(node.ctx, ast.Load):
+            scope.attributes.add(node.attr)
+        self.visit(node.value, scope, (*around, node))
+
+    def constant(self, node: ast.Constant, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
+        if isinstance(node.value, str) and node.value.isidentifier():
+            scope.attributes.add(node.value)
+
+    def imports(self, node: Import, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
+        scope.imports.append(node)
+        if isinstance(node, ast.ImportFrom):
+            scope.attributes.update(alias.name for alias in node.names if alias.asname)
+            self.imported.update(alias.name for alias in node.names)
+
+    def call(self, node: ast.Call, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
+        around = (*around, node)
+        name = last_name(node.func)
+        scope.calls.append(CallPlace(node, name, around))
+        if name in ("isinstance", "issubclass"):
+            self._each(node.args[:1], scope, around)
+            return
+        if not isinstance(node.func, ast.Name):
+            self.visit(node.func.value if isinstance(node.func, ast.Attribute) else node.func, scope, around)
+        self._each(node.args, scope, around)
+        self._each(node.keywords, scope, around)
+
+    def outer_names(self, node: ast.Nonlocal, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
+        for each in self.scopes:  # one of them is meant
+            each.stored.update(node.names)
+
+    def assignment(self, node: ast.Assign, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
+        if not any(last_name(each) == "__all__" for each in node.targets):
+            self.inside(node, scope, around)
+
+    def addition(self, node: ast.AugAssign, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
+        scope.attributes.add(last_name(node.target))
+        self.inside(node, scope, around)
+
+    def annotated(self, node: ast.AnnAssign, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
+        self._each([node.target, *([node.value] if node.value else [])], scope, (*around, node))
+
+    def test(self, node: ast.If, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
+        if last_name(node.test) == "TYPE_CHECKING":
+            self.block(node.orelse, scope, (*around, node))
+        else:
+            self.inside(node, scope, around)
 
     def _each(self, nodes: Iterable[ast.AST], scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
         for node in nodes:
             self.visit(node, scope, around)
 
-    def _function(self, node: Function, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
+    def function(self, node: Function, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
         cls = around[-1] if around and isinstance(around[-1], ast.ClassDef) else None
         inner = FunctionText(node, cls if isinstance(cls, ast.ClassDef) else None, self.module.path)
         self.scopes.append(inner)
@@ -210,11 +228,26 @@ class _Reader:
             scope.inner.append(inner)
         self.block(node.body, inner, ())
 
-    def _class(self, node: ast.ClassDef, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
+    def class_body(self, node: ast.ClassDef, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
         self.classes.setdefault(node.name, []).append(node)
         self._each(node.decorator_list, scope, around)
         self.block(node.body, scope, (*around, node))
 
+
+_VISITORS: dict[type, Callable[[_Reader, Any, FunctionText, tuple[ast.AST, ...]], None]] = {
+    ast.Name: _Reader.name,
+    ast.Attribute: _Reader.attribute,
+    ast.Constant: _Reader.constant,
+    ast.Call: _Reader.call,
+    **dict.fromkeys((ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda), _Reader.function),
+    ast.ClassDef: _Reader.class_body,
+    **dict.fromkeys((ast.Import, ast.ImportFrom), _Reader.imports),
+    ast.Nonlocal: _Reader.outer_names,
+    ast.Assign: _Reader.assignment,
+    ast.AugAssign: _Reader.addition,
+    ast.AnnAssign: _Reader.annotated,
+    ast.If: _Reader.test,
+}
 
 _PLAIN_DECORATORS = frozenset({
     "property", "cached_property", "staticmethod", "classmethod", "abstractmethod", "override", "overload", "setter",
@@ -440,7 +473,7 @@ Literals = Mapping[str, object]  # by parameter
 def is_dead(around: tuple[ast.AST, ...], module: str, literals: Literals = MappingProxyType({})) -> bool:
     """Return True if a test of literals, or of the ``module``'s name, keeps control from the last of ``around``."""
     for outer, inner in itertools.pairwise(around):
-        if isinstance(outer, ast.If | ast.While | ast.IfExp):
+        if isinstance(outer, (ast.If, ast.While, ast.IfExp)):
             outcome = _decided(outer.test, module, literals)
             body = outer.body if isinstance(outer.body, list) else [outer.body]
             orelse = outer.orelse if isinstance(outer.orelse, list) else [outer.orelse]
@@ -463,7 +496,7 @@ def _decided(test: ast.expr, module: str, literals: Literals) -> bool | None:
         return bool(test.value)
     if isinstance(test, ast.Name) and test.id in literals:
         return bool(literals[test.id])
-    if isinstance(test, ast.Name | ast.Attribute) and last_name(test) == "TYPE_CHECKING":
+    if isinstance(test, (ast.Name, ast.Attribute)) and last_name(test) == "TYPE_CHECKING":
         return False
     if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not):
         outcome = _decided(test.operand, module, literals)
@@ -473,8 +506,8 @@ def _decided(test: ast.expr, module: str, literals: Literals) -> bool | None:
         other, op = test.comparators[0], test.ops[0]
         if test.left.id in known and isinstance(other, ast.Constant):
             equal = known[test.left.id] == other.value
-            if isinstance(op, ast.Eq | ast.NotEq) or other.value is None:
-                return equal is isinstance(op, ast.Eq | ast.Is)
+            if isinstance(op, (ast.Eq, ast.NotEq)) or other.value is None:
+                return equal is isinstance(op, (ast.Eq, ast.Is))
     return None
 
 
@@ -499,13 +532,8 @@ def _literals(scope: FunctionText, entry: ast.AST | None) -> Literals:
         (each.arg, default) for each, default in zip(node.args.kwonlyargs, node.args.kw_defaults, strict=True)
     )
     values.update((each.arg, each.value) for each in entry.keywords if each.arg is not None)
-    changed = {
-        each.id
-        for each in ast.walk(node)
-        if isinstance(each, ast.Name) and not isinstance(each.ctx, ast.Load)
-    }
     return {
         name: value.value
         for name, value in values.items()
-        if isinstance(value, ast.Constant) and name not in changed
+        if isinstance(value, ast.Constant) and name not in scope.stored
     }

@@ -66,7 +66,7 @@ class _Mangler(ast.NodeVisitor):
                 name = getattr(node, field, None)
                 if isinstance(name, str) and not isinstance(node, ast.keyword):
                     setattr(node, field, self._mangled(name))
-            if isinstance(node, ast.Global | ast.Nonlocal):
+            if isinstance(node, (ast.Global, ast.Nonlocal)):
                 node.names = [self._mangled(name) for name in node.names]
         if isinstance(node, ast.ClassDef):
             outer, self._class = self._class, node.name.lstrip("_")

@@ -176,7 +176,7 @@ def _parts(piece: Piece, first: bool) -> list[Part]:
 
 def _input_parts(piece: Input) -> list[Part]:
     """Return the symbolic part once per default."""
-    assert isinstance(piece.owner, NodeRecord | OptionDefaults)
+    assert isinstance(piece.owner, (NodeRecord, OptionDefaults))
     declared = piece.owner.default(piece.name)
     if piece.item == "each" and declared and all(_is_empty_list(atom) for atom in declared):
         return [ParameterPart(piece.name, "", piece.item, (("unless empty", ()), *piece.edits))]
@@ -193,7 +193,7 @@ def _default_texts(value: Value, item: int | str | None) -> list[str | None]:
     for atom in value:
         if item is not None:
             texts.extend(_default_items(atom, item))
-        elif isinstance(atom, str | int | float):
+        elif isinstance(atom, (str, int, float)):
             texts.append(str(atom))
         elif isinstance(atom, Text) and not is_of_inputs(atom):
             texts.extend(_plain_texts((atom,)) or [None])

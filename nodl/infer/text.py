@@ -234,7 +234,7 @@ def constant_text(atom: object) -> object:
 
 def is_of_inputs(text: Text) -> bool:
     """Return True if inputs alone decide the text: neither unknown parts nor the node's name."""
-    return not any(isinstance(piece, Hole | NodePart) for piece in text.pieces)
+    return not any(isinstance(piece, (Hole, NodePart)) for piece in text.pieces)
 
 
 def is_condition(piece: Input) -> bool:

@@ -308,7 +308,7 @@ def contains(value: Value, atom: object) -> bool:
     if kind in _COMPARED_IN_C:
         return atom in value
     if kind is Unknown:
-        return any(type(other) is Unknown for other in value)
+        return Unknown in map(type, value)
     for other in value:  # noqa: SIM110 - called for every join; a generator takes twice as long
         if other is atom or (type(other) is kind and other == atom):
             return True
@@ -320,8 +320,8 @@ def _limited(value: Value) -> Value:
         return (_join_items([atom for atom in value if isinstance(atom, Items)]),)
     if len(value) <= MAX_STRINGS:
         return value
-    texts = [atom for atom in value if isinstance(atom, str | Text)]
-    others = tuple(atom for atom in value if not isinstance(atom, str | Text))
+    texts = [atom for atom in value if isinstance(atom, (str, Text))]
+    others = tuple(atom for atom in value if not isinstance(atom, (str, Text)))
     if len(texts) > MAX_STRINGS:
         return join(others, (widened_texts(texts),))
     if len(value) > MAX_ATOMS:
@@ -375,7 +375,7 @@ def mixed_with_unknown(value: Value) -> Value:
     several = sum(atom is not None and type(atom) not in (bool, Absent, Unknown) for atom in value) > 1
     if not several:
         return value
-    others = tuple(atom for atom in value if not isinstance(atom, str | Text))
+    others = tuple(atom for atom in value if not isinstance(atom, (str, Text)))
     return join(others, unknown("a variable that changes while other code runs"))
 
 
@@ -398,8 +398,8 @@ def _widened(old: Value, joined: Value, texts_too: bool) -> Value:
         if not old:
             return joined
         joined = join(tuple(atom for atom in joined if type(atom) not in (int, float)), ANY)
-    texts = [atom for atom in joined if isinstance(atom, str | Text)]
-    kept = [atom for atom in joined if not isinstance(atom, str | Text)]
+    texts = [atom for atom in joined if isinstance(atom, (str, Text))]
+    kept = [atom for atom in joined if not isinstance(atom, (str, Text))]
     if texts_too and any(isinstance(atom, Sequence) and not contains(old, atom) for atom in kept):
         kept = [atom for atom in kept if not isinstance(atom, Sequence)]
         return join((*kept, *texts), unknown(TOO_MANY))  # containers in containers, without end

@@ -161,7 +161,7 @@ def _of_class(run: Run, cls: ClassValue, name: str, node: ast.AST, frame: Frame)
             value = base.cells.get(name)
             if value is None:
                 continue
-            if is_enumeration(cls) and not isinstance(value[0], FunctionValue | ClassMethod | PropertyValue):
+            if is_enumeration(cls) and not isinstance(value[0], (FunctionValue, ClassMethod, PropertyValue)):
                 return (enumeration_member(run, base, name),)
             result: Value = BOTTOM
             for atom in value:

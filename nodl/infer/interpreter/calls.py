@@ -86,9 +86,9 @@ def _is_generator(node: ast.AST) -> bool:
     left = [node.body] if isinstance(node, ast.Lambda) else list(getattr(node, "body", []))
     while left:
         part = left.pop()
-        if isinstance(part, ast.Yield | ast.YieldFrom):
+        if isinstance(part, (ast.Yield, ast.YieldFrom)):
             return True
-        if not isinstance(part, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda | ast.ClassDef):
+        if not isinstance(part, (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda, ast.ClassDef)):
             left.extend(ast.iter_child_nodes(part))
     return False
 

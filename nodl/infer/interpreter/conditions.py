@@ -63,7 +63,7 @@ def truth_of(atom: object) -> bool | None:
     if isinstance(atom, Sequence):
         items = atom.items
         return None if items.exact is None else bool(items.exact)
-    if isinstance(atom, FunctionValue | ModuleValue | ClassValue):
+    if isinstance(atom, (FunctionValue, ModuleValue, ClassValue)):
         return True
     if isinstance(atom, Dictionary):
         entries = atom.entries()
@@ -202,7 +202,7 @@ def either(condition: Guard, first: Value, second: Value) -> Value:
     return join_all(
         tuple(
             only_if(held, atom)
-            if held and isinstance(atom, str | Text) and not contains(other, atom)
+            if held and isinstance(atom, (str, Text)) and not contains(other, atom)
             else atom
             for atom in value
         )
@@ -223,12 +223,12 @@ def _comparison(run: Run, test: ast.Compare, frame: Frame) -> Guard | None:
         ):
             asked, defaults, op = asked._replace(item="each"), ("",), ast.Eq
         op = _MIRRORED.get(op, op)
-        if issubclass(op, ast.In | ast.NotIn):
+        if issubclass(op, (ast.In, ast.NotIn)):
             return None
     if asked is None or not (all(type(each) is str for each in defaults) or _whole_numbers(defaults)):
         return None
     value = _answer(run, other, frame)
-    if issubclass(op, ast.In | ast.NotIn):
+    if issubclass(op, (ast.In, ast.NotIn)):
         among = _texts_in(value)
         edit = "only if among" if issubclass(op, ast.In) else "only if not among"
         return None if among is None else Guard(asked, edit, among)
@@ -238,7 +238,7 @@ def _comparison(run: Run, test: ast.Compare, frame: Frame) -> Guard | None:
     if isinstance(bound, int) and op in _BOUNDS:
         edit, less = _BOUNDS[op]
         return Guard(asked, edit, (str(bound - less),))
-    if not isinstance(bound, str | int) or not issubclass(op, ast.Eq | ast.NotEq):
+    if not isinstance(bound, (str, int)) or not issubclass(op, (ast.Eq, ast.NotEq)):
         return None
     return Guard(asked, "only if equal" if issubclass(op, ast.Eq) else "only if different", (str(bound),))
 
@@ -282,7 +282,7 @@ def _truth_again(run: Run, part: ast.expr, frame: Frame) -> bool | None:
 def _asked(run: Run, node: ast.expr, frame: Frame) -> tuple[Input | None, Value]:
     value = _answer(run, node, frame)
     asked = input_of(value[0]) if len(value) == 1 else None
-    if asked is None or not is_parameter(asked) or not isinstance(asked.owner, NodeRecord | OptionDefaults):
+    if asked is None or not is_parameter(asked) or not isinstance(asked.owner, (NodeRecord, OptionDefaults)):
         return None, ()
     defaults = asked.owner.default(asked.name)
     if asked.item is not None:
@@ -311,7 +311,7 @@ def _may_ask(node: ast.expr) -> bool:
     if isinstance(node, ast.Compare):
         return all(isinstance(each, ast.Call) or _only_reads(each) for each in (node.left, *node.comparators))
     return isinstance(node, ast.Call) or (
-        isinstance(node, ast.Name | ast.Attribute | ast.Subscript) and _only_reads(node)
+        isinstance(node, (ast.Name, ast.Attribute, ast.Subscript)) and _only_reads(node)
     )
 
 
@@ -364,7 +364,7 @@ def compare(run: Run, node: ast.Compare, frame: Frame) -> Value:
     left = run.evaluate(node.left, frame)
     results: set[bool | None] = set()
     for op, comparator in zip(node.ops, node.comparators, strict=True):
-        if isinstance(op, ast.In | ast.NotIn) and _all_variables(run, comparator, frame):
+        if isinstance(op, (ast.In, ast.NotIn)) and _all_variables(run, comparator, frame):
             results.add(None)  # ``'node' in locals()``
             continue
         right = run.evaluate(comparator, frame)
@@ -393,14 +393,14 @@ def compare_values(op: ast.cmpop, left: Value, right: Value) -> bool | None:
 
 def _compare_atoms(op: ast.cmpop, left: object, right: object) -> bool | None:
     left, right = constant_text(left), constant_text(right)
-    if isinstance(op, ast.In | ast.NotIn):
+    if isinstance(op, (ast.In, ast.NotIn)):
         found = _is_among(left, right)
         return None if found is None else found is isinstance(op, ast.In)
     if isinstance(left, CONSTANTS) and isinstance(right, CONSTANTS):
         return _compare_constants(op, left, right)
-    if not isinstance(op, ast.Is | ast.IsNot | ast.Eq | ast.NotEq):
+    if not isinstance(op, (ast.Is, ast.IsNot, ast.Eq, ast.NotEq)):
         return None
-    same = isinstance(op, ast.Is | ast.Eq)
+    same = isinstance(op, (ast.Is, ast.Eq))
     if isinstance(left, Instance) and isinstance(right, Instance) and left.cls is right.cls:
         members = (
             isinstance(left.cls, ClassValue) and is_enumeration(left.cls) and "__eq__" not in left.cls.cells
@@ -408,7 +408,7 @@ def _compare_atoms(op: ast.cmpop, left: object, right: object) -> bool | None:
         return (left is right) is same if members else None
     if left is None or right is None:
         other = right if left is None else left
-        own = isinstance(other, Instance) and isinstance(op, ast.Eq | ast.NotEq)
+        own = isinstance(other, Instance) and isinstance(op, (ast.Eq, ast.NotEq))
         return not same if isinstance(other, _NEVER_NONE) and not own else None
     return None
 
@@ -433,7 +433,7 @@ _NEVER_NONE = (Instance, FunctionValue, ClassValue, ModuleValue, Sequence, Dicti
 
 
 def _compare_constants(op: ast.cmpop, left: object, right: object) -> bool | None:
-    if isinstance(op, ast.Is | ast.IsNot) and type(left) is not type(right):
+    if isinstance(op, (ast.Is, ast.IsNot)) and type(left) is not type(right):
         return isinstance(op, ast.IsNot)
     try:
         return bool(_COMPARED[type(op)](left, right))

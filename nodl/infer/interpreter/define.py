@@ -178,7 +178,7 @@ def _decorated_class(run: Run, value: Value, cls: ClassValue, decorator: ast.exp
     if isinstance(atom, External) and run.tables.keeps_off(atom.path):
         return value
     made = run.call(callee, Arguments([value]), decorator, frame)
-    if isinstance(atom, External | Unknown):
+    if isinstance(atom, (External, Unknown)):
         run.gap(decorator, frame, f"class {cls.name} is handed to a decorator that is not analysed")
         return value
     return made or value
@@ -310,4 +310,4 @@ def is_constant(atom: object) -> bool:
     """Return True if ``atom`` is a constant that a dictionary can have as a key, or a member of an enumeration."""
     if isinstance(atom, Instance):
         return isinstance(atom.cls, ClassValue) and is_enumeration(atom.cls)
-    return isinstance(atom, str | int | float | bool | type(None))
+    return isinstance(atom, (str, int, float, bool, type(None)))

@@ -85,7 +85,7 @@ def _element(run: Run, atom: object, key: Value, node: ast.Subscript, frame: Fra
 def entries_by_parameter(obj: object, key: Value) -> list[tuple[Guard, Value]] | None:
     """Return what each value of the parameter that is the ``key`` chooses; ``None``: not such a look-up."""
     asked = input_of(key[0]) if len(key) == 1 else None
-    if asked is None or not is_parameter(asked) or not isinstance(obj, Dictionary | Sequence):
+    if asked is None or not is_parameter(asked) or not isinstance(obj, (Dictionary, Sequence)):
         return None
     kind = int if is_whole_number(key[0]) else str
     entries = _certain_entries(obj)
@@ -107,7 +107,7 @@ def chosen_by_parameter(obj: Dictionary | Sequence, key: Value, default: Value |
     keys = tuple(guard.given[0] for guard, _ in entries)
     other = entries[0][0]._replace(edit="only if not among", given=keys)
     chosen = [(guard, value[0]) for guard, value in entries] + [(other, atom) for atom in default or ()]
-    found = [only_if(guard, atom) for guard, atom in chosen if isinstance(atom, str | Text)]
+    found = [only_if(guard, atom) for guard, atom in chosen if isinstance(atom, (str, Text))]
     return tuple(found) if len(found) == len(chosen) else None
 
 
@@ -151,7 +151,7 @@ def with_other_entries(obj: Dictionary, found: Value) -> Value:
     """Return ``found`` or what is under keys that are not constants; of several texts nobody knows which is meant."""
     others = present(obj.cells.get(OTHER, BOTTOM))
     found = join(found, others)
-    several = sum(isinstance(atom, str | Text) for atom in found) > 1
+    several = sum(isinstance(atom, (str, Text)) for atom in found) > 1
     return join(found, unknown("which entry of a dictionary is meant")) if others and several else found
 
 
@@ -434,7 +434,7 @@ def _delete_attribute(run: Run, owner: object, name: str, certain: bool, node: a
         if name in owner.cells:
             kept = BOTTOM if certain and not owner.summary else owner.cells[name]
             run.state.write(owner.cells, name, join(kept, ABSENT))
-    elif isinstance(owner, ClassValue | ModuleValue) and name in owner.cells:
+    elif isinstance(owner, (ClassValue, ModuleValue)) and name in owner.cells:
         run.gap(node, frame, f"{name} is deleted; what is found instead is not analysed")
 
 
@@ -453,8 +453,8 @@ def change(run: Run, owner: Sequence, added: Value, taken: bool = True) -> None:
     ``taken``: something was taken away, nobody knows what; a text among the elements may be the one.
     """
     others = join(owner.items.any_element(), added)
-    if taken and any(isinstance(atom, str | Text) for atom in others):
-        others = join(tuple(atom for atom in others if not isinstance(atom, str | Text)), EDITED)
+    if taken and any(isinstance(atom, (str, Text)) for atom in others):
+        others = join(tuple(atom for atom in others if not isinstance(atom, (str, Text))), EDITED)
     run.state.store(owner, ITEMS, (Items(None, others),))
 
 
@@ -462,4 +462,4 @@ def _any_of(found: Value) -> Value:
     """Return one of several elements, nobody knows which: of texts nothing is known then."""
     if len(found) < 2:
         return found
-    return join(tuple(atom for atom in found if not isinstance(atom, str | Text)), ANY)
+    return join(tuple(atom for atom in found if not isinstance(atom, (str, Text))), ANY)

@@ -90,9 +90,9 @@ def binary_operation(
         return ANY  # by a special method, which is called from outside
     if isinstance(op, ast.Add):
         return _add(run, node, left, right)
-    if isinstance(op, ast.Mod) and any(isinstance(atom, str | Text) for atom in left):
+    if isinstance(op, ast.Mod) and any(isinstance(atom, (str, Text)) for atom in left):
         return percent(left, right)
-    if type(op) in _COMBINING and any(isinstance(atom, Sequence | Dictionary) for atom in (*left, *right)):
+    if type(op) in _COMBINING and any(isinstance(atom, (Sequence, Dictionary)) for atom in (*left, *right)):
         run.escape_value((*left, *right))  # dictionaries or sets: what is in them may be called
         return ANY
     if type(op) in _ARITHMETIC and len(left) * len(right) <= 16:
@@ -122,7 +122,7 @@ def _arithmetic_atoms(run: Run, node: ast.AST, a: object, op: ast.operator, b: o
     if isinstance(a, _NUMBERS) and isinstance(b, _NUMBERS) and max(abs(a), abs(b)) < _LARGE:
         result = _ARITHMETIC[type(op)](a, b)
         return (result,) if isinstance(result, _NUMBERS) else ANY
-    if isinstance(op, ast.Add | ast.Sub) and type(b) is int and is_whole_number(a):
+    if isinstance(op, (ast.Add, ast.Sub)) and type(b) is int and is_whole_number(a):
         return _plus(a, -b if isinstance(op, ast.Sub) else b)
     if isinstance(op, ast.Add) and type(a) is int and is_whole_number(b):
         return _plus(b, a)
@@ -137,8 +137,8 @@ def _plus(number: Text, added: int) -> Value:
 def _add(run: Run, node: ast.AST, left: Value, right: Value) -> Value:
     if len(left) == 1 and len(right) == 1 and type(left[0]) is str and type(right[0]) is str:
         return (concatenate(left[0], right[0]),)
-    texts_left = [atom for atom in left if isinstance(atom, str | Text)]
-    texts_right = [atom for atom in right if isinstance(atom, str | Text)]
+    texts_left = [atom for atom in left if isinstance(atom, (str, Text))]
+    texts_right = [atom for atom in right if isinstance(atom, (str, Text))]
     sequences = [atom for atom in (*left, *right) if isinstance(atom, Sequence)]
     if sequences:
         return _added_sequences(run, node, left, right, sequences)
@@ -153,7 +153,7 @@ def _add(run: Run, node: ast.AST, left: Value, right: Value) -> Value:
 def _text_side(value: Value) -> list[TextAtom]:
     found: list[TextAtom] = []
     for atom in value:
-        if isinstance(atom, str | Text):
+        if isinstance(atom, (str, Text)):
             found.append(atom)
         elif isinstance(atom, Unknown):
             found.append(make_text((Hole(atom.why),)))
@@ -211,7 +211,7 @@ def _call(run: Run, node: ast.Call, frame: Frame) -> Value:
     callee = run.evaluate(function, frame)
     if type(function) is ast.Attribute and function.attr in _RUNS_COROUTINES:
         run.awaited.update(node.args)
-    if any(type(atom) is Unknown for atom in callee):
+    if Unknown in map(type, callee):
         run.doubtful.add(node)
     args = arguments_of(run, node, frame)
     run.at = node, frame
@@ -280,7 +280,7 @@ def _super(run: Run, node: ast.Call, frame: Frame) -> Value:
         classes = [atom for atom in owner if isinstance(atom, ClassValue)]
     else:
         classes, receiver = _implicit_super(frame)
-    objects = [atom for atom in receiver if isinstance(atom, Instance | ClassValue)]
+    objects = [atom for atom in receiver if isinstance(atom, (Instance, ClassValue))]
     result = join_all((SuperProxy(cls, atom),) for cls in classes for atom in objects)
     return result or unknown("super() outside of an analysed object")
 
@@ -382,7 +382,7 @@ def _otherwise(before: Value, value: Value) -> Value:
     if asked is None or asked.edits != (("unless empty", ()),):
         return value
     condition = Guard(asked._replace(edits=()), "only if equal", ("",))
-    return tuple(only_if(condition, atom) if isinstance(atom, str | Text) else atom for atom in value)
+    return tuple(only_if(condition, atom) if isinstance(atom, (str, Text)) else atom for atom in value)
 
 
 def _unary(run: Run, node: ast.UnaryOp, frame: Frame) -> Value:
@@ -390,7 +390,7 @@ def _unary(run: Run, node: ast.UnaryOp, frame: Frame) -> Value:
     if isinstance(node.op, ast.Not):
         outcome = truth(value)
         return boolean(None if outcome is None else not outcome)
-    if isinstance(node.op, ast.USub) and len(value) == 1 and isinstance(value[0], int | float):
+    if isinstance(node.op, ast.USub) and len(value) == 1 and isinstance(value[0], (int, float)):
         return (-value[0],)
     return ANY
 

@@ -41,9 +41,9 @@ def as_texts(value: Value) -> list[TextAtom]:
 
 
 def _text_of_atom(atom: object) -> TextAtom:
-    if isinstance(atom, str | Text):
+    if isinstance(atom, (str, Text)):
         return atom
-    if isinstance(atom, int | float | type(None)):
+    if isinstance(atom, (int, float, type(None))):
         return str(atom)
     if isinstance(atom, Unknown):
         return _hole(atom.why)
@@ -95,7 +95,7 @@ def formatted(value: Value, spec: str | None) -> list[TextAtom]:
         if spec == "d" and is_whole_number(atom):
             texts.append(atom)
             continue
-        if spec is None or not isinstance(atom, str | int | float) or _WIDE.search(spec):
+        if spec is None or not isinstance(atom, (str, int, float)) or _WIDE.search(spec):
             texts.append(_hole("formatted text"))
             continue
         with suppress(ValueError, TypeError, OverflowError):  # an error at run time, no text
@@ -108,7 +108,7 @@ def is_whole_number(atom: object) -> TypeGuard[Text]:
     if not isinstance(atom, Text) or len(atom.pieces) != 1:
         return False
     (piece,) = atom.pieces
-    if not isinstance(piece, Input) or not isinstance(piece.owner, NodeRecord | OptionDefaults):
+    if not isinstance(piece, Input) or not isinstance(piece.owner, (NodeRecord, OptionDefaults)):
         return False
     default = piece.owner.default(piece.name)
     return bool(default) and all(type(each) is int for each in default)
@@ -153,7 +153,7 @@ def str_format(template: TextAtom, args: Arguments) -> list[TextAtom]:
 
 def joined(separators: Value, items: Items) -> list[TextAtom]:
     """Run ``separator.join(items)``."""
-    separator_texts = [atom for atom in separators if isinstance(atom, str | Text)]
+    separator_texts = [atom for atom in separators if isinstance(atom, (str, Text))]
     if items.exact is None or len(items.exact) > 32 or not separator_texts:
         return [_hole("joined texts")]
     results: list[TextAtom] = []

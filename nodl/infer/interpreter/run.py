@@ -139,7 +139,7 @@ class Call:  # its fields are read so often that those of a named tuple would co
 
 
 class Called(NamedTuple):
-    """The latest call of a callback: the stamp of the state before it, what ran in it, the containers it looked into."""
+    """A call of a callback: the stamp of the state before it, what ran in it, the containers it looked into."""
 
     stamp: int
     functions: set[FunctionValue]
@@ -335,7 +335,7 @@ class Run(Allocations):
         ``since``: it does so at any time since this mark of the state, and not only where the program waits.
         """
         for atom in value:
-            if isinstance(atom, FunctionValue | BoundMethod | Partial | ClassMethod):
+            if isinstance(atom, (FunctionValue, BoundMethod, Partial, ClassMethod)):
                 if since is not None:
                     self.at_any_time.setdefault(atom, since)
                 if atom not in self.callbacks:

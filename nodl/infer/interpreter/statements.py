@@ -72,7 +72,7 @@ def _annotated(run: Run, node: ast.AnnAssign, frame: Frame) -> bool:
 def _augmented(run: Run, node: ast.AugAssign, frame: Frame) -> bool:
     old = run.evaluate(_as_load(node.target), frame)
     added = run.evaluate(node.value, frame)
-    if isinstance(node.op, ast.Add | ast.BitOr):
+    if isinstance(node.op, (ast.Add, ast.BitOr)):
         mutated = [atom for atom in old if isinstance(atom, Sequence) and atom.kind in ("list", "set")]
         for atom in mutated:
             method = run.attribute((atom,), "extend" if atom.kind == "list" else "update", node, frame)
@@ -114,7 +114,7 @@ def _if(run: Run, node: ast.If, frame: Frame) -> bool:
 def _return(run: Run, node: ast.Return, frame: Frame) -> bool:
     value = NONE if node.value is None else run.evaluate(node.value, frame)
     for condition in run.guards[frame.guards :]:
-        value = tuple(only_if(condition, atom) if isinstance(atom, str | Text) else atom for atom in value)
+        value = tuple(only_if(condition, atom) if isinstance(atom, (str, Text)) else atom for atom in value)
     frame.returned = join(frame.returned, value)
     _leave(run, frame)
     return False
@@ -152,7 +152,7 @@ def _match(run: Run, node: ast.Match, frame: Frame) -> bool:
     if tests is not None:
         return run.execute(tests, frame)
     subject = run.evaluate(node.subject, frame)
-    if not any(isinstance(atom, Unknown | External) for atom in subject):
+    if not any(isinstance(atom, (Unknown, External)) for atom in subject):
         run.gap(node, frame, "which case of this match statement is taken is not followed")
     last = node.cases[-1]
     everything = isinstance(last.pattern, ast.MatchAs) and last.pattern.pattern is None and last.guard is None
@@ -166,7 +166,7 @@ def _as_tests(node: ast.Match) -> list[ast.stmt] | None:
 
     None if a case is of another form, or if the subject, which each test reads again, is more than a name.
     """
-    if not isinstance(node.subject, ast.Name | ast.Attribute | ast.Constant):
+    if not isinstance(node.subject, (ast.Name, ast.Attribute, ast.Constant)):
         return None
     following: list[ast.stmt] = []
     for case in reversed(node.cases):

@@ -47,7 +47,7 @@ _SPLITS = frozenset({"split", "rsplit", "splitlines", "partition", "rpartition"}
 
 def call_method(run: Run, receiver: object, name: str, call: Call) -> Value:
     """Return what a method of a text or container gives and, in a container, changes; unknown without a model."""
-    if isinstance(receiver, str | Text):
+    if isinstance(receiver, (str, Text)):
         return _text_method(run, receiver, name, call)
     if isinstance(receiver, Dictionary):
         run.spend(len(receiver.cells))
@@ -77,7 +77,7 @@ def _text_method(run: Run, text: TextAtom, name: str, call: Call) -> Value:
     if name == "join":
         return text_value(joined((text,), elements(run, call.args.at(0) or ANY, call.node, call.frame)))
     arguments = tuple(sole(value) for value in call.args.positional)
-    constant = all(isinstance(argument, str | int | type(None)) for argument in arguments)
+    constant = all(isinstance(argument, (str, int, type(None))) for argument in arguments)
     if not constant or call.args.keywords or call.args.more:
         return unknown(f"the result of str.{name}()")
     if isinstance(text, str):

@@ -125,7 +125,7 @@ def namespace_attribute(run: Run, namespace: Instance, name: str) -> Value:
     parsers = (atom for atom in namespace.cells.get("parser", BOTTOM) if isinstance(atom, Instance))
     found = join_all(parser.cells.get("dest " + name, BOTTOM) for parser in parsers)
     if "[given]" in namespace.cells:  # not what launch writes on the command line, but a list of the program
-        known = tuple(atom for atom in found if not isinstance(atom, str | Text))
+        known = tuple(atom for atom in found if not isinstance(atom, (str, Text)))
         return join(known, unknown(f"the option {name} in arguments that the program makes"))
     return found or unknown(f"the command line option {name}")
 

@@ -137,7 +137,7 @@ def records_of(run: Run, value: Value | None, call: Call) -> list[NodeRecord]:
     for atom in value or ANY:
         if isinstance(atom, Instance):
             records.append(record_of_instance(run, atom, call))
-        elif isinstance(atom, Unknown | External):
+        elif isinstance(atom, (Unknown, External)):
             why = atom.why if isinstance(atom, Unknown) else f"a result of {atom.path.removesuffix(RESULT)}"
             run.findings.gap(call.source, f"the node of this endpoint is not known: {why}")
             records.append(run.findings.unknown_node(call.source))
@@ -246,7 +246,7 @@ def add_endpoint(
 ) -> None:
     """Add an endpoint to the node, under the conditions on its parameters and the options that hold here."""
     conditions = [guard.piece for guard in run.guards if guard.asked.owner in (record, run.options)]
-    if conditions and isinstance(name, str | Text):
+    if conditions and isinstance(name, (str, Text)):
         pieces = pieces_of(name)
         name = make_text((*(each for each in conditions if each not in pieces), *(pieces if name else ())))
     record.add_endpoint(kind, name, type_name, call.source, qos)
@@ -262,9 +262,9 @@ def names_of(value: Value) -> list[object]:
     """Return the names that ``value`` may be: texts and unknowns; other values are errors in the program."""
     names: list[object] = []
     for atom in value:
-        if isinstance(atom, str | Text | Unknown):
+        if isinstance(atom, (str, Text, Unknown)):
             names.append(atom)
-        elif atom is not None and not isinstance(atom, int | float):
+        elif atom is not None and not isinstance(atom, (int, float)):
             names.append(unknown("a name that is made by an object")[0])
     return names or [unknown("the name is never set to a text")[0]]
 
@@ -555,7 +555,7 @@ def _object_of(run: Run, path: str, call: Call) -> Value:
 def _init(run: Run, path: str, call: Call) -> Value:
     given = call.args.at(0, "args")
     if given is not None:
-        known = tuple(atom for atom in given if not isinstance(atom, Unknown | External | Text))
+        known = tuple(atom for atom in given if not isinstance(atom, (Unknown, External, Text)))
         if known and len(known) == len(given):
             words = strings_in(run, known, call)
             run.findings.global_arguments = join(run.findings.global_arguments, words)

@@ -127,7 +127,7 @@ def call_now(run: Run, call: Call) -> None:
     """Call each function among the arguments, with anything, as a library may do before it returns."""
     given = Arguments(more=unknown("an argument given by code that is not analysed"))
     for value in call.args.all_values():
-        functions = tuple(atom for atom in value if isinstance(atom, FunctionValue | BoundMethod | Partial))
+        functions = tuple(atom for atom in value if isinstance(atom, (FunctionValue, BoundMethod, Partial)))
         if functions:
             _perhaps_called(run, functions, given, call)
 
@@ -208,7 +208,7 @@ def _getattr(run: Run, call: Call) -> Value:
             if isinstance(atom, Instance):
                 for held in list(atom.cells.values()):
                     run.escape_value(held, opened=False, objects=False)
-        if any(isinstance(atom, ModuleValue | ClassValue) for atom in owner):
+        if any(isinstance(atom, (ModuleValue, ClassValue)) for atom in owner):
             run.gap(
                 call.node,
                 call.frame,
