@@ -9,6 +9,7 @@ import ast
 import functools
 import operator
 from collections.abc import Callable
+from functools import partial
 from typing import Any, TypeVar
 
 from nodl.infer.findings import NodeRecord, OptionDefaults
@@ -194,6 +195,39 @@ def under(run: Run, conditions: tuple[Guard, ...], action: Callable[[], T]) -> T
     result = action()
     run.guards = before
     return result
+
+
+def sides_of(
+    run: Run, test: ast.expr, frame: Frame, action: Callable[[bool], T]
+) -> tuple[Guard | None, list[Callable[[], T]]]:
+    """Return what ``test`` asks of a parameter, and ``action`` for either outcome, under what is certain then."""
+    held = {holds: conditions_of(run, test, holds, frame) for holds in (True, False)}
+
+    def side(holds: bool) -> T:
+        narrowed(run, test, holds, frame)
+        return under(run, held[holds], partial(action, holds))
+
+    return condition_of(run, test, frame), [partial(side, True), partial(side, False)]
+
+
+def where_either(first: tuple[Guard, ...], second: tuple[Guard, ...]) -> tuple[Guard, ...]:
+    """Return what is certain of parameters where all of ``first`` or all of ``second`` hold."""
+    found = {each: None for each in first if each in second}
+    for asked in dict.fromkeys(each.asked for each in first if each.asked.item is None):
+        texts = [_texts_left(asked, guards) for guards in (first, second)]
+        if all(texts):
+            found[Guard(asked, "only if among", tuple(dict.fromkeys((*texts[0], *texts[1]))))] = None
+    return tuple(found)
+
+
+def _texts_left(asked: Input, guards: tuple[Guard, ...]) -> tuple[str, ...]:
+    """Return the texts that ``guards`` leave to a parameter; none where they do not list them."""
+    own = [each for each in guards if each.asked == asked]
+    listed = [each.given for each in own if each.edit in ("only if equal", "only if among")]
+    others = {
+        text for each in own if each.edit in ("only if different", "only if not among") for text in each.given
+    }
+    return tuple(text for text in min(listed, key=len, default=()) if text not in others)
 
 
 def either(condition: Guard, first: Value, second: Value) -> Value:
@@ -396,6 +430,10 @@ def _compare_atoms(op: ast.cmpop, left: object, right: object) -> bool | None:
     if isinstance(op, (ast.In, ast.NotIn)):
         found = _is_among(left, right)
         return None if found is None else found is isinstance(op, ast.In)
+    if isinstance(left, Sequence) and isinstance(right, Sequence):
+        first, second = _constants_in(left), _constants_in(right)
+        known = first is not None and second is not None and not isinstance(op, (ast.Is, ast.IsNot))
+        return _compare_constants(op, first, second) if known else None
     if isinstance(left, CONSTANTS) and isinstance(right, CONSTANTS):
         return _compare_constants(op, left, right)
     if not isinstance(op, (ast.Is, ast.IsNot, ast.Eq, ast.NotEq)):
@@ -427,6 +465,18 @@ def _is_among(constant: object, container: object) -> bool | None:
         held, certain = container.held(constant)
         return True if certain else None if held or container.summary else False
     return None
+
+
+_PLAIN: dict[str, type] = {"tuple": tuple, "list": list}
+
+
+def _constants_in(sequence: Sequence) -> object:
+    """Return a tuple or list of constants; None if it is not known as one."""
+    exact = sequence.items.exact
+    if exact is None or any(len(each) != 1 or not isinstance(each[0], CONSTANTS) for each in exact):
+        return None
+    make = _PLAIN.get(sequence.kind)
+    return None if make is None else make(each[0] for each in exact)
 
 
 _NEVER_NONE = (Instance, FunctionValue, ClassValue, ModuleValue, Sequence, Dictionary)

@@ -10,12 +10,11 @@ from functools import partial
 
 from nodl.infer.interpreter.conditions import (
     compare,
-    condition_of,
-    conditions_of,
     decide,
     either,
     narrowed,
     only_if,
+    sides_of,
     truth,
     truth_of,
     under,
@@ -334,14 +333,12 @@ def _conditional(run: Run, node: ast.IfExp, frame: Frame) -> Value:
     outcome = decide(run, node.test, frame)
     if outcome is not None:
         return run.evaluate(node.body if outcome else node.orelse, frame)
-    condition = condition_of(run, node.test, frame)
-    held = {holds: conditions_of(run, node.test, holds, frame) for holds in (True, False)}
 
-    def side(expression: ast.expr, holds: bool) -> Value:
-        narrowed(run, node.test, holds, frame)
-        return under(run, held[holds], lambda: run.evaluate(expression, frame))
+    def side(holds: bool) -> Value:
+        return run.evaluate(node.body if holds else node.orelse, frame)
 
-    body, orelse = run.state.each((partial(side, node.body, True), partial(side, node.orelse, False)))
+    condition, sides = sides_of(run, node.test, frame, side)
+    body, orelse = run.state.each(sides)
     return either(condition, body, orelse) if condition else join(body, orelse)
 
 

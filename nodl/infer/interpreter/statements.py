@@ -8,13 +8,11 @@ from typing import Any
 
 from nodl.infer.interpreter import imports, loops
 from nodl.infer.interpreter.conditions import (
-    condition_of,
-    conditions_of,
     decide,
     either,
-    narrowed,
     only_if,
-    under,
+    sides_of,
+    where_either,
 )
 from nodl.infer.interpreter.define import define_class, define_function, program_classes
 from nodl.infer.interpreter.elements import assign, delete
@@ -93,21 +91,18 @@ def _if(run: Run, node: ast.If, frame: Frame) -> bool:
     outcome = decide(run, node.test, frame)
     if outcome is not None:
         return run.execute(node.body if outcome else node.orelse, frame)
-    condition = condition_of(run, node.test, frame)
-    held = {holds: conditions_of(run, node.test, holds, frame) for holds in (True, False)}
     passing: list[tuple[Guard, ...]] = []
 
-    def side(body: list[ast.stmt], holds: bool) -> bool:
-        narrowed(run, node.test, holds, frame)
-        passes = under(run, held[holds], lambda: run.execute(body, frame))
+    def side(holds: bool) -> bool:
+        passes = run.execute(node.body if holds else node.orelse, frame)
         if passes:
-            passing.append(held[holds])
+            passing.append(run.guards_at_end)
         return passes
 
-    sides = (partial(side, node.body, True), partial(side, node.orelse, False))
+    condition, sides = sides_of(run, node.test, frame, side)
     passes = run.state.branches(sides, partial(either, condition) if condition else None)
-    if len(passing) == 1:
-        run.guards = (*run.guards, *passing[0])  # to the end of this block
+    if passing:
+        run.guards = where_either(passing[0], passing[-1])  # to the end of this block
     return passes
 
 
