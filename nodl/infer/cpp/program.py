@@ -94,6 +94,8 @@ class Sources:
         package = self.workspace.package_of(found)
         if folder in _MODELLED_IF_INSTALLED:
             return package is None
+        if os.path.basename(name) == "json.hpp" and "JSON for Modern C++" in (self._read(found) or "")[:1000]:
+            return True  # a copy of nlohmann's, which knows nothing of ROS
         return folder in KNOWN_HEADERS and package is not self.workspace.package_of(file)
 
     def _read(self, file: str) -> str | None:

@@ -109,7 +109,8 @@ CASES: dict[str, tuple[str, list[str]]] = {
     "generator": ("def f():\n    yield 'a'\n    yield 'b'\nfor x in f():\n    self.P(x)", ["?", "a", "b"]),
     "getattr": ("self.a = 'x'\nself.P(getattr(self, 'a'))", ["x"]),
     "setattr by a name known in part": (
-        "class S:\n    a_error = 'a'\n    topic = 'b'\n    def run(self): return 'c'\n    @property\n    def drops(self): return 'd'\ns = S()\n"
+        "class S:\n    a_error = 'a'\n    topic = 'b'\n    def run(self): return 'c'\n"
+        "    @property\n    def drops(self): return 'd'\ns = S()\n"
         "setattr(s, sys.argv[1] + '_error', 'x')\nself.P(s.a_error); self.P(s.topic + s.run())",
         ["a", "bc", "x"],
     ),

@@ -561,6 +561,17 @@ def test_kernels_of_cuda_are_read_as_cpp(tmp_path: Path) -> None:
     assert any("constructor of Engine is not in reach" in why for why in gaps(without))
 
 
+def test_a_copy_of_nlohmann_json_is_not_read(tmp_path: Path) -> None:
+    header = "// JSON for Modern C++\nnamespace nlohmann { class json { void start(rclcpp::Node * n) { $$$"
+    source = '#include "own/json.hpp"\n' + in_class(f'nlohmann::json j; j.start(1); {PUB}("a", 1);')
+    system = infer(tmp_path, source, include__own__json_hpp=header)
+    assert (names(system), gaps(system)) == (["a"], [])
+    other = header.replace("JSON for Modern C++", "ours").replace("$$$", f'n->{PUB}("b", 1); }} }}; }}')
+    body = f'nlohmann::json j; j.start(this); {PUB}("a", 1);'
+    source = '#include "own/json.hpp"\n' + in_class(body)
+    assert names(infer(tmp_path / "other", source, include__own__json_hpp=other)) == ["a", "b"]
+
+
 def test_methods_of_qt_know_nothing_of_ros(tmp_path: Path) -> None:
     source = in_class(f'{PUB}("a", 1); this->connect(1, 2, this); this->strange(this);')
     both = source.replace("public rclcpp::Node", "public QWidget, public rclcpp::Node")
