@@ -66,8 +66,8 @@ def unknown_call(
     last = name.rpartition("::")[2]
     harmless = is_harmless_function(name) or (receiver is not None and receiver.type.name in LIBRARY_CLASSES)
     owner = name.rpartition("::")[0]
-    if "::" in owner and is_harmless_class(owner):
-        harmless = True
+    foreign = "::" in owner and is_harmless_class(owner)
+    harmless = harmless or foreign
     if receiver is not None and receiver.foreign_base and is_harmless_class(receiver.foreign_base):
         harmless = True
     if receiver is not None and _is_of_qt(run, receiver) and not CREATES.fullmatch(last):
@@ -82,7 +82,7 @@ def unknown_call(
         called_now(run, values, node, frame)
     if harmless:
         run.resolve(node, frame)
-        if CREATES.fullmatch(last):
+        if foreign:  # what it makes is none of ROS: ``lcm::LCM::subscribe``
             run.handle(node, frame)
         run.later(values, frame)
         return unknown(f"the result of {name}()")

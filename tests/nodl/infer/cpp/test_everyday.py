@@ -561,6 +561,13 @@ def test_kernels_of_cuda_are_read_as_cpp(tmp_path: Path) -> None:
     assert any("constructor of Engine is not in reach" in why for why in gaps(without))
 
 
+def test_what_another_middleware_subscribes_is_none_of_ros(tmp_path: Path) -> None:
+    body = f'{PUB}("a", 1); lcm_.subscribe("b", 1, this);'
+    assert not gaps(infer(tmp_path, in_class(body, "lcm::LCM lcm_;", "#include <lcm/lcm-cpp.hpp>\n")))
+    other = in_class(body.replace("lcm_", "acme_"), "acme::Bus acme_;", "#include <acme/bus.hpp>\n")
+    assert any("acme::Bus" in why for why in gaps(infer(tmp_path / "other", other)))
+
+
 def test_a_copy_of_nlohmann_json_is_not_read(tmp_path: Path) -> None:
     header = "// JSON for Modern C++\nnamespace nlohmann { class json { void start(rclcpp::Node * n) { $$$"
     source = '#include "own/json.hpp"\n' + in_class(f'nlohmann::json j; j.start(1); {PUB}("a", 1);')
