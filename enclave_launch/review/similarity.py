@@ -11,6 +11,8 @@ from typing import NamedTuple
 
 from enclave_launch.review.document import GrantedName, PlanDocument
 
+_ALIKE = 0.5  # least similarity of two enclaves that could be one
+
 
 class Merge(NamedTuple):
     """``similarity``: permissions that both have over those that either has, 0 to 1. ``excess``: what each gains."""
@@ -36,7 +38,7 @@ class Split(NamedTuple):
         return sum(len(grants) for _, grants in self.saved)
 
 
-def merges(plan: PlanDocument, *, least_similarity: float = 0.5) -> list[Merge]:
+def merges(plan: PlanDocument) -> list[Merge]:
     """Return pairs of enclaves that are alike, cheapest first; what every node has is left out of the comparison."""
     own = {path: plan.own(path) for path in plan.enclaves}
     found = [
@@ -44,7 +46,7 @@ def merges(plan: PlanDocument, *, least_similarity: float = 0.5) -> list[Merge]:
         for one, two in combinations(sorted(own), 2)
         if own[one] and own[two]
     ]
-    alike = [merge for merge in found if merge.similarity >= least_similarity]
+    alike = [merge for merge in found if merge.similarity >= _ALIKE]
     return sorted(alike, key=lambda merge: (merge.cost, -merge.similarity, merge.one, merge.two))
 
 

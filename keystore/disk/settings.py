@@ -14,24 +14,21 @@ from typing import Any
 from keystore.errors import DamagedKeystoreError
 from keystore.formats.subject import SubjectScheme
 from keystore.formats.validity import DEFAULT_LIFETIME
-from keystore.signing.authority import Curve
 
 _VERSION = 1
 
 
 @dataclass(frozen=True, slots=True)
 class KeystoreSettings:
-    """``lifetime`` is for new certificates of enclaves, ``curve`` for new keys of CAs and enclaves."""
+    """``lifetime`` is for new certificates of enclaves."""
 
     subjects: SubjectScheme = SubjectScheme.EXACT
-    curve: Curve = Curve.P256
     lifetime: timedelta = DEFAULT_LIFETIME
 
     def to_json(self) -> bytes:
         content = {
             "version": _VERSION,
             "subjects": self.subjects.value,
-            "curve": self.curve.value,
             "lifetime_seconds": int(self.lifetime.total_seconds()),
         }
         return json.dumps(content, indent=2, sort_keys=True).encode() + b"\n"
@@ -45,7 +42,6 @@ class KeystoreSettings:
                 raise DamagedKeystoreError(f"{place} was written by a newer version; update secure-keystore")
             return cls(
                 SubjectScheme(content["subjects"]),
-                Curve(content["curve"]),
                 timedelta(seconds=int(content["lifetime_seconds"])),
             )
         except (ValueError, KeyError, TypeError, OverflowError, RecursionError):

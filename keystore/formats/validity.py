@@ -1,7 +1,7 @@
 """From when until when a certificate and its permissions hold: one value for both. Performs no I/O.
 
 The DDS implementations disagree about permissions dates: Cyclone DDS reads UTC, Fast DDS the local time of
-the process, in every release inspected. Hence the back-dating floor of 14 hours (the most easterly offset),
+the process, in every release inspected. Hence back-dating by more than 14 hours (the most easterly offset),
 and no promise of an expiry more precise than that on Fast DDS.
 """
 
@@ -13,10 +13,8 @@ from typing import NamedTuple
 
 from keystore.errors import InvalidInputError, printable
 
-# Clocks behind ours, and Connext 5.3.1, make SROS2 back-date by a day; Fast DDS needs at least 14 h.
-DEFAULT_BACKDATE = timedelta(days=1)
-MIN_BACKDATE = timedelta(hours=14)
-MAX_BACKDATE = timedelta(days=3650)
+BACKDATE = timedelta(days=1)
+"""As SROS2, for clocks behind ours and Connext 5.3.1; Fast DDS needs at least 14 h."""
 DEFAULT_LIFETIME = timedelta(days=3650)
 # Cyclone DDS counts nanoseconds in 64 bits (until 2262-04-11) and refuses later dates as expired.
 LATEST = datetime(2262, 4, 11, tzinfo=timezone.utc)
@@ -51,20 +49,15 @@ class Validity(_Ends):
         lifetime: timedelta = DEFAULT_LIFETIME,
         *,
         until: datetime | None = None,
-        backdate: timedelta = DEFAULT_BACKDATE,
     ) -> Validity:
-        """Make a validity from ``now`` minus ``backdate`` for ``lifetime``, or to the absolute date ``until``.
+        """Make a validity from ``now`` minus ``BACKDATE`` for ``lifetime``, or to the absolute date ``until``.
 
-        Raises InvalidInputError if ``until`` is past, or ``backdate`` under 14 hours or over 10 years.
+        Raises InvalidInputError if ``until`` is past.
         """
-        if backdate < MIN_BACKDATE:
-            raise InvalidInputError("back-dating under 14 h makes Fast DDS start late west of UTC; use more")
         end = until if until is not None else later(now, lifetime)
         if end <= now:
             raise InvalidInputError(f"the validity would already have expired ({iso(end)})")
-        if backdate > MAX_BACKDATE:
-            raise InvalidInputError("back-dating by more than 10 years helps no clock; use less")
-        return cls(now - backdate, end)
+        return cls(now - BACKDATE, end)
 
     def within(self, outer: Validity) -> Validity:
         """Cut to what the issuer itself can promise: no leaf outlives its CA."""

@@ -12,7 +12,6 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timezone
-from enum import Enum
 
 from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
@@ -24,13 +23,6 @@ from keystore.formats.certificate import CertificateFacts, read_der
 from keystore.formats.role import Role
 from keystore.formats.validity import Validity
 from keystore.signing.signer import FileSigner, PublicKey, Signer, builder_key, spki
-
-
-class Curve(str, Enum):
-    """The elliptic curves of keys that are made here."""
-
-    P256 = "P-256"
-    P384 = "P-384"  # Fast DDS only: Cyclone DDS refuses EC keys that are not 256 bits
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,9 +52,9 @@ def default_ca_name(role: Role) -> str:
     return f"ROS {role.value.removesuffix('_ca')} CA {os.urandom(4).hex()}"
 
 
-def new_key(curve: Curve) -> FileSigner:
-    """Make a private key on ``curve``, in memory."""
-    return FileSigner(ec.generate_private_key(ec.SECP256R1() if curve is Curve.P256 else ec.SECP384R1()))
+def new_key() -> FileSigner:
+    """Make a private key, in memory; P-256, since Cyclone DDS takes no other elliptic curve."""
+    return FileSigner(ec.generate_private_key(ec.SECP256R1()))
 
 
 def self_signed_ca(role: Role, name: str, signer: Signer, validity: Validity) -> Authority:

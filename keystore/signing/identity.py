@@ -11,7 +11,7 @@ from cryptography.hazmat.primitives import hashes, serialization
 from keystore.errors import DamagedKeystoreError
 from keystore.formats.certificate import UNREADABLE, CertificateFacts
 from keystore.formats.validity import Validity
-from keystore.signing.authority import Curve, IdentityIssuer, new_key
+from keystore.signing.authority import IdentityIssuer, new_key
 from keystore.signing.public_key import key_kind
 from keystore.signing.signer import (
     FileSigner,
@@ -37,11 +37,9 @@ class Identity:
         return self.facts.pem
 
 
-def new_identity(
-    issuer: IdentityIssuer, common_name: str, validity: Validity, curve: Curve = Curve.P256
-) -> Identity:
+def new_identity(issuer: IdentityIssuer, common_name: str, validity: Validity) -> Identity:
     """Make a key pair, and a certificate for it from ``issuer``."""
-    signer = new_key(curve)
+    signer = new_key()
     return Identity(issuer.issue(common_name, signer.public_key(), validity), key_pem(signer))
 
 

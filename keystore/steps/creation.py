@@ -23,9 +23,9 @@ from keystore.formats.governance import Governance, governance_document, parse_g
 from keystore.formats.register import AuthorityState
 from keystore.formats.role import Role
 from keystore.formats.subject import SubjectScheme
-from keystore.formats.validity import DEFAULT_BACKDATE, DEFAULT_LIFETIME, Validity, utc_now
+from keystore.formats.validity import DEFAULT_LIFETIME, Validity, utc_now
 from keystore.signing import authority
-from keystore.signing.authority import Authority, Curve, check_can_serve
+from keystore.signing.authority import Authority, check_can_serve
 from keystore.signing.ca_access import Secret
 from keystore.signing.pkcs11_signer import open_signer
 from keystore.signing.public_key import CYCLONE_KINDS, key_kind
@@ -51,10 +51,8 @@ class CreateOptions(ChangeOptions):
     domains: Domains = field(default_factory=lambda: Domains.single(0))
     governance: Governance | None = None
     subjects: SubjectScheme = SubjectScheme.EXACT
-    curve: Curve = Curve.P256
     ca_lifetime: timedelta = DEFAULT_LIFETIME
     lifetime: timedelta = DEFAULT_LIFETIME
-    backdate: timedelta = DEFAULT_BACKDATE
     names: Mapping[Role, str] = field(default_factory=dict)
     imported: Mapping[Role, ImportedCa] = field(default_factory=dict)
     encrypt_ca_keys: bool = False
@@ -62,7 +60,7 @@ class CreateOptions(ChangeOptions):
 
     @property
     def settings(self) -> KeystoreSettings:
-        return KeystoreSettings(self.subjects, self.curve, self.lifetime)
+        return KeystoreSettings(self.subjects, self.lifetime)
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +92,7 @@ def refuse_unusable(options: CreateOptions) -> None:
     """Refuse, before anything is written, options that no keystore can be made with; raises InvalidInputError."""
     now = options.now or utc_now()
     for lifetime in (options.ca_lifetime, options.lifetime):
-        Validity.starting(now, lifetime, backdate=options.backdate)
+        Validity.starting(now, lifetime)
     for name in options.names.values():
         authority.refuse_ca_name(name)
     if (passphrase := _passphrase(options)) is not None:
@@ -199,7 +197,7 @@ def _refuse_foreign_enclaves(view: KeystoreView, role: Role) -> None:
 
 def new_ca(role: Role, options: CreateOptions) -> tuple[Authority, bytes]:
     """Make a CA and its key file."""
-    signer = authority.new_key(options.curve)
+    signer = authority.new_key()
     return _self_signed(role, options, signer), key_pem(signer, _passphrase(options))
 
 
@@ -214,7 +212,7 @@ def _present_key_ca(view: KeystoreView, role: Role, options: CreateOptions) -> t
 
 
 def _self_signed(role: Role, options: CreateOptions, signer: Signer) -> Authority:
-    validity = Validity.starting(options.now or utc_now(), options.ca_lifetime, backdate=options.backdate)
+    validity = Validity.starting(options.now or utc_now(), options.ca_lifetime)
     name = options.names.get(role) or authority.default_ca_name(role)
     return authority.self_signed_ca(role, name, signer, validity)
 

@@ -19,14 +19,13 @@ from keystore.disk.view import KeystoreView
 from keystore.errors import DamagedKeystoreError, InvalidInputError
 from keystore.formats.register import IssuedCertificate, Register
 from keystore.formats.role import Role
-from keystore.formats.validity import later
+from keystore.formats.validity import BACKDATE, later
 from keystore.signing.authority import IdentityIssuer
 from keystore.signing.ca_access import CaAccess
 from keystore.signing.public_key import fingerprint
 
 # Nobody fetches CRLs in a DDS system: a short life would buy nothing and risk an outage.
 CRL_LIFETIME = timedelta(days=365)
-_BACKDATE = timedelta(days=1)
 
 
 def can_revoke(view: KeystoreView) -> bool:
@@ -62,7 +61,7 @@ def publish_crl(opened: Store, register: Register, access: CaAccess, now: dateti
     issuer = view.authority(Role.IDENTITY, access)
     end = min(now + CRL_LIFETIME, issuer.validity.not_after)
     revoked = register.revoked(fingerprint(issuer.facts.der))
-    crl = IdentityIssuer(issuer).revocation_list(revoked, now - _BACKDATE, end, register.crl_number)
+    crl = IdentityIssuer(issuer).revocation_list(revoked, now - BACKDATE, end, register.crl_number)
     with opened.batch() as batch:
         batch.record(register)
         batch.file(layout.CRL_UNLINKED, b"", PRIVATE_MODE)

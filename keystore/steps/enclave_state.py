@@ -28,7 +28,7 @@ from keystore.formats.permissions_document import grant_for, taken_away
 from keystore.formats.register import Register
 from keystore.formats.role import Role
 from keystore.formats.subject import names_enclave, subject_name
-from keystore.formats.validity import DEFAULT_BACKDATE, Validity
+from keystore.formats.validity import BACKDATE, Validity
 from keystore.signing import smime
 from keystore.signing.identity import public_half, request_key
 from keystore.signing.public_key import fingerprint, is_our_form, issued_by, key_matches
@@ -145,7 +145,7 @@ def granted_lifetime(view: KeystoreView, register: Register | None, enclave: str
         return timedelta(seconds=last.lifetime)
     if any(last.not_after == ca.validity.not_after for role in Role for ca in view.ca_bundle(role)):
         return None  # cut to the life of its CA
-    return max(last.not_after - last.not_before - DEFAULT_BACKDATE, timedelta(hours=1))
+    return max(last.not_after - last.not_before - BACKDATE, timedelta(hours=1))
 
 
 def _is_there(view: KeystoreView, directory: str) -> bool:

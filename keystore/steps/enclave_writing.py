@@ -82,7 +82,7 @@ class EnclaveWriter:
     def _validity(self, enclave: str) -> Validity:
         self._view.refuse_ended(self._now, *Role)
         cas = [self._view.ca(role).validity for role in Role]
-        requested = Validity.starting(self._now, self._lifetime(enclave), backdate=self._options.backdate)
+        requested = Validity.starting(self._now, self._lifetime(enclave))
         return requested.within(cas[0]).within(cas[1])
 
     @property
@@ -206,7 +206,7 @@ class EnclaveWriter:
         if state.reissue is Reissue.KEY_PAIR:
             known = state.facts is not None or bool(self._register.of_enclave(state.enclave))
             actions.append("key and certificate" if known and state.reasons != (NEW,) else "created")
-            return new_identity(self._issuer, cn, self._validity(state.enclave), self._view.settings.curve)
+            return new_identity(self._issuer, cn, self._validity(state.enclave))
         directory = layout.enclave_directory(state.enclave)
         relative = layout.request(state.enclave) if made_on_host else f"{directory}/{layout.KEY}"
         key = safe_files.read_private(self._view.root, relative)

@@ -33,7 +33,7 @@ from keystore.formats.bundle import BundledEnclave
 from keystore.formats.certificate import read_certificate
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.subject import common_name
-from keystore.signing.authority import Curve, new_key
+from keystore.signing.authority import new_key
 from keystore.signing.ca_access import CaAccess
 from keystore.signing.identity import new_request, request_key
 from keystore.signing.pkcs11_signer import open_signer
@@ -112,7 +112,7 @@ def _request(pending: Path, enclave: str, options: RequestOptions) -> Request:
 
 def _new_key(options: RequestOptions) -> tuple[HostKey, Signer]:
     if options.token is None:
-        made = new_key(Curve.P256)
+        made = new_key()
         return HostKey(layout.KEY, key_pem(made)), made
     reference = f"{options.token}\n".encode()
     if not reference.startswith(b"pkcs11:") or len(reference.split()) != 1:

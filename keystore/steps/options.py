@@ -13,7 +13,7 @@ from keystore.disk.share_files import LaunchHold
 from keystore.formats.domains import Domains
 from keystore.formats.policy import EnclavePolicy
 from keystore.formats.subject import Half, SubjectScheme
-from keystore.formats.validity import DEFAULT_BACKDATE, DEFAULT_LIFETIME, Validity
+from keystore.formats.validity import DEFAULT_LIFETIME, Validity
 from keystore.signing.ca_access import CaAccess
 
 Progress = Callable[[int, int], None]
@@ -43,7 +43,6 @@ class ProvisionOptions(NamedTuple):
     ca_lifetime: timedelta = DEFAULT_LIFETIME
     lifetime: timedelta | None = None
     valid_until: datetime | None = None
-    backdate: timedelta = DEFAULT_BACKDATE
     renew_within: timedelta = timedelta(0)
     subjects: SubjectScheme | None = None
     rmw: str | None = None

@@ -200,7 +200,7 @@ def reconcile(
     require("cryptography", "asn1crypto", "lxml")
     # An impossible validity is refused before a keystore is made for it.
     lifetime = DEFAULT_LIFETIME if options.lifetime is None else options.lifetime
-    Validity.starting(now, lifetime, until=options.valid_until, backdate=options.backdate)
+    Validity.starting(now, lifetime, until=options.valid_until)
     with _locked(root, options, now) as opened:
         done, warnings = _complete_keystore(opened, options, now)
         done = [*opened.notes, *done]

@@ -97,7 +97,6 @@ def roll_over(
 def _creation(options: ProvisionOptions, now: datetime, encrypt: bool) -> CreateOptions:
     return CreateOptions(
         ca_lifetime=options.ca_lifetime,
-        backdate=options.backdate,
         access=options.access,
         encrypt_ca_keys=encrypt,
         now=now,

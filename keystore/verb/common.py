@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Iterable
-from dataclasses import dataclass
 from datetime import datetime, timedelta
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -16,7 +15,7 @@ from keystore.disk.lock import DEFAULT_TIMEOUT
 from keystore.errors import InvalidInputError, KeystoreError
 from keystore.formats.domains import Domains
 from keystore.formats.subject import SubjectScheme
-from keystore.formats.validity import DEFAULT_BACKDATE, iso, parse_duration, parse_end, utc_now
+from keystore.formats.validity import iso, parse_duration, parse_end, utc_now
 from keystore.signing.ca_access import CaAccess, Secret
 from keystore.steps.options import ProvisionOptions
 
@@ -60,12 +59,10 @@ DOMAINS: Option = ("--domain-id IDS", TEXT, "domains of the permissions (default
 """Read by ``domains``."""
 REVOKE_OLD: Option = ("--revoke-old", FLAG, "also revoke the certificates these enclaves had before")
 ENCRYPTION: Option = ("--encrypt-ca-keys", FLAG, "encrypt new CA keys with the passphrase")
-BACKDATE: Option = ("--backdate TIME", TEXT, "begin this much earlier, for clocks that lag (1d)")
-VALIDITY: Table = (
-    ("--valid-for TIME", TEXT, "90d, 12h, 10y from now, or until an ISO date (default: the keystore's)"),
-    BACKDATE,
-)
-"""How long certificates and permissions hold; read by ``span``."""
+VALIDITY: Option = (
+    "--valid-for TIME", TEXT, "90d, 12h, 10y from now, or until an ISO date (default: the keystore's)"
+)  # fmt: skip
+"""How long certificates and permissions hold."""
 SUBJECTS: tuple[Option, ...] = (
     ("--compatible-subjects", FLAG,
      "CN=/path as SROS2 writes it, for use with 'ros2 security create_permission'; on Cyclone DDS "
@@ -92,7 +89,7 @@ CLOCK: Option = (
 CHANGE: Table = (*SIGNING, LOCK, CLOCK)
 """Of each verb that signs and writes; read by ``change``."""
 PROVISIONING: Table = (
-    *VALIDITY,
+    VALIDITY,
     ("--no-revoke", FLAG,
      "if rights are removed or a validity is shortened: do not revoke the previous certificate (it is "
      "usable until it expires)"),
@@ -101,7 +98,6 @@ PROVISIONING: Table = (
 )  # fmt: skip
 """Of each verb that issues certificates for enclaves; read by ``provision_options``."""
 FOLDED: tuple[Option, ...] = (
-    BACKDATE,
     *SUBJECTS,
     *(option for secret in SIGNING for option in secret.options),
     LOCK,
@@ -141,34 +137,22 @@ def change(arguments: argparse.Namespace) -> dict[str, Any]:
     }
 
 
-@dataclass(frozen=True, slots=True)
-class Span:
-    """``--valid-for`` and ``--backdate`` as the functions want them."""
-
-    lifetime: timedelta | None
-    until: datetime | None
-    backdate: timedelta
-
-
-def span(arguments: argparse.Namespace) -> Span:
-    """Return the validity from the options of ``VALIDITY``; raises ``InvalidInputError``."""
-    text: str | None = arguments.valid_for
-    backdate = parse_duration(arguments.backdate) if arguments.backdate else DEFAULT_BACKDATE
+def _span(text: str | None) -> tuple[timedelta | None, datetime | None]:
+    """Return ``--valid-for`` as a lifetime or as an end; raises ``InvalidInputError``."""
     if text is None:
-        return Span(None, None, backdate)
+        return None, None
     try:
-        return Span(parse_duration(text), None, backdate)
+        return parse_duration(text), None
     except InvalidInputError:
-        return Span(None, parse_end(text, utc_now()), backdate)
+        return None, parse_end(text, utc_now())
 
 
 def provision_options(arguments: argparse.Namespace, **more: Any) -> ProvisionOptions:
     """Return what ``PROVISIONING`` was given."""
-    validity = span(arguments)
+    lifetime, until = _span(arguments.valid_for)
     return ProvisionOptions(
-        lifetime=validity.lifetime,
-        valid_until=validity.until,
-        backdate=validity.backdate,
+        lifetime=lifetime,
+        valid_until=until,
         subjects=SubjectScheme.COMPATIBLE if arguments.compatible_subjects else None,
         allow_subject_overlap=arguments.allow_subject_overlap,
         revoke=not arguments.no_revoke,

@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import argparse
 
-from enclave_common.command_line import PATH, TEXT, one_of
+from enclave_common.command_line import PATH, TEXT
 from keystore.formats.domains import Domains
 from keystore.formats.governance_yaml import load_governance_yaml
 from keystore.formats.role import Role
 from keystore.formats.subject import SubjectScheme
 from keystore.formats.validity import DEFAULT_LIFETIME, parse_end, utc_now
-from keystore.signing.authority import Curve
 from keystore.steps.creation import CreateOptions, ImportedCa, create_keystore
 from keystore.verb import common
 
@@ -30,9 +29,8 @@ OPTIONS: common.Table = (
     common.KEYSTORE,
     ("--domain-id IDS", {"default": "0"}, "domains of the governance: 0, 0-10, 3,7 or all"),
     ("--governance FILE.yaml", PATH, "governance instead of SROS2's default"),
-    ("--curve", one_of("P-256", "P-384"), "P-384 works on Fast DDS only"),
     ("--ca-valid-for TIME", {"default": "10y"}, "validity of the CAs (10y)"),
-    *common.VALIDITY,
+    common.VALIDITY,
     *_imported("identity"),
     *_imported("permissions"),
     ("--external-identity-ca CERT", PATH,
@@ -45,11 +43,8 @@ OPTIONS: common.Table = (
 
 def run(arguments: argparse.Namespace) -> int:
     """Create or complete the keystore, and print what was made. Returns 0."""
-    validity = common.span(arguments)
     now = utc_now()
-    lifetime = validity.lifetime
-    if lifetime is None:
-        lifetime = validity.until - now if validity.until else DEFAULT_LIFETIME
+    lifetime = parse_end(arguments.valid_for, now) - now if arguments.valid_for else DEFAULT_LIFETIME
     given = vars(arguments)
     imported = {role: ImportedCa(*given[role.value]) for role in Role if given[role.value]}
     if arguments.external_identity_ca:
@@ -58,10 +53,8 @@ def run(arguments: argparse.Namespace) -> int:
         domains=Domains.parse(arguments.domain_id),
         governance=load_governance_yaml(arguments.governance) if arguments.governance else None,
         subjects=SubjectScheme.COMPATIBLE if arguments.compatible_subjects else SubjectScheme.EXACT,
-        curve=Curve(arguments.curve),
         ca_lifetime=parse_end(arguments.ca_valid_for, now) - now,
         lifetime=lifetime,
-        backdate=validity.backdate,
         names={role: given[f"{role.value}_name"] for role in Role if given[f"{role.value}_name"]},
         imported=imported,
         encrypt_ca_keys=arguments.encrypt_ca_keys,

@@ -22,7 +22,7 @@ from keystore.disk.view import KeystoreView, keystore_at
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.register import UNKNOWN, IssuedCertificate
 from keystore.formats.role import Role
-from keystore.formats.validity import DEFAULT_BACKDATE, Validity, later, utc_now
+from keystore.formats.validity import Validity, later, utc_now
 from keystore.signing.authority import IdentityIssuer, new_key
 from keystore.signing.ca_access import CaAccess
 from keystore.signing.identity import public_half
@@ -203,9 +203,9 @@ def _issue(
     view.refuse_ended(now, Role.IDENTITY)
     authority = view.authority(Role.IDENTITY, access)
     key = router_key(view)
-    fresh = None if key is not None else new_key(view.settings.curve)
+    fresh = None if key is not None else new_key()
     public = fresh.public_key() if fresh is not None else public_half(key or b"", layout.ZENOH_ROUTER_KEY)
-    validity = Validity.starting(now, view.settings.lifetime, backdate=DEFAULT_BACKDATE)
+    validity = Validity.starting(now, view.settings.lifetime)
     facts = IdentityIssuer(authority).issue(ROUTER_NAME, public, validity, address.hosts)
     files = {layout.ZENOH_ROUTER_KEY: key_pem(fresh)} if fresh is not None else {}
     record = certificate_record(UNKNOWN, facts, authority.facts)._replace(replaced=True)

@@ -18,7 +18,7 @@ from keystore.formats import certificate
 from keystore.formats.role import Role
 from keystore.formats.validity import Validity
 from keystore.signing import authority
-from keystore.signing.authority import Authority, Curve, IdentityIssuer
+from keystore.signing.authority import Authority, IdentityIssuer
 from keystore.signing.identity import new_identity, new_request, request_key
 from keystore.signing.public_key import issued_by
 from keystore.signing.signer import spki
@@ -27,8 +27,8 @@ from tests.keystore.kit import DAY, NOW, openssl
 VALIDITY = Validity.starting(NOW, 90 * DAY)
 
 
-def ca(role: Role, curve: Curve = Curve.P256) -> Authority:
-    return authority.self_signed_ca(role, authority.default_ca_name(role), authority.new_key(curve), VALIDITY)
+def ca(role: Role) -> Authority:
+    return authority.self_signed_ca(role, authority.default_ca_name(role), authority.new_key(), VALIDITY)
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +75,7 @@ def test_cas_have_names_of_their_own() -> None:
     assert ca(Role.IDENTITY).facts.subject != ca(Role.IDENTITY).facts.subject
     for name in ("", "a" * 65, "a,b", "a/b", "a=b", 'a"b', "a\\b"):
         with pytest.raises(InvalidInputError):
-            authority.self_signed_ca(Role.IDENTITY, name, authority.new_key(Curve.P256), VALIDITY)
+            authority.self_signed_ca(Role.IDENTITY, name, authority.new_key(), VALIDITY)
 
 
 def test_an_enclave_never_outlives_its_ca(identity_ca: Authority) -> None:
@@ -132,7 +132,7 @@ def test_damaged_certificates_are_read_or_refused(position: int, damage: bytes) 
 
 
 def test_a_request_and_a_crl_of_a_version_that_x509_does_not_have_are_refused() -> None:
-    request = new_request("ros.a", authority.new_key(Curve.P256))
+    request = new_request("ros.a", authority.new_key())
     assert request_key(request, "it").common_name == "ros.a"
     with pytest.raises(DamagedKeystoreError, match="it is not a certificate request"):
         request_key(with_version(request, b"\x00", b"\x07"), "it")

@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from cryptography.hazmat.primitives.asymmetric import ec
 
 from keystore import CaAccess, CreateOptions, ImportedCa, Secret, create_keystore, provision, verify
 from keystore.disk.view import KeystoreView
@@ -17,7 +18,7 @@ from keystore.formats.governance import DomainRule, Governance, Protection
 from keystore.formats.role import Role
 from keystore.formats.validity import Validity
 from keystore.signing import authority
-from keystore.signing.authority import Authority, Curve
+from keystore.signing.authority import Authority
 from keystore.signing.signer import FileSigner, key_pem
 from tests.keystore.kit import DAY, NOW, actions, created, mode, openssl, options, policy, snapshot
 
@@ -53,20 +54,21 @@ def test_a_file_and_a_full_directory_are_not(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["file"]
 
 
-def test_names_curve_and_validity(tmp_path: Path) -> None:
-    root = created(
-        tmp_path / "ks", names={Role.IDENTITY: "acme robots"}, curve=Curve.P384, ca_lifetime=90 * DAY, now=NOW
-    )
+def test_names_and_validity(tmp_path: Path) -> None:
+    root = created(tmp_path / "ks", names={Role.IDENTITY: "acme robots"}, ca_lifetime=90 * DAY, now=NOW)
     ca = KeystoreView(root).ca(Role.IDENTITY)
     assert ca.common_name == "acme robots"
     assert ca.validity == Validity(NOW - DAY, NOW + 90 * DAY)
-    assert "ASN1 OID: secp384r1" in openssl(
+    assert "ASN1 OID: prime256v1" in openssl(
         "x509", "-noout", "-text", "-in", root / "public/identity_ca.cert.pem"
     )
 
 
-def test_p384_is_warned_about(tmp_path: Path) -> None:
-    report = create_keystore(tmp_path / "ks", CreateOptions(curve=Curve.P384, durable=False))
+def test_imported_cas_with_p384_are_warned_about(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr(ec, "SECP256R1", ec.SECP384R1)
+        imported = {role: made_ca(role, tmp_path)[1] for role in Role}
+    report = create_keystore(tmp_path / "ks", CreateOptions(imported=imported, durable=False, now=NOW))
     assert len(report.warnings) == 2 and "Cyclone DDS accepts only" in report.warnings[0]
 
 
@@ -80,7 +82,7 @@ def test_domains_and_governance(tmp_path: Path) -> None:
 
 
 def made_ca(role: Role, directory: Path, **kind: object) -> tuple[Authority, ImportedCa]:
-    signer = authority.new_key(Curve.P256)
+    signer = authority.new_key()
     validity = Validity.starting(NOW, 9000 * DAY)
     made = authority.self_signed_ca(role, f"imported {role.value}", signer, validity)
     cert, key = directory / f"{role.value}.crt", directory / f"{role.value}.key"
@@ -175,7 +177,7 @@ def test_passphrases_from_descriptor_and_environment(monkeypatch: pytest.MonkeyP
 
 
 def test_no_key_material_in_representations(monkeypatch: pytest.MonkeyPatch) -> None:
-    signer = authority.new_key(Curve.P256)
+    signer = authority.new_key()
     secret = Secret(variable="X")
     monkeypatch.setenv("X", SENTENCE.decode())
     assert secret.value() == SENTENCE

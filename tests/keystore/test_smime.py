@@ -17,7 +17,7 @@ from keystore.formats import certificate
 from keystore.formats.role import Role
 from keystore.formats.validity import Validity
 from keystore.signing import authority, smime
-from keystore.signing.authority import Authority, Curve, IdentityIssuer
+from keystore.signing.authority import Authority, IdentityIssuer
 from keystore.signing.identity import new_identity
 from keystore.signing.signer import FileSigner, key_pem, load_private_key
 from tests.keystore.kit import DAY, NOW, openssl
@@ -29,7 +29,7 @@ AT = str(int(NOW.timestamp()))
 
 def new_ca() -> Authority:
     name = authority.default_ca_name(Role.PERMISSIONS)
-    return authority.self_signed_ca(Role.PERMISSIONS, name, authority.new_key(Curve.P256), VALIDITY)
+    return authority.self_signed_ca(Role.PERMISSIONS, name, authority.new_key(), VALIDITY)
 
 
 CA, OTHER = new_ca(), new_ca()

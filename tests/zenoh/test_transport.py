@@ -18,7 +18,6 @@ from keystore.formats.role import Role
 from keystore.formats.validity import Validity, utc_now
 from keystore.signing.authority import (
     Authority,
-    Curve,
     IdentityIssuer,
     new_key,
     self_signed_ca,
@@ -46,7 +45,7 @@ def identity(
     folder: Path, ca: Authority, name: str, validity: Validity | None = None, hosts: tuple[str, ...] = ()
 ) -> dict[str, str]:
     """Certificate and key as settings for connecting and listening."""
-    signer = new_key(Curve.P256)
+    signer = new_key()
     span = validity or Validity.starting(utc_now(), LIFE)
     folder.mkdir(exist_ok=True)
     cert, key = folder / "cert.pem", folder / "key.pem"
@@ -65,9 +64,7 @@ def talker(system: System) -> str:
 
 @pytest.fixture(scope="module")
 def foreign() -> Authority:
-    return self_signed_ca(
-        Role.IDENTITY, "another CA", new_key(Curve.P256), Validity.starting(utc_now(), LIFE)
-    )
+    return self_signed_ca(Role.IDENTITY, "another CA", new_key(), Validity.starting(utc_now(), LIFE))
 
 
 def test_an_enclave_with_its_certificate_gets_in(talker: str) -> None:

@@ -10,19 +10,11 @@ from enclave_launch.review.document import plan_from_document
 from enclave_launch.review.similarity import merges, splits
 from enclave_launch.verb.secure_plan.plans import read_plan
 
-OPTIONS = {
-    "": (
-        (
-            "--similarity 0..1",
-            {"type": float, "default": 0.5},
-            "least share of common permissions of a merge (default: 0.5)",
-        ),
-    )
-}
+OPTIONS = {"": ()}
 
 
 def run(options: argparse.Namespace) -> int:
     """Print which enclaves could be merged or split. Returns 0."""
     plan = plan_from_document(read_plan(options.words, options))
-    sys.stdout.write(suggestions_text(merges(plan, least_similarity=options.similarity), splits(plan)))
+    sys.stdout.write(suggestions_text(merges(plan), splits(plan)))
     return 0
