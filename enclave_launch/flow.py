@@ -85,7 +85,7 @@ def _launcher_refusals(plan: LaunchPlan) -> list[Diagnostic]:
     """Return why our own node cannot run: it runs in our environment, not in one of the launch file's."""
     if plan.launcher is None:
         return []
-    middleware = middleware_of(os.environ, plan.distro)
+    middleware = middleware_of(os.environ)
     why = why_not(middleware, plan.inputs.options.admission.middlewares)
     if why is None:
         return []

@@ -278,7 +278,7 @@ def enclave_processes(processes: Iterable[PlannedProcess]) -> tuple[EnclaveProce
 def on_zenoh(plan: LaunchPlan, environment: Mapping[str, str]) -> frozenset[str]:
     """Return enclaves with a process on Zenoh, or with the launcher's own node, in ``environment``, on it."""
     found = {item.enclave.path for item in plan.processes if item.enclave and item.middleware == ZENOH}
-    if plan.launcher is not None and middleware_of(environment, plan.distro) == ZENOH:
+    if plan.launcher is not None and middleware_of(environment) == ZENOH:
         found.add(plan.launcher.enclave)
     return frozenset(found)
 

@@ -32,9 +32,9 @@ def make_plan(evaluation: Evaluation, inputs: PlanInputs) -> LaunchPlan:
 
     Raises ``LaunchFileError`` for an enclave name or remap rule that the started process would refuse.
     """
-    distro, options = evaluation.distro, inputs.options
+    options = inputs.options
     processes = tuple(
-        _admitted(_plan_process(process, inputs.lookup, options.enclave_scope), distro, options.admission)
+        _admitted(_plan_process(process, inputs.lookup, options.enclave_scope), options.admission)
         for process in evaluation.processes
     )
     containers = _containers(processes)
@@ -42,7 +42,7 @@ def make_plan(evaluation: Evaluation, inputs: PlanInputs) -> LaunchPlan:
     launcher = launcher_node(evaluation.launcher_calls) if evaluation.launcher_calls else None
     derived = derive_policy(
         nodes_of(processes, components, launcher),
-        distro=distro,
+        distro=evaluation.distro,
         options=options.policy,
         # Enclaves of which no node is known: of executables to which the launch file gives one, and of processes
         # without a manifest, which must not be missing from what a person looks at.
@@ -60,7 +60,7 @@ def make_plan(evaluation: Evaluation, inputs: PlanInputs) -> LaunchPlan:
             *evaluation.warnings,
             *(not_foreseeable(action.what, action.location) for action in evaluation.unforeseeable),
             *plan_diagnostics.notes(processes, components, launcher),
-            *(note for item in processes for note in notes(item.process, distro)),
+            *(note for item in processes for note in notes(item.process)),
             *plan_diagnostics.shared_domains(processes),
             *plan_diagnostics.ungranted_enclaves(processes, derived),
             *plan_diagnostics.failing_handshakes(processes),
@@ -69,13 +69,13 @@ def make_plan(evaluation: Evaluation, inputs: PlanInputs) -> LaunchPlan:
     )
 
 
-def _admitted(planned: PlannedProcess, distro: str, options: AdmissionOptions) -> PlannedProcess:
+def _admitted(planned: PlannedProcess, options: AdmissionOptions) -> PlannedProcess:
     process = planned.process
-    middleware = middleware_of(process.final_environment, distro)
+    middleware = middleware_of(process.final_environment)
     if planned.enclave is None and process.kind == "executable":
         unkept = tuple(prefix_refusals(process, options))
         return planned._replace(refusals=unkept, middleware=middleware)
-    refused = tuple(refusals(process, distro, options))
+    refused = tuple(refusals(process, options))
     bad = any(refusal.code is Code.DOMAIN_INVALID for refusal in refused)
     domain = 0 if bad else domain_of(process.final_environment)
     return planned._replace(refusals=refused, domain=domain, middleware=middleware)

@@ -223,7 +223,7 @@ class PlanProvider:
         if launcher is None:
             return None
         self._check(self._policies[launcher.enclave])
-        middleware = middleware_of(os.environ, self._plan.distro)
+        middleware = middleware_of(os.environ)
         variables = enclave_environment(launcher.enclave, middleware, settings)
         return StartAdditions(("--enclave", launcher.enclave), variables)
 

@@ -29,11 +29,11 @@ def prefix_refusals(process: ResolvedProcess, options: AdmissionOptions) -> Iter
         )
 
 
-def refusals(process: ResolvedProcess, distro: str, options: AdmissionOptions) -> Iterator[Diagnostic]:
+def refusals(process: ResolvedProcess, options: AdmissionOptions) -> Iterator[Diagnostic]:
     """Report why a process must not start in its enclave."""
     name, place = process.process_name, process.location
     yield from prefix_refusals(process, options)
-    middleware = middleware_of(process.final_environment, distro)
+    middleware = middleware_of(process.final_environment)
     if (why := why_not(middleware, options.middlewares)) is not None:
         given = VARIABLE in process.environment
         yield diagnostics.middleware_refused(name, middleware, why, place, by_launch_file=given)
@@ -45,10 +45,10 @@ def refusals(process: ResolvedProcess, distro: str, options: AdmissionOptions) -
         yield diagnostics.security_configured(name, setting.variable, setting.value, place)
 
 
-def notes(process: ResolvedProcess, distro: str) -> Iterator[Diagnostic]:
+def notes(process: ResolvedProcess) -> Iterator[Diagnostic]:
     """Report what matters about a process that may start."""
     name, place = process.process_name, process.location
-    middleware = middleware_of(process.final_environment, distro)
+    middleware = middleware_of(process.final_environment)
     for setting in overridden(process.environment, on_zenoh=middleware == ZENOH):
         yield diagnostics.variable_overridden(name, setting.variable, setting.value, place)
     for setting in preloaded(process.environment):

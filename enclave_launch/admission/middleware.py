@@ -22,7 +22,6 @@ from keystore.formats.subject import Half, guid_prefix
 
 VARIABLE = "RMW_IMPLEMENTATION"
 DEFAULT = "rmw_fastrtps_cpp"
-_DEFAULT_OF = {"galactic": "rmw_cyclonedds_cpp"}
 
 
 class Vendor(str, Enum):
@@ -48,9 +47,9 @@ _NO_ENCLAVES = {
 }
 
 
-def middleware_of(environment: Mapping[str, str], distro: str) -> str:
+def middleware_of(environment: Mapping[str, str]) -> str:
     """Return the middleware that a process loads (rmw_implementation functions.cpp: an empty variable is unset)."""
-    return environment.get(VARIABLE) or _DEFAULT_OF.get(distro, DEFAULT)
+    return environment.get(VARIABLE) or DEFAULT
 
 
 def vendor_of(middleware: str) -> Vendor | None:

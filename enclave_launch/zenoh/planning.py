@@ -44,7 +44,7 @@ def report(plan: LaunchPlan, environment: Mapping[str, str]) -> LaunchPlan:
 
 def middleware_problems(plan: LaunchPlan, environment: Mapping[str, str]) -> Iterator[Diagnostic]:
     """Calls of the launcher that cannot arrive: its node would wait for ever."""
-    own = middleware_of(environment, plan.distro)
+    own = middleware_of(environment)
     by_node = {node.fqn: item for item in plan.processes for node in item.nodes}
     for call in plan.evaluation.launcher_calls:
         item = _serving(call.service, by_node)
