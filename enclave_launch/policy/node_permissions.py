@@ -71,13 +71,11 @@ class PolicyOptions(NamedTuple):
     """``accept_patterns``: partly known names become wildcards, each with a warning.
 
     ``also``: what every node gets beyond what it has by itself (``ALSO``).
-    ``policy_file``: merged over the derived policy. ``actions_as_a_whole``: rcl remaps action names, in
-    any distribution.
+    ``policy_file``: merged over the derived policy.
     """
 
     accept_patterns: bool = False
     policy_file: PolicyDocument | None = None
-    actions_as_a_whole: bool = False
     also: frozenset[str] = frozenset()
 
 
@@ -136,7 +134,7 @@ class _Collector:
         self._node = node
         self._fqn = node.fqn
         self._distro = distro
-        self._whole = distro in REMAPS_WHOLE_ACTIONS or options.actions_as_a_whole
+        self._whole = distro in REMAPS_WHOLE_ACTIONS
         self._names = NodeNames(node.name, node.namespace, node.rules)
         self._result = NodePermissions(node, [], [], [])
 

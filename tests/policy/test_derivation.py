@@ -147,12 +147,6 @@ def test_actions_from_kilted_on_are_remapped_as_a_whole(node: NodeMaker, distro:
     assert found.warnings == ()
 
 
-def test_whether_actions_are_remapped_can_be_told(node: NodeMaker) -> None:
-    options = PolicyOptions(actions_as_a_whole=True)
-    found = derive(node("action fib", remap=("fib:=whole",)), distro="humble", options=options)
-    assert declared(found) == {"execute /whole"}
-
-
 # -- built-in interfaces ---------------------------------------------------------------------------
 
 SIX = (
