@@ -99,6 +99,17 @@ class FunctionText:
     def name(self) -> str:
         return "" if self.node is None else getattr(self.node, "name", "a lambda")
 
+    @functools.cached_property
+    def mentioned(self) -> frozenset[str]:
+        """What the function reads or calls, by last names."""
+        return frozenset({*self.names, *self.attributes, *(place.name for place in self.calls)})
+
+
+def _with_inner(scope: FunctionText) -> Iterator[FunctionText]:
+    yield scope
+    for inner in scope.inner:
+        yield from _with_inner(inner)
+
 
 class _Text(NamedTuple):
     scopes: list[FunctionText]
@@ -118,10 +129,7 @@ def _text_of(module: SourceModule) -> _Text:
 @functools.lru_cache(maxsize=256)
 def words_read(module: SourceModule) -> dict[ast.AST | None, frozenset[str]]:
     """Return what each function of a module reads or calls, by the last names in its text."""
-    return {
-        scope.node: frozenset({*scope.names, *scope.attributes, *(place.name for place in scope.calls)})
-        for scope in _text_of(module).scopes
-    }
+    return {scope.node: scope.mentioned for scope in _text_of(module).scopes}
 
 
 class _Reader:
@@ -331,23 +339,18 @@ class _Net:
                 if scope.node is not None
                 and not isinstance(scope.node, ast.Lambda)
                 and scope.name not in makers
-                if any(place.name in makers for place in self._with_inner(scope))
+                if any(not makers.isdisjoint(each.mentioned) for each in _with_inner(scope))
             }
             constructed = {
                 scope.cls.name
                 for scope in self._scopes
                 if scope.cls is not None and scope.name in _CONSTRUCTORS
-                if any(place.name in makers for place in scope.calls)
+                if not makers.isdisjoint(scope.mentioned)
             }
             more = (found | self._class_makers(constructed)) - makers - _CONSTRUCTORS
             if not more:
                 return makers
             makers |= more
-
-    def _with_inner(self, scope: FunctionText) -> Iterator[CallPlace]:
-        yield from scope.calls
-        for inner in scope.inner:
-            yield from self._with_inner(inner)
 
     def _class_makers(self, known: set[str]) -> set[str]:
         """Return classes with a base, near or far, that makes a node, or is among ``known``."""
