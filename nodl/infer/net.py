@@ -22,7 +22,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from nodl.infer.interpreter.imports import absolute_name
-from nodl.infer.interpreter.run import Run
+from nodl.infer.interpreter.run import Entry, Run
 from nodl.infer.models import ros
 from nodl.infer.models.signatures import NODE_ENDPOINTS
 from nodl.infer.program import Program, SourceModule
@@ -74,11 +74,15 @@ def _imported(node: ast.AST, module: SourceModule) -> Iterator[str]:
 
 
 class CallPlace(NamedTuple):
-    """A call by name, with what surrounds it inside of its function, from outside in."""
+    """A call by name, with what surrounds it inside of its function, from outside in.
+
+    ``certain``: each run of the function gets there.
+    """
 
     node: ast.Call
     name: str
     around: tuple[ast.AST, ...]
+    certain: bool
 
 
 class FunctionText:
@@ -93,6 +97,7 @@ class FunctionText:
         self.attributes: set[str] = set()  # the same, with identifiers in texts
         self.inner: list[FunctionText] = []  # lambdas and decorated functions, whose use needs no name
         self.stored: set[str] = set()  # variables
+        self.may_leave = False  # before what is read next
         self.imports: list[Import] = []
 
     @property
@@ -146,6 +151,7 @@ class _Reader:
         for statement in body:
             self.visit(statement, scope, around)
             if isinstance(statement, (ast.Return, ast.Raise, ast.Continue, ast.Break)):
+                scope.may_leave = True
                 return
 
     def visit(self, node: ast.AST, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
@@ -187,7 +193,9 @@ class _Reader:
     def call(self, node: ast.Call, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
         around = (*around, node)
         name = last_name(node.func)
-        scope.calls.append(CallPlace(node, name, around))
+        certain = not scope.may_leave and not any(isinstance(each, _CONDITIONAL) for each in around)
+        scope.calls.append(CallPlace(node, name, around, certain))
+        scope.may_leave = scope.may_leave or name in _ENDS
         if name in ("isinstance", "issubclass"):
             self._each(node.args[:1], scope, around)
             return
@@ -257,6 +265,11 @@ _VISITORS: dict[type, Callable[[_Reader, Any, FunctionText, tuple[ast.AST, ...]]
     ast.If: _Reader.test,
 }
 
+_CONDITIONAL = (
+    ast.If, ast.IfExp, ast.BoolOp, ast.For, ast.AsyncFor, ast.While, ast.Try, ast.Match, ast.comprehension, ast.Assert,
+    ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp,
+)  # fmt: skip
+_ENDS = frozenset({"exit", "_exit", "quit"})
 _PLAIN_DECORATORS = frozenset({
     "property", "cached_property", "staticmethod", "classmethod", "abstractmethod", "override", "overload", "setter",
     "getter", "deleter", "lru_cache", "cache", "contextmanager", "asynccontextmanager", "final", "wraps", "fixture",
@@ -412,6 +425,11 @@ class _Net:
     def _evaluated(self) -> set[ast.AST]:
         return {node for node, _ in self._run.evaluated}
 
+    @functools.cached_property
+    def _evaluated_from(self) -> set[tuple[ast.AST, ast.AST | None]]:
+        """Calls that were evaluated, with the call that entered their function."""
+        return {(node, entry and entry.call) for node, entry in self._run.evaluated}
+
     def _is_meant(self, name: str, path: str) -> bool:
         return ("", name) in self._meant or (path, name) in self._meant
 
@@ -442,9 +460,13 @@ class _Net:
 
     # --- one function, entered by one call ------------------------------------------------------------------
 
-    def _entered(self, scope: FunctionText, entry: ast.AST | None, places: list[CallPlace]) -> None:
+    def _entered(self, scope: FunctionText, entry: Entry | None, places: list[CallPlace]) -> None:
         for place in places:
-            if (place.node, entry) in self._run.evaluated:
+            if (
+                (place.node, entry) in self._run.evaluated
+                if place.certain
+                else (place.node, entry and entry.call) in self._evaluated_from
+            ):
                 if place.node not in self._run.understood:
                     self._gap(
                         scope, place.node, f"{place.name}() is called on something that is not understood"
@@ -452,14 +474,14 @@ class _Net:
             elif not self._is_dead(place, scope, entry):
                 self._gap(scope, place.node, self._skipped(scope, place, entry))
 
-    def _skipped(self, scope: FunctionText, place: CallPlace, entry: ast.AST | None) -> str:
-        caller = self._callers.get(entry) if isinstance(entry, ast.Call) else None
-        line = getattr(entry, "lineno", 0)
+    def _skipped(self, scope: FunctionText, place: CallPlace, entry: Entry | None) -> str:
+        caller = self._callers.get(entry.call) if entry and isinstance(entry.call, ast.Call) else None
+        line = getattr(entry and entry.call, "lineno", 0)
         where = f" where {scope.name} is called at {caller.path.rpartition('/')[2]}:{line}" if caller else ""
         return f"{place.name}() was not reached{where}; what it would make there is not listed"
 
-    def _is_dead(self, place: CallPlace, scope: FunctionText, entry: ast.AST | None) -> bool:
-        return is_dead(place.around, self._names[scope.path], _literals(scope, entry))
+    def _is_dead(self, place: CallPlace, scope: FunctionText, entry: Entry | None) -> bool:
+        return is_dead(place.around, self._names[scope.path], _literals(scope, entry and entry.call))
 
     def _gap(self, scope: FunctionText, node: ast.AST, why: str) -> None:
         self.gaps.append(Gap(SourceRef(scope.path, getattr(node, "lineno", 0)), why))

@@ -16,7 +16,7 @@ from nodl.infer.interpreter.define import (
     program_classes,
 )
 from nodl.infer.interpreter.loops import fixpoint
-from nodl.infer.interpreter.run import MAX_DEPTH, Arguments, Call, Frame, Run
+from nodl.infer.interpreter.run import MAX_DEPTH, Arguments, Call, Entry, Frame, Run
 from nodl.infer.models import foreign
 from nodl.infer.values import (
     ANY,
@@ -145,10 +145,10 @@ def _run_body(run: Run, function: FunctionValue, cells: LocalCells, call: Call) 
     frame = Frame(function.module, cells, closure, run.state.depth)
     frame.again = earlier is not None
     frame.function = function
-    frame.entry = call.node
+    frame.entry = Entry(call.node, run.context)
     frame.forks = frame.loop_forks = run.state.forks
     frame.guards = len(run.guards)
-    run.entries.setdefault(function.node, {})[call.node] = None
+    run.entries.setdefault(function.node, {})[frame.entry] = None
     run.running.add(function)
     run.stack.append(function.node)
     mark = run.state.mark()

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from nodl.infer import InferredSystem, analysis
+from nodl.infer.values import ANY, FunctionValue, Value
 
 Infer = Callable[..., InferredSystem]
 PROGRAM = """
@@ -115,3 +116,61 @@ def test_it_does_not_believe_the_interpreter(infer: Infer, monkeypatch: pytest.M
     monkeypatch.setitem(analysis.TABLES.statements, kind, skip)
     body = "self.make('a')\n            self.make('b')\n            self.make('c')"
     assert sum("was not reached" in why for why in _gaps(infer, body)) >= 1
+
+
+ONE_CALL = """
+    import rclpy
+    from rclpy.node import Node
+    from std_msgs.msg import String
+    class N(Node):
+        def __init__(self, name):
+            super().__init__(name)
+            self.make(name)
+        def make(self, name):
+            self.create_publisher(String, name, 10)
+    def main():
+        rclpy.init()
+        N('first')
+        N('second')
+    if __name__ == '__main__':
+        main()
+    """
+
+
+@pytest.mark.parametrize("which", [1, 2])
+def test_a_place_that_one_run_of_its_function_reached_and_another_lost_is_a_gap(
+    which: int, infer: Infer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Both runs of ``make`` are entered by the same call."""
+    assert not infer(ONE_CALL).gaps
+    kind = next(each for each in analysis.TABLES.statements if each.__name__ == "Expr")
+    really = analysis.TABLES.statements[kind]
+    left = [which]
+
+    def lose_one(run: object, node: object, frame: object) -> bool:
+        left[0] -= getattr(node, "lineno", 0) == 10
+        lost, left[0] = left[0] == 0, left[0] or -1
+        return lost or bool(really(run, node, frame))  # type: ignore[arg-type]
+
+    monkeypatch.setitem(analysis.TABLES.statements, kind, lose_one)
+    (gap,) = infer(ONE_CALL).gaps
+    assert "create_publisher() was not reached where make is called at main.py:8" in gap.why
+
+
+def test_a_call_of_what_hands_a_creating_function_on_counts(
+    infer: Infer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = "def setup(node): node.create_timer(1, lambda: make_more(node))\n"
+    before += "    def make_more(node): node.create_client(String, 'c')"
+    assert not _gaps(infer, "setup(self)", before=before)
+    kind = next(each for each in analysis.TABLES.callables if each.__name__ == "FunctionValue")
+    really = analysis.TABLES.callables[kind]
+
+    def lose_setup(run: object, function: FunctionValue, call: object) -> Value:
+        return ANY if function.name == "setup" else really(run, function, call)  # type: ignore[arg-type]
+
+    monkeypatch.setitem(analysis.TABLES.callables, kind, lose_setup)
+    assert any(
+        "setup() is called on something that is not understood" in why
+        for why in _gaps(infer, "setup(self)", before=before)
+    )
