@@ -22,7 +22,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from nodl.infer.interpreter.imports import absolute_name
-from nodl.infer.interpreter.run import Entry, Run
+from nodl.infer.interpreter.run import FunctionEntry, Run
 from nodl.infer.models import ros
 from nodl.infer.models.signatures import NODE_ENDPOINTS
 from nodl.infer.program import Program, SourceModule
@@ -460,7 +460,7 @@ class _Net:
 
     # --- one function, entered by one call ------------------------------------------------------------------
 
-    def _entered(self, scope: FunctionText, entry: Entry | None, places: list[CallPlace]) -> None:
+    def _entered(self, scope: FunctionText, entry: FunctionEntry | None, places: list[CallPlace]) -> None:
         for place in places:
             if (
                 (place.node, entry) in self._run.evaluated
@@ -474,13 +474,13 @@ class _Net:
             elif not self._is_dead(place, scope, entry):
                 self._gap(scope, place.node, self._skipped(scope, place, entry))
 
-    def _skipped(self, scope: FunctionText, place: CallPlace, entry: Entry | None) -> str:
+    def _skipped(self, scope: FunctionText, place: CallPlace, entry: FunctionEntry | None) -> str:
         caller = self._callers.get(entry.call) if entry and isinstance(entry.call, ast.Call) else None
         line = getattr(entry and entry.call, "lineno", 0)
         where = f" where {scope.name} is called at {caller.path.rpartition('/')[2]}:{line}" if caller else ""
         return f"{place.name}() was not reached{where}; what it would make there is not listed"
 
-    def _is_dead(self, place: CallPlace, scope: FunctionText, entry: Entry | None) -> bool:
+    def _is_dead(self, place: CallPlace, scope: FunctionText, entry: FunctionEntry | None) -> bool:
         return is_dead(place.around, self._names[scope.path], _literals(scope, entry and entry.call))
 
     def _gap(self, scope: FunctionText, node: ast.AST, why: str) -> None:

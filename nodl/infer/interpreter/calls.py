@@ -16,7 +16,7 @@ from nodl.infer.interpreter.define import (
     program_classes,
 )
 from nodl.infer.interpreter.loops import fixpoint
-from nodl.infer.interpreter.run import MAX_DEPTH, Arguments, Call, Entry, Frame, Run
+from nodl.infer.interpreter.run import MAX_DEPTH, Arguments, Call, FunctionEntry, Frame, Run
 from nodl.infer.models import foreign
 from nodl.infer.values import (
     ANY,
@@ -145,7 +145,7 @@ def _run_body(run: Run, function: FunctionValue, cells: LocalCells, call: Call) 
     frame = Frame(function.module, cells, closure, run.state.depth)
     frame.again = earlier is not None
     frame.function = function
-    frame.entry = Entry(call.node, run.context)
+    frame.entry = FunctionEntry(call.node, run.context)
     frame.forks = frame.loop_forks = run.state.forks
     frame.guards = len(run.guards)
     run.entries.setdefault(function.node, {})[frame.entry] = None

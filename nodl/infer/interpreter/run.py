@@ -44,7 +44,7 @@ from nodl.infer.values import (
 from nodl.source_ref import SourceRef
 
 
-class Entry(NamedTuple):
+class FunctionEntry(NamedTuple):
     """What runs a function: the call, in its calling context."""
 
     call: ast.AST
@@ -66,7 +66,7 @@ class Frame:
         self.closure = closure
         self.depth = depth  # of branches when the frame was entered
         self.function: FunctionValue | None = None
-        self.entry: Entry | None = None
+        self.entry: FunctionEntry | None = None
         self.returned: Value = BOTTOM
         self.yielded: Value | None = None
         self.early = False  # some path left before the end
@@ -217,8 +217,8 @@ class Run(Allocations):
         self.with_metaclass: set[ast.AST] = set()
         # For the net: calls with the call that entered their function, what entered each function, and calls of
         # what is not known.
-        self.evaluated: set[tuple[ast.AST, Entry | None]] = set()
-        self.entries: dict[ast.AST, dict[Entry, None]] = {}
+        self.evaluated: set[tuple[ast.AST, FunctionEntry | None]] = set()
+        self.entries: dict[ast.AST, dict[FunctionEntry, None]] = {}
         self.doubtful: set[ast.AST] = set()
         # Calls that made an interface, or ran a function of the program.
         self.understood: set[ast.AST] = set()
