@@ -62,9 +62,9 @@ def load_yaml_with_lines(text: str, limit: int = MAX_CHARACTERS) -> YamlDocument
     return _read(text, limit, document)
 
 
-def compose_yaml(text: str, limit: int = MAX_CHARACTERS) -> yaml.Node | None:
+def compose_yaml(text: str) -> yaml.Node | None:
     """Return the root node of the one document in ``text``, None without one; raises YAMLError and ``RefusedYaml``."""
-    return _read(text, limit, lambda node: node)
+    return _read(text, MAX_CHARACTERS, lambda node: node)
 
 
 def construct(node: yaml.Node) -> Any:

@@ -28,7 +28,8 @@ from enclave_launch.runtime.warden import PR_SET_PDEATHSIG, load_libc
 PROGRAM = "lib/rmw_zenoh_cpp/rmw_zenohd"
 CONFIGURATION = "ZENOH_ROUTER_CONFIG_URI"
 _PATIENCE = 30.0  # seconds until it answers
-_PROBE = 0.1
+_INTERVAL = 0.1  # between two probes
+_ANSWER = 5.0  # until a probe gives up
 _PAUSE = 1.0  # before one that ended is started again
 _LAST_LINES = 20
 _PLAIN = {"ZENOH_CONFIG_OVERRIDE": "", "NO_COLOR": "1"}
@@ -60,15 +61,16 @@ def find_router(prefixes: Sequence[str]) -> str | None:
     return next((path for path in candidates if os.access(path, os.X_OK)), None)
 
 
-def who_answers(place: RouterPlace, timeout: float = 5.0) -> RouterAnswer:
+def who_answers(place: RouterPlace) -> RouterAnswer:
     """Connect with TLS, and judge who is there by the certificate that is presented."""
     context = ssl.create_default_context(cafile=place.authorities)
     host, port = place.address
     try:
-        with socket.create_connection((host, port), timeout) as plain:
-            plain.settimeout(timeout)
-            with context.wrap_socket(plain, server_hostname=host) as secured:
-                presented = secured.getpeercert(binary_form=True)
+        with (
+            socket.create_connection((host, port), _ANSWER) as plain,
+            context.wrap_socket(plain, server_hostname=host) as secured,
+        ):
+            presented = secured.getpeercert(binary_form=True)
     except ConnectionRefusedError:
         return RouterAnswer.NOBODY
     except (TimeoutError, ssl.SSLError, ConnectionError):
@@ -125,7 +127,7 @@ class ZenohRouter:
             if stranger or self._failed.is_set() or time.monotonic() > end:
                 self._stop.set()
                 raise RuntimeFailure(self._failure(answer))
-            time.sleep(_PROBE)
+            time.sleep(_INTERVAL)
             answer = self._probe()
         self._answered.set()
 
@@ -187,7 +189,7 @@ class ZenohRouter:
 
     def _follow(self, process: subprocess.Popen[bytes], seen: object) -> None:
         refused = ""
-        while not self._stop.wait(_PROBE):
+        while not self._stop.wait(_INTERVAL):
             if process.poll() is not None and not self._answered.is_set():
                 return
             if process.poll() is not None:

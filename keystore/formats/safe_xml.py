@@ -19,12 +19,12 @@ if TYPE_CHECKING:
 MAX_BYTES = 4_000_000
 
 
-def parse_xml(document: bytes, where: str, max_bytes: int = MAX_BYTES) -> etree._Element:
+def parse_xml(document: bytes, where: str) -> etree._Element:
     """Parse XML to its root element; raises ``InvalidInputError`` with ``where`` and the line."""
     from lxml import etree
 
-    if len(document) > max_bytes:
-        raise InvalidInputError(f"{where}: larger than the allowed {max_bytes} bytes")
+    if len(document) > MAX_BYTES:
+        raise InvalidInputError(f"{where}: larger than the allowed {MAX_BYTES} bytes")
     _refuse_doctype(b"<!DOCTYPE" in document, where)
     parser = etree.XMLParser(
         resolve_entities=False,

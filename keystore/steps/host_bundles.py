@@ -150,14 +150,12 @@ def last_signed(view: KeystoreView, host: str) -> tuple[Manifest, bytes] | None:
     return manifest, signed
 
 
-def hosts_that_left(
-    keystore: Path | str, hosts: Iterable[str], now: datetime | None = None
-) -> dict[str, tuple[str, ...]]:
+def hosts_that_left(keystore: Path | str, hosts: Iterable[str]) -> dict[str, tuple[str, ...]]:
     """Return hosts with a bundle of this keystore that are not among ``hosts`` -> their enclaves.
 
     Only enclaves whose certificates on that host are neither revoked nor expired: whoever has the host can use them.
     """
-    view, at = keystore_at(keystore), now or utc_now()
+    view, at = keystore_at(keystore), utc_now()
     register = read_register(view.root) or Register()
     present = set(hosts)
     found = {}
