@@ -64,7 +64,7 @@ def secret_name(enclave: str) -> str:
 
 
 def _secret(deployment: Deployment, material: EnclaveMaterial) -> dict[str, Any]:
-    """Return the Secret; without the key if it was made on its host: whoever has it adds it there."""
+    """Return the Secret; without the key if it was made on its host, where it has to be added."""
     files = {**material.public, **({layout.KEY: material.key} if material.key is not None else {})}
     data = {name: base64.b64encode(content).decode() for name, content in sorted(files.items())}
     return {**_object(deployment, "Secret", secret_name(material.enclave)), "type": "Opaque", "data": data}

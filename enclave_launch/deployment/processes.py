@@ -16,7 +16,7 @@ from keystore.formats.hosts import Needs
 from nodl.ros_arguments import parse_ros_arguments, words_after_program
 
 LONGEST_NAME = 40
-"""With a suffix it stays a DNS label (63 characters, RFC 1123), which Kubernetes asks for."""
+"""With a suffix it stays a DNS label (63 characters, RFC 1123), which Kubernetes requires."""
 _SECURITY = (ENABLE, KEYSTORE, OVERRIDE, STRATEGY)
 
 

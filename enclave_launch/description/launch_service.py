@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class LaunchService:
-    """Include descriptions, emit events, then run: what was asked before is done first, in order.
+    """Include descriptions, emit events, then run: what was requested earlier is done first, in order.
 
     One run per object. ``shutdown`` works while ``run_async`` does.
     """

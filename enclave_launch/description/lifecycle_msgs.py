@@ -28,7 +28,7 @@ class State:
 
 @dataclass
 class Transition:
-    """A transition that can be asked for (below 10), or a result of one (callbacks)."""
+    """A transition that can be requested (below 10), or a result of one (callbacks)."""
 
     TRANSITION_CREATE: ClassVar[int] = 0
     TRANSITION_CONFIGURE: ClassVar[int] = 1

@@ -44,7 +44,7 @@ class Security(NamedTuple):
 class Circumstances(NamedTuple):
     """``security`` ``None``: the system runs unsecured. ``accepted``: names of nodes, with wildcards, that may run
     beside the plan. ``strangers``: pids on this machine that the launch did not start; empty where nobody knows.
-    ``forged``: lists of nodes that somebody published for others."""
+    ``forged``: lists of nodes that one participant published for another."""
 
     security: Security | None = None
     accepted: tuple[str, ...] = ()
@@ -60,7 +60,7 @@ def compare(
 ) -> list[DriftFinding]:
     """List every difference, in the order of processes and names.
 
-    ``enclaves_now`` reads the table of enclaves again: one that is made while somebody watches is not of another CA.
+    ``enclaves_now`` reads the table of enclaves again: an enclave that is made during the watch is not of another CA.
     """
     given = circumstances or Circumstances()
     found = list(_Comparison(expected, graph, given).findings())

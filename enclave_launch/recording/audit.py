@@ -1,6 +1,6 @@
 """``--audit``: a launch runs as usual, and what its nodes ask for is held against the plan.
 
-Told live and at the end, for each enclave: what the plan would refuse, and what it grants and nobody asked for.
+Reported live and at the end, for each enclave: what the plan would refuse, and what it grants and no node requests.
 DDS-Security has no such mode: a team records what enforcement would do before it enforces. Listens to a recording.
 """
 

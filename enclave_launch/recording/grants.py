@@ -1,4 +1,4 @@
-"""What the plan grants, asked by what was recorded: in DDS's own terms, as the signed permissions will say it."""
+"""Look up in the plan what was recorded: in DDS's own terms, as the signed permissions will say it."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ class PlannedGrants:
     def need(
         self, process: RecordedProcess, node: RecordedNode, line: EndpointMade
     ) -> tuple[Need, RequestedEndpoint] | None:
-        """Return the permission for what ``line`` asked for, None if nothing is enforced or no name is known."""
+        """Return the permission that ``line`` needs, None if nothing is enforced or no name is known."""
         enclave, endpoint = self.enclave_of(process), requested_endpoint(process, node, line)
         if enclave is None or endpoint is None or not endpoint.final:
             return None

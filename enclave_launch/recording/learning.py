@@ -32,7 +32,7 @@ _LONGEST_START = 60.0
 
 
 class QuietWatch(Listener):
-    """Ends the launch when nothing new was asked for during ``patience`` seconds; ``None``: never."""
+    """Ends the launch when nothing new was requested during ``patience`` seconds; ``None``: never."""
 
     def __init__(self, patience: float | None) -> None:
         self._patience = patience

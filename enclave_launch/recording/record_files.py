@@ -43,7 +43,7 @@ class RecordFiles:
         self.reports: list[str] = []
 
     def path_of(self, process: str) -> Path:
-        """Return the file of ``process``, created when it is first asked for. Raises ``OSError``."""
+        """Return the file of ``process``, created on the first call. Raises ``OSError``."""
         if process not in self._files:
             path = self._folder / f"record-{secrets.token_hex(16)}"
             path.touch()

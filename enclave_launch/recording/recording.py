@@ -50,7 +50,7 @@ from nodl.record.requested import RequestedEndpoint, requested_endpoint
 from nodl.ros_arguments import parse_ros_arguments
 
 INTERVAL = 0.1
-"""Seconds between two looks at the record."""
+"""Seconds between two reads of the record."""
 _LONGEST_WAIT = 2.0
 """Seconds after which nobody waits any more to hear who started a process."""
 

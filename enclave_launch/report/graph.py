@@ -60,7 +60,7 @@ class Channel(NamedTuple):
 
 class ChannelUse(NamedTuple):
     """The use of one channel by one member, both by number; ``member`` is ``None`` where only the enclave's policy
-    says so and no node of it asks for it."""
+    says so and no node of it requests it."""
 
     member: int | None
     enclave: str

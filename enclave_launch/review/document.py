@@ -34,7 +34,7 @@ class GrantedName(NamedTuple):
 
 
 class NodeView(NamedTuple):
-    """One node under its final name. ``own``: what it asks for itself; ``built_in``: what every node has.
+    """One node under its final name. ``own``: what it requests itself; ``built_in``: what every node has.
 
     ``unit``: the node that the launch file starts and of whose process this one is a helper; mostly the node itself.
     """

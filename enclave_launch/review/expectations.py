@@ -1,4 +1,4 @@
-"""The expectations of a repository on its plans: flows that must never be, and findings that somebody accepted.
+"""The expectations of a repository on its plans: flows that must never be, and findings that were accepted.
 
 A file ``enclaves.review.yaml`` beside the launch files, under version control:
 

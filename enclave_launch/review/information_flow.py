@@ -5,7 +5,7 @@ participant may do, but a message that it reads can change what it writes. So in
 what another subscribes, calls what it serves, or serves what it calls (the answer flows back), reaches it and all that
 it reaches. Every enclave is taken to let everything through; that errs on the side of flows that do not happen.
 
-What every node has (parameter services, /rosout, /clock ...) counts only where asked for: almost everybody may publish
+What every node has (parameter services, /rosout, /clock ...) counts only on request: almost everybody may publish
 /parameter_events, which would connect all with all.
 """
 

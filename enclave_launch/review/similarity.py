@@ -28,7 +28,7 @@ class Merge(NamedTuple):
 
 
 class Split(NamedTuple):
-    """``saved``: for each node of the enclave what it may do today and neither it nor its process asks for."""
+    """``saved``: for each node of the enclave what it may do today and neither it nor its process requests."""
 
     enclave: str
     saved: tuple[tuple[str, tuple[GrantedName, ...]], ...]

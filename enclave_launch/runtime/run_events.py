@@ -57,7 +57,7 @@ class EndpointRequested(NamedTuple):
     """An endpoint that a node requested of rcl.
 
     ``node`` and ``name`` are final, after all rules; ``written`` as the source has it. ``component``:
-    ``package/plugin`` of the composable node that asked, empty for nodes of the program itself. An action is one
+    ``package/plugin`` of the composable node that requested it, empty for nodes of the program itself. An action is one
     endpoint."""
 
     node: str
@@ -78,7 +78,7 @@ class EndpointCreated(NamedTuple):
 
 
 class EndpointRefused(NamedTuple):
-    """It was asked for and not made: DDS refused it, or rcl its name. ``reason``: rcl's texts, first cause first."""
+    """It was requested and not made: DDS refused it, or rcl its name. ``reason``: rcl's texts, first cause first."""
 
     name: str
     pid: int

@@ -70,7 +70,7 @@ def learn_launch(target: LaunchTarget, options: argparse.Namespace, start: Start
 
 
 def _report_unseen(folder: Path, options: argparse.Namespace) -> None:
-    """Report what other descriptions of the recorded nodes have: some names exist only while somebody reads another."""
+    """Report what other descriptions of the recorded nodes have: some names exist only while another is read."""
     from nodl.verb.check_record import never_seen  # an add-on: inference
 
     _say("comparing the records with sources and the library")

@@ -37,7 +37,7 @@ _PLAIN = {"ZENOH_CONFIG_OVERRIDE": "", "NO_COLOR": "1"}
 
 class RouterPlace(NamedTuple):
     """``address``: host and port; the others are absolute paths. ``differences``: why the configuration must not be
-    used; it is asked before each start."""
+    used; called before each start."""
 
     address: tuple[str, int]
     configuration: str

@@ -32,7 +32,7 @@ _MOST_PARTICIPANTS = 119  # of one domain on one host: what its ports have room 
 _LOOPBACK = '<NetworkInterface name="lo"/>'
 _BOTH = f'<NetworkInterface autodetermine="true"/>{_LOOPBACK}'
 _TYPE_HASH = b"typehash=RIHS01_91a0593bacdcc50ea9bdcf849a938b128412cc1ea821245c663bcd26f83c295e;"
-"""Of rmw_dds_common/msg/ParticipantEntitiesInfo; nodes since Iron warn of an endpoint that tells none."""
+"""Of rmw_dds_common/msg/ParticipantEntitiesInfo; nodes since Iron warn of an endpoint without one."""
 _FILES = {
     "dds.sec.auth.identity_ca": "identity_ca.cert.pem",
     "dds.sec.auth.identity_certificate": "cert.pem",
@@ -168,7 +168,7 @@ def _domain(domain_id: int, environment: Mapping[str, str]) -> Any:
 
 
 def configuration(environment: Mapping[str, str]) -> str:
-    """Return what Cyclone DDS is told: ROS's variables as rmw_cyclonedds reads them, then the user's
+    """Return the configuration for Cyclone DDS: ROS's variables as rmw_cyclonedds reads them, then the user's
     ``CYCLONEDDS_URI``, which wins.
 
     On this machine only, both of its addresses are used: nodes on Cyclone DDS up to Humble are at 127.0.0.1 alone,

@@ -1,4 +1,4 @@
-"""``python -m nodl.graph.follow``: watch a domain and tell its graph, as a JSON line after each change, until standard
+"""``python -m nodl.graph.follow``: watch a domain and print its graph, as a JSON line after each change, until standard
 input ends. For a program that watches and must not be disturbed by DDS in its own process. Acts.
 """
 

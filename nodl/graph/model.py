@@ -1,6 +1,6 @@
 """What DDS discovery announced (claims of whoever sent them) → processes, nodes and their interfaces. Performs no I/O.
 
-Which node owns an endpoint is told by ``ros_discovery_info`` only. Where its list is missing, a participant with one
+Only ``ros_discovery_info`` says which node owns an endpoint. Where its list is missing, a participant with one
 node owns its endpoints, and parameter services tell the names of nodes (programs that publish no list, or one that this
 observer may not read). What no rule gives to a node stays the process's: nothing is guessed.
 """
@@ -83,7 +83,7 @@ class Attribution(str, Enum):
 
 
 class Owner(NamedTuple):
-    """A node of a participant; ``ordinal`` tells several of one name apart."""
+    """A node of a participant; ``ordinal`` distinguishes several of one name."""
 
     fqn: str
     ordinal: int = 0

@@ -44,7 +44,7 @@ class Quality(NamedTuple):
 
 
 def unmet(offered: Quality, requested: Quality) -> tuple[str, ...]:
-    """Return why a reader that asks for ``requested`` gets nothing from a writer of ``offered``; empty if they meet."""
+    """Return why a reader with ``requested`` gets nothing from a writer of ``offered``; empty if they meet."""
     return tuple(_unmet(offered, requested))
 
 

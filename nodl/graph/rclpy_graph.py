@@ -1,7 +1,7 @@
 """Asks rclpy for the graph, where that is installed: through the middleware that the nodes themselves use. Acts.
 
 rclpy tells names and types by node; quality of service and identifiers of topics only, so participants are told apart
-by the identifiers of what their nodes publish. It does not tell processes. Source: rclpy ``node.py``,
+by the identifiers of what their nodes publish. It does not know processes. Source: rclpy ``node.py``,
 ``action/graph.py``.
 """
 
@@ -32,7 +32,7 @@ _NO_DURATION = (0, 9223372036854775807)  # unspecified, and rmw's infinite
 
 
 class RclpyObserver:
-    """As ``CycloneObserver``, for the domain and the enclave that rclpy is told by ``ROS_*``. Raises ``ImportError``
+    """As ``CycloneObserver``, for the domain and the enclave that rclpy takes from ``ROS_*``. Raises ``ImportError``
     without rclpy, and what rclpy raises where the middleware refuses."""
 
     def __init__(self) -> None:
@@ -68,7 +68,7 @@ class RclpyObserver:
 
     @property
     def forged(self) -> tuple[str, ...]:
-        """Return nothing: rclpy does not tell who wrote a list."""
+        """Return nothing: rclpy does not show who wrote a list."""
         return ()
 
     def close(self) -> None:

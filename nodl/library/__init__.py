@@ -19,7 +19,7 @@ SHIPPED = os.path.join(os.path.dirname(os.path.abspath(__file__)), "documents")
 
 
 class Hit(NamedTuple):
-    """A document for what was asked. ``doubt``: it was written for another version, in words for a person."""
+    """A document that was found. ``doubt``: it was written for another version, in words for a person."""
 
     document: LibraryDocument
     doubt: str = ""

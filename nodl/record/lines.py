@@ -83,7 +83,7 @@ class ParametersDeclared(NamedTuple):
 
 
 class EndpointMade(NamedTuple):
-    """An endpoint that was asked for; ``rc`` 0 is granted, 1 refused or failed, others say that an argument is bad.
+    """An endpoint that was requested; ``rc`` 0 is granted, 1 refused or failed, others say that an argument is bad.
 
     ``written`` is the name as the source has it, ``final`` after expansion and remapping (empty when rcl could not
     say), ``by`` the library that called rcl, ``error`` all texts that passed, the first cause first. ``qos``:

@@ -36,7 +36,7 @@ class EndpointRole(Enum):
 
 
 class RequestedEndpoint(NamedTuple):
-    """One endpoint that the program asked for.
+    """One endpoint that the program requested.
 
     ``written`` as rcl got it, ``name`` as the source means it (``~/x`` for a name made from the node's own),
     ``final`` after expansion and remapping; for an action that of its parts. ``moved``: rules that the program
@@ -65,7 +65,7 @@ class RequestedEndpoint(NamedTuple):
 
 
 class RequestedNode(NamedTuple):
-    """What one node asked for. ``name`` and ``namespace`` are the source's own, ``fqn`` the final name.
+    """The requests of one node. ``name`` and ``namespace`` are the source's own, ``fqn`` the final name.
 
     ``parameters``, ``arguments`` and ``rules`` are those that the launch gave it; ``known_start``: whether a line of
     the supervisor reports them at all; ``declared``: values of parameters that the node declared;
@@ -130,7 +130,7 @@ def _role_of_server(endpoint: EndpointMade) -> EndpointRole:
 
 
 def requested_by(process: RecordedProcess, node: RecordedNode) -> RequestedNode:
-    """Return what ``node`` asked for, with what the launch started there."""
+    """Return what ``node`` requested, with what the launch started there."""
     started, component = process.started, node.component
     rules = _rules(started, component)
     made = node.made

@@ -184,7 +184,7 @@ def _passing(start_state: str, goal_state: str) -> dict[str, str]:
 
 
 class LifecycleTransition(Action):
-    """Asks each node for the first transition; each reached goal state asks for the next one."""
+    """Requests the first transition of each node; each goal state that is reached requests the next one."""
 
     transition_targets: ClassVar[dict[int, dict[str, str]]] = {
         Transition.TRANSITION_CONFIGURE: _passing("configuring", "inactive"),

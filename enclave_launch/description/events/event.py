@@ -1,4 +1,4 @@
-"""Events: something happened, or is asked for; those of processes, their matchers and what a dry run supposes."""
+"""Events: something happened, or is requested; those of processes, their matchers and what a dry run supposes."""
 
 from __future__ import annotations
 

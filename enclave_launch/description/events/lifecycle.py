@@ -1,4 +1,4 @@
-"""Events of lifecycle nodes: a transition is asked for, a state has changed."""
+"""Events of lifecycle nodes: a transition is requested, a state has changed."""
 
 from __future__ import annotations
 

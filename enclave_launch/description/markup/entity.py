@@ -1,4 +1,4 @@
-"""``Entity``: one element of a launch file in any syntax, and the types its attributes are asked for."""
+"""``Entity``: one element of a launch file in any syntax, and the types its attributes are read as."""
 
 from __future__ import annotations
 

@@ -24,7 +24,7 @@ _VALUE_TYPES = frozenset({str, int, float, bool, None})  # certainly no lists of
 
 
 class Entity(BaseEntity):
-    """One XML element; attributes are coerced to the type that is asked for."""
+    """One XML element; attributes are coerced to the requested type."""
 
     def __init__(self, xml_element: XmlElement, *, parent: Entity | None = None, file: str = "") -> None:
         self._element = xml_element
