@@ -182,6 +182,56 @@ def test_sensors_of_cartographer_that_lua_computes_are_a_gap(
     assert why in problems(launch(node))
 
 
+RSLIDAR = """
+common: {{msg_source: {source}, send_packet_ros: {packets}, send_point_cloud_ros: true}}
+lidar:
+  - driver: {{lidar_type: RS16}}
+    ros: {{ros_send_point_cloud_topic: /front/points, ros_recv_packet_topic: /front/packets}}
+  - driver: {{lidar_type: RS16}}
+    ros: {{ros_send_packet_topic: rear_packets, ros_send_imu_data_topic: /imu}}
+"""
+RSLIDAR_NODE = (
+    '<node pkg="rslidar_sdk" exec="rslidar_sdk_node" namespace="lidar">'
+    '<param name="config_path" value="{}"/></node>'
+)
+
+
+def test_rslidar_sdk_has_the_topics_of_its_file(launch: Launch, tmp_path: Path) -> None:
+    file = tmp_path / "lidars.yaml"
+    file.write_text(RSLIDAR.format(source=1, packets="false"))
+    plan = launch(RSLIDAR_NODE.format(file))
+    assert not plan.problems
+    assert allowed(plan, "publish") == ["/front/points", "/lidar/rslidar_points"]
+    assert allowed(plan, "subscribe") == []
+    assert {"/lidar/rslidar_points_destination_0", "/lidar/rslidar_points_destination_1"} <= {
+        node.fqn for node in plan.nodes
+    }
+    file.write_text(RSLIDAR.format(source=2, packets="true"))
+    plan = launch(RSLIDAR_NODE.format(file))
+    assert allowed(plan, "publish") == [
+        *("/front/points", "/lidar/rear_packets", "/lidar/rslidar_packets", "/lidar/rslidar_points"),
+    ]
+    assert allowed(plan, "subscribe") == ["/front/packets", "/lidar/rslidar_packets"]
+
+
+@pytest.mark.parametrize(
+    ("written", "why"),
+    [
+        (RSLIDAR.format(source=7, packets="false"), "msg_source '7' is none of rslidar_sdk"),
+        (RSLIDAR.format(source=1, packets="perhaps"), "send_packet_ros is neither true nor false"),
+        ("lidar: []", "a mapping 'common' and a list 'lidar'"),
+        (None, "there is no such file"),
+    ],
+)
+def test_a_file_that_rslidar_sdk_cannot_use_is_a_gap(
+    launch: Launch, tmp_path: Path, written: str | None, why: str
+) -> None:
+    file = tmp_path / "lidars.yaml"
+    if written is not None:
+        file.write_text(written)
+    assert why in problems(launch(RSLIDAR_NODE.format(file)))
+
+
 TWIST_MUX = '<node pkg="twist_mux" exec="twist_mux" name="twist_mux"><param from="{}"/></node>'
 
 

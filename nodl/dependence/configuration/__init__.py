@@ -16,6 +16,7 @@ from nodl.dependence.configuration.cartographer import of_lua
 from nodl.dependence.configuration.configured import Configured
 from nodl.dependence.configuration.ros2_control import of_robot_description
 from nodl.dependence.configuration.ros_gz_bridge import of_arguments, of_configuration
+from nodl.dependence.configuration.rslidar import of_sensors
 from nodl.errors import InvalidNoDLError
 from nodl.name_template import NameTemplate as NameTemplate
 from nodl.names import InvalidNameError as InvalidNameError
@@ -56,6 +57,8 @@ def read_configuration(kind: str, file: str, situation: Situation, place: Source
         return rviz.of_file(root, situation.distro)
     if kind == "ros_gz_bridge":
         return of_configuration(root)
+    if kind == "rslidar":
+        return of_sensors(root)
     return Configured(gaps=(Gap(place, f"there is no reader for files of kind {kind!r}"),))
 
 
