@@ -226,6 +226,15 @@ _MAKES_NOTHING = frozenset({
     "tf2_geometry_msgs", "tf2_sensor_msgs", "tf2_py", "launch", "launch_ros", "rclpy", "rospkg", "ros2cli", "rosbags",
     "diagnostic_updater", "message_filters", "interactive_markers",
 })  # fmt: skip
+# Libraries that know nothing of ROS, under names that package.xml lists too.
+_NOT_OF_ROS = frozenset({
+    "pinocchio", "hppfcl", "coal", "eigenpy", "crocoddyl", "example_robot_data", "casadi", "mujoco", "pybullet",
+    "numpy", "scipy", "sympy", "matplotlib", "pandas", "networkx", "shapely", "transforms3d", "pyquaternion",
+    "numba", "torch", "torchvision", "ultralytics", "mediapipe", "tensorflow", "onnxruntime", "open3d",
+    "trimesh", "depthai", "pyrealsense2", "serial", "smbus", "smbus2", "gpiozero", "spidev", "can", "evdev",
+    "pynput", "pygame", "pymavlink", "mavsdk", "pyproj", "utm", "pynmea2", "psutil", "requests", "websockets",
+    "zmq", "flask", "jinja2", "yaml", "lxml", "simple_pid", "filterpy", "cvxpy", "osqp",
+})  # fmt: skip
 _MAKERS = {
     "rosbag2_py": frozenset({"Recorder", "Player"}),
     "tf2_ros": frozenset({"BufferClient"}),
@@ -242,7 +251,7 @@ def may_make_nodes(path: str, dependencies: frozenset[str]) -> bool:
     ``dependencies``: what the program's package names in its ``package.xml``.
     """
     package, _, rest = path.partition(".")
-    if package in _MAKES_NOTHING or not rest or "(" in path or ".exceptions." in path:
+    if package in _MAKES_NOTHING | _NOT_OF_ROS or not rest or "(" in path or ".exceptions." in path:
         return False
     if package in _MAKERS:
         return path.rpartition(".")[2] in _MAKERS[package]

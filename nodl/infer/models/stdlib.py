@@ -36,9 +36,11 @@ from nodl.infer.values import (
     ModuleValue,
     Partial,
     PropertyValue,
+    Sequence,
     Value,
     boolean,
     constant_strings,
+    external,
     join,
     join_all,
     present,
@@ -271,9 +273,15 @@ def _set_any(run: Run, obj: Instance, names: Value, value: Value) -> bool:
 
 
 def _type(run: Run, call: Call) -> Value:
-    """Return the class of an object, else unknown; with three arguments, a class that is not followed."""
+    """Return the class of an object, else unknown; with three arguments, a class that is not followed.
+
+    It is no gap if ``object`` alone is its base.
+    """
     if len(call.args.positional) == 3:
-        run.gap(call.node, call.frame, "a class is made at run time (type)")
+        bases = sole(call.args.at(1))
+        listed = bases.items.exact if isinstance(bases, Sequence) else None
+        if listed is None or any(each != external("builtins.object") for each in listed):
+            run.gap(call.node, call.frame, "a class is made at run time (type)")
         run.escape(call.args)
         return unknown("a class made at run time")
     atom = sole(call.args.at(0))

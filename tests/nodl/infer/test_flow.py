@@ -114,6 +114,9 @@ CASES: dict[str, tuple[str, list[str]]] = {
         "setattr(s, sys.argv[1] + '_error', 'x')\nself.P(s.a_error); self.P(s.topic + s.run())",
         ["a", "bc", "x"],
     ),
+    "a class without bases by type()": (
+        "s = type('S', (object,), {'topic': 'a'})()\nself.P('b')\nself.P(s.topic)", ["?", "b"]
+    ),
     "setattr by any name": (
         "class S:\n    def __init__(self): self.topic = 'b'\ns = S()\nsetattr(s, sys.argv[1], 'x')\nself.P(s.topic)",
         ["b", "x"],

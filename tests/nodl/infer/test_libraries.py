@@ -7,6 +7,7 @@ from collections.abc import Callable
 import pytest
 
 from nodl.infer import InferredSystem
+from nodl.infer.models.signatures import may_make_nodes
 
 Infer = Callable[..., InferredSystem]
 
@@ -52,6 +53,14 @@ def test_what_a_ros_package_makes_that_cannot_be_read_is_a_gap(imports: str, bod
 )
 def test_what_makes_no_node_is_none(imports: str, body: str, infer: Infer) -> None:
     assert not infer(_OWN_NODE.format(imports=imports, body=body)).gaps
+
+
+@pytest.mark.parametrize(("library", "made"), [("pinocchio", False), ("pynput", False), ("acme", True)])
+def test_a_library_that_package_xml_names_is_of_ros_unless_it_is_known_not_to_be(
+    library: str, made: bool
+) -> None:
+    assert may_make_nodes(f"{library}.Model", frozenset({library})) is made
+    assert not may_make_nodes(f"{library}.Model", frozenset())
 
 
 _WRITER = """class Writer:
