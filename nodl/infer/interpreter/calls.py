@@ -16,7 +16,7 @@ from nodl.infer.interpreter.define import (
     program_classes,
 )
 from nodl.infer.interpreter.loops import fixpoint
-from nodl.infer.interpreter.run import MAX_DEPTH, Arguments, Call, FunctionEntry, Frame, Run
+from nodl.infer.interpreter.run import MAX_DEPTH, Arguments, Call, Frame, FunctionEntry, Run
 from nodl.infer.models import foreign
 from nodl.infer.values import (
     ANY,
