@@ -97,6 +97,7 @@ class FunctionText:
         self.attributes: set[str] = set()  # the same, with identifiers in texts
         self.inner: list[FunctionText] = []  # lambdas and decorated functions, whose use needs no name
         self.stored: set[str] = set()  # variables
+        self.set: set[str] = set()  # attributes, which may be properties
         self.may_leave = False  # before what is read next
         self.imports: list[Import] = []
 
@@ -176,8 +177,7 @@ class _Reader:
             scope.stored.add(node.id)
 
     def attribute(self, node: ast.Attribute, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
-        if isinstance(node.ctx, ast.Load):
-            scope.attributes.add(node.attr)
+        (scope.attributes if isinstance(node.ctx, ast.Load) else scope.set).add(node.attr)
         self.visit(node.value, scope, (*around, node))
 
     def constant(self, node: ast.Constant, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
@@ -406,7 +406,7 @@ class _Net:
 
     def _refer(self, scope: FunctionText) -> None:
         """Note what the text refers to, and calls that were not evaluated, or on something that is not known."""
-        self._meant.update(("", name) for name in scope.attributes)
+        self._meant.update(("", name) for name in scope.attributes | scope.set)
         names = set(scope.names)
         for place in scope.calls:
             entries = self._run.entries.get(scope.node) if scope.node is not None else None

@@ -456,9 +456,10 @@ class SuperProxy(NamedTuple):
 
 
 class PropertyValue(NamedTuple):
-    """A property, by what reads it."""
+    """A property, by what reads and what sets it."""
 
     getter: Value
+    setter: Value = BOTTOM
 
 
 class ClassMethod(NamedTuple):

@@ -82,6 +82,10 @@ def define_function(run: Run, node: ast.FunctionDef | ast.AsyncFunctionDef, fram
 def _decorated(run: Run, value: Value, function: FunctionValue, decorator: ast.expr, frame: Frame) -> Value:
     if isinstance(decorator, ast.Attribute) and decorator.attr in ("setter", "deleter", "getter"):
         found = run.evaluate(decorator.value, frame)
+        known = sole(found)
+        if decorator.attr == "setter" and isinstance(known, PropertyValue):
+            run.has_setters = True
+            return (PropertyValue(known.getter, value),)
         if found and all(isinstance(atom, PropertyValue) for atom in found):
             why = f"property {function.name} has a {decorator.attr}, which is not analysed"
             run.gap(decorator, frame, why)
@@ -288,6 +292,13 @@ def expect_methods(run: Run, value: Value, since: int | None = None) -> None:
 
 
 _NOT_CALLED = frozenset({"__init__", "__new__", "__init_subclass__", "__class_getitem__", "__set_name__"})
+
+
+def setter_of(owner: Instance, name: str) -> Value:
+    """Return what sets the attribute, if it is a property with a setter."""
+    classes = program_classes(owner.cls) if isinstance(owner.cls, ClassValue) else []
+    held = next((each.cells[name] for each in classes if name in each.cells), ())
+    return tuple(setter for atom in held if isinstance(atom, PropertyValue) for setter in atom.setter)
 
 
 def foreign_bases(cls: ClassValue) -> list[object]:

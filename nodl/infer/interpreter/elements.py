@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import ast
 import sys
+from functools import partial
 
 from nodl.infer.interpreter.conditions import is_parameter, only_if
-from nodl.infer.interpreter.define import enumeration_members, is_constant, is_enumeration
+from nodl.infer.interpreter.define import enumeration_members, is_constant, is_enumeration, setter_of
 from nodl.infer.interpreter.formatting import is_whole_number
 from nodl.infer.interpreter.run import Arguments, Frame, Run
 from nodl.infer.text import Guard, Input, Text, constant_text, input_of, is_one_of_several, make_text
@@ -286,7 +287,11 @@ def store_attribute(run: Run, owners: Value, name: str, value: Value, node: ast.
     if name.startswith("__") and name.endswith("__") and name not in _DESCRIBING:
         run.gap(node, frame, f"{name} is set; what Python then does otherwise is not followed")
     for owner in owners:
-        if isinstance(owner, (Instance, ClassValue, ModuleValue)):
+        setter = setter_of(owner, name) if run.has_setters and isinstance(owner, Instance) else BOTTOM
+        if setter:
+            call = partial(run.call, setter, Arguments([(owner,), value]), node, frame)
+            call() if certain else run.state.perhaps(call)
+        elif isinstance(owner, (Instance, ClassValue, ModuleValue)):
             kept = BOTTOM if certain else owner.cells.get(name, BOTTOM)
             run.state.store(owner, name, join(kept, value))
         else:

@@ -215,6 +215,7 @@ class Run(Allocations):
         self.called: dict[ast.AST, None] = {}  # functions analysed so far
         self.instantiated: dict[ast.AST, None] = {}  # classes of which an object was made
         self.with_metaclass: set[ast.AST] = set()
+        self.has_setters = False  # a class has a property that can be set
         # For the net: calls with the call that entered their function, what entered each function, and calls of
         # what is not known.
         self.evaluated: set[tuple[ast.AST, FunctionEntry | None]] = set()
