@@ -425,9 +425,10 @@ def _is_dead(run: Machine, file: str, offset: int) -> bool:
 
 def leads_to_interfaces(run: Machine, words: frozenset[str]) -> bool:
     """Return whether a function with these words, or one that it may call, makes an interface, a node or a plugin."""
-    return _make(words) or any(_make(function.words) for function in Reach(run).from_words(words))
+    return makes_by_words(words) or any(makes_by_words(each.words) for each in Reach(run).from_words(words))
 
 
 @lru_cache(maxsize=50_000)
-def _make(words: frozenset[str]) -> bool:
+def makes_by_words(words: frozenset[str]) -> bool:
+    """Return whether one of the words makes an interface by itself."""
     return not words.isdisjoint(MAKERS) or any(map(CREATES.fullmatch, words))

@@ -11,6 +11,7 @@ from nodl.infer.cpp.syntax import Node, Tree, children, field_of, line_of, text,
 
 if TYPE_CHECKING:
     from nodl.infer.cpp.ledger import Site
+    from nodl.infer.cpp.reading.writes import VariableWrites
 
 
 _LITERAL = re.compile(r'"(?:\\.|[^"\\\n])*"')
@@ -55,7 +56,7 @@ class Function:
     static: bool = False
     variadic: bool = False
     specialises: tuple[str, ...] | None = None  # arguments as written, its own or those of its class
-    written: frozenset[str] | None = None  # variables that it may change, when asked
+    written: VariableWrites | None = None  # what it does to variables, when asked
     _words: frozenset[str] | None = None
 
     @property

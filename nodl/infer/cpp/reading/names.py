@@ -49,6 +49,12 @@ def _once(
     return update_wrapper(ask, method)
 
 
+_PLAIN = re.compile(
+    r"(?:const\s+)?(?:std::)?(?:(?:string|char|u?int\d*(?:_t)?|bool|size_t|double|float)|"
+    r"(?:vector|(?:unordered_)?(?:map|set)|list|array|deque|optional)<.*>)"
+)
+
+
 class Names:
     """``files``: the sources and headers of the program. ``visible``: file -> every file that it includes."""
 
@@ -134,6 +140,12 @@ class Names:
             for function in index.all_functions:
                 found.setdefault(function.name, []).append(function)
         return found
+
+    @cached_property
+    def pointers_to_plain(self) -> frozenset[str]:
+        """The names of members that are pointers or references to texts, numbers or containers."""
+        fields = [each for listed in self.classes.values() for cls in listed for each in cls.fields.values()]
+        return frozenset(each.name for each in fields if each.pointer and _PLAIN.fullmatch(each.type))
 
     @_once
     def spoken_of(self, function: Function) -> frozenset[str]:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
+from typing import NamedTuple
 
-from nodl.infer.cpp.syntax import Node, field_of, text, walk
+from nodl.infer.cpp.syntax import Node, callee_name, children, field_of, text, unwrapped, walk
 
 _WORD = re.compile(r"[A-Za-z_]\w*")
 _READING = frozenset({
@@ -22,6 +23,109 @@ def writes_of(node: Node) -> frozenset[str]:
     That is assigned, counted up, read from a stream, given to a call or changed by a method of theirs.
     """
     return frozenset(word for each in walk(node) for word in _words_of(each))
+
+
+class VariableWrites(NamedTuple):
+    """What a piece of code does to variables, by their names.
+
+    Attributes:
+        assigned: What is replaced: an object as well as a text or number.
+        changed: What is changed in place: texts, numbers and containers; an object stays who it is.
+        seen: Objects whose methods are called, and what aliases stand for.
+        passed: Arguments: the function, the argument's position and the variables in it.
+        lasting: What closures in it write, whenever they run.
+    """
+
+    assigned: frozenset[str]
+    changed: frozenset[str]
+    seen: frozenset[str]
+    passed: tuple[tuple[str, int, frozenset[str]], ...]
+    lasting: frozenset[str]
+
+
+_REPLACES = frozenset({"reset", "swap", "emplace", "assign", "store", "exchange", "release", "tie"})
+_FILLS = frozenset({
+    "push_back", "emplace_back", "push_front", "emplace_front", "insert", "insert_or_assign", "emplace", "try_emplace",
+    "erase", "clear", "resize", "append", "pop_back", "pop_front", "pop", "push", "assign", "fill", "sort", "merge",
+    "splice", "remove", "remove_if", "unique", "reverse", "replace", "swap", "reset",
+})  # fmt: skip
+_READS_ARGUMENTS = re.compile(r"RCLCPP_\w+|lookupTransform|canTransform|publish|get_logger")
+
+
+def written_by(node: Node) -> VariableWrites:
+    """Return what the code below ``node`` does to variables itself."""
+    assigned: set[str] = set()
+    changed: set[str] = set()
+    seen: set[str] = set()
+    lasting: set[str] = set()
+    passed: list[tuple[str, int, frozenset[str]]] = []
+    aliases: list[tuple[set[str], set[str]]] = []
+    for each in walk(node):
+        words = _words_of(each)
+        if each.type == "assignment_expression":
+            left = unwrapped(field_of(each, "left"))
+            changed |= words
+            if left is not None and left.type == "field_expression":
+                assigned |= _in(field_of(left, "field"))
+            elif left is not None and left.type != "subscript_expression":
+                assigned |= words
+        elif each.type == "call_expression":
+            callee = field_of(each, "function")
+            last = re.split(r"::|\.|->", callee_name(callee))[-1] if callee is not None else ""
+            receivers = _receivers(callee)
+            seen |= receivers
+            changed |= receivers if last in _FILLS else set()
+            assigned |= words if last in _REPLACES else set()
+            if not _READS_ARGUMENTS.fullmatch(last):
+                passed += _passed(last, field_of(each, "arguments"))
+            for argument in children(field_of(each, "arguments")):
+                changed |= _iterated(argument)
+        elif each.type in ("for_range_loop", "declaration") and _is_alias(each):
+            seen |= words
+            aliases.append((_in(field_of(each, "declarator")), words))
+        else:
+            changed |= words
+            if each.type == "init_declarator":
+                aliases.append((_in(field_of(each, "declarator")), _iterated(field_of(each, "value"))))
+            lasting |= writes_of(each) if each.type == "lambda_expression" else set()
+    for names, behind in aliases:
+        assigned |= behind if names & assigned else set()
+        changed |= behind if names & changed else set()
+    return VariableWrites(
+        frozenset(assigned), frozenset(changed), frozenset(seen), tuple(passed), frozenset(lasting)
+    )
+
+
+def _iterated(value: Node | None) -> set[str]:
+    """Return the variables that an iterator or pointer into a container leads to: ``x.begin()``."""
+    callee = field_of(value, "function") if value is not None and value.type == "call_expression" else None
+    if callee is None or callee.type != "field_expression":
+        return set()
+    return (
+        _in(field_of(callee, "argument")) if _LEADS_INTO.fullmatch(text(field_of(callee, "field"))) else set()
+    )
+
+
+_LEADS_INTO = re.compile(
+    r"r?(?:begin|end)|data|find\w*|(?:lower|upper)_bound|front|back|at|top|get|value|emplace\w*|insert\w*"
+)
+
+
+def _receivers(callee: Node | None) -> set[str]:
+    if callee is None or callee.type != "field_expression" or text(field_of(callee, "field")) in _READING:
+        return set()
+    return _in(field_of(callee, "argument"))
+
+
+def _passed(callee: str, arguments: Node | None) -> list[tuple[str, int, frozenset[str]]]:
+    return [
+        (callee, index, frozenset(_in(each)))
+        for index, each in enumerate(children(arguments))
+        if each.type in _VARIABLES
+    ]
+
+
+_VARIABLES = ("identifier", "field_expression", "pointer_expression", "subscript_expression")
 
 
 def _words_of(node: Node) -> set[str]:
@@ -45,7 +149,7 @@ def _called(node: Node) -> set[str]:
     given = arguments.named_children if arguments is not None else []
     found: set[str] = set()
     for each in given:  # an argument may be a reference
-        if each.type in ("identifier", "field_expression", "pointer_expression", "subscript_expression"):
+        if each.type in _VARIABLES:
             found |= _in(each)
     if callee is not None and callee.type == "field_expression":
         name = text(field_of(callee, "field"))

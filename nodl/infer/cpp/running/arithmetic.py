@@ -101,11 +101,20 @@ _INTEGER = re.compile(
 def as_type(name: str, value: Value) -> Value:
     """Return ``value`` as a variable of this fundamental type holds it; of other types as it was."""
     if name in ("double", "float"):
+        if any(isinstance(atom, Unknown | Text) for atom in value):
+            return unknown("a number")
         return tuple(float(atom) if type(atom) is int else atom for atom in value)
     if name == "bool":
-        return tuple(bool(atom) if isinstance(atom, int | float) else atom for atom in value)
+        return join(*((_as_bool(atom),) for atom in value))
     match = _INTEGER.fullmatch(name)
     return value if match is None else join(*((_held(atom, match),) for atom in value))
+
+
+def _as_bool(atom: object) -> object:
+    """Return a number as a condition, a text as one that is not known."""
+    if isinstance(atom, Text):
+        return Unknown("a condition")
+    return bool(atom) if isinstance(atom, int | float) else atom
 
 
 def _held(atom: object, kind: re.Match[str]) -> object:

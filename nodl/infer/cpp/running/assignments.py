@@ -128,7 +128,7 @@ def _combined(operator: str, before: Value, value: Value) -> Value:
 
 def as_declared(run: Machine, left: Node, value: Value, frame: Frame) -> Value:
     """Return a number as the type of the variable holds it."""
-    if not any(isinstance(atom, int | float) for atom in value):
+    if not any(isinstance(atom, int | float | Text | Unknown) for atom in value):
         return value
     kind, pointer = declared_type(run, left, frame)
     return value if pointer else as_type(kind.name, value)

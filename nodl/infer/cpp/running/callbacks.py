@@ -8,9 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import partial
 
-from nodl.infer.cpp.ledger import Reach
-from nodl.infer.cpp.reading.declarations import Class, Function
-from nodl.infer.cpp.reading.writes import writes_of
+from nodl.infer.cpp.reading.declarations import Class
+from nodl.infer.cpp.running.effects import effects_of
 from nodl.infer.cpp.running.invocation import HOOKS, call_lambda, invoke
 from nodl.infer.cpp.running.machine import NEXT, Frame, Machine
 from nodl.infer.cpp.running.memory import Reads
@@ -29,7 +28,6 @@ from nodl.infer.cpp.running.values import (
     open_sequence,
     unknown,
 )
-from nodl.infer.cpp.syntax import words_in
 from nodl.source_ref import SourceRef
 
 PATIENCE = 3
@@ -51,7 +49,6 @@ class _Rounds:
     run: Machine
     last: dict[Key, _Ran] = field(default_factory=dict)
     names_read: set[str] = field(default_factory=set)  # by callbacks
-    writes: dict[object, frozenset[str]] = field(default_factory=dict)
 
 
 def run_callbacks(run: Machine) -> None:
@@ -120,35 +117,22 @@ def _run(run: Machine, atom: object, frame: Frame) -> None:
 
 
 def _matters(rounds: _Rounds, atom: object) -> bool:
-    """Return whether it may make an interface, or change what a callback that runs has read."""
-    return _makes(rounds.run, atom) or not rounds.names_read.isdisjoint(_writes(rounds, atom))
+    """Return whether it may make an interface, give away a node, or change what a callback that runs has read."""
+    if not isinstance(atom, Lambda | Bound):
+        return False
+    effects = effects_of(rounds.run, atom.function if isinstance(atom, Bound) else atom)
+    written = effects.written
+    return (
+        _makes(rounds.run, atom)
+        or effects.leaving.gives_node
+        or not rounds.names_read.isdisjoint(written.assigned | written.changed | written.seen)
+    )
 
 
 def _makes(run: Machine, atom: object) -> bool:
     if isinstance(atom, Lambda):
         return run.subtree_matters(atom.node)
     return isinstance(atom, Bound) and run.makes_interfaces(atom.function)
-
-
-def _writes(rounds: _Rounds, atom: object) -> frozenset[str]:
-    """Return what the callback, and whatever it may call, writes."""
-    run = rounds.run
-    if not isinstance(atom, Lambda | Bound):
-        return frozenset()
-    key = (atom.node.id if isinstance(atom, Lambda) else atom.function, len(run.used_classes()))
-    if key not in rounds.writes:
-        if isinstance(atom, Lambda):
-            own, words = writes_of(atom.node), words_in(atom.node)
-        else:
-            own, words = _written(atom.function), atom.function.words
-        rounds.writes[key] = own.union(*map(_written, Reach(run).from_words(words)))
-    return rounds.writes[key]
-
-
-def _written(function: Function) -> frozenset[str]:
-    if function.written is None:
-        function.written = writes_of(function.node)
-    return function.written
 
 
 def _widen(run: Machine, mark: int, give_up: bool) -> None:

@@ -12,11 +12,11 @@ from functools import partial
 
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES, Call, is_harmless_class
 from nodl.infer.cpp.reading.declarations import Class, Field, Function, FunctionParameter
-from nodl.infer.cpp.reading.known_headers import KNOWN_HEADERS, ROS_LIBRARIES
 from nodl.infer.cpp.reading.type_names import NO_TYPE, Type
 from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.arithmetic import as_type
 from nodl.infer.cpp.running.contents import copied, elements_copied, handed_over, items_of, takes_another
+from nodl.infer.cpp.running.foreign import unmodelled
 from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
 from nodl.infer.cpp.running.overloads import candidates
 from nodl.infer.cpp.running.references import as_referred_to
@@ -378,18 +378,8 @@ def _unmodelled(run: Machine, kind: Type, node: Node, frame: Frame, deliberate: 
 
     ``deliberate``: it is made with arguments or with new, as structures of C are not.
     """
-    first = kind.name.partition("::")[0]
-    if first in KNOWN_HEADERS and not (deliberate and first in ROS_LIBRARIES):
-        return
-    if first in ROS_LIBRARIES:
-        why = f"the class {kind.name} is not in the table of {first}: it may be a node or make one"
-        run.gap(node, frame, why)
-        return
-    header = run.names.foreign_header(kind.name, frame.file)
-    if not header and deliberate and "::" not in kind.name:
-        header = "no header in reach defines it"
-    if header:
-        why = f"the class {kind.name} is not in reach ({header}): it may be a node or make one"
+    why = unmodelled(run.names, kind.name, frame.file, deliberate)
+    if why:
         run.gap(node, frame, why)
 
 

@@ -197,6 +197,8 @@ def new(run: Machine, node: Node, frame: Frame) -> Value:
     given = children(field_of(node, "arguments"))
     values = [run.evaluate(child, frame) for child in given]
     several = field_of(node, "declarator") is not None
+    if several and kind.name in ("unsigned char", "char", "double", "float", "int", "unsigned int", "bool"):
+        return unknown("an array of numbers")
     run.repeated += several
     found = construct(run, kind._replace(pointer=False), values, node, frame, heap=True)
     run.repeated -= several

@@ -14,6 +14,7 @@ from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.constructors import as_parameter, bind_parameters
 from nodl.infer.cpp.running.contents import copied, handed_over
+from nodl.infer.cpp.running.left_out import leave_out
 from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
 from nodl.infer.cpp.running.memory import MEMORY_DEPTH, CallOutcome, Changes
 from nodl.infer.cpp.running.overloads import candidates, chosen
@@ -274,6 +275,8 @@ def invoke(
             run.gap(node, frame, f"{function} calls itself, deeper than is followed")
         return unknown("a recursion")
     if function.only_computes and not run.makes_interfaces(function):
+        return unknown(f"the result of {function.name}()")
+    if leave_out(run, function, values, node, frame):
         return unknown(f"the result of {function.name}()")
     inner = Frame(
         function.file, function.scope, function, this_object, bindings or {},

@@ -38,6 +38,8 @@ from nodl.source_ref import SourceRef
 
 if TYPE_CHECKING:
     from nodl.infer.cpp.libraries import Call
+    from nodl.infer.cpp.running.effects import CallEffects
+    from nodl.infer.cpp.running.foreign import Leaving
 
 NEXT, RETURN, BREAK, CONTINUE = 1, 2, 4, 8
 
@@ -127,6 +129,10 @@ class Machine:
         self.unset: dict[tuple[str, int], tuple[SourceRef, str, str]] = {}  # calls on pointers to nothing
         self._used: set[str] = set()
         self._known: set[Class] = set()
+        self.effects: dict[tuple[object, int], CallEffects] = {}  # by how many classes were used
+        self.leaving: dict[Function, Leaving] = {}
+        self.taken: dict[tuple[str, int], int] = {}
+        self.looked_at: dict[int, frozenset[str]] = {}
         self._leading: dict[tuple[object, int], bool] = {}
 
     # --- running ------------------------------------------------------------------------------------------
@@ -349,6 +355,7 @@ class Machine:
         return bool(CREATES.fullmatch(function.name)) or self._leads(function, function.words)
 
     def subtree_matters(self, node: Node) -> bool:
+        """Return ``makes_interfaces`` of a closure or other part of a function."""
         return self._leads(node.id, words_in(node))
 
     def _leads(self, key: object, words: frozenset[str]) -> bool:

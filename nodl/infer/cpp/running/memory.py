@@ -6,7 +6,17 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import NamedTuple, TypeVar
 
-from nodl.infer.cpp.running.values import BOTTOM, Noted, NoteLog, Obj, Value, bounded, hold, join
+from nodl.infer.cpp.running.values import (
+    BOTTOM,
+    Noted,
+    NoteLog,
+    Obj,
+    Value,
+    bounded,
+    hold,
+    holds_callable,
+    join,
+)
 
 MEMORY_DEPTH = 20
 """Paths of calls are whole up to this depth (``Frame.path``): then the same path means the same callers."""
@@ -31,6 +41,8 @@ class AbstractStore:
         """``spend`` is told the steps that long looks at the trail count for; what it raises ends the run."""
         self._spend = spend
         self._cells: dict[Cell, Value] = {}
+        self._by_name: dict[str, dict[Cell, None]] = {}
+        self.callable_names: set[str] = set()  # of variables that ever held a function or closure
         self._trail: list[tuple[Cell, Value, int]] = []  # what was there before, and since when
         self._since: dict[Cell, int] = {}  # the place in the trail where a cell was written last
         self._reads: set[Cell] | None = None
@@ -92,6 +104,10 @@ class AbstractStore:
         old = self._cells.get(cell, _ABSENT)
         if old is not value:
             value = bounded(value)
+            if old is _ABSENT and not hasattr(cell[0], "finished"):
+                self._by_name.setdefault(_name(cell), {})[cell] = None
+            if any(map(holds_callable, value)):
+                self.callable_names.add(_name(cell))
             self._trail.append((cell, old, self._since.get(cell, -1)))
             self._since[cell] = len(self._trail) - 1
             self._cells[cell] = value
@@ -99,6 +115,10 @@ class AbstractStore:
                 self._remember(cell, value)
             if self._held is not None:
                 self._hold(cell, None if old is _ABSENT else join(old, value))
+
+    def named(self, name: str) -> list[Cell]:
+        """Return the members, globals and static members of that name that were ever set."""
+        return list(self._by_name.get(name, ()))
 
     def held_during(self, action: Callable[[], Held]) -> tuple[Held, Changes]:
         """Run ``action``; what it gives, and every value that cells held meanwhile which were there before."""
@@ -171,6 +191,11 @@ class AbstractStore:
             if any(cell not in changes for changes in alternatives):
                 self._read(cell, self._since.get(cell, -1))
             self.set(cell, join(*(changes.get(cell, present) for changes in alternatives)))
+
+
+def _name(cell: Cell) -> str:
+    """Return the name of a variable; that of a global stands in its owner."""
+    return cell[1] or str(getattr(cell[0], "name", ""))
 
 
 def _is_over(cell: Cell) -> bool:

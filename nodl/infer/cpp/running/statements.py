@@ -10,6 +10,7 @@ from nodl.infer.cpp.reading.declarations import type_text
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.constructors import declared_value, fields_of
 from nodl.infer.cpp.running.contents import copied, iterated
+from nodl.infer.cpp.running.effects import only_changes_variables
 from nodl.infer.cpp.running.launch_values import decided, settled
 from nodl.infer.cpp.running.machine import (
     BREAK,
@@ -25,9 +26,21 @@ from nodl.infer.cpp.running.machine import (
 from nodl.infer.cpp.running.memory import Changes
 from nodl.infer.cpp.running.references import bind_reference, elements_written
 from nodl.infer.cpp.running.static_types import element_type, seen_type
-from nodl.infer.cpp.running.values import BOTTOM, Const, Group, Obj, Seq, Text, Value, join, plain, unknown
+from nodl.infer.cpp.running.values import (
+    BOTTOM,
+    Const,
+    Group,
+    Obj,
+    Seq,
+    Text,
+    Value,
+    join,
+    may_name,
+    plain,
+    unknown,
+)
 from nodl.infer.cpp.running.variables import member
-from nodl.infer.cpp.syntax import Node, children, field_of, parse_expression, text, unwrapped, walk
+from nodl.infer.cpp.syntax import Node, children, field_of, parse_expression, text, unwrapped, walk, words_in
 
 
 def in_a_block(handler: StatementHandler) -> StatementHandler:
@@ -394,6 +407,8 @@ def _bound_part(run: Machine, atom: object, index: int) -> list[Value]:
 
 MAX_UNROLLED = 64
 MAX_ENDLESS = 8
+MAX_NAMELESS = 2
+"""Turns of a loop in which nothing that may name something changed; the others are run to a fixpoint."""
 MAX_ROUNDS = 3
 
 
@@ -508,7 +523,16 @@ def _counted(run: Machine, node: Node, frame: Frame) -> int:
             if index == 0:
                 run.kill(body, frame, "the condition of the loop is never true")
             break
-        if holds is None or loop.breaks or (index == MAX_ENDLESS and _is_endless(condition)):
+        if (
+            holds is None
+            or loop.breaks
+            or (index == MAX_ENDLESS and _is_endless(condition))
+            or (
+                index == MAX_NAMELESS
+                and not any(map(may_name, run.store.changes(loop.start).values()))
+                and _computes(run, node)
+            )
+        ):
             returns |= _repeated(run, body, update, condition, frame, loop)
             break
         mark, frame.path = run.store.mark(), (*outer_path, index)
@@ -522,6 +546,11 @@ def _counted(run: Machine, node: Node, frame: Frame) -> int:
         returns |= _repeated(run, body, update, condition, frame, loop)
     frame.path = outer_path
     return returns | _after(run, loop, NEXT)
+
+
+def _computes(run: Machine, loop: Node) -> bool:
+    """Return whether a loop makes no interface and does nothing but change variables."""
+    return not run.subtree_matters(loop) and only_changes_variables(run, words_in(loop))
 
 
 def _is_endless(condition: Node | None) -> bool:

@@ -179,6 +179,31 @@ class Obj:
         return f"<{self.type.name}>"
 
 
+def holds_callable(atom: Atom) -> bool:
+    """Return whether an alternative is or holds a function or closure."""
+    if isinstance(atom, Lambda | Bound):
+        return True
+    if isinstance(atom, Seq | Group):
+        return any(holds_callable(each) for item in atom.items for each in item)
+    if isinstance(atom, Map):
+        return any(holds_callable(each) for entry in atom.entries for item in entry for each in item)
+    return False
+
+
+def may_name(value: Value) -> bool:
+    """Return whether a text, parameter, function or object of the program is or lies in it."""
+    for atom in value:
+        if isinstance(atom, Text | Param | Lambda | Bound | Const):
+            return True
+        if isinstance(atom, Obj) and (atom.cls is not None or atom.node is not None):
+            return True
+        if isinstance(atom, Seq | Group) and any(map(may_name, atom.items)):
+            return True
+        if isinstance(atom, Map) and any(may_name(each) for entry in atom.entries for each in entry):
+            return True
+    return False
+
+
 def bounded(value: Value) -> Value:
     """Return ``value``, or one that is not known if containers in it hold too much in all."""
     containers = [atom for atom in value if isinstance(atom, Seq | Map | Group)]
@@ -216,6 +241,8 @@ def join(*values: Value) -> Value:
                 unknown_one = unknown_one or atom
                 atom = unknown_one
             every[atom] = None
+    if unknown_one is not None:
+        every = {atom: None for atom in every if not isinstance(atom, float)}
     found = tuple(every)
     if len(found) > MAX_SEQUENCES:
         found = _one_container(found)

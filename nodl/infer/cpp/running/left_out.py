@@ -1,0 +1,187 @@
+"""Calls that need not run: they lead to no interface, and what they may change is not known already or not looked at.
+
+What such a call may have changed is not known afterwards. Most code of a robot is of this kind: it computes.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+
+from nodl.infer.cpp.reading.declarations import Function, type_text
+from nodl.infer.cpp.running.assignments import assign
+from nodl.infer.cpp.running.effects import CallEffects, effects_of, looked_at
+from nodl.infer.cpp.running.machine import Frame, Machine
+from nodl.infer.cpp.running.memory import Cell
+from nodl.infer.cpp.running.values import (
+    BOTTOM,
+    Group,
+    Map,
+    Obj,
+    Seq,
+    Unknown,
+    Value,
+    holds_callable,
+    join,
+    may_name,
+    unknown,
+)
+from nodl.infer.cpp.syntax import Node, children, field_of, unwrapped
+
+LEAST_SIZE = 10_000
+"""Bytes of source, with everything that it may call, from which on leaving a call out is worth its look."""
+_NUMBERS = re.compile(
+    r"(?:const\s+)?(?:void|bool|int|double|float|(?:std::)?size_t|unsigned|unsigned int|unsigned char|u?int\d+_t)"
+)
+_LEADS_ELSEWHERE = re.compile(r"\b(?:auto|It)\b|[Ii]ter")
+"""Parameters through which a call may write to variables that are not its arguments."""
+_VARIABLES = ("identifier", "field_expression", "subscript_expression")
+
+
+def leave_out(run: Machine, function: Function, values: Sequence[Value], node: Node, frame: Frame) -> bool:
+    """Leave a call out, if that loses nothing that matters.
+
+    Returns:
+        Whether it was: then what it may have changed is not known any more.
+    """
+    if run.makes_interfaces(function) or function.name == function.owner.rpartition("::")[2]:
+        return False
+    if function.templates or any(_LEADS_ELSEWHERE.search(each.type) for each in function.parameters):
+        return False
+    effects = effects_of(run, function)
+    if effects.size < LEAST_SIZE or not effects.only_variables or not _is_unused(function, node):
+        return False
+    if not run.store.callable_names.isdisjoint(effects.words):
+        return False
+    if any(
+        holds_callable(atom) or (isinstance(atom, Obj) and atom.node is not None)
+        for v in values
+        for atom in v
+    ):
+        return False
+    targets, changes = _targets(function, node), _changes(run, effects)
+    if changes is None or None in targets:
+        return False
+    why = unknown(f"what {function.name}() may have written")
+    for cell, value in changes.items():
+        run.store.set(cell, join(value, why))
+    for target in targets:
+        _forget(run, target, why, frame)
+    return True
+
+
+def _is_unused(function: Function, call: Node) -> bool:
+    """Return whether nobody looks at what the call gives, or it is a number or condition."""
+    is_statement = call.type != "call_expression" or (
+        call.parent is not None and call.parent.type == "expression_statement"
+    )
+    return is_statement or _NUMBERS.fullmatch(type_text(function.node)) is not None
+
+
+def _changes(run: Machine, effects: CallEffects) -> dict[Cell, Value] | None:
+    """Return the variables that may change, with their values; ``None`` if one of them matters and is known now."""
+    store, written, matters = run.store, effects.written, looked_at(run)
+    if not matters.isdisjoint(written.lasting) or not run.names.pointers_to_plain.isdisjoint(
+        written.assigned | written.changed
+    ):
+        return None
+    if effects.kept_by is not None:
+        cell, is_assigned, is_changed = effects.kept_by
+        value = store.get(cell) or BOTTOM
+        if _would_change(value, is_assigned, is_changed) and _decides(value):
+            return None
+    every = written.assigned | written.changed | written.seen
+    found: dict[Cell, Value] = {}
+    waiting = [
+        (cell, name, name in written.assigned, name in written.changed)
+        for name in (*sorted(every & matters), *sorted(every - matters))
+        for cell in store.named(name)
+    ]
+    done: set[Cell] = set()
+    while waiting:
+        cell, name, is_assigned, is_changed = waiting.pop()
+        if cell in done:
+            continue
+        done.add(cell)
+        value = store.get(cell) or BOTTOM
+        if _would_change(value, is_assigned, is_changed):
+            if name in matters and _decides(value):
+                effects.kept_by = (cell, is_assigned, is_changed)
+                return None
+            found[cell] = value
+        if is_assigned:
+            waiting += [((obj, field), field, True, True) for obj, field in _members(run, value)]
+    for obj, name in _never_set(run, every):
+        if name in matters and name in written.assigned and not _is_number(run, obj, name):
+            return None
+        found[obj, name] = BOTTOM
+    return found
+
+
+def _would_change(value: Value, is_assigned: bool, is_changed: bool) -> bool:
+    """Return whether a variable with this value is known now, and something else may be in it afterwards."""
+    if any(isinstance(atom, Unknown) for atom in value):
+        return False
+    return is_assigned or not _of_objects(value, containers=not is_changed)
+
+
+def _decides(value: Value) -> bool:
+    """Return whether ``value`` may be part of a name or decide a condition."""
+    return may_name(value) or any(type(atom) in (bool, int) for atom in value)
+
+
+def _members(run: Machine, value: Value) -> Iterator[tuple[Obj, str]]:
+    """Yield the members of the program's own objects in ``value``."""
+    for atom in value:
+        if isinstance(atom, Obj) and atom.cls is not None:
+            for each in run.names.ancestry(atom.cls):
+                for name in each.fields:
+                    yield atom, name
+
+
+def _never_set(run: Machine, names: frozenset[str]) -> Iterator[tuple[Obj, str]]:
+    """Yield members of these names that no object has set yet."""
+    for obj in list(run.objects.values()):
+        for each in run.names.ancestry(obj.cls):
+            for name in each.fields.keys() & names:
+                if not each.fields[name].static and run.store.get((obj, name)) is None:
+                    yield obj, name
+
+
+def _is_number(run: Machine, obj: Obj, name: str) -> bool:
+    declared = next(each.fields[name] for each in run.names.ancestry(obj.cls) if name in each.fields)
+    return not declared.pointer and _NUMBERS.fullmatch(declared.type) is not None
+
+
+def _of_objects(value: Value, containers: bool) -> bool:
+    """Return whether ``value`` consists of objects alone; with ``containers`` also of containers of such."""
+    for atom in value:
+        if isinstance(atom, Obj):
+            continue
+        if not containers or not isinstance(atom, Seq | Group | Map):
+            return False
+        items = atom.items if isinstance(atom, Seq | Group) else [each for _, each in atom.entries]
+        if not all(_of_objects(each, containers) for each in items):
+            return False
+    return True
+
+
+def _targets(function: Function, node: Node) -> list[Node | None]:
+    """Return the caller's variables that the call may write to; ``None`` for one that is no plain variable."""
+    found: list[Node | None] = []
+    for parameter, argument in zip(function.parameters, children(field_of(node, "arguments")), strict=False):
+        target = unwrapped(argument) if parameter.written_back else None
+        if target is not None and target.type == "pointer_expression":
+            target = unwrapped(field_of(target, "argument"))
+        if parameter.written_back:
+            found.append(target if target is not None and target.type in (*_VARIABLES, "this") else None)
+    return found
+
+
+def _forget(run: Machine, target: Node | None, why: Value, frame: Frame) -> None:
+    """Make what the caller's variable holds unknown; objects stay who they are."""
+    if target is None or target.type == "this":
+        return
+    before = run.evaluate(target, frame)
+    if not any(isinstance(atom, Unknown) for atom in before) and not _of_objects(before, containers=False):
+        assign(run, target, join(before, why), frame)

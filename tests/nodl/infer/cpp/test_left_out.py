@@ -1,0 +1,70 @@
+"""Calls that lead to no interface need not run: what they may have changed is not known afterwards."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.nodl.infer.cpp.workspace import gaps, in_class, infer, names
+
+pytest.importorskip("tree_sitter_cpp", reason="the extra cpp is not installed")
+
+MEMBERS = 'std::string topic = "a"; double sum = 0; std::vector<std::string> list = {"a"};'
+MAKES = "create_publisher<std_msgs::msg::String>(topic, 1);"
+
+
+@pytest.fixture(autouse=True)
+def every_size(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Small functions are left out, too."""
+    monkeypatch.setattr("nodl.infer.cpp.running.left_out.LEAST_SIZE", 0)
+
+
+def with_method(method: str, body: str) -> str:
+    return in_class(body, f"{MEMBERS} {method}")
+
+
+def test_a_name_stays_exact_behind_a_call_that_does_not_change_it(tmp_path: Path) -> None:
+    system = infer(tmp_path, with_method("void compute() { sum = sum + 1; }", f"compute(); {MAKES}"))
+    assert (names(system), gaps(system)) == (["a"], [])
+
+
+WRITES = {
+    "the member": 'topic = "b";',
+    "through a reference": 'auto & other = topic; other = "b";',
+    "through a pointer": 'std::string * other = &topic; *other = "b";',
+    "by a method": 'topic.append("b");',
+    "in a function it calls": "further();",
+    "in a closure": 'auto set = [this]() { topic = "b"; }; set();',
+}
+
+
+@pytest.mark.parametrize("body", WRITES.values(), ids=WRITES)
+def test_a_name_that_the_call_may_change_is_never_taken_for_the_earlier_one(
+    body: str, tmp_path: Path
+) -> None:
+    methods = f'void further() {{ topic = "b"; }} void change() {{ {body} }}'
+    system = infer(tmp_path, with_method(methods, f"change(); {MAKES}"))
+    assert names(system) != ["a"] or gaps(system)
+
+
+def test_what_an_argument_holds_afterwards_is_not_the_earlier_value_either(tmp_path: Path) -> None:
+    body = f"change(topic); {MAKES}"
+    system = infer(tmp_path, with_method('void change(std::string & x) { x = "b"; }', body))
+    assert names(system) != ["a"] or gaps(system)
+
+
+LATER = "create_wall_timer(std::chrono::seconds(1), [this]() { tick(); });"
+
+
+def test_a_node_that_a_callback_gives_to_unknown_code_is_a_gap(tmp_path: Path) -> None:
+    tick = "void tick() { foo::attach(shared_from_this()); }"
+    told = gaps(infer(tmp_path, with_method(tick, LATER)))
+    assert any(each.startswith("the node is handed to foo::attach()") for each in told)
+
+
+def test_one_that_it_gives_to_a_function_of_the_program_is_none(tmp_path: Path) -> None:
+    before = "void attach(std::shared_ptr<rclcpp::Node>) {}"
+    tick = "void tick() { attach(shared_from_this()); }"
+    system = infer(tmp_path, in_class(LATER, f"{MEMBERS} {tick}", before=before))
+    assert gaps(system) == []
