@@ -11,7 +11,7 @@ from nodl.infer.cpp.libraries import (
     is_harmless_class,
     is_harmless_function,
 )
-from nodl.infer.cpp.reading.declarations import FileIndex, Function
+from nodl.infer.cpp.reading.declarations import Class, FileIndex, Function
 from nodl.infer.cpp.reading.known_headers import KNOWN_HEADERS, ROS_LIBRARIES
 from nodl.infer.cpp.reading.names import Names
 from nodl.infer.cpp.syntax import (
@@ -105,7 +105,7 @@ def _class_of(names: Names, written: str, function: Function, deliberate: bool) 
     if (
         not kind.name
         or kind.name == "auto"
-        or names.class_of(kind, function.scope, function.file) is not None
+        or names.find_class(kind.name, function.scope, function.file) is not None
     ):
         return False, False
     if kind.name in LIBRARY_CLASSES:
@@ -125,10 +125,20 @@ def _is_unknown_call(names: Names, call: Node) -> bool:
 
 def _may_be_node(names: Names, function: Function) -> bool:
     """Return whether objects of the function's class may be nodes: a base of it is not in reach."""
-    classes = names.classes.get(function.owner.rpartition("::")[2], ())
-    return any(
-        base is None for cls in classes for each in names.ancestry(cls) for _, base in names.bases(each)
-    )
+    waiting = list(names.classes.get(function.owner.rpartition("::")[2], ()))
+    seen: set[Class] = set()
+    while waiting:
+        cls = waiting.pop()
+        if cls in seen:
+            continue
+        seen.add(cls)
+        for written in cls.bases:
+            # Not ``Names.bases``: to look is not to use, and a template that is used is doubted.
+            base = names.find_class(names.resolve(written, cls.scope, cls.file).name, cls.scope, cls.file)
+            if base is None:
+                return True
+            waiting.append(base)
+    return False
 
 
 def _node_among(arguments: Node | None, is_node: bool) -> bool:
