@@ -134,7 +134,9 @@ def test_damaged_certificates_are_read_or_refused(position: int, damage: bytes) 
 def test_a_request_and_a_crl_of_a_version_that_x509_does_not_have_are_refused() -> None:
     request = new_request("ros.a", authority.new_key())
     assert request_key(request, "it").common_name == "ros.a"
-    with pytest.raises(DamagedKeystoreError, match="it is not a certificate request"):
+    # cryptography 3.4, of Ubuntu 22.04, reads it: there its signature is what is wrong.
+    refused = "it is not a certificate request|it is not signed by the key that it is for"
+    with pytest.raises(DamagedKeystoreError, match=refused):
         request_key(with_version(request, b"\x00", b"\x07"), "it")
     crl = IdentityIssuer(_SAMPLE).revocation_list({}, NOW, NOW + DAY, 1)
     assert is_crl(crl) and not is_crl(with_version(crl, b"\x01", b"\x07"))
