@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from nodl.infer.cpp.running.machine import Machine
 
 _BEYOND_VARIABLES = re.compile(
-    r"\w*declare\w*|set_\w*parameter\w*|undeclare\w*|NodeOptions|arguments|init|thread|jthread|async|bind|spin\w*|"
+    r"\w*declare\w*|set_\w*parameter\w*|NodeOptions|arguments|init|thread|jthread|async|bind|spin\w*|"
     r"execute_\w+|handle_(?:message|request|response|loaned_message)|create_\w*timer|add_\w*callback\w*|\w+Listener"
 )
 """Functions that do more than change variables: they declare parameters, keep closures or run callbacks."""
@@ -38,9 +38,8 @@ class CallEffects:
         self._run = run
         own, words = ([of], of.words) if isinstance(of, Function) else ([], words_in(of.node))
         self._of = of
-        self.kept_by: tuple[Cell, bool, bool] | None = (
-            None  # the variable that mattered and was known, the last time
-        )
+        # The variable that mattered and was known the last time; whether it is assigned, and changed.
+        self.kept_by: tuple[Cell, bool, bool] | None = None
         self.functions: frozenset[Function] = frozenset((*own, *Reach(run).from_words(words)))
 
     @cached_property
@@ -140,7 +139,7 @@ def _taken(run: Machine, callee: str, index: int) -> int:
 
 def _taken_by(run: Machine, function: Function, index: int) -> int:
     if index >= len(function.parameters):
-        return _CHANGED if function.variadic else _AS_A_VALUE
+        return _CHANGED  # somebody else's function of the same name
     parameter = function.parameters[index]
     if not parameter.written_back:
         return _AS_A_VALUE
