@@ -43,8 +43,8 @@ def infer_executable(
 ) -> InferredExecutable:
     """Return the nodes that ``executable`` of an installed package creates; gaps are attached to them.
 
-    Compiled programs and components are read from ``sources``, in the light of what launch gives them (``start_of``);
-    ``compiled_only``: those of Python, which are read anew each time, are left alone.
+    Compiled programs and components are read from ``sources``; all under what launch gives them (``start_of``).
+    ``compiled_only``: programs in Python, which are read anew each time, are left alone.
     """
     if executable is None:
         return _compiled(package, None, plugin, sources, start_of, f"component {plugin} is compiled code")
@@ -61,7 +61,7 @@ def infer_executable(
         return InferredExecutable((), f"{path} is a Python program")
     from nodl.infer.python_executable import infer_python
 
-    return InferredExecutable(*infer_python(path, package, executable, prefixes))
+    return InferredExecutable(*infer_python(path, package, executable, prefixes, start_of))
 
 
 def infer_plugin(

@@ -11,13 +11,13 @@ import configparser
 import glob
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 from enclave_common.files import read_text
 from nodl.infer.cache import CachedAnswer
 from nodl.infer.program import Program, ProgramTarget
-from nodl.infer.start import LaunchKey
-from nodl.node_interface import NodeInterface
+from nodl.infer.start import InferredProgram, LaunchedNode, LaunchKey, Start
+from nodl.node_interface import Gap, NodeInterface
 
 _SITE_PATTERNS = (
     "lib/python3*/site-packages",
@@ -31,24 +31,39 @@ _DEVELOPED = re.compile(r"^__file__ = ['\"](.+)['\"]$", re.MULTILINE)
 
 
 def infer_python(
-    path: str, package: str, executable: str, prefixes: Sequence[str]
-) -> tuple[tuple[NodeInterface, ...], str]:
+    path: str, package: str, executable: str, prefixes: Sequence[str], start: Start | None
+) -> tuple[tuple[NodeInterface, ...], str, bool]:
     """Return the nodes that the program at ``path`` creates, with its gaps; without any, why none was found.
 
-    The answer of an earlier run is taken where nothing that it was made from has changed.
+    Parameters stay open, for each start of the program to fill in. Where their values decide more than that can say,
+    the program is read once more with those of ``start``; the last item is then True. The answer of an earlier run is
+    taken where nothing that it was made from has changed.
     """
     finder = _Finder(prefixes)
     target = finder.target(path, package, executable)
-    cached = CachedAnswer(finder.program, (path, package, executable, target))
-    known = cached.find()
-    if known is not None:
-        interfaces, why = known
-        return interfaces, why
-    from nodl.infer.analysis import infer_program  # the whole analysis of Python comes with it
 
-    answer = infer_program(finder.program, target, path, LaunchKey(package, executable))
-    cached.store(answer)
-    return answer
+    def answered(launched: Mapping[str, LaunchedNode], lost: tuple[Gap, ...] | None) -> InferredProgram:
+        said = [(name, sorted(each.parameters.items()), each[1:]) for name, each in launched.items()]
+        cached = CachedAnswer(finder.program, (path, package, executable, target, said))
+        answer: InferredProgram | None = cached.find()
+        if answer is None:
+            from nodl.infer.analysis import infer_program  # the whole analysis of Python comes with it
+
+            answer = infer_program(
+                finder.program, target, path, LaunchKey(package, executable), launched, lost
+            )
+            cached.store(answer)
+        return answer
+
+    found = answered({}, None)
+    if start is None or not found.asks_launch:
+        return found.interfaces, found.why, False
+    names = dict.fromkeys(node.name for node in found.interfaces if node.name is not None)
+    launched = {name: LaunchedNode(start.parameters(name), *start.final_name(name)) for name in names}
+    settled = answered(launched, found.lost)
+    if not settled.interfaces or settled.open_places > found.open_places:
+        return found.interfaces, found.why, False
+    return settled.interfaces, "", True
 
 
 class _Finder:

@@ -1,9 +1,12 @@
-"""What a launch decides about the nodes of one program that it starts, as inference may ask. Pure."""
+"""What a launch decides about the nodes of one program that it starts, as inference may ask, and the answer. Pure."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import NamedTuple, Protocol
+
+from nodl.name_template import UnknownPart
+from nodl.node_interface import Gap, NodeInterface
 
 
 class LaunchKey(NamedTuple):
@@ -12,6 +15,14 @@ class LaunchKey(NamedTuple):
     package: str | None = None
     executable: str | None = None
     plugin: str | None = None
+
+
+class LaunchedNode(NamedTuple):
+    """What one launch makes of a node: the parameters that it sets, final name and namespace."""
+
+    parameters: Mapping[str, object]
+    name: str | None
+    namespace: str | None
 
 
 class Start(Protocol):
@@ -24,3 +35,22 @@ class Start(Protocol):
     def final_name(self, node: str | None) -> tuple[str | None, str | None]:
         """Name and namespace under the rules of the launch."""
         ...
+
+
+class InferredProgram(NamedTuple):
+    """The nodes of a program, with its gaps; ``why`` there are none.
+
+    ``asks_launch``: with the parameters of a launch more may be known. ``lost``: the net's gaps, also in the nodes.
+    """
+
+    interfaces: tuple[NodeInterface, ...]
+    why: str = ""
+    asks_launch: bool = False
+    lost: tuple[Gap, ...] = ()
+
+    @property
+    def open_places(self) -> int:
+        """How much is not known: gaps, and names that are not known in full."""
+        gaps = sum(len(node.gaps) for node in self.interfaces)
+        names = (each.name for node in self.interfaces for each in node.endpoints)
+        return gaps + sum(any(isinstance(part, UnknownPart) for part in name.parts) for name in names)

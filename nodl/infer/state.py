@@ -338,10 +338,11 @@ class Allocations:
             found = self._tuples[key] = (Sequence("tuple", Items(parts)),)
         return found
 
-    def sequence(self, node: ast.AST, kind: str, items: Items) -> Value:
+    def sequence(self, node: ast.AST, kind: str, items: Items, key: str = "") -> Value:
+        """Return a sequence made at ``node``; ``key`` tells several of a kind apart."""
         if kind == "tuple" and items.exact is not None:
             return self.tuple_of(items.exact)
-        obj = self.allocate(node, kind, lambda: Sequence(kind, items))
+        obj = self.allocate(node, key or kind, lambda: Sequence(kind, items))
         if obj.summary:
             self.state.store(obj, "[items]", (items,))
         return (obj,)

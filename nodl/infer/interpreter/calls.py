@@ -7,6 +7,7 @@ import functools
 
 from nodl.infer.interpreter.conditions import under
 from nodl.infer.interpreter.define import (
+    enumeration_members,
     foreign_bases,
     functions_of,
     is_enumeration,
@@ -18,9 +19,11 @@ from nodl.infer.interpreter.define import (
 from nodl.infer.interpreter.loops import fixpoint
 from nodl.infer.interpreter.run import MAX_DEPTH, Arguments, Call, Frame, FunctionEntry, Run
 from nodl.infer.models import foreign
+from nodl.infer.text import constant_text
 from nodl.infer.values import (
     ANY,
     BOTTOM,
+    CONSTANTS,
     NONE,
     OTHER,
     BoundMethod,
@@ -36,6 +39,7 @@ from nodl.infer.values import (
     Partial,
     Value,
     join,
+    sole,
     unknown,
     widen,
 )
@@ -226,12 +230,29 @@ def _keywords(run: Run, node: ast.AST, given: Arguments, used: set[str]) -> Valu
     return (obj,)
 
 
+def _member_by_value(run: Run, cls: ClassValue, call: Call) -> Value:
+    """Return the member with a value that is known; unknown where a method of the class may decide."""
+    given = constant_text(sole(call.args.at(0)))
+    members = enumeration_members(run, cls)
+    values = [constant_text(sole(member.cells["value"])) for member in members]
+    decides = any(not _DECIDE_MEMBERS.isdisjoint(base.cells) for base in program_classes(cls))
+    if all(isinstance(each, CONSTANTS) for each in (given, *values)) and not decides:
+        found = (member for member, value in zip(members, values, strict=True) if value == given)
+        first = next(found, None)
+        if first is not None:
+            return (first,)
+    return unknown("a member of an enumeration that is looked up by its value")
+
+
+_DECIDE_MEMBERS = frozenset({"_missing_", "__new__", "__init__", "__eq__", "_generate_next_value_"})
+
+
 def instantiate(run: Run, cls: ClassValue, call: Call) -> Value:
     """Return a new object: its constructor is the first one in the method resolution order."""
     for base in program_classes(cls):
         run.instantiated.setdefault(base.node)
     if is_enumeration(cls):
-        return unknown("a member of an enumeration that is looked up by its value")
+        return _member_by_value(run, cls, call)
     made = _made_by_new(run, cls, call)
     if made is not None:
         return made

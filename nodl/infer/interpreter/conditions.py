@@ -18,6 +18,7 @@ from nodl.infer.interpreter.run import Frame, Run
 from nodl.infer.text import (
     Guard,
     Input,
+    NodePart,
     Text,
     TextAtom,
     constant_text,
@@ -202,12 +203,29 @@ def sides_of(
 ) -> tuple[Guard | None, list[Callable[[], T]]]:
     """Return what ``test`` asks of a parameter, and ``action`` for either outcome, under what is certain then."""
     held = {holds: conditions_of(run, test, holds, frame) for holds in (True, False)}
+    if not all(held.values()) and _reads_parameter(run, test, frame):
+        run.asks_launch = True
 
     def side(holds: bool) -> T:
         narrowed(run, test, holds, frame)
         return under(run, held[holds], partial(action, holds))
 
     return condition_of(run, test, frame), [partial(side, True), partial(side, False)]
+
+
+def _reads_parameter(run: Run, test: ast.expr, frame: Frame) -> bool:
+    """Return whether a variable, a field or a call in ``test`` gives what a parameter or the node's name decides."""
+    parts = (part for part in ast.walk(test) if isinstance(part, ast.Name | ast.Attribute | ast.Call))
+    return any(is_of_launch(atom) for part in parts if _may_ask(part) for atom in _answer(run, part, frame))
+
+
+def is_of_launch(atom: object) -> bool:
+    """Return whether a launch decides a text: it has a parameter in it, or what the node is called."""
+    pieces = atom.pieces if isinstance(atom, Text) else ()
+    return any(
+        isinstance(piece, NodePart) or (isinstance(piece, Input) and isinstance(piece.owner, NodeRecord))
+        for piece in pieces
+    )
 
 
 def where_either(first: tuple[Guard, ...], second: tuple[Guard, ...]) -> tuple[Guard, ...]:

@@ -6,7 +6,7 @@ import ast
 import sys
 from functools import partial
 
-from nodl.infer.interpreter.conditions import is_parameter, only_if
+from nodl.infer.interpreter.conditions import is_of_launch, is_parameter, only_if
 from nodl.infer.interpreter.define import enumeration_members, is_constant, is_enumeration, setter_of
 from nodl.infer.interpreter.formatting import is_whole_number
 from nodl.infer.interpreter.run import Arguments, Frame, Run
@@ -139,6 +139,7 @@ def dictionary_item(run: Run, obj: Dictionary, key: Value, node: ast.AST, frame:
         everywhere = everywhere and certain
         everything = everything or not (held or is_constant(atom))
     if everything:
+        run.asks_launch = run.asks_launch or any(map(is_of_launch, key))
         run.spend(len(obj.cells))
         result = join(result, values_of(obj).any_element())
         everywhere = False
@@ -259,7 +260,8 @@ EDITED = unknown("an element of a list that is edited while that is undecided")
 
 def assign(run: Run, target: ast.expr, value: Value, frame: Frame) -> None:
     """Bind ``value`` to a name, field or element, or take it apart for a tuple or list of targets."""
-    if any(type(atom) is Sequence and atom.kind == LAZY for atom in value):
+    at_once = isinstance(target, ast.Tuple | ast.List)
+    if not at_once and any(type(atom) is Sequence and atom.kind == LAZY for atom in value):
         value = _stored(run, value, target)
     if isinstance(target, ast.Name):
         run.assign_name(target.id, value, frame)

@@ -7,13 +7,14 @@ or callable stands in the tables handed in (``Tables``), so that each concern ha
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from typing import Any, NamedTuple
 
 from nodl.infer.findings import Findings, OptionDefaults
 from nodl.infer.packages import find_package
 from nodl.infer.program import Program, SourceModule
+from nodl.infer.start import LaunchedNode
 from nodl.infer.state import Allocations, ProgramState
 from nodl.infer.text import Guard, Text
 from nodl.infer.values import (
@@ -230,6 +231,10 @@ class Run(Allocations):
         self.recursions: dict[ast.AST, Any] = {}  # functions that are calling themselves
         self.since_recursion = 0  # how many calls surround the innermost of these
         self.options = OptionDefaults()
+        self.launched: Mapping[
+            str, LaunchedNode
+        ] = {}  # by the name in the source; empty: parameters stay open
+        self.asks_launch = False  # the value of a parameter decides more than conditions on names can say
         self.settle: Callable[[Run], None] = lambda run: None  # runs the callbacks; set by who drives the run
         self.guards: tuple[Guard, ...] = ()  # of parameters, that hold at the current point
         self.guards_at_end: tuple[Guard, ...] = ()  # of the latest block
@@ -342,6 +347,7 @@ class Run(Allocations):
 
         ``since``: it does so at any time since this mark of the state, and not only where the program waits.
         """
+        self.asks_launch = self.asks_launch or bool(self.guards)  # which its interfaces do not have
         for atom in value:
             if isinstance(atom, (FunctionValue, BoundMethod, Partial, ClassMethod)):
                 if since is not None:

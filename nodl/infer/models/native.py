@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
+from nodl.infer.interpreter.conditions import is_of_launch
 from nodl.infer.interpreter.define import is_constant
 from nodl.infer.interpreter.elements import (
     change,
@@ -171,6 +172,7 @@ def _get(run: Run, owner: Dictionary, call: Call) -> Value:
         missing = missing or not certain
         found = join(found, held)
         if not held and not is_constant(atom):
+            run.asks_launch = run.asks_launch or is_of_launch(atom)
             found = join(found, values_of(owner).any_element())
     found = with_other_entries(owner, found)
     if missing or owner.is_open:

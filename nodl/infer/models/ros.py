@@ -25,6 +25,7 @@ from nodl.infer.models.signatures import (
     Helper,
     library_node,
 )
+from nodl.infer.start import LaunchedNode
 from nodl.infer.text import (
     Guard,
     Input,
@@ -41,6 +42,7 @@ from nodl.infer.values import (
     ABSENT,
     ANY,
     BOTTOM,
+    CONSTANTS,
     NONE,
     OTHER,
     OTHER_KEYS,
@@ -58,6 +60,7 @@ from nodl.infer.values import (
     join_all,
     present,
     result_of,
+    sole,
     unknown,
 )
 from nodl.name_template import ONLY_IF_UNSET
@@ -328,7 +331,19 @@ def _callback_method(name: str) -> NodeMethod:
 
 
 def _own_name(what: str) -> NodeMethod:
-    return lambda run, record, call: (make_text((NodePart(what),)),)
+    def method(run: Run, record: NodeRecord, call: Call) -> Value:
+        launched = _launched(run, record)
+        if (
+            launched is None
+            or launched.name is None
+            or launched.namespace is None
+            or record.namespaces != NONE
+        ):
+            return (make_text((NodePart(what),)),)
+        full = f"{launched.namespace.rstrip('/')}/{launched.name}"
+        return ({"name": launched.name, "namespace": launched.namespace}.get(what, full),)
+
+    return method
 
 
 def _resolved_name(run: Run, record: NodeRecord, call: Call) -> Value:
@@ -379,7 +394,7 @@ def _declare_parameter(run: Run, record: NodeRecord, call: Call) -> Value:
         if ignored is not False:  # what launch says does not count, or perhaps not
             record.assigned[name] = default
             run.state.write(record.cells, name, join(default or NONE, BOTTOM if ignored else ABSENT))
-    return parameter_object(run, call, call.args.at(0, "name") or ANY, _inputs(run, record, names))
+    return parameter_object(run, call, call.args.at(0, "name") or ANY, _inputs(run, record, names, call))
 
 
 def _default_value(default: Value | None) -> Value:
@@ -389,7 +404,7 @@ def _default_value(default: Value | None) -> Value:
     return tuple(atom for atom in default if atom is not None)
 
 
-def _inputs(run: Run, record: NodeRecord, names: list[str]) -> Value:
+def _inputs(run: Run, record: NodeRecord, names: list[str], call: Call) -> Value:
     """Return the values of parameters: what the program set them to, else what launch and the defaults say."""
     if not names:
         return unknown("a parameter whose name is not known")
@@ -397,7 +412,12 @@ def _inputs(run: Run, record: NodeRecord, names: list[str]) -> Value:
     for name in names:
         held = record.cells.get(name, ABSENT)
         result = join(result, present(held))
-        if ABSENT[0] in held:
+        if ABSENT[0] not in held:
+            continue
+        settled = _settled(run, record, name, call)
+        if settled:
+            result = join(result, settled)
+        else:
             asked, declared = Input(name, record), record.default(name)
             unset = Guard(asked, *ONLY_IF_UNSET)
             others = [
@@ -409,23 +429,51 @@ def _inputs(run: Run, record: NodeRecord, names: list[str]) -> Value:
     return result
 
 
+def _launched(run: Run, record: NodeRecord) -> LaunchedNode | None:
+    """Return what the launch makes of the node, ``None`` if that is open; nothing of one that does not listen."""
+    name = sole(record.names)
+    if not isinstance(name, str) or record.arguments or run.findings.global_arguments:
+        return None
+    if run.launched and record.use_global_arguments == (False,):
+        return LaunchedNode({}, None, None)
+    return run.launched.get(name) if record.use_global_arguments == (True,) else None
+
+
+def _settled(run: Run, record: NodeRecord, name: str, call: Call) -> Value:
+    """Return the value of a parameter in this launch, else its default; nothing where it stays open."""
+    launched = _launched(run, record)
+    if launched is None:
+        return BOTTOM
+    if name not in launched.parameters:
+        return record.default(name)
+    given = launched.parameters[name]
+    if isinstance(given, list | tuple):
+        items = Items(tuple((each,) for each in given))
+        return run.sequence(call.node, "list", items, f"parameter {name} of {record.source}")
+    return (given,) if isinstance(given, CONSTANTS) else BOTTOM
+
+
 def _declare_parameters(run: Run, record: NodeRecord, call: Call) -> Value:
     prefixes = constant_strings(call.args.at(0, "namespace") or ANY) or [""]
     listed = call.args.at(1, "parameters") or ANY
-    found: Value = BOTTOM
+    found: list[Value] = []
+    known = len(prefixes) == 1
     for entry in _entries(run, listed, call):
         parts = elements(run, entry, call.node, call.frame)
         if parts.exact is None or not parts.exact:
             run.findings.gap(call.source, "the list of declared parameters is not known")
+            known = False
             continue
         default = parts.exact[1] if len(parts.exact) > 1 else None
-        for name in constant_strings(parts.exact[0]):
-            for prefix in prefixes:
-                full = f"{prefix}.{name}" if prefix else name
-                record.declare(full, _default_value(default))
-                value = _inputs(run, record, [full])
-                found = join(found, parameter_object(run, call, (full,), value, full))
-    return run.sequence(call.node, "list", Items(None, found or ANY))
+        names = constant_strings(parts.exact[0])
+        known = known and len(names) == 1
+        for full in (f"{prefix}.{name}" if prefix else name for name in names for prefix in prefixes):
+            record.declare(full, _default_value(default))
+            value = _inputs(run, record, [full], call)
+            found.append(parameter_object(run, call, (full,), value, full))
+    exact = known and elements(run, listed, call.node, call.frame).exact is not None
+    items = Items(tuple(found)) if exact else Items(None, join_all(found) or ANY)
+    return run.sequence(call.node, "list", items)
 
 
 def _entries(run: Run, value: Value, call: Call) -> list[Value]:
@@ -434,7 +482,9 @@ def _entries(run: Run, value: Value, call: Call) -> list[Value]:
 
 
 def _get_parameter(run: Run, record: NodeRecord, call: Call) -> Value:
-    return parameter_object(run, call, call.args.at(0, "name") or ANY, _inputs(run, record, _names(call)))
+    return parameter_object(
+        run, call, call.args.at(0, "name") or ANY, _inputs(run, record, _names(call), call)
+    )
 
 
 def _get_parameters(run: Run, record: NodeRecord, call: Call) -> Value:
@@ -442,7 +492,9 @@ def _get_parameters(run: Run, record: NodeRecord, call: Call) -> Value:
     if names is None:
         return ANY
     found = (
-        parameter_object(run, call, each, _inputs(run, record, constant_strings(each)), f"parameter {index}")
+        parameter_object(
+            run, call, each, _inputs(run, record, constant_strings(each), call), f"parameter {index}"
+        )
         for index, each in enumerate(names)
     )
     return run.sequence(call.node, "list", Items(tuple(found)))
@@ -460,7 +512,7 @@ def _get_parameters_by_prefix(run: Run, record: NodeRecord, call: Call) -> Value
         run.state.store(found, OTHER_KEYS, join(found.cells.get(OTHER_KEYS, BOTTOM), keys))
         for name in record.parameters:
             if name.startswith(start):
-                held = parameter_object(run, call, (name,), _inputs(run, record, [name]), name)
+                held = parameter_object(run, call, (name,), _inputs(run, record, [name], call), name)
                 run.state.store(found, Key(name.removeprefix(start)), held)
     return (found,) if OTHER in found.cells else unknown("parameters below a prefix that is not known")
 
@@ -471,7 +523,7 @@ def _get_parameter_or(run: Run, record: NodeRecord, call: Call) -> Value:
     default = join_all(present(other.cells.get("value", BOTTOM)) for other in others)
     for name in names:
         record.declare(name, _default_value(default or None))
-    return parameter_object(run, call, call.args.at(0, "name") or ANY, _inputs(run, record, names))
+    return parameter_object(run, call, call.args.at(0, "name") or ANY, _inputs(run, record, names, call))
 
 
 def _set_parameters(run: Run, record: NodeRecord, call: Call) -> Value:

@@ -6,13 +6,13 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from nodl.infer import analysis, infer_executable
 from nodl.infer.cache import own_sources
 from nodl.infer.program import Program, ProgramTarget
-from nodl.infer.start import LaunchKey
 
 PROGRAM = """\
 #!/usr/bin/python3
@@ -58,9 +58,9 @@ def analyses(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     seen: list[str] = []
     really = analysis.infer_program
 
-    def infer_program(program: Program, target: ProgramTarget, path: str, origin: LaunchKey) -> object:
+    def infer_program(program: Program, target: ProgramTarget, path: str, *others: Any) -> object:
         seen.append(path)
-        return really(program, target, path, origin)
+        return really(program, target, path, *others)
 
     monkeypatch.setattr(analysis, "infer_program", infer_program)
     return seen

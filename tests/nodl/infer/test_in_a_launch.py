@@ -335,3 +335,104 @@ def test_options_of_the_command_line_decide_which_interfaces_there_are(
 def test_a_flag_that_another_spelling_may_give_is_open(launch: Launch, prefix: Path) -> None:
     install_program(prefix, PYTHON + OPTIONS, "flags")
     assert launch('<launch><node pkg="demo" exec="flags" args="-r"/></launch>').problems
+
+
+DECIDED = """
+from enum import Enum
+import rclpy
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from std_msgs.msg import String
+
+class Kind(Enum):
+    ARM = "arm"
+    HAND = "hand"
+
+JOINTS = {"arm": 2, "hand": 1}
+
+class Decided(Node):
+    def __init__(self):
+        super().__init__("decided")
+        kind = Kind(self.declare_parameter("kind", "arm").value)
+        if self.declare_parameter("rate", 10.0).value > 20.0:
+            self.publish("fast")
+        if kind is Kind.HAND:
+            self.publish("grip")
+        for i in range(JOINTS[kind.value]):
+            self.publish(f"{kind.value}/joint_{i + 1}")
+        me = self.get_namespace().strip("/")
+        for robot in self.declare_parameter("robots", ["r1", "r2"]).value:
+            if robot != me:
+                self.publish(f"/{robot}/inbox")
+        if not self.declare_parameter("listen", True).value:
+            self.create_timer(1.0, lambda: self.publish("polled"))
+        if self.declare_parameter("mode", "idle").value == "auto":
+            self.set_parameters([Parameter("mode", value="manual")])
+        if self.get_parameter("mode").value == "manual":
+            self.publish("manual")
+
+    def publish(self, topic):
+        self.create_publisher(String, topic, 10)
+
+rclpy.init()
+rclpy.spin(Decided())
+"""
+
+
+@pytest.mark.parametrize(
+    ("given", "published"),
+    [
+        ({}, {"/r1/arm/joint_1", "/r1/arm/joint_2", "/r2/inbox"}),
+        ({"rate": "20.0"}, {"/r1/arm/joint_1", "/r1/arm/joint_2", "/r2/inbox"}),
+        ({"rate": "20.5"}, {"/r1/fast", "/r1/arm/joint_1", "/r1/arm/joint_2", "/r2/inbox"}),
+        ({"kind": "hand"}, {"/r1/grip", "/r1/hand/joint_1", "/r2/inbox"}),
+        ({"robots": "[r3, r1]"}, {"/r1/arm/joint_1", "/r1/arm/joint_2", "/r3/inbox"}),
+        ({"listen": "false"}, {"/r1/arm/joint_1", "/r1/arm/joint_2", "/r2/inbox", "/r1/polled"}),
+        ({"mode": "manual"}, {"/r1/arm/joint_1", "/r1/arm/joint_2", "/r2/inbox", "/r1/manual"}),
+        ({"mode": "auto"}, {"/r1/arm/joint_1", "/r1/arm/joint_2", "/r2/inbox", "/r1/manual"}),
+    ],
+)
+def test_parameters_of_the_launch_decide_what_a_program_makes(
+    given: dict[str, str], published: set[str], launch: Launch, prefix: Path
+) -> None:
+    """Comparisons of numbers, look-ups in tables and enumerations, elements of lists, callbacks under a condition."""
+    install_program(prefix, PYTHON + DECIDED, "decided")
+    params = "".join(f'<param name="{name}" value="{value}"/>' for name, value in given.items())
+    plan = launch(
+        f'<launch><node pkg="demo" exec="decided" namespace="r1">{params}</node></launch>',
+        accept_patterns=False,
+    )
+    assert not plan.problems
+    own = {name for operation, name in permissions(plan) if operation == "publish"}
+    assert own - {"/rosout", "/parameter_events"} == published
+
+
+def test_each_start_of_a_program_has_the_interfaces_of_its_own_parameters(
+    launch: Launch, prefix: Path
+) -> None:
+    install_program(prefix, PYTHON + DECIDED, "decided")
+    plan = launch(
+        '<launch><node pkg="demo" exec="decided" name="one" namespace="a"><param name="kind" value="hand"/></node>'
+        '<node pkg="demo" exec="decided" name="two" namespace="b"/></launch>',
+        enclave_scope="node",
+    )
+    granted = {
+        enclave: {rule.expression for rule in rules} for enclave, rules in plan.derived.reasons.items()
+    }
+    hands = {enclave for enclave, names in granted.items() if any("grip" in name for name in names)}
+    arms = {enclave for enclave, names in granted.items() if any("joint_2" in name for name in names)}
+    assert len(granted) == 2 and len(hands) == 1 and len(arms) == 1 and not hands & arms
+
+
+@pytest.mark.parametrize(
+    ("node", "fast"),
+    [("", True), (", use_global_arguments=False", False), (", cli_args=['--ros-args']", None)],
+)
+def test_parameters_of_the_launch_decide_for_a_node_that_listens_to_it(
+    node: str, fast: bool | None, launch: Launch, prefix: Path
+) -> None:
+    """What arguments in code do to the launch's parameters is not followed: nothing is decided then."""
+    install_program(prefix, PYTHON + DECIDED.replace('"decided")', f'"decided"{node})'), "decided")
+    plan = launch('<launch><node pkg="demo" exec="decided"><param name="rate" value="30.0"/></node></launch>')
+    assert bool(plan.problems) is (fast is None)
+    assert (("publish", "/fast") in permissions(plan)) is (fast is not False)
