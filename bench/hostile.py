@@ -13,8 +13,8 @@ from typing import Any
 from enclave_common.shell_words import split_words
 from enclave_common.terminal import json_text, printable_lines
 from enclave_common.yaml_reader import load_yaml
+from enclave_launch.description.markup.xml import parse_launch_xml
 from enclave_launch.frontend.substitution_grammar import parse_template
-from enclave_launch.frontend.xml_tree import parse_launch_xml
 from enclave_launch.ros_rules.parameter_file import sections_of_text
 from enclave_launch.ros_rules.rcl_parameters import section_applies
 from keystore.formats.governance_yaml import parse_governance_yaml

@@ -20,7 +20,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from enclave_launch.recording.build import recorder_library, with_recorder
+from enclave_launch.recording.programs import recorder_library, with_recorder
 from tests.recording.stand_in_launch import Program, asks, build_stand_in, make_workspace
 
 ROOT = Path(__file__).resolve().parent.parent

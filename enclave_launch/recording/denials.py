@@ -16,10 +16,9 @@ from enclave_common.words import some_of
 from enclave_launch.admission.middleware import ZENOH
 from enclave_launch.plan import LaunchPlan
 from enclave_launch.recording.grants import WORDS, Description, Need, PlannedGrants
-from enclave_launch.recording.patches import Patch
 from enclave_launch.recording.reasons import MIXED_MIDDLEWARES, NOT_AS_PLANNED, Cause, cause_of
 from enclave_launch.recording.recording import Listener
-from enclave_launch.recording.remedies import Remedies
+from enclave_launch.recording.remedies import Patch, Remedies
 from enclave_launch.runtime.run_events import ProcessOutput, RunEvent
 from nodl.record.assembly import RecordedNode, RecordedProcess
 from nodl.record.lines import EndpointMade, Initialised, Line, NodeMade

@@ -1,4 +1,8 @@
-"""Programs that the recorder cannot get into, and those that need care: reported before they start. Reads their heads.
+"""The recorder as a shared library, and the programs that it cannot get into, known by their heads.
+
+It is built by the system's C compiler on first use and kept in the user's cache, under the hash of its source. It gets
+into a process by the environment, behind what a launch file puts into ``LD_PRELOAD`` itself; a program built with the
+dynamic runtime of AddressSanitizer ends at once unless that runtime is the first library of all.
 
 ``ld.so`` ignores LD_PRELOAD without a word for programs that gain privileges; a static program has no ``ld.so``; some
 programs start others with a cleaned environment (man 8 ld.so, ELF specification).
@@ -6,13 +10,21 @@ programs start others with a cleaned environment (man 8 ld.so, ELF specification
 
 from __future__ import annotations
 
+import hashlib
 import os
+import platform
+import re
 import shutil
 import stat
 import struct
-from collections.abc import Iterator, Sequence
+import subprocess
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
+from pathlib import Path
 from typing import BinaryIO, NamedTuple
+
+from enclave_launch.errors import RuntimeFailure
 
 _LOAD, _DYNAMIC, _INTERPRETER = 1, 2, 3  # p_type
 _NEEDED, _STRING_TABLE = 1, 5  # d_tag
@@ -153,3 +165,69 @@ def _needed(file: BinaryIO, segments: Sequence[_Segment], wide: bool, order: str
             file.seek(offset + value)
             names.append(os.fsdecode(file.read(256).split(b"\0")[0]))
     return names
+
+
+RECORD_VARIABLE = "ENCLAVE_LAUNCH_RECORD"
+PRELOAD = "LD_PRELOAD"
+SOURCE = Path(__file__).with_name("recorder.c")
+_FLAGS = ("-std=gnu11", "-shared", "-fPIC", "-O2", "-Wl,-z,now")
+
+
+def recorder_library() -> Path:
+    """Return the path of the library, built if needed; raises ``RuntimeFailure`` if that is not possible."""
+    text = SOURCE.read_bytes() + " ".join(_FLAGS).encode()
+    wanted = _cache() / f"recorder-{hashlib.sha256(text).hexdigest()[:16]}-{platform.machine()}.so"
+    if not _is_ours(wanted):
+        _build(wanted)
+    return wanted
+
+
+def _cache() -> Path:
+    base = os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")
+    if not os.path.isabs(base):
+        raise RuntimeFailure("there is no folder for the recorder: no home directory; set XDG_CACHE_HOME")
+    return Path(base, "enclave-launch")
+
+
+def _is_ours(path: Path) -> bool:
+    """Return True if nobody else can have written it: every process of a launch loads it."""
+    try:
+        status = path.stat()
+    except OSError:
+        return False
+    others_may_write = status.st_mode & (stat.S_IWGRP | stat.S_IWOTH)
+    return status.st_uid == os.geteuid() and not others_may_write
+
+
+def _build(wanted: Path) -> None:
+    compiler = os.environ.get("CC") or "cc"
+    if shutil.which(compiler) is None:
+        raise RuntimeFailure(
+            f"recording needs a C compiler ('{compiler}' is not there): install one (apt install gcc libc6-dev); or "
+            f"take {wanted.name} from ~/.cache/enclave-launch on a machine of this kind that has recorded once, with "
+            f"this version of enclave-launch, and put it into {wanted.parent}; or launch without recording"
+        )
+    try:
+        wanted.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
+        with tempfile.TemporaryDirectory(dir=wanted.parent) as folder:
+            built = Path(folder, wanted.name)
+            command = [compiler, *_FLAGS, "-o", str(built), str(SOURCE), "-ldl"]
+            run = subprocess.run(command, capture_output=True, text=True, check=False, timeout=60)
+            if run.returncode != 0:
+                raise RuntimeFailure(
+                    f"the recorder cannot be built: {' '.join(command)}: {run.stderr.strip()}"
+                )
+            built.chmod(0o755)
+            built.rename(wanted)
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise RuntimeFailure(f"the recorder cannot be built in {wanted.parent}: {error}") from error
+
+
+def with_recorder(
+    environment: Mapping[str, str], library: str, record: str, sanitizer: str | None = None
+) -> dict[str, str]:
+    """Return ``environment`` with the recorder, behind the ``sanitizer`` that must come first."""
+    present = [name for name in re.split(r"[ :]+", environment.get(PRELOAD, "")) if name]
+    first = [sanitizer] if sanitizer and not any("libasan" in name for name in present) else []
+    others = [name for name in present if name != library]
+    return {**environment, PRELOAD: ":".join([*first, *others, library]), RECORD_VARIABLE: record}

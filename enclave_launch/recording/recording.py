@@ -20,9 +20,13 @@ from typing import NamedTuple
 from enclave_launch.errors import RuntimeFailure
 from enclave_launch.policy.program_inputs import own_words
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
-from enclave_launch.recording.build import RECORD_VARIABLE, recorder_library, with_recorder
 from enclave_launch.recording.markers import Marked, MarkerRun
-from enclave_launch.recording.programs import inspect_command
+from enclave_launch.recording.programs import (
+    RECORD_VARIABLE,
+    inspect_command,
+    recorder_library,
+    with_recorder,
+)
 from enclave_launch.recording.record_files import RecordFiles
 from enclave_launch.runtime.companion import LaunchControl
 from enclave_launch.runtime.process_tree import ProcessSpec

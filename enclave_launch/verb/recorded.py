@@ -5,9 +5,15 @@ what they request with its plan.
 from __future__ import annotations
 
 import argparse
+import ctypes
+import fcntl
 import os
+import random
+import socket
+import struct
 import sys
 from collections.abc import Callable
+from enum import Enum
 from pathlib import Path
 
 from enclave_common.dependencies import installed
@@ -19,7 +25,6 @@ from enclave_launch.flow import run
 from enclave_launch.options import RunSettings
 from enclave_launch.plan import LaunchPlan
 from enclave_launch.recording.audit import Audit, audit_json, audit_text
-from enclave_launch.recording.isolation import DEVICES_STAY_REAL, isolate
 from enclave_launch.recording.learning import (
     RECORDS,
     LearntFolder,
@@ -115,3 +120,89 @@ def audit_launch(plan: LaunchPlan, options: argparse.Namespace, settings: RunSet
         ):
             write_text(options.audit_report, audit_json(report))
     return status or report.exit_status
+
+
+_NEW_USER, _NEW_NET = 0x10000000, 0x40000000  # linux/sched.h
+_GET_FLAGS, _SET_FLAGS, _UP = 0x8913, 0x8914, 0x1  # linux/sockios.h, linux/if.h
+# Those whose ports lie below the ephemeral ones (ROS 2 documentation, ROS_DOMAIN_ID).
+_DOMAINS = range(1, 101)
+
+DEVICES_STAY_REAL = "motors, sensors and device files are not isolated: what the nodes do to them is real"
+
+
+class Isolation(str, Enum):
+    """What keeps a launch apart; the value is the text for a reader."""
+
+    NAMESPACE = "network namespace"
+    LOCAL = "discovery on this machine only, in a DDS domain of its own"
+    NONE = "nothing: it communicates with other nodes of its domain"
+
+
+def isolate(wanted: str = "auto") -> Isolation:
+    """Isolate this process from other robots and other nodes of this machine, and return what was done.
+
+    A learning run is real and unsecured. A network namespace of its own keeps everything in but devices; if that is not
+    allowed, or nodes need the network, discovery stays on this machine, in a DDS domain that nobody else uses. Call it
+    before any thread or process is started.
+    """
+    if wanted == "none":
+        return Isolation.NONE
+    if wanted == "auto" and _a_child_can() and _enter_namespace():
+        return Isolation.NAMESPACE
+    os.environ.update(local_discovery(os.environ.get("ROS_DOMAIN_ID", "0")))
+    os.environ.pop("ROS_STATIC_PEERS", None)  # a peer that is named here is talked to all the same
+    return Isolation.LOCAL
+
+
+def local_discovery(domain_in_use: str) -> dict[str, str]:
+    """Return variables for all releases: the first one since iron, the second one before."""
+    others = [str(domain) for domain in _DOMAINS if str(domain) != domain_in_use]
+    return {
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        "ROS_LOCALHOST_ONLY": "1",
+        "ROS_DOMAIN_ID": random.SystemRandom().choice(others),
+    }
+
+
+def _a_child_can() -> bool:
+    """Return True if it works in a child: half of it, done to ourselves, could not be undone."""
+    child = os.fork()
+    if child == 0:
+        os._exit(0 if _enter_namespace() else 1)
+    return os.waitpid(child, 0)[1] == 0
+
+
+def _enter_namespace() -> bool:
+    """Enter a network namespace with its loopback up; as an ordinary user in a user namespace with the same user."""
+    libc = ctypes.CDLL(None, use_errno=True)
+    user, group = os.geteuid(), os.getegid()
+    if user == 0:
+        entered = libc.unshare(_NEW_NET) == 0
+    else:
+        entered = libc.unshare(_NEW_USER | _NEW_NET) == 0 and _map_us(user, group)
+    return bool(entered) and _loopback_up()
+
+
+def _map_us(user: int, group: int) -> bool:
+    try:
+        for file, text in (
+            ("setgroups", "deny"),
+            ("uid_map", f"{user} {user} 1"),
+            ("gid_map", f"{group} {group} 1"),
+        ):
+            with open(f"/proc/self/{file}", "w", encoding="ascii") as stream:
+                stream.write(text)
+    except OSError:
+        return False
+    return True
+
+
+def _loopback_up() -> bool:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        try:
+            request = struct.pack("16sh22x", b"lo", 0)
+            flags = struct.unpack("16sh22x", fcntl.ioctl(probe, _GET_FLAGS, request))[1]
+            fcntl.ioctl(probe, _SET_FLAGS, struct.pack("16sh22x", b"lo", flags | _UP))
+        except OSError:
+            return False
+    return True

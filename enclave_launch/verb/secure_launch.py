@@ -5,28 +5,33 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
+
+import yaml
 
 from enclave_common.command_line import CommandParser, complete, guarded
 from enclave_common.terminal import (
     printable,
+    printable_lines,
     safe_output,
     short_paths,
     stdout_is_for_the_plan,
     warn,
 )
 from enclave_common.words import did_you_mean
+from enclave_launch.description.actions.arguments import DeclareLaunchArgument
+from enclave_launch.description.introspection import LaunchIntrospector
+from enclave_launch.description.launch_description import LaunchDescription
 from enclave_launch.errors import EnclaveLaunchError, ManifestError, UsageError
 from enclave_launch.evaluation.evaluate import read_description
 from enclave_launch.host.plan_host import PlanHost
 from enclave_launch.plan import LaunchPlan
 from enclave_launch.prefixes import ament_prefixes
 from enclave_launch.report.explained import explainable, explained
-from enclave_launch.report.launch_file import arguments_text, description_text
-from enclave_launch.report.params import params_yaml
 from enclave_launch.report.plan_json import plan_document, plan_json
 from enclave_launch.report.terminal_style import terminal_style_of
 from enclave_launch.report.tree import plan_tree
+from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.security_environment import SecuritySettings
 from enclave_launch.verb.options import build_parser, resolve_options
 from enclave_launch.verb.planning import planned
@@ -145,3 +150,58 @@ def _explained(plan: LaunchPlan, subject: str) -> str:
         others = meant or f"; enclaves: {' '.join(enclaves)}"
         raise UsageError(f"{subject!r} is not an {what} of this launch{others}")
     return "\n".join(map(printable, lines)) + "\n"
+
+
+def params_yaml(plan: LaunchPlan) -> str:
+    """Render YAML that ``--params-file`` accepts: one section per node that has parameters, by final name if known."""
+    sections: dict[str, dict[str, dict[str, object]]] = {}
+    for name, parameters in _named(plan):
+        if parameters:
+            section = sections.setdefault(name, {"ros__parameters": {}})
+            section["ros__parameters"].update({key: _plain(value) for key, value in parameters.items()})
+    if not sections:
+        return ""
+    text = yaml.safe_dump(sections, sort_keys=True, allow_unicode=True)
+    readable = printable_lines(text) == text
+    return text if readable else yaml.safe_dump(sections, sort_keys=True)  # with YAML's own escapes
+
+
+def _named(plan: LaunchPlan) -> Iterator[tuple[str, Mapping[str, ParameterValue]]]:
+    for process in plan.processes:
+        if process.process.kind != "executable":
+            if not process.nodes:
+                yield process.fqn or "/**", process.process.parameters
+            yield from ((node.fqn, node.parameters) for node in process.nodes)
+    for component in plan.components:
+        if not component.nodes:
+            yield component.fqn, component.component.parameters
+        yield from ((node.fqn, node.parameters) for node in component.nodes)
+
+
+def _plain(value: ParameterValue) -> object:
+    return [_plain(item) for item in value] if isinstance(value, tuple) else value
+
+
+def arguments_text(description: LaunchDescription) -> str:
+    """Return the declared arguments as ``ros2 launch --show-args`` prints them (ros2launch/api/api.py)."""
+    arguments = description.get_launch_arguments()
+    blocks = ["Arguments (pass arguments as '<name>:=<value>'):"]
+    blocks += ["\n".join(_argument(argument)) for argument in arguments] or ["  No arguments."]
+    if any(argument._conditionally_included for argument in arguments):
+        blocks.append("* argument(s) which are only used if specific conditions occur")
+    return "\n\n".join(blocks) + "\n"
+
+
+def _argument(argument: DeclareLaunchArgument) -> Iterator[str]:
+    yield f"    '{printable(argument.name)}':{'*' if argument._conditionally_included else ''}"
+    yield f"        {argument.description}"
+    if argument.choices:
+        yield f"        one of: {', '.join(repr(choice) for choice in argument.choices)}"
+    if argument.default_value is not None:
+        default = " + ".join(part.describe() for part in argument.default_value)
+        yield f"        (default: {printable(default)})"
+
+
+def description_text(description: LaunchDescription) -> str:
+    """Return the description as a tree, as ``ros2 launch --print`` prints it; nothing is executed."""
+    return LaunchIntrospector().format_launch_description(description) + "\n"

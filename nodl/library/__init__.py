@@ -2,17 +2,19 @@
 
 Folders of NoDL v2 documents, one for each program, plugin or further node: those of users (``--library DIR``) before
 the one that ships with us. ``find`` opens the index and one document. docs/library.md describes the form.
+
+The shipped index is ``index.json`` beside the documents, written by ``tools/library``; folders of users are scanned.
 """
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from nodl.errors import NoDLError
-from nodl.library.document import LibraryDocument, read_library_document
-from nodl.library.index import IndexEntry, read_index, scanned
+from nodl.library.document import SUFFIX, LibraryDocument, read_library_document, stem_of
 from nodl.node_interface import NodeInterface
 
 SHIPPED = os.path.join(os.path.dirname(os.path.abspath(__file__)), "documents")
@@ -154,3 +156,91 @@ def _doubt(document: LibraryDocument, distro: str, version: str | None) -> str:
     read = ", ".join(f"{series} ({name})" for name, series in document.versions.items())
     here = f"version {version}" if version else f"distribution {distro}"
     return f"{document.stem} was written for {read}, here is {here}"
+
+
+INDEX = "index.json"
+
+
+class IndexEntry(NamedTuple):
+    """One document: ``file`` relative to the folder, and by what it is found."""
+
+    file: str
+    programs: tuple[str, ...] = ()
+    classes: tuple[str, ...] = ()
+    versions: dict[str, str] = {}  # noqa: RUF012  # never changed
+    transport: str = ""
+
+    @property
+    def package(self) -> str:
+        return self.stem.partition("/")[0]
+
+    @property
+    def stem(self) -> str:
+        return stem_of(self.file)
+
+
+def read_index(folder: str) -> tuple[IndexEntry, ...]:
+    """Return what the index file of a library folder lists.
+
+    Raises ``OSError``, ``ValueError`` for JSON that does not parse.
+    """
+    with open(os.path.join(folder, INDEX), encoding="utf-8") as stream:
+        listed = json.load(stream)
+    return tuple(
+        IndexEntry(
+            file,
+            tuple(entry.get("programs", ())),
+            tuple(entry.get("classes", ())),
+            entry.get("versions", {}),
+            entry.get("transport", ""),
+        )
+        for file, entry in listed.items()
+    )
+
+
+def scanned(folder: str) -> tuple[IndexEntry, ...]:
+    """Return the entries of all documents below ``folder``.
+
+    Raises ``InvalidNoDLError`` for a broken one, ``NoDLError`` for one that would never be found.
+    """
+    found = {file: read_library_document(folder, file) for file in _files(folder)}
+    for file, document in found.items():
+        if "/" not in document.stem and not document.recorded:  # a program without a package can be recorded
+            raise _misplaced(folder, file)
+    return tuple(_entry(folder, document) for document in found.values())
+
+
+def _entry(folder: str, document: LibraryDocument) -> IndexEntry:
+    return IndexEntry(
+        os.path.relpath(document.file, folder).replace(os.sep, "/"),
+        document.programs,
+        document.classes,
+        document.versions,
+        document.transport,
+    )
+
+
+def _files(folder: str) -> Iterator[str]:
+    """Yield ``PACKAGE/NAME.nodl.yaml``, and ``PACKAGE__NAME.nodl.yaml`` as ``--learn`` writes them.
+
+    Raises ``NoDLError`` for other documents: to pass over them would look as if they said nothing.
+    """
+    for name in sorted(os.listdir(folder)):
+        if os.path.isdir(os.path.join(folder, name)):
+            inside = sorted(os.listdir(os.path.join(folder, name)))
+            yield from (f"{name}/{each}" for each in inside if _is_document(folder, f"{name}/{each}"))
+        elif _is_document(folder, name):
+            yield name
+
+
+def _is_document(folder: str, file: str) -> bool:
+    if ".nodl." in file and not file.endswith(SUFFIX):
+        raise _misplaced(folder, file)
+    return file.endswith(SUFFIX)
+
+
+def _misplaced(folder: str, file: str) -> NoDLError:
+    return NoDLError(
+        f"{os.path.join(folder, file)}: a library has documents of NoDL v2 as PACKAGE/NAME{SUFFIX}, "
+        f"or PACKAGE__NAME{SUFFIX} as --learn writes them; name any other file with --nodl"
+    )

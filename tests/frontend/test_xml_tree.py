@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from enclave_common.xml_tree import MAX_NESTING, RefusedXml, XmlElement
-from enclave_launch.frontend.xml_tree import MAX_ENTITY_LENGTH, parse_launch_xml
+from enclave_launch.description.markup.xml import MAX_ENTITY_LENGTH, parse_launch_xml
 
 
 def shape(element: XmlElement | ET.Element) -> tuple[object, ...]:

@@ -13,8 +13,8 @@ import yaml
 from enclave_common.shell_words import split_words
 from enclave_common.xml_tree import RefusedXml
 from enclave_common.yaml_reader import load_yaml
+from enclave_launch.description.markup.xml import parse_launch_xml as parse_launch_xml
 from enclave_launch.frontend.substitution_grammar import TemplateSyntaxError, parse_template
-from enclave_launch.frontend.xml_tree import parse_launch_xml as parse_launch_xml
 from enclave_launch.ros_rules.parameter_file import RefusedParameters, sections_of_text
 from keystore import KeystoreError, request
 from keystore.disk.archive import archive_bytes, read_archive

@@ -14,6 +14,7 @@ from keystore.zenoh.configuration import (
     router_configuration,
     session_configuration,
 )
+from keystore.zenoh.denials import meaning
 from keystore.zenoh.grants import (
     Grants,
     Types,
@@ -29,7 +30,6 @@ from keystore.zenoh.key_expressions import (
     name_expressions,
     type_chunk,
 )
-from keystore.zenoh.meaning import meaning
 from keystore.zenoh.rules import AccessRule, access_rules
 from keystore.zenoh.types import types_of_interface, united_types
 

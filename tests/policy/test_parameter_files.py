@@ -9,7 +9,7 @@ import pytest
 
 from enclave_launch import LaunchPlan, ManifestError, ResolveOptions, provision, resolve
 from enclave_launch.diagnostics import Code
-from enclave_launch.report.params import params_yaml
+from enclave_launch.verb.secure_launch import params_yaml
 
 NODE = """#!/usr/bin/env python3
 import rclpy

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from enclave_launch.recording.build import RECORD_VARIABLE, recorder_library
+from enclave_launch.recording.programs import RECORD_VARIABLE, recorder_library
 from nodl.record.assembly import Record, read_record
 from tests.dds.conftest import domain_id as domain_id
 from tests.recording.stand_in_launch import build_stand_in

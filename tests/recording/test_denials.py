@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from enclave_launch.recording.patches import manifest_patch, policy_patch
 from enclave_launch.recording.reasons import cause_of
+from enclave_launch.recording.remedies import manifest_patch, policy_patch
 from keystore.verb import main as keystore_main
 from nodl.document import read_document
 from nodl.node_interface import EndpointKind

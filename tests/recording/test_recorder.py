@@ -11,8 +11,7 @@ from pathlib import Path
 import pytest
 
 from enclave_launch import RuntimeFailure
-from enclave_launch.recording.build import recorder_library
-from enclave_launch.recording.programs import inspect_command
+from enclave_launch.recording.programs import inspect_command, recorder_library
 from nodl.record.requested import RequestedEndpoint, RequestedNode, all_requested
 from tests.recording.conftest import Recorded, RunRecorded
 
@@ -142,7 +141,7 @@ def test_without_the_variable_the_library_does_nothing(run_recorded: RunRecorded
 
 
 def test_a_library_that_the_launch_preloads_stays(run_recorded: RunRecorded) -> None:
-    from enclave_launch.recording.build import with_recorder
+    from enclave_launch.recording.programs import with_recorder
 
     worn = with_recorder({"LD_PRELOAD": "/lib/a.so:/lib/b.so"}, "/r.so", "/record")
     assert worn["LD_PRELOAD"] == "/lib/a.so:/lib/b.so:/r.so"

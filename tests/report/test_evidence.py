@@ -18,7 +18,7 @@ from enclave_launch.report.evidence.documents import PAYLOAD_TYPE, csv_text, mat
 from enclave_launch.report.evidence.requirements import DISCLAIMER, PARTS
 from enclave_launch.report.graph import plan_graph
 from enclave_launch.verb.secure_plan import main
-from keystore.signing.dsse import signed_bytes
+from enclave_launch.verb.secure_plan.evidence import signed_bytes
 from tests.report.conftest import hostile, robot
 
 PREFIX = Path(__file__).parent.parent.parent / "fixtures" / "demo_ws"

@@ -10,7 +10,7 @@ from enclave_launch.dry_run import DryRun
 from enclave_launch.errors import UsageError
 from enclave_launch.review.checks import RULES, check_plan
 from enclave_launch.review.document import PlanFinding
-from enclave_launch.review.expectations import read_expectations, rule_findings
+from enclave_launch.verb.secure_plan.judging import read_expectations, rule_findings
 from tests.review.conftest import ROBOT, Asked, document, process
 
 

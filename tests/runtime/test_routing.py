@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from enclave_launch import RuntimeFailure
 from enclave_launch.ros_rules.output import OutputSetting, output_routes
 from enclave_launch.runtime.launch_log import LaunchLog, Writers
-from enclave_launch.runtime.routing import (
+from enclave_launch.runtime.live_process import (
     LONGEST_LINE,
     LineBuffer,
     OutputRouter,

@@ -16,8 +16,7 @@ from hypothesis import strategies as st
 
 from keystore import RenewOptions, renew
 from keystore.verb import main
-from keystore.zenoh.denials import RUST_LOG, Explanation, RouterLog, RouterLogExplainer
-from keystore.zenoh.meaning import meaning
+from keystore.zenoh.denials import RUST_LOG, Explanation, RouterLog, RouterLogExplainer, meaning
 from tests.keystore.kit import filled, options
 from tests.zenoh import kit
 from tests.zenoh.conftest import Grants, keystore_of

@@ -10,6 +10,7 @@ A key file may hold the pkcs11: URI of a token, as those of a keystore. Exit sta
 from __future__ import annotations
 
 import argparse
+import base64
 import hashlib
 import json
 import os
@@ -31,8 +32,9 @@ from enclave_launch.verb.secure_plan.plans import is_saved_plan, read_document
 from keystore.errors import InvalidInputError
 from keystore.formats.validity import iso, parse_time, utc_now
 from keystore.signing.ca_access import CaAccess, Secret
-from keystore.signing.dsse import envelope, envelope_text
 from keystore.signing.pkcs11_signer import open_signer
+from keystore.signing.public_key import fingerprint
+from keystore.signing.signer import Signer, spki
 from keystore.steps.inventory import governance_facts, inventory
 from keystore.verification import verify
 
@@ -167,3 +169,26 @@ def _write(folder: Path, files: Mapping[str, bytes]) -> None:
         folder.mkdir(parents=True, exist_ok=True)
         for name, data in files.items():
             write_bytes(folder / name, data)
+
+
+def envelope(payload: bytes, payload_type: str, signer: Signer) -> dict[str, Any]:
+    """Make a DSSE envelope (secure-systems-lab/dsse, protocol.md 1.0.2) with one signature over type and content.
+
+    ``keyid`` is the SHA-256 of the public key in DER, in hex.
+
+    Raises ``SigningUnavailableError`` as ``signer``.
+    """
+    signature = signer.sign(signed_bytes(payload, payload_type))
+    key = {"keyid": fingerprint(spki(signer.public_key())), "sig": base64.b64encode(signature).decode()}
+    return {"payload": base64.b64encode(payload).decode(), "payloadType": payload_type, "signatures": [key]}
+
+
+def signed_bytes(payload: bytes, payload_type: str) -> bytes:
+    """Return the pre-authentication encoding, which is what is signed."""
+    kind = payload_type.encode()
+    return b"DSSEv1 %d %b %d %b" % (len(kind), kind, len(payload), payload)
+
+
+def envelope_text(content: dict[str, Any]) -> str:
+    """Render an envelope as the JSON text that is written."""
+    return json.dumps(content, indent=2) + "\n"

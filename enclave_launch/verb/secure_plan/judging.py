@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Iterable, Mapping
 from datetime import datetime
+from fnmatch import fnmatchcase
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import yaml
 
@@ -15,8 +18,9 @@ from enclave_launch.dry_run import DryRun
 from enclave_launch.errors import UsageError, translated
 from enclave_launch.review.checks import check_plan
 from enclave_launch.review.checks.keystore import against_keystore, against_router
-from enclave_launch.review.document import PlanFinding, plan_from_document
-from enclave_launch.review.expectations import Expectations, read_expectations, rule_findings
+from enclave_launch.review.checks.rules import finding
+from enclave_launch.review.document import PlanDocument, PlanFinding, plan_from_document
+from enclave_launch.review.information_flow import FlowStep, flow_graph, shortest_paths
 from enclave_launch.verb.secure_plan.keystores import (
     DEFAULT_MARGIN,
     endings,
@@ -60,10 +64,151 @@ def _of_keystore(
 
 def expectations(file: Path | None) -> Expectations:
     """Read the expectations; raises ``UsageError`` for a named file that is missing, and for invalid content."""
-
     if file is None:
         if not os.path.exists(EXPECTATIONS):
             return Expectations()
         file = Path(EXPECTATIONS)
     with translated(OSError, UsageError, f"{file}: "), translated(yaml.YAMLError, UsageError, f"{file}: "):
         return read_expectations(load_yaml(read_text(file)) or {}, str(file))
+
+
+_TAKES = ("subscribe", "serve_services", "serve_actions")
+
+
+class Never(NamedTuple):
+    """No influence from ``source`` to ``target``, over any number of enclaves."""
+
+    source: str
+    target: str
+    why: str
+
+
+class Accepted(NamedTuple):
+    """Findings with this code about a subject that matches (shell wildcards), and why they are accepted."""
+
+    code: str
+    subject: str
+    why: str
+
+    def covers(self, diagnostic: PlanFinding) -> bool:
+        return diagnostic.code == self.code and fnmatchcase(diagnostic.subject, self.subject)
+
+
+class Expectations(NamedTuple):
+    """All that an ``enclaves.review.yaml`` says; empty without one."""
+
+    never: tuple[Never, ...] = ()
+    accept: tuple[Accepted, ...] = ()
+
+    def reason_to_accept(self, diagnostic: PlanFinding) -> str | None:
+        """Return why a finding was accepted, None if it was not."""
+        return next((accepted.why for accepted in self.accept if accepted.covers(diagnostic)), None)
+
+
+class Broken(NamedTuple):
+    """A rule that the plan breaks: the shortest way on which it does. Without steps both ends are one enclave."""
+
+    rule: Never
+    source: str
+    target: str
+    steps: tuple[FlowStep, ...]
+
+
+def read_expectations(content: Any, place: str) -> Expectations:
+    """Read a parsed YAML document; raises ``UsageError`` if it is not such a file.
+
+    never:
+      - from: /camera          # an enclave or a node; wildcards as in permissions
+        to: /base              # the same, or a topic, service or action: whoever may receive on it
+        why: images come from a vendor's binary
+    accept:
+      - code: name-unremappable
+        subject: /camera*      # optional: what it is about
+        why: the driver writes the double underscore
+    """
+    if not isinstance(content, Mapping) or content.keys() - {"never", "accept"}:
+        raise UsageError(f"{place}: expected a mapping with 'never' and 'accept'")
+    return Expectations(
+        tuple(
+            Never(*_texts(item, ("from", "to"), ("why",), f"{place}: never"))
+            for item in _items(content, "never", place)
+        ),
+        tuple(
+            Accepted(code, subject or "*", why)
+            for item in _items(content, "accept", place)
+            for code, why, subject in [_texts(item, ("code", "why"), ("subject",), f"{place}: accept")]
+        ),
+    )
+
+
+def rule_findings(document: DryRun, rules: Iterable[Never]) -> list[PlanFinding]:
+    """Return an error for each forbidden flow and a warning for each rule that names nothing in this plan."""
+    broken, idle = broken_rules(plan_from_document(document), rules)
+    forbidden = [finding("flow-forbidden", found.source, _broken_text(found)) for found in broken]
+    return [diagnostic._replace(severity="error") for diagnostic in forbidden] + [
+        finding("rule-idle", rule.source, f"no {rule.source} or no {rule.target} in this plan")
+        for rule in idle
+    ]
+
+
+def _broken_text(found: Broken) -> str:
+    rule = found.rule
+    ways = "; ".join(f"{step.source} -> {step.target} by {step.hops[0]}" for step in found.steps)
+    how = ways or f"both are in enclave {found.source}"
+    return f"{rule.source} must never reach {rule.target}{f' ({rule.why})' if rule.why else ''}: {how}"
+
+
+def broken_rules(plan: PlanDocument, rules: Iterable[Never]) -> tuple[list[Broken], list[Never]]:
+    """Return rules that the plan breaks, each with one shortest way, and rules that name nothing in the plan."""
+    graph = flow_graph(plan)
+    broken, idle = [], []
+    for rule in rules:
+        sources, targets = _enclaves_named(plan, rule.source), _enclaves_receiving(plan, rule.target)
+        if not sources or not targets:
+            idle.append(rule)
+            continue
+        ways = [_way(graph, source, target) for source in sources for target in targets]
+        shortest = min(
+            (way for way in ways if way is not None), key=lambda way: (len(way[2]), way), default=None
+        )
+        if shortest is not None:
+            broken.append(Broken(rule, *shortest))
+    return broken, idle
+
+
+def _way(graph: Any, source: str, target: str) -> tuple[str, str, tuple[FlowStep, ...]] | None:
+    if source == target:
+        return source, target, ()
+    paths = shortest_paths(graph, source, target)
+    return (source, target, paths[0]) if paths else None
+
+
+def _enclaves_named(plan: PlanDocument, pattern: str) -> list[str]:
+    of_nodes = {node.enclave for node in plan.nodes if fnmatchcase(node.fqn, pattern)}
+    return sorted(of_nodes | {path for path in plan.enclaves if fnmatchcase(path, pattern)})
+
+
+def _enclaves_receiving(plan: PlanDocument, pattern: str) -> list[str]:
+    named = _enclaves_named(plan, pattern)
+    return named or sorted(
+        path
+        for path, grants in plan.enclaves.items()
+        if any(each.operation in _TAKES and fnmatchcase(each.name, pattern) for each in grants)
+    )
+
+
+def _items(content: Mapping[str, Any], key: str, place: str) -> list[Any]:
+    items = content.get(key) or []
+    if not isinstance(items, list):
+        raise UsageError(f"{place}: '{key}' must be a list")
+    return items
+
+
+def _texts(item: Any, needed: tuple[str, ...], optional: tuple[str, ...], place: str) -> list[str]:
+    if not isinstance(item, Mapping) or item.keys() - {*needed, *optional} or not item.keys() >= set(needed):
+        also = f", and may have {', '.join(optional)}" if optional else ""
+        raise UsageError(f"{place}: each entry needs {', '.join(needed)}{also}; this one is {item!r}")
+    values = [item.get(key, "") for key in (*needed, *optional)]
+    if not all(isinstance(value, str) for value in values):
+        raise UsageError(f"{place}: texts expected in {item!r}")
+    return values

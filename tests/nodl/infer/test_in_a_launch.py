@@ -18,7 +18,7 @@ from enclave_launch.flow import provision, resolve
 from enclave_launch.options import ResolveOptions
 from enclave_launch.plan import LaunchPlan
 from enclave_launch.report.explained import explain
-from enclave_launch.report.params import params_yaml
+from enclave_launch.verb.secure_launch import params_yaml
 
 REPEATER = Path(__file__).parents[3] / "fixtures" / "programs" / "repeater.py"
 SITE = f"lib/python{sys.version_info.major}.{sys.version_info.minor}/site-packages"

@@ -10,9 +10,8 @@ from pathlib import Path
 import pytest
 
 from nodl.dependence import Dependence
-from nodl.library import SHIPPED, Library, fits
+from nodl.library import INDEX, SHIPPED, Library, fits, read_index
 from nodl.library.document import LibraryDocument, read_library_document
-from nodl.library.index import INDEX, read_index
 from nodl.node_interface import EndpointKind
 from nodl.verb import main
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from hypothesis import given
 from hypothesis import strategies as st
 
-from nodl.record.parameter_event import declared_values
+from nodl.record.lines import declared_values
 
 Value = bool | int | float | str | list[str]
 
