@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from enclave_launch.admission import AdmissionOptions
 from enclave_launch.enclave import EnclaveScope
 from enclave_launch.errors import UsageError, translated
-from enclave_launch.host.protocol import HostOptions
+from enclave_launch.host.host import HostOptions
 from enclave_launch.plan import PlanOptions
 from enclave_launch.policy import PolicyOptions
 from enclave_launch.policy.node_permissions import ALSO

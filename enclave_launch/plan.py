@@ -17,7 +17,7 @@ from enclave_launch.admission.middleware import (
 )
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.enclave import EnclaveAssignment, EnclaveScope
-from enclave_launch.host.protocol import HostOptions
+from enclave_launch.host.host import HostOptions
 from enclave_launch.host.user_code_results import RecordedResults
 from enclave_launch.policy import DerivedPolicy, PolicyOptions, RunningNode
 from enclave_launch.process import UNSPECIFIED_NODE_NAME, Evaluation, ResolvedComponent, ResolvedProcess

@@ -11,7 +11,7 @@ from enclave_launch.description import read_only
 from enclave_launch.description.events.queue import Buckets, EventQueue, Handler, HandlerTable, QueuedEvent
 from enclave_launch.host.current import current_host
 from enclave_launch.host.environment import Environment
-from enclave_launch.host.protocol import Host
+from enclave_launch.host.host import Host
 
 if TYPE_CHECKING:
     from enclave_launch.description.events.event import Event

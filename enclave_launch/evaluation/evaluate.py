@@ -34,8 +34,8 @@ from enclave_launch.frontend import error_location, python_file
 from enclave_launch.frontend.libyaml import libyaml_for_launch_files
 from enclave_launch.host.current import active_host
 from enclave_launch.host.environment import environment_untouched
+from enclave_launch.host.host import Host
 from enclave_launch.host.plan_host import PlanHost
-from enclave_launch.host.protocol import Host
 from enclave_launch.process import Evaluation
 from enclave_launch.source_location import SourceLocation
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from enclave_launch.host.plan_host import PlanHost
 
 if TYPE_CHECKING:
-    from enclave_launch.host.protocol import Host
+    from enclave_launch.host.host import Host
     from enclave_launch.ros_rules.distro import Release
 
 _current: ContextVar[Host | None] = ContextVar("enclave_launch_host", default=None)

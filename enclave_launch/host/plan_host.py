@@ -6,11 +6,10 @@ import heapq
 from collections.abc import Callable, Coroutine, Sequence
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from enclave_launch.host.base_host import BaseHost
-from enclave_launch.host.protocol import Completion, HostOptions
+from enclave_launch.host.host import Completion, Host, HostOptions
 
 if TYPE_CHECKING:
-    from enclave_launch.host.protocol import ExecuteLocal, LaunchContext, LifecycleNode, UserCodeResults
+    from enclave_launch.host.host import ExecuteLocal, LaunchContext, LifecycleNode, UserCodeResults
     from enclave_launch.process import (
         LauncherCall,
         Reaction,
@@ -20,8 +19,10 @@ if TYPE_CHECKING:
     )
 
 
-class PlanHost(BaseHost):
+class PlanHost(Host):
     """The dry run's world: everything is recorded, nothing is started or written."""
+
+    loop: VirtualLoop
 
     def __init__(
         self,

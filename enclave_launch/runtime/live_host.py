@@ -17,8 +17,7 @@ from enclave_launch.description.events.lifecycle import StateTransition
 from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.errors import EnclaveLaunchError, RuntimeFailure
-from enclave_launch.host.base_host import BaseHost
-from enclave_launch.host.protocol import HostOptions
+from enclave_launch.host.host import Host, HostOptions
 from enclave_launch.host.user_code_results import RecordedResults
 from enclave_launch.process import LauncherCall, ResolvedComponent, ResolvedProcess, Unforeseeable
 from enclave_launch.runtime.companion import LaunchCompanion
@@ -31,9 +30,11 @@ from enclave_launch.runtime.ros_services import ALTERNATIVE, RosServices
 from enclave_launch.runtime.run_events import Observer, ProcessOver, ProcessPlanned
 
 
-class LiveHost(BaseHost):
+class LiveHost(Host):
     """``secrets``: variables that no child may see. ``fail`` is called with why the launch cannot go on. ``services``
     raises ``RuntimeFailure`` if a launch that was not evaluated before needs rclpy, and there is none."""
+
+    loop: asyncio.AbstractEventLoop
 
     def __init__(
         self,
@@ -51,7 +52,7 @@ class LiveHost(BaseHost):
     ) -> None:
         super().__init__(options, user_code_results)
         self._observe = observe
-        self._loop = asyncio.get_running_loop()
+        self.loop = asyncio.get_running_loop()
         self._tree = tree
         self._log = log
         self._gate = gate
@@ -67,13 +68,9 @@ class LiveHost(BaseHost):
         self._planned: dict[str, Mapping[str, str]] = {}  # security variables by process name
         self._watch = EnvironmentWatch(self._watched, self._on_unplanned)
         if gate is not None:
-            self._tasks.add(self._loop.create_task(self._watch.run(), name="environment watch"))
+            self._tasks.add(self.loop.create_task(self._watch.run(), name="environment watch"))
         self.processes: list[LiveProcess] = []
         self.failed: list[str] = []  # names of processes that ended badly on their own
-
-    @property
-    def loop(self) -> asyncio.AbstractEventLoop:
-        return self._loop
 
     def started_so_far(self) -> int:
         return len(self._tasks)
@@ -99,8 +96,8 @@ class LiveHost(BaseHost):
         self._observe(ProcessPlanned(process))
         self._watch_state(action, process, context)
         self.processes.append(live)
-        completed: asyncio.Future[None] = self._loop.create_future()
-        task = self._loop.create_task(self._run(live, completed), name=process.process_name)
+        completed: asyncio.Future[None] = self.loop.create_future()
+        task = self.loop.create_task(self._run(live, completed), name=process.process_name)
         self._tasks.add(task)
         task.add_done_callback(self._tasks.discard)
         return completed
@@ -208,6 +205,6 @@ class LiveHost(BaseHost):
             return grant
         self._waiting_at_the_gate += 1
         try:
-            return await self._loop.run_in_executor(self._at_the_gate, self._gate.ensure, process)
+            return await self.loop.run_in_executor(self._at_the_gate, self._gate.ensure, process)
         finally:
             self._waiting_at_the_gate -= 1

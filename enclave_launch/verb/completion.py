@@ -12,8 +12,8 @@ from collections.abc import Iterable, Sequence
 
 from enclave_launch.errors import EnclaveLaunchError
 from enclave_launch.evaluation.evaluate import read_description
+from enclave_launch.host.host import HostOptions
 from enclave_launch.host.plan_host import PlanHost
-from enclave_launch.host.protocol import HostOptions
 from enclave_launch.verb.target import find_target
 from nodl import ament_index
 

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 
 from enclave_launch.evaluation.evaluate import EvaluationError, evaluate, parse_arguments
+from enclave_launch.host.host import HostOptions
 from enclave_launch.host.plan_host import PlanHost
-from enclave_launch.host.protocol import HostOptions
 from enclave_launch.host.user_code_results import RecordedResults
 from enclave_launch.process import Evaluation
 

@@ -25,7 +25,7 @@ from enclave_launch.ros_rules.distro import Feature
 
 if TYPE_CHECKING:
     from enclave_launch.description.launch_context import LaunchContext
-    from enclave_launch.host.protocol import CommandResult
+    from enclave_launch.host.host import CommandResult
 
 
 _MODES = ("fail", "ignore", "warn", "capture")

@@ -1,4 +1,7 @@
-"""What a dry run and a live run have in common: reading the ament index, running commands, warnings."""
+"""The interface of evaluation to the world: actions and substitutions ask ``context.host``, which records or acts.
+
+A dry run and a live run read the ament index, run commands and warn alike; what they do with processes differs.
+"""
 
 from __future__ import annotations
 
@@ -8,8 +11,9 @@ import shutil
 import socket
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
-from typing import TYPE_CHECKING, Any, TypeVar
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Hashable, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
 
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.diagnostics.evaluation import (
@@ -20,20 +24,92 @@ from enclave_launch.diagnostics.evaluation import (
     ros_distro_unknown,
 )
 from enclave_launch.host.environment import environment_snapshot
-from enclave_launch.host.protocol import CommandResult, HostOptions
 from enclave_launch.ros_rules.distro import Distro, choose_release
 from nodl import ament_index
 from nodl.ament_index import MISSING_PREFIX
 
 if TYPE_CHECKING:
-    from enclave_launch.host.protocol import DescriptionSource, UserCodeResults
+    import logging
 
+    from enclave_launch.process import LauncherCall, ResolvedComponent, ResolvedProcess, Unforeseeable
+
+# Types of ``description``, which is the floor above and knows this one.
+LaunchContext = Any
+ExecuteLocal = Any
+LifecycleNode = Any
 
 T = TypeVar("T")
 
 
-class BaseHost:
-    """What a dry run and a live run have in common: reading the ament index, running commands, warnings."""
+class HostOptions(NamedTuple):
+    """Properties of the world that an evaluation knows, in a dry run and live.
+
+    ``distro``: whose rules to follow, ``None`` for that of the environment. ``anonymous_seed``: two hosts with the same
+    seed give the same names at random, in the same order.
+    """
+
+    distro: str | None = None
+    allow_missing_packages: bool = False
+    no_python: bool = False
+    anonymous_seed: int | None = None
+
+
+class CommandResult(NamedTuple):
+    """The result of a command: its exit status and what it wrote."""
+
+    returncode: int
+    stdout: str
+    stderr: str
+
+
+class Completion(Protocol):
+    """A future of a process's end. ``asyncio.Future`` is one."""
+
+    def done(self) -> bool: ...
+    def add_done_callback(self, callback: Callable[[Any], object], /) -> None: ...
+
+
+class UserCodeResults(Protocol):
+    """Results of the user's code, recorded in a dry run and given again by the start that follows it."""
+
+    def call(
+        self,
+        key: Hashable,
+        function: Callable[[], T],
+        context: LaunchContext | None = None,
+        *,
+        at_event: bool = False,
+        worth: Callable[[T], bool] = ...,
+    ) -> T:
+        """Call ``function``, or return what it gave when it was called with ``key`` before."""
+
+    def keep(self, *objects: object) -> tuple[int, ...]:
+        """Return the ids of the objects, as part of a key."""
+
+    def remember_state(self, entity: object) -> None:
+        """Record the state of an object that is about to be visited."""
+
+    def listen(self, logger: logging.Logger) -> None:
+        """Record what user code logs."""
+
+    def stop_listening(self) -> None:
+        """End the recording of logs."""
+
+
+class DescriptionSource(Protocol):
+    """The source of a launch description."""
+
+    def location_without_context(self) -> str | None: ...
+    def try_get_launch_description_without_context(self) -> Any: ...
+
+
+class Host(ABC):
+    """The world as evaluation reaches it.
+
+    ``loop`` is behind ``context.asyncio_loop``: asyncio's when live, a virtual clock in a dry run.
+    """
+
+    loop: Any
 
     def __init__(self, options: HostOptions, user_code_results: UserCodeResults | None = None) -> None:
         named = os.environ.get("ROS_DISTRO")
@@ -54,9 +130,11 @@ class BaseHost:
         self._executable_cache: dict[tuple[str, str, str], str] = {}
 
     def prefixes(self) -> tuple[str, ...]:
+        """Return ament prefixes to search, first wins, from the present environment."""
         return ament_index.search_prefixes()
 
     def find_package_prefix(self, package: str) -> str:
+        """Return the prefix; raises ``PackageNotFoundError`` (a ``KeyError``), ``ValueError`` for an invalid name."""
         key = (package, os.environ.get("AMENT_PREFIX_PATH", ""))
         known = self._prefix_cache.get(key)
         if known is None:
@@ -74,6 +152,7 @@ class BaseHost:
         return placeholder
 
     def find_executable(self, package: str, executable: str) -> str:
+        """Return the file in the package's libexec directory; raises ExecutableNotInstalledError."""
         prefix = self.find_package_prefix(package)
         key = (prefix, package, executable)
         known = self._executable_cache.get(key)
@@ -94,9 +173,11 @@ class BaseHost:
         return placeholder
 
     def is_missing(self, path: str) -> bool:
+        """Return True if ``path`` is inside the placeholder of a package that is not installed."""
         return self.allow_missing_packages and path.startswith(f"{MISSING_PREFIX}/")
 
     def find_program(self, name: str) -> str | None:
+        """Return its path on the ``PATH``; None if it is not there."""
         found = shutil.which(name)
         if found is None and self.allow_missing_packages:
             return f"{MISSING_PREFIX}/bin/{name}"
@@ -139,15 +220,18 @@ class BaseHost:
         return CommandResult(result.returncode, result.stdout, result.stderr or "")
 
     def next_process_index(self) -> int:
+        """Return N of the process name NAME-N, from 1."""
         self._process_count += 1
         return self._process_count
 
     def warn(self, warning: Diagnostic) -> None:
+        """Warn the person; of the same once."""
         if warning not in self._warned:
             self._warned.add(warning)
             self.warnings.append(warning)
 
     def anonymous_name(self, name: str) -> str:
+        """Return a unique name made from ``name``."""
         # Two hosts with the same seed give the same names in the same order: a live run has those of its plan.
         if self.user_code_results is None:
             return self._new_anonymous_name(name)
@@ -161,7 +245,42 @@ class BaseHost:
         return full.translate(str.maketrans("-.:", "___"))
 
     def log_directory(self) -> str | None:
+        """Return the folder of this run's log files; None in a dry run, which makes none."""
         return None
+
+    @abstractmethod
+    def write_parameter_file(self, text: str) -> str:
+        """Keep ``text`` for a process about to start; give the path to pass (``<params:N>`` in a dry run)."""
+
+    @abstractmethod
+    def parameter_file(self, path: str) -> str | None:
+        """Return the text of a file written by ``write_parameter_file``; None for any other path."""
+
+    @abstractmethod
+    def started_so_far(self) -> int:
+        """Return a number that grows with everything that is started or scheduled."""
+
+    @abstractmethod
+    def start_process(
+        self, action: ExecuteLocal, process: ResolvedProcess, context: LaunchContext
+    ) -> Completion | None:
+        """Start ``process``; the result is done when it has ended for good. Does not wait."""
+
+    @abstractmethod
+    def load_components(self, components: Sequence[ResolvedComponent], context: LaunchContext) -> None:
+        """Load them one after another, once their container's service is there. Does not wait."""
+
+    @abstractmethod
+    def launcher_call(self, call: LauncherCall) -> None:
+        """Record a ROS service that launch itself must call."""
+
+    @abstractmethod
+    def change_state(self, node: LifecycleNode, transition_id: int, context: LaunchContext) -> None:
+        """Ask a started lifecycle node for a transition. Does not wait."""
+
+    @abstractmethod
+    def unforeseeable(self, item: Unforeseeable) -> None:
+        """Record something only known at run time."""
 
 
 def _succeeded(result: CommandResult) -> bool:
