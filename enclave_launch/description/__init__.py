@@ -17,8 +17,9 @@ def read_only(*names: str) -> Callable[[type[_Class]], type[_Class]]:
 
     def of(cls: type[_Class]) -> type[_Class]:
         for name in names:
-            private = f"_{cls.__name__}__{name}"
-            setattr(cls, private, vars(cls)[name])
+            private = f"_{cls.__name__.lstrip('_')}__{name}"
+            if name in vars(cls):
+                setattr(cls, private, vars(cls)[name])
             setattr(cls, name, property(attrgetter(private)))
         return cls
 

@@ -9,6 +9,7 @@ from enum import Enum
 from types import FrameType
 from typing import TYPE_CHECKING, Any
 
+from enclave_launch.description import read_only
 from enclave_launch.description.conditions import Condition, IfCondition, UnlessCondition
 from enclave_launch.description.events.event import ExecutionComplete
 from enclave_launch.host.user_code import executed_once, is_users
@@ -97,8 +98,11 @@ def normalize_to_list_of_entities(entities: Iterable[SomeEntitiesType]) -> list[
     return flat
 
 
+@read_only("condition")
 class Action(LaunchDescriptionEntity):
     """An intention, carried out by ``execute`` when its condition holds; else no substitution is performed."""
+
+    condition: Condition | None
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         """Remember results of the user's classes: the start that follows a plan does not call ``execute`` again."""
@@ -126,10 +130,6 @@ class Action(LaunchDescriptionEntity):
         if if_text is not None:
             return Action, {"condition": IfCondition(parser.parse_substitution(if_text))}
         return Action, {"condition": UnlessCondition(parser.parse_substitution(unless_text or ""))}
-
-    @property
-    def condition(self) -> Condition | None:
-        return self.__condition
 
     def describe(self) -> str:
         return repr(self)

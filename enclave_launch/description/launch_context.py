@@ -62,7 +62,7 @@ MAX_UNFOLDED = 250_000
 """Entities of one walk over a launch file: loops and includes can multiply without end."""
 
 
-@read_only("noninteractive", "is_shutdown")
+@read_only("noninteractive", "is_shutdown", "argv", "launch_configurations")
 class LaunchContext:
     """Launch configurations, environment, locals, events. Upstream's class, plus:
 
@@ -72,6 +72,8 @@ class LaunchContext:
 
     noninteractive: bool = False
     is_shutdown: bool = False
+    argv: Iterable[str]
+    launch_configurations: dict[str, Any]
 
     def __init__(
         self, *, argv: Iterable[str] | None = None, noninteractive: bool = False, host: Host | None = None
@@ -86,7 +88,7 @@ class LaunchContext:
         self.__combined: dict[str, Any] | None = None
         self.event_looked_at = False  # by code that asks about the event being handled
         self.configurations_looked_at: set[str] = set()
-        self.__configurations: dict[str, Any] = WatchedConfigurations(self.configurations_looked_at)
+        self.__launch_configurations: dict[str, Any] = WatchedConfigurations(self.configurations_looked_at)
         self.__configurations_stack: list[dict[str, Any]] = []
         self.process_environment = Environment()
         self._event_queue = EventQueue()
@@ -104,10 +106,6 @@ class LaunchContext:
         if self.__host is None:
             self.__host = current_host()
         return self.__host
-
-    @property
-    def argv(self) -> Iterable[str]:
-        return self.__argv
 
     def count_unfolded(self, entities: int) -> None:
         """Count the entities that the walk in progress visits or copies. Raises ``RuntimeError`` for too many."""
@@ -185,18 +183,14 @@ class LaunchContext:
 
     # Launch configurations
 
-    @property
-    def launch_configurations(self) -> dict[str, Any]:
-        return self.__configurations
-
     def _push_launch_configurations(self) -> None:
         """Keep a *shallow* copy: lists stay shared between the scopes, as upstream."""
-        self.__configurations_stack.append(self.__configurations.copy())
+        self.__configurations_stack.append(self.__launch_configurations.copy())
 
     def _pop_launch_configurations(self) -> None:
         if not self.__configurations_stack:
             raise RuntimeError("launch_configurations stack unexpectedly empty")
-        self.__configurations = self.__configurations_stack.pop()
+        self.__launch_configurations = self.__configurations_stack.pop()
 
     # Events
 
@@ -230,7 +224,7 @@ class LaunchContext:
         """Save everything that an event could change, for ``restore``."""
         configurations = {
             name: list(value) if isinstance(value, list) else value
-            for name, value in dict(self.__configurations).items()
+            for name, value in dict(self.__launch_configurations).items()
         }
         return ContextState(
             configurations=configurations,
@@ -245,8 +239,8 @@ class LaunchContext:
         )
 
     def restore(self, saved: ContextState) -> None:
-        self.__configurations = WatchedConfigurations(self.configurations_looked_at)
-        self.__configurations.update(saved.configurations)
+        self.__launch_configurations = WatchedConfigurations(self.configurations_looked_at)
+        self.__launch_configurations.update(saved.configurations)
         self.__configurations_stack = saved.configurations_stack
         self.__locals = saved.locals
         self.__locals_stack = saved.locals_stack

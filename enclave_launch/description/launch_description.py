@@ -14,12 +14,13 @@ if TYPE_CHECKING:
     from enclave_launch.description.launch_context import LaunchContext
 
 
-@read_only("deprecated_reason")
+@read_only("deprecated_reason", "entities")
 class LaunchDescription(LaunchDescriptionEntity):
     """Visited, it gives its entities. ``deprecated_reason`` is warned about at each visit."""
 
     argument_summary: DeclaredArguments | None = None  # of a file whose arguments were collected before
     deprecated_reason: str | None = None
+    entities: list[LaunchDescriptionEntity]
 
     def __init__(
         self,
@@ -29,10 +30,6 @@ class LaunchDescription(LaunchDescriptionEntity):
     ) -> None:
         self.__entities = list(initial_entities) if initial_entities is not None else []
         self.__deprecated_reason = deprecated_reason
-
-    @property
-    def entities(self) -> list[LaunchDescriptionEntity]:
-        return self.__entities
 
     @property
     def deprecated(self) -> bool:

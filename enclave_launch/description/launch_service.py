@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import signal
-from collections.abc import Callable, Iterable
-from signal import SIGINT, SIGTERM
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
+from enclave_launch.description import read_only
 from enclave_launch.description.actions.events import EmitEvent
 from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.description.launch_description import LaunchDescription
@@ -17,11 +18,14 @@ if TYPE_CHECKING:
     from enclave_launch.runtime.live_launch import LiveLaunch
 
 
+@read_only("context")
 class LaunchService:
     """Include descriptions, emit events, then run: what was requested earlier is done first, in order.
 
     One run per object. ``shutdown`` works while ``run_async`` does.
     """
+
+    context: LaunchContext  # before the run; a run makes its own
 
     def __init__(
         self, *, argv: Iterable[str] | None = None, noninteractive: bool = False, debug: bool = False
@@ -33,11 +37,6 @@ class LaunchService:
         self.__context = LaunchContext(argv=self.__argv, noninteractive=noninteractive)
         self.__running: LiveLaunch | None = None
 
-    @property
-    def context(self) -> LaunchContext:
-        """Return the context before the run; a run makes its own."""
-        return self.__context
-
     def include_launch_description(self, launch_description: LaunchDescription) -> None:
         self.__description.add_entity(launch_description)
 
@@ -46,43 +45,31 @@ class LaunchService:
 
     def run(self, *, shutdown_when_idle: bool = True) -> int:
         """Block until all is over; SIGINT shuts down in order. Returns 0, or 1 if something failed."""
-        import asyncio
+        from enclave_launch.runtime.live_launch import run_launch
 
-        return asyncio.run(self.__run(shutdown_when_idle, handle_interrupt=True))
+        with self.__launch(shutdown_when_idle) as launch:
+            return run_launch(launch)
 
     async def run_async(self, *, shutdown_when_idle: bool = True) -> int:
         """Run as ``run`` does, inside a running loop and without touching signals."""
-        return await self.__run(shutdown_when_idle, handle_interrupt=False)
+        with self.__launch(shutdown_when_idle) as launch:
+            return await launch.run()
 
     def shutdown(self, force_sync: bool = False) -> None:
         """End the run in progress, in order; nothing happens without one."""
         if self.__running is not None:
             self.__running.shut_down("LaunchService.shutdown() called")
 
-    async def __run(self, shutdown_when_idle: bool, *, handle_interrupt: bool) -> int:
+    @contextmanager
+    def __launch(self, shutdown_when_idle: bool) -> Iterator[LiveLaunch]:
         from enclave_launch.runtime.live_launch import DescribedLaunch
 
         self.__running = DescribedLaunch(self.__description, self.__noninteractive, self.__debug)
         self.__running.shutdown_when_idle = shutdown_when_idle
         try:
-            if not handle_interrupt:
-                return await self.__running.run()
-            return await self.__run_with_signals(self.__running)
+            yield self.__running
         finally:
             self.__running = None
-
-    @staticmethod
-    async def __run_with_signals(service: LiveLaunch) -> int:
-        import asyncio
-
-        loop = asyncio.get_running_loop()
-        for number in (SIGINT, SIGTERM):
-            loop.add_signal_handler(number, service.on_signal, number)
-        try:
-            return await service.run()
-        finally:
-            for number in (SIGINT, SIGTERM):
-                loop.remove_signal_handler(number)
 
 
 class AsyncSafeSignalManager:

@@ -11,13 +11,14 @@ from enclave_launch.description.events.handlers import OnShutdown
 from enclave_launch.description.launch_context import LaunchContext
 
 
-@read_only("ros_context", "ros_node", "ros_executor")
+@read_only("ros_context", "ros_node", "ros_executor", "argv")
 class ROSAdapter:
     """Holds an rclpy context and a node ``launch_ros_<pid>``, spun by a thread of its own."""
 
     ros_context: Any = None
     ros_node: Any = None
     ros_executor: Any = None
+    argv: list[str]
 
     def __init__(self, *, argv: list[str] | None = None, autostart: bool = True):
         self.__argv = argv or []  # never None: rclpy would take sys.argv
@@ -49,10 +50,6 @@ class ROSAdapter:
         self.__ros_node.destroy_node()
         self.__ros_context.try_shutdown()
         self.__ros_node = None
-
-    @property
-    def argv(self) -> list[str]:
-        return self.__argv
 
 
 def get_ros_adapter(context: LaunchContext) -> ROSAdapter:

@@ -24,7 +24,9 @@ if TYPE_CHECKING:
     from enclave_launch.source_location import SourceLocation
 
 
-@read_only("node_name", "node_namespace", "parameters", "remappings", "extra_arguments")
+@read_only(
+    "node_name", "node_namespace", "parameters", "remappings", "extra_arguments", "package", "node_plugin"
+)
 class ComposableNode:
     """Package and plugin with its name, namespace, parameters, remap rules and extra arguments.
 
@@ -37,6 +39,8 @@ class ComposableNode:
     parameters: Parameters | None = None
     remappings: RemapRules | None = None
     extra_arguments: Parameters | None = None
+    package: list[Substitution]
+    node_plugin: list[Substitution]
 
     def __init__(
         self,
@@ -51,7 +55,7 @@ class ComposableNode:
         condition: Condition | None = None,
     ):
         self.__package = normalize_to_list_of_substitutions(package)
-        self.__plugin = normalize_to_list_of_substitutions(plugin)
+        self.__node_plugin = normalize_to_list_of_substitutions(plugin)
         self.__node_name = None if name is None else normalize_to_list_of_substitutions(name)
         self.__node_namespace = None if namespace is None else normalize_to_list_of_substitutions(namespace)
         self.__parameters = None if parameters is None else normalize_parameters(parameters)
@@ -90,14 +94,6 @@ class ComposableNode:
         description = kind(**kwargs)
         description.source_location = entity.source_location
         return description
-
-    @property
-    def package(self) -> list[Substitution]:
-        return self.__package
-
-    @property
-    def node_plugin(self) -> list[Substitution]:
-        return self.__plugin
 
     def condition(self) -> Condition | None:
         return self.__condition

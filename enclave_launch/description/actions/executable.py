@@ -25,8 +25,8 @@ Variables = list[tuple["list[Substitution]", "list[Substitution]"]]
 
 
 @read_only(
-    "name", "cwd", "env", "additional_env", "arguments",
-    "final_name", "final_cmd", "final_prefix", "final_cwd", "final_env",
+    "name", "cwd", "env", "additional_env", "arguments", "final_name", "final_cmd", "final_prefix", "final_cwd",
+    "final_env", "prefix", "cmd",
 )  # fmt: skip
 class Executable:
     """Describes a process; ``prepare`` performs it. The ``final_...`` members are ``None`` before that."""
@@ -41,6 +41,8 @@ class Executable:
     final_prefix: tuple[str, ...] = ()  # the words of ``final_cmd`` that the prefix gave (ours)
     final_cwd: str | None = None
     final_env: dict[str, str] | None = None  # shared between processes with the same one: do not modify
+    prefix: list[Substitution]
+    cmd: list[list[Substitution]]  # shared: derived descriptions append to it
 
     def __init__(
         self,
@@ -63,15 +65,6 @@ class Executable:
         self.__env = None if env is None else _normalize(env)
         self.__additional_env = None if additional_env is None else _normalize(additional_env)
         self.__arguments = arguments
-
-    @property
-    def prefix(self) -> list[Substitution]:
-        return self.__prefix
-
-    @property
-    def cmd(self) -> list[list[Substitution]]:
-        """Return the command, shared: derived descriptions append to it."""
-        return self.__cmd
 
     def prepare(self, context: LaunchContext, action: Action) -> None:
         """Perform command, prefix, name, directory and environment, in this order."""

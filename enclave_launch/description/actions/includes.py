@@ -8,6 +8,7 @@ import os
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
+from enclave_launch.description import read_only
 from enclave_launch.description.actions.configurations import SetLaunchConfiguration
 from enclave_launch.description.actions.flow import OpaqueFunction
 from enclave_launch.description.argument_scan import check_required_arguments
@@ -77,10 +78,13 @@ Arguments = Iterable[tuple["SomeSubstitutionsType", "SomeSubstitutionsType"]]
 
 
 @expose_action("include")
+@read_only("launch_description_source", "launch_arguments")
 class IncludeLaunchDescription(Action):
     """Loads another description and gives its entities; opens no scope: what the file sets stays set."""
 
     scan_role = ScanRole.INCLUDE
+    launch_description_source: LaunchDescriptionSource
+    launch_arguments: tuple[tuple[SomeSubstitutionsType, SomeSubstitutionsType], ...]
 
     def __init__(
         self,
@@ -92,7 +96,7 @@ class IncludeLaunchDescription(Action):
         super().__init__(**kwargs)
         if not isinstance(launch_description_source, LaunchDescriptionSource):
             launch_description_source = AnyLaunchDescriptionSource(launch_description_source)
-        self.__source: LaunchDescriptionSource = launch_description_source
+        self.__launch_description_source: LaunchDescriptionSource = launch_description_source
         self.__launch_arguments = () if launch_arguments is None else tuple(launch_arguments)
         self.entered_with: tuple[dict[str, Any], dict[str, str]] = ({}, {})  # the state when it was executed
 
@@ -115,16 +119,8 @@ class IncludeLaunchDescription(Action):
                 child.assert_entity_completely_parsed()
         return cls, kwargs
 
-    @property
-    def launch_description_source(self) -> LaunchDescriptionSource:
-        return self.__source
-
-    @property
-    def launch_arguments(self) -> tuple[tuple[SomeSubstitutionsType, SomeSubstitutionsType], ...]:
-        return self.__launch_arguments
-
     def get_sub_entities(self) -> list[LaunchDescriptionEntity]:
-        description = self.__source.try_get_launch_description_without_context()
+        description = self.__launch_description_source.try_get_launch_description_without_context()
         return [] if description is None else [description]
 
     def argument_names_without_context(self) -> list[str] | None:
@@ -159,11 +155,13 @@ class IncludeLaunchDescription(Action):
         return [*arguments, description]
 
     def __set_file_locals(self, context: LaunchContext) -> None:
-        path = os.path.abspath(self.__source.location)
+        path = os.path.abspath(self.__launch_description_source.location)
         exists = os.path.exists(path)
         context.extend_locals(
             {
                 "current_launch_file_path": path,
-                "current_launch_file_directory": os.path.dirname(path) if exists else self.__source.location,
+                "current_launch_file_directory": os.path.dirname(path)
+                if exists
+                else self.__launch_description_source.location,
             }
         )

@@ -69,7 +69,7 @@ class RosSpecificArgument(Substitution):
 
 
 @expose_action("node")
-@read_only("node_package", "expanded_remapping_rules")
+@read_only("node_package", "expanded_remapping_rules", "node_executable", "expanded_node_namespace")
 class Node(ExecuteProcess):
     """Starts ``executable`` of ``package`` (without package: the program as given).
 
@@ -83,6 +83,8 @@ class Node(ExecuteProcess):
     process_kind: ProcessKind = "node"
     node_package: SomeSubstitutionsType | None = None
     expanded_remapping_rules: list[PlacedRule] | None = None
+    node_executable: SomeSubstitutionsType
+    expanded_node_namespace: str
 
     def __init__(
         self,
@@ -109,13 +111,13 @@ class Node(ExecuteProcess):
             cmd=[program, *user_words, "--ros-args", *name_words], **{**kwargs, "name": exec_name}
         )
         self.__node_package = package
-        self.__executable = executable
+        self.__node_executable = executable
         self.__name = None if name is None else normalize_to_list_of_substitutions(name)
         self.__namespace = None if namespace is None else normalize_to_list_of_substitutions(namespace)
         self.__parameters = NodeParameters(normalize_parameters(parameters or []))
         self.__remappings = list(normalize_remap_rules(remappings or ()))
         self.__expanded_name = UNSPECIFIED_NODE_NAME
-        self.__expanded_namespace = UNSPECIFIED_NODE_NAMESPACE
+        self.__expanded_node_namespace = UNSPECIFIED_NODE_NAMESPACE
         self.__final_name: str | None = None
         self.__first_remap = 0  # the index of its "-r" in self.cmd
 
@@ -148,19 +150,11 @@ class Node(ExecuteProcess):
         return cls, kwargs
 
     @property
-    def node_executable(self) -> SomeSubstitutionsType:
-        return self.__executable
-
-    @property
     def node_name(self) -> str:
         """Return the fully qualified name; raises ``RuntimeError`` before the action was executed."""
         if self.__final_name is None:
             raise RuntimeError("cannot access 'node_name' before executing action")
         return self.__final_name
-
-    @property
-    def expanded_node_namespace(self) -> str:
-        return self.__expanded_namespace
 
     def is_node_name_fully_specified(self) -> bool:
         return not any(
@@ -185,10 +179,10 @@ class Node(ExecuteProcess):
         pushed = context.launch_configurations.get(NAMESPACE)
         namespace = make_namespace_absolute(prefix_namespace(pushed, own))
         if namespace is not None:
-            self.__expanded_namespace = namespace
+            self.__expanded_node_namespace = namespace
             self.cmd.extend([[TextSubstitution(text="-r")], [RosSpecificArgument("ns")]])
             validate_namespace(namespace)
-        self.__final_name = prefix_namespace(self.__expanded_namespace, self.__expanded_name)
+        self.__final_name = prefix_namespace(self.__expanded_node_namespace, self.__expanded_name)
 
     def __settle_remaps(self, context: LaunchContext) -> None:
         everywhere = context.launch_configurations.get("ros_remaps") or []
@@ -203,7 +197,7 @@ class Node(ExecuteProcess):
 
     def execute(self, context: LaunchContext) -> list[LaunchDescriptionEntity] | None:
         self._perform_substitutions(context)
-        arguments = {"ns": f"__ns:={self.__expanded_namespace}"}
+        arguments = {"ns": f"__ns:={self.__expanded_node_namespace}"}
         if self.__name is not None:
             arguments["name"] = f"__node:={self.__expanded_name}"
         for extension in installed_extensions():
@@ -222,9 +216,9 @@ class Node(ExecuteProcess):
         return process._replace(
             kind=self.process_kind,
             package=None if self.__node_package is None else _performed(context, self.__node_package),
-            executable=_performed(context, self.__executable),
+            executable=_performed(context, self.__node_executable),
             name=self.__expanded_name,
-            namespace=self.__expanded_namespace,
+            namespace=self.__expanded_node_namespace,
             fqn=self.node_name,
             remaps=tuple(self.__placed_remaps(process)),
             parameters=parameters.values,

@@ -51,7 +51,11 @@ _SIGTERM_TIMEOUT = LaunchConfiguration("sigterm_timeout", default=5)
 _SIGKILL_TIMEOUT = LaunchConfiguration("sigkill_timeout", default=5)
 
 
-@read_only("shell", "emulate_tty", "cached_output", "log_cmd", "respawn_delay", "respawn_max_retries")
+@read_only(
+    "shell", "emulate_tty", "cached_output", "log_cmd", "respawn_delay", "respawn_max_retries",
+    "process_description", "sigterm_timeout", "sigkill_timeout", "output", "output_format", "respawn",
+    "process_details",
+)  # fmt: skip
 class ExecuteLocal(Action):
     """Starts ``process_description`` when executed; may be executed once.
 
@@ -65,6 +69,13 @@ class ExecuteLocal(Action):
     log_cmd: bool = False
     respawn_delay: float | None = None
     respawn_max_retries: int = -1
+    process_description: Executable
+    sigterm_timeout: list[Substitution]
+    sigkill_timeout: list[Substitution]
+    output: list[Substitution] | Mapping[str, Any]
+    output_format: str
+    respawn: Any  # a bool once prepared, before that what was given
+    process_details: dict[str, Any] | None  # of the process events: set when prepared, ``pid`` once started
 
     def __init__(
         self,
@@ -104,40 +115,10 @@ class ExecuteLocal(Action):
         self.__machine = None if machine is None else normalize_to_list_of_substitutions(machine)
         self.__executed = False
         self.final_routes: Routes = {}
-        self.__event_args: dict[str, Any] | None = None
+        self.__process_details: dict[str, Any] | None = None
         self.__completed: Any = None
         self.captured_output: tuple[list[str], list[str]] = ([], [])
         self.final_return_code: int | None = None
-
-    @property
-    def process_description(self) -> Executable:
-        return self.__process_description
-
-    @property
-    def sigterm_timeout(self) -> list[Substitution]:
-        return self.__sigterm_timeout
-
-    @property
-    def sigkill_timeout(self) -> list[Substitution]:
-        return self.__sigkill_timeout
-
-    @property
-    def output(self) -> list[Substitution] | Mapping[str, Any]:
-        return self.__output
-
-    @property
-    def output_format(self) -> str:
-        return self.__output_format
-
-    @property
-    def respawn(self) -> Any:
-        """Return a bool once prepared, before that what was given."""
-        return self.__respawn
-
-    @property
-    def process_details(self) -> dict[str, Any] | None:
-        """Return ``action``, ``name``, ``cmd``, ``cwd``, ``env`` and, once started, ``pid``; None unprepared."""
-        return self.__event_args
 
     @property
     def return_code(self) -> int | None:
@@ -168,7 +149,7 @@ class ExecuteLocal(Action):
         """Perform everything that the process needs."""
         self.__process_description.prepare(context, self)
         description = self.__process_description
-        self.__event_args = {
+        self.__process_details = {
             "action": self,
             "name": description.final_name,
             "cmd": description.final_cmd,

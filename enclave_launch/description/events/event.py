@@ -30,34 +30,30 @@ class Event:
         return ""
 
 
+@read_only("action")
 class ExecutionComplete(Event):
     """``action`` has been executed; for processes and timers: has ended."""
 
     name = "launch.events.ExecutionComplete"
+    action: Action
 
     def __init__(self, *, action: Action) -> None:
         self.__action = action
-
-    @property
-    def action(self) -> Action:
-        return self.__action
 
     def subject(self) -> str:
         details = getattr(self.__action, "process_details", None)
         return details["name"] if details else type(self.__action).__name__
 
 
+@read_only("launch_description")
 class IncludeLaunchDescription(Event):
     """``launch_description`` is to be visited."""
 
     name = "launch.events.IncludeLaunchDescription"
+    launch_description: LaunchDescription
 
     def __init__(self, launch_description: LaunchDescription) -> None:
         self.__launch_description = launch_description
-
-    @property
-    def launch_description(self) -> LaunchDescription:
-        return self.__launch_description
 
 
 @read_only("reason", "due_to_sigint")
@@ -73,17 +69,15 @@ class Shutdown(Event):
         self.__due_to_sigint = due_to_sigint
 
 
+@read_only("timer_action")
 class TimerEvent(Event):
     """The period of ``timer_action`` has passed."""
 
     name = "launch.events.TimerEvent"
+    timer_action: TimerAction
 
     def __init__(self, *, timer_action: TimerAction) -> None:
         self.__timer_action = timer_action
-
-    @property
-    def timer_action(self) -> TimerAction:
-        return self.__timer_action
 
     def subject(self) -> str:
         return f"{self.__timer_action.performed_period:g}"
@@ -99,7 +93,7 @@ def event_named(name: str) -> Callable[[Event], bool]:
     return lambda event: event.name == name
 
 
-@read_only("process_name", "cwd", "env", "pid")
+@read_only("process_name", "cwd", "env", "pid", "action", "cmd")
 class RunningProcessEvent(Event):
     """``process_name`` is NAME-N; ``cmd``, ``cwd``, ``env`` are final."""
 
@@ -108,6 +102,8 @@ class RunningProcessEvent(Event):
     cwd: str | None = None
     env: Mapping[str, str] | None = None
     pid: int = 0
+    action: ExecuteLocal
+    cmd: list[str]
 
     def __init__(
         self,
@@ -127,16 +123,8 @@ class RunningProcessEvent(Event):
         self.__pid = pid
 
     @property
-    def action(self) -> ExecuteLocal:
-        return self.__action
-
-    @property
     def execute_process_action(self) -> ExecuteLocal:
         return self.__action
-
-    @property
-    def cmd(self) -> list[str]:
-        return self.__cmd
 
     def subject(self) -> str:
         return self.__process_name
@@ -212,17 +200,15 @@ class ProcessStderr(ProcessIO):
         super().__init__(text=text, fd=2, **kwargs)
 
 
+@read_only("process_matcher")
 class ProcessTargetedEvent(Event):
     """For the processes that ``process_matcher`` accepts."""
 
     name = "launch.events.process.ProcessTargetedEvent"
+    process_matcher: Callable[[ExecuteLocal], bool]
 
     def __init__(self, *, process_matcher: Callable[[ExecuteLocal], bool]) -> None:
         self.__process_matcher = process_matcher
-
-    @property
-    def process_matcher(self) -> Callable[[ExecuteLocal], bool]:
-        return self.__process_matcher
 
 
 # Matchers for ``ProcessTargetedEvent``; a process that was not prepared matches none.
@@ -259,10 +245,12 @@ class ShutdownProcess(ProcessTargetedEvent):
     name = "launch.events.process.ShutdownProcess"
 
 
+@read_only("signal")
 class SignalProcess(ProcessTargetedEvent):
     """``signal_number``: one of ``signal.Signals``, or the text ``SIGKILL``."""
 
     name = "launch.events.process.SignalProcess"
+    signal: str | signals.Signals
 
     def __init__(
         self, *, signal_number: str | signals.Signals, process_matcher: Callable[[ExecuteLocal], bool]
@@ -270,10 +258,6 @@ class SignalProcess(ProcessTargetedEvent):
         super().__init__(process_matcher=process_matcher)
         ensure_argument_type(signal_number, (str, signals.Signals), "signal_number", "SignalProcess")
         self.__signal = signal_number
-
-    @property
-    def signal(self) -> str | signals.Signals:
-        return self.__signal
 
     @property
     def signal_name(self) -> str:

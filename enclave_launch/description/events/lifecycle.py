@@ -16,7 +16,7 @@ def _constants(message: type, prefix: str) -> dict[int, str]:
     return dict(sorted(named.items()))
 
 
-@read_only("transition_id")
+@read_only("transition_id", "lifecycle_node_matcher")
 class ChangeState(Event):
     """``transition_id`` is one of the constants of ``lifecycle_msgs/msg/Transition``."""
 
@@ -31,6 +31,7 @@ class ChangeState(Event):
         **_constants(State, "TRANSITION_STATE_"),
     }
     transition_id: int = 0
+    lifecycle_node_matcher: Callable[[Any], bool]
 
     def __init__(self, *, lifecycle_node_matcher: Callable[[Any], bool], transition_id: int):
         super().__init__()
@@ -40,17 +41,14 @@ class ChangeState(Event):
         self.__lifecycle_node_matcher = lifecycle_node_matcher
         self.__transition_id = transition_id
 
-    @property
-    def lifecycle_node_matcher(self) -> Callable[[Any], bool]:
-        return self.__lifecycle_node_matcher
 
-
-@read_only("msg")
+@read_only("msg", "action")
 class StateTransition(Event):
     """``msg`` is a ``lifecycle_msgs/msg/TransitionEvent`` that ``action``'s node published."""
 
     name = "launch_ros.events.lifecycle.StateTransition"
     msg: Any = None
+    action: Any
 
     def __init__(self, *, action: Any, msg: Any):
         super().__init__()
@@ -59,10 +57,6 @@ class StateTransition(Event):
 
     def subject(self) -> str:
         return str(self.__action.node_name)
-
-    @property
-    def action(self) -> Any:
-        return self.__action
 
     @property
     def timestamp(self) -> int:

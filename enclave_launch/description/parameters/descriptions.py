@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Union, cast
 import yaml
 
 from enclave_common.files import read_text
+from enclave_launch.description import read_only
 from enclave_launch.description.argument_types import ensure_argument_type
 from enclave_launch.description.markup.parse_substitution import parse_substitution
 from enclave_launch.description.parameters import yaml_text
@@ -33,8 +34,11 @@ EvaluatedParameterValue = Union[  # noqa: UP007  (evaluated at run time, as upst
 ]
 
 
+@read_only("value_type")
 class ParameterValue:
     """A value, or substitutions whose text becomes one, of ``value_type`` (``None``: by YAML's rules)."""
+
+    value_type: Any
 
     def __init__(self, value: Any, *, value_type: Any = None):
         self.__value = normalize_typed_substitution(value, value_type)
@@ -44,10 +48,6 @@ class ParameterValue:
     @property
     def value(self) -> Any:
         return self.__value if self.__evaluated is None else self.__evaluated
-
-    @property
-    def value_type(self) -> Any:
-        return self.__value_type
 
     def __str__(self) -> str:
         return f"launch_ros.description.ParameterValue(value={self.value}, value_type={self.value_type})"
@@ -93,8 +93,11 @@ class Parameter:
         return self.__evaluated
 
 
+@read_only("allow_substs")
 class ParameterFile:
     """A parameter file; with ``allow_substs`` its whole text, comments included, is a template."""
+
+    allow_substs: bool
 
     def __init__(
         self,
@@ -120,10 +123,6 @@ class ParameterFile:
     @property
     def param_file(self) -> list[Substitution] | os.PathLike[str]:
         return self.__param_file if self.__evaluated is None else self.__evaluated
-
-    @property
-    def allow_substs(self) -> bool:
-        return self.__allow_substs
 
     def __str__(self) -> str:
         return (

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from enclave_common import shell_words
 from enclave_common.files import read_text
+from enclave_launch.description import read_only
 from enclave_launch.description.markup.expose import expose_substitution
 from enclave_launch.description.substitution import (
     MAX_TEXT,
@@ -82,11 +83,15 @@ _DEFAULT_MODULES = ("math",)
 
 
 @expose_substitution("eval")
+@read_only("expression", "python_modules")
 class PythonExpression(Substitution):
     """The value of a Python expression, as text. It sees the builtins and the modules given.
 
     Names are those of the modules, and what module ``math`` holds; humble knows only the latter.
     """
+
+    expression: list[Substitution]
+    python_modules: list[Substitution]
 
     def __init__(
         self, expression: SomeSubstitutionsType, python_modules: SomeSubstitutionsType = _DEFAULT_MODULES
@@ -106,14 +111,6 @@ class PythonExpression(Substitution):
         if len(data) == 1:
             return cls, {"expression": data[0]}
         return cls, {"expression": data[0], "python_modules": _literal_names(data[1])}
-
-    @property
-    def expression(self) -> list[Substitution]:
-        return self.__expression
-
-    @property
-    def python_modules(self) -> list[Substitution]:
-        return self.__python_modules
 
     def describe(self) -> str:
         modules = ", ".join(sub.describe() for sub in self.__python_modules)

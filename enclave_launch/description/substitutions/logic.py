@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
+from enclave_launch.description import read_only
 from enclave_launch.description.markup.expose import expose_substitution
 from enclave_launch.description.substitution import (
     SomeSubstitutionsType,
@@ -83,8 +84,11 @@ class OrSubstitution(_Binary):
         return _text(any(self._operands(context)))
 
 
+@read_only("args")
 class _Variadic(Substitution):
     """All operands are always performed."""
+
+    args: list[list[Substitution]]
 
     def __init__(self, *args: SomeSubstitutionsType) -> None:
         self.__args = [normalize_to_list_of_substitutions(arg) for arg in args]
@@ -97,10 +101,6 @@ class _Variadic(Substitution):
         if current_release().has(Feature.ANY_ALL_ARGUMENTS):
             return partial(cls, *data), {}
         return cls, {"args": data}
-
-    @property
-    def args(self) -> list[list[Substitution]]:
-        return self.__args
 
     def describe(self) -> str:
         return f"{type(self).__name__}({' '.join(str(arg) for arg in self.__args)})"

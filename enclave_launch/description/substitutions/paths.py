@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from enclave_launch.description import ament_index as packages
+from enclave_launch.description import read_only
 from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.description.logging import launch_config
 from enclave_launch.description.markup.expose import expose_substitution
@@ -77,17 +78,16 @@ def _part(item: Any) -> list[Substitution]:
     return normalize_to_list_of_substitutions([item])
 
 
+@read_only("path")
 class PathSubstitution(PathOperator, Substitution):
     """A ``pathlib.Path`` as a substitution, or anything that gives a path, with the operator ``/``."""
+
+    path: object
 
     def __init__(self, path: object) -> None:
         self.__path = path
         text = str(path) if isinstance(path, Path) else path
         self.__parts = normalize_to_list_of_substitutions(text)  # type: ignore[arg-type]
-
-    @property
-    def path(self) -> object:
-        return self.__path
 
     def describe(self) -> str:
         return f"'{self.__path}'"
