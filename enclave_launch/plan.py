@@ -21,7 +21,6 @@ from enclave_launch.host.host import HostOptions
 from enclave_launch.host.user_code_results import RecordedResults
 from enclave_launch.policy import DerivedPolicy, PolicyOptions, RunningNode
 from enclave_launch.process import UNSPECIFIED_NODE_NAME, Evaluation, ResolvedComponent, ResolvedProcess
-from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.source_location import SourceLocation
 from keystore.formats.policy import Operation
 from nodl.node_interface import NodeInterface
@@ -105,26 +104,9 @@ class PlannedProcess(NamedTuple):
     middleware: str = DEFAULT_MIDDLEWARE
 
     @property
-    def package(self) -> str | None:
-        return self.process.package
-
-    @property
-    def executable(self) -> str:
-        return self.process.executable
-
-    @property
     def program(self) -> str:
         """Return ``package/executable``, or the executable alone."""
         return self.process.program
-
-    @property
-    def cmd(self) -> tuple[str, ...]:
-        """Return the command without what ``--secure`` appends."""
-        return self.process.cmd
-
-    @property
-    def parameters(self) -> Mapping[str, ParameterValue]:
-        return self.process.parameters
 
     @property
     def location(self) -> SourceLocation:
@@ -155,14 +137,6 @@ class PlannedComponent(NamedTuple):
     origin: InterfaceOrigin | None = None
     doubt: str = ""
     descriptions: tuple[Described, ...] = ()
-
-    @property
-    def package(self) -> str:
-        return self.component.package
-
-    @property
-    def plugin(self) -> str:
-        return self.component.plugin
 
     @property
     def program(self) -> str:

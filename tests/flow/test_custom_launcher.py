@@ -202,6 +202,10 @@ def test_one_prefix_is_one_prefix_however_it_is_given(prefixes: Any) -> None:
 def test_a_plan_reads_as_one_would_say_it() -> None:
     plan = resolve(DEMO / "share/demo_nodes/launch/talker_listener.launch.xml", options=OPTIONS)
     talker, listener = plan.processes
-    assert (talker.name, talker.package, talker.executable) == ("talker", "demo_nodes", "talker")
+    assert (talker.name, talker.process.package, talker.process.executable) == (
+        "talker",
+        "demo_nodes",
+        "talker",
+    )
     assert talker.enclave is not None and talker.enclave.path == "/"
-    assert talker.location.line == 5 and listener.parameters["count"] == 5
+    assert talker.location.line == 5 and listener.process.parameters["count"] == 5

@@ -32,7 +32,7 @@ def plan(tmp_path: Path) -> Plan:
 
 
 def started(found: LaunchPlan) -> list[str]:
-    return [" ".join(process.cmd) for process in found.processes]
+    return [" ".join(process.process.cmd) for process in found.processes]
 
 
 TALKER = '<node pkg="demo_nodes" exec="talker">{}</node>'
