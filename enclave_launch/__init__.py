@@ -26,11 +26,7 @@ _MODULES = {
         "run_async",
         "start",
     ),
-    "enclave_launch.options": (
-        "ResolveOptions",
-        "RunSettings",
-        "SecurityOptions",
-    ),
+    "enclave_launch.options": ("ResolveOptions", "RunSettings", "SecurityOptions"),
     "enclave_launch.plan": ("LaunchPlan",),
     "enclave_launch.runtime.running_launch": (
         "RunningLaunch",

@@ -11,58 +11,19 @@ from enclave_common.lazy_names import lazy_names
 _MODULES = {
     "keystore.disk.share_files": ("LaunchHold",),
     "keystore.errors": ("KeystoreError",),
-    "keystore.formats.hosts": (
-        "Hosts",
-        "load_hosts",
-    ),
+    "keystore.formats.hosts": ("Hosts", "load_hosts"),
     "keystore.formats.subject": ("SubjectScheme",),
-    "keystore.signing.ca_access": (
-        "CaAccess",
-        "Secret",
-    ),
-    "keystore.steps.bundle": (
-        "PublicFiles",
-        "export",
-    ),
-    "keystore.steps.creation": (
-        "CreateOptions",
-        "CreateReport",
-        "ImportedCa",
-        "create_keystore",
-    ),
-    "keystore.steps.expiry": (
-        "Expiry",
-        "StatusReport",
-        "expires_soon",
-        "status",
-    ),
-    "keystore.steps.fleet": (
-        "FleetReport",
-        "fleet_status",
-    ),
-    "keystore.steps.governance": (
-        "GovernanceOptions",
-        "set_governance",
-    ),
-    "keystore.steps.host_bundles": (
-        "BundleOptions",
-        "HostBundle",
-        "export_hosts",
-    ),
-    "keystore.steps.host_keys": (
-        "RequestOptions",
-        "request",
-    ),
-    "keystore.steps.importing": (
-        "ImportOptions",
-        "ImportReport",
-        "import_bundle",
-    ),
-    "keystore.steps.options": (
-        "EnclaveReport",
-        "ProvisionOptions",
-        "ProvisionReport",
-    ),
+    "keystore.signing.ca_access": ("CaAccess", "Secret"),
+    "keystore.steps.bundle": ("PublicFiles", "export"),
+    "keystore.steps.creation": ("CreateOptions", "CreateReport", "ImportedCa", "create_keystore"),
+    "keystore.steps.expiry": ("Expiry", "StatusReport", "expires_soon", "status"),
+    "keystore.steps.fleet": ("FleetReport", "fleet_status"),
+    "keystore.steps.governance": ("set_governance",),
+    "keystore.steps.host_bundles": ("BundleOptions", "HostBundle", "export_hosts"),
+    "keystore.steps.host_keys": ("RequestOptions", "request"),
+    "keystore.steps.importing": ("ImportOptions", "ImportReport", "import_bundle"),
+    "keystore.steps.opening": ("ChangeOptions",),
+    "keystore.steps.options": ("EnclaveReport", "ProvisionOptions", "ProvisionReport"),
     "keystore.steps.provisioning": (
         "apply_policy",
         "create_enclave",
@@ -71,39 +32,13 @@ _MODULES = {
         "list_enclaves",
         "provision",
     ),
-    "keystore.steps.removal": (
-        "RemoveOptions",
-        "RemoveReport",
-        "remove",
-    ),
-    "keystore.steps.renewal": (
-        "RenewOptions",
-        "renew",
-    ),
-    "keystore.steps.request_signing": (
-        "SigningOptions",
-        "accept_certificates",
-        "sign_requests",
-    ),
-    "keystore.steps.rollover": (
-        "Step",
-        "roll_over",
-    ),
-    "keystore.steps.sharing": (
-        "LaunchShares",
-        "list_shares",
-    ),
-    "keystore.steps.tool_enclaves": (
-        "ToolEnclave",
-        "create_tool_enclave",
-    ),
-    "keystore.verification": (
-        "Finding",
-        "Requirements",
-        "Severity",
-        "VerifyReport",
-        "verify",
-    ),
+    "keystore.steps.removal": ("RemoveOptions", "RemoveReport", "remove"),
+    "keystore.steps.renewal": ("RenewOptions", "renew"),
+    "keystore.steps.request_signing": ("accept_certificates", "sign_requests"),
+    "keystore.steps.rollover": ("Step", "roll_over"),
+    "keystore.steps.sharing": ("LaunchShares", "list_shares"),
+    "keystore.steps.tool_enclaves": ("ToolEnclave", "create_tool_enclave"),
+    "keystore.verification": ("Finding", "Requirements", "Severity", "VerifyReport", "verify"),
 }
 """The public names of each module. ``__init__.pyi`` says the same to type checkers; a test compares the two."""
 __all__, __getattr__, __dir__ = lazy_names(__name__, _MODULES)

@@ -19,7 +19,6 @@ from keystore.steps.expiry import expires_soon as expires_soon
 from keystore.steps.expiry import status as status
 from keystore.steps.fleet import FleetReport as FleetReport
 from keystore.steps.fleet import fleet_status as fleet_status
-from keystore.steps.governance import GovernanceOptions as GovernanceOptions
 from keystore.steps.governance import set_governance as set_governance
 from keystore.steps.host_bundles import BundleOptions as BundleOptions
 from keystore.steps.host_bundles import HostBundle as HostBundle
@@ -29,6 +28,7 @@ from keystore.steps.host_keys import request as request
 from keystore.steps.importing import ImportOptions as ImportOptions
 from keystore.steps.importing import ImportReport as ImportReport
 from keystore.steps.importing import import_bundle as import_bundle
+from keystore.steps.opening import ChangeOptions as ChangeOptions
 from keystore.steps.options import EnclaveReport as EnclaveReport
 from keystore.steps.options import ProvisionOptions as ProvisionOptions
 from keystore.steps.options import ProvisionReport as ProvisionReport
@@ -43,7 +43,6 @@ from keystore.steps.removal import RemoveReport as RemoveReport
 from keystore.steps.removal import remove as remove
 from keystore.steps.renewal import RenewOptions as RenewOptions
 from keystore.steps.renewal import renew as renew
-from keystore.steps.request_signing import SigningOptions as SigningOptions
 from keystore.steps.request_signing import accept_certificates as accept_certificates
 from keystore.steps.request_signing import sign_requests as sign_requests
 from keystore.steps.rollover import Step as Step

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
@@ -55,19 +55,14 @@ def renew_governance(opened: Store, domains: Domains, access: CaAccess, now: dat
     return True
 
 
-@dataclass(frozen=True, slots=True)
-class GovernanceOptions(ChangeOptions):
-    """How ``set_governance`` signs."""
-
-
 def set_governance(
-    keystore: Path | str, governance: Governance, *, options: GovernanceOptions | None = None
+    keystore: Path | str, governance: Governance, *, options: ChangeOptions | None = None
 ) -> bool:
     """Sign ``governance`` and put it in force; whether it differs from before.
 
     It must be deployed to all participants at once: those with different protection kinds do not talk.
     """
-    chosen = options or GovernanceOptions()
+    chosen = options or ChangeOptions()
     root = keystore_at(keystore).root
     document = governance_document(governance)
     now = chosen.now or utc_now()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 
@@ -28,27 +27,23 @@ from keystore.steps.past_permissions import previous_permissions
 from keystore.steps.renewal import RenewOptions, renew
 
 
-@dataclass(frozen=True, slots=True)
-class SigningOptions:
-    """``revoke_old``: revoke what the enclaves had before, of which the private key was here."""
-
-    revoke_old: bool = False
-    provisioning: ProvisionOptions = field(default_factory=ProvisionOptions)
-
-
 def sign_requests(
-    keystore: Path | str, requests: Iterable[Request], *, options: SigningOptions | None = None
+    keystore: Path | str,
+    requests: Iterable[Request],
+    *,
+    revoke_old: bool = False,
+    options: ProvisionOptions | None = None,
 ) -> ProvisionReport:
     """Certify the requested keys in the place of those that the enclaves have; repeating does nothing more.
 
-    The enclaves must exist, with the permissions that they are to have; their private keys are deleted here. Raises
+    The enclaves must exist, with the permissions that they are to have; their private keys are deleted here.
+    ``revoke_old``: revoke what the enclaves had before, of which the private key was here. Raises
     InvalidInputError for an enclave that does not exist and a key that is another's, SigningUnavailableError.
     """
-    chosen = options or SigningOptions()
+    chosen = options or ProvisionOptions()
     root, listed = keystore_at(keystore).root, list(requests)
-    provisioning = chosen.provisioning
-    now = provisioning.now or utc_now()
-    with opened_for_change(root, now, provisioning) as opened:
+    now = chosen.now or utc_now()
+    with opened_for_change(root, now, chosen) as opened:
         view = KeystoreView(root)
         for one in listed:
             _refuse_unfit(view, opened.register, one)
@@ -59,8 +54,7 @@ def sign_requests(
         for one in listed:
             opened.remove(f"{layout.enclave_directory(one.enclave)}/{layout.KEY}")
     names = [one.enclave for one in fresh]
-    requested = RenewOptions(revoke_old=chosen.revoke_old, provisioning=provisioning)
-    return renew(root, names, options=requested)
+    return renew(root, names, options=RenewOptions(revoke_old=revoke_old, provisioning=chosen))
 
 
 def accept_certificates(

@@ -9,7 +9,8 @@ import argparse
 
 from enclave_common.command_line import PATH
 from keystore.formats.governance_yaml import load_governance_yaml
-from keystore.steps.governance import GovernanceOptions, set_governance
+from keystore.steps.governance import set_governance
+from keystore.steps.opening import ChangeOptions
 from keystore.verb import common
 
 OPTIONS: common.Table = (
@@ -22,7 +23,7 @@ OPTIONS: common.Table = (
 def run(arguments: argparse.Namespace) -> int:
     """Sign the governance if it differs, and print whether it did. Returns 0."""
     governance = load_governance_yaml(arguments.file)
-    options = GovernanceOptions(**common.change(arguments))
+    options = ChangeOptions(**common.change(arguments))
     changed = set_governance(arguments.keystore, governance, options=options)
     print(
         "governance signed; deploy it to all participants"

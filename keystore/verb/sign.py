@@ -11,7 +11,7 @@ import argparse
 from enclave_common.command_line import PATH
 from keystore.formats.given_file import read_given
 from keystore.steps.host_keys import parse_requests
-from keystore.steps.request_signing import SigningOptions, accept_certificates, sign_requests
+from keystore.steps.request_signing import accept_certificates, sign_requests
 from keystore.verb import common
 
 OPTIONS: common.Table = (
@@ -33,8 +33,9 @@ def run(arguments: argparse.Namespace) -> int:
         accept_certificates(arguments.keystore, requests, issued, options=provisioning)
         common.print_lines(f"{one.enclave}: certificate taken, key SHA-256 {one.key}" for one in requests)
         return 0
-    options = SigningOptions(arguments.revoke_old, provisioning)
-    report = sign_requests(arguments.keystore, requests, options=options)
+    report = sign_requests(
+        arguments.keystore, requests, revoke_old=arguments.revoke_old, options=provisioning
+    )
     common.print_lines(f"{one.enclave}: key SHA-256 {one.key}" for one in requests)
     common.print_report(report, arguments)
     return 0

@@ -17,7 +17,6 @@ import pytest
 from keystore import (
     ImportOptions,
     ProvisionOptions,
-    SigningOptions,
     export_hosts,
     import_bundle,
     sign_requests,
@@ -88,7 +87,7 @@ def enclaves(tmp_path: Path, token: dict[str, str], domain_id: int) -> Path:
     policies = [EnclavePolicy("/speaker", (talker,)), EnclavePolicy("/ear", (listener,))]
     provision(tmp_path / "ca", domain_id, policies)
     requests = parse_requests(asked_for(tmp_path / "ks", token, tmp_path).read_bytes(), "requests")
-    signing = SigningOptions(provisioning=ProvisionOptions(durable=False))
+    signing = ProvisionOptions(durable=False)
     sign_requests(tmp_path / "ca", requests, options=signing)
     bundle = export_hosts(tmp_path / "ca", tmp_path / "out", {"robot": ["*"]})[0]
     pins = ImportOptions("robot", pinned(bundle.manifest))

@@ -17,7 +17,6 @@ from keystore import (
     ImportOptions,
     RemoveOptions,
     RenewOptions,
-    SigningOptions,
     export_hosts,
     import_bundle,
     remove,
@@ -316,7 +315,7 @@ def test_only_members_of_the_domain_talk(tmp_path: Path) -> None:
 def test_a_key_that_is_only_on_its_host_is_not_written(tmp_path: Path) -> None:
     launch = launch_file(tmp_path)
     ks = provisioned(launch, tmp_path / "ks")
-    sign_requests(ks, request(tmp_path / "host", ["/ear"]), options=SigningOptions(provisioning=options()))
+    sign_requests(ks, request(tmp_path / "host", ["/ear"]), options=options())
     assert export("kubernetes", launch, ks, tmp_path / "out") == 0
     secrets = objects(tmp_path / "out", "Secret")
     assert "key.pem" not in secrets["enclave-ear"]["data"]

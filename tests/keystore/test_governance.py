@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from keystore import GovernanceOptions, Requirements, provision, set_governance, verify
+from keystore import ChangeOptions, Requirements, provision, set_governance, verify
 from keystore.errors import InvalidInputError
 from keystore.formats.domains import Domains
 from keystore.formats.governance import (
@@ -23,7 +23,7 @@ from keystore.formats.governance_yaml import parse_governance_yaml
 from tests.dds.sros2_style import GOVERNANCE
 from tests.keystore.kit import contents, filled, options, policy, snapshot
 
-QUICK = GovernanceOptions(durable=False)
+QUICK = ChangeOptions(durable=False)
 CAMERA = b"""
 version: 1
 domain_rules:

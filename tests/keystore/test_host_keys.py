@@ -14,7 +14,6 @@ from keystore import (
     ImportReport,
     RemoveOptions,
     RenewOptions,
-    SigningOptions,
     export,
     export_hosts,
     import_bundle,
@@ -35,7 +34,7 @@ from keystore.verb import main
 from tests.keystore.kit import actions, filled, mode, openssl, options, policy
 
 NAMES = ("/arm", "/arm/hand")
-SIGNING = SigningOptions(provisioning=options())
+SIGNING = options()
 
 
 @pytest.fixture
@@ -119,7 +118,7 @@ def test_a_new_key_replaces_the_one_of_before_when_it_comes_back_signed(ca: Path
     before = private_keys(host.resolve())
     asked = request(host, ["/arm"])
     assert private_keys(host.resolve()) == before, "in use until then"
-    sign_requests(ca, asked, options=SigningOptions(revoke_old=True, provisioning=options()))
+    sign_requests(ca, asked, revoke_old=True, options=options())
     carried(host, ca, tmp_path / "again")
     after = private_keys(host.resolve())
     assert after["enclaves/arm/key.pem"] != before["enclaves/arm/key.pem"]

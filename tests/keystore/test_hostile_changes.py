@@ -484,12 +484,13 @@ def test_a_launch_says_what_is_exposed_though_nothing_is_to_be_done(
 
 
 def test_a_launch_says_where_its_governance_is_weak(present: Path, tmp_path: Path) -> None:
-    from keystore.steps.governance import GovernanceOptions, set_governance
+    from keystore.steps.governance import set_governance
+    from keystore.steps.opening import ChangeOptions
     from keystore.steps.provisioning import provision
 
     root = copy_of(present, tmp_path)
     weak = Governance((DomainRule(rtps_protection_kind=NONE),))
-    set_governance(root, weak, options=GovernanceOptions(durable=False))
+    set_governance(root, weak, options=ChangeOptions(durable=False))
     for _ in range(2):
         report = provision(root, [policy("/a", "/chatter")], options=options())
         assert any("rtps_protection_kind NONE" in warning for warning in report.warnings)

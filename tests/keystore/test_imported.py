@@ -12,7 +12,7 @@ import pytest
 
 from keystore import (
     BundleOptions,
-    GovernanceOptions,
+    ChangeOptions,
     HostBundle,
     ImportOptions,
     KeystoreError,
@@ -146,7 +146,7 @@ def test_an_identity_ca_alone_cannot_become_the_permissions_ca(ca: Path, tmp_pat
 
 def test_a_weaker_governance_is_taken_only_by_name(ca: Path, host: Path, tmp_path: Path) -> None:
     weak = Governance((DomainRule(rtps_protection_kind=Protection.NONE),))
-    set_governance(ca, weak, options=GovernanceOptions(durable=False))
+    set_governance(ca, weak, options=ChangeOptions(durable=False))
     bundle = exported(ca, tmp_path / "weak", accept=True)
     for accepted in ((), ("discovery_protection_kind",)):
         with pytest.raises(UnsafeKeystoreError, match="--accept-weaker rtps_protection_kind"):

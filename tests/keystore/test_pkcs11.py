@@ -18,7 +18,6 @@ from keystore import (
     RenewOptions,
     RequestOptions,
     Secret,
-    SigningOptions,
     export_hosts,
     import_bundle,
     provision,
@@ -185,7 +184,7 @@ def test_an_enclaves_key_in_a_token_is_asked_for_and_used_by_its_uri(
     asking = RequestOptions(token=uri(Role.IDENTITY), access=access(token))
     asked = request(tmp_path / "ks", ["/arm"], options=asking)
     for _ in range(2):  # the second time renewed, for the same key
-        sign_requests(ca, asked, options=SigningOptions(provisioning=options()))
+        sign_requests(ca, asked, options=options())
         bundle = export_hosts(ca, tmp_path / "out", {"arm": ["/arm"]})[0]
         import_bundle(tmp_path / "ks", bundle.path, options=ImportOptions("arm", pinned(bundle.manifest)))
         assert (tmp_path / "ks/enclaves/arm/key.p11").read_text() == uri(Role.IDENTITY) + "\n"

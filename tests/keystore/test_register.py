@@ -13,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from keystore import (
-    GovernanceOptions,
+    ChangeOptions,
     RemoveOptions,
     RenewOptions,
     Step,
@@ -371,12 +371,10 @@ class TestIncidents:
         lax = Governance((DomainRule(domains=Domains.single(0), rtps_protection_kind=Protection.NONE),))
         filled(root, ["/a"])
         strict = (root / "enclaves/governance.xml").read_bytes()
-        set_governance(root, lax, options=GovernanceOptions(durable=False))
+        set_governance(root, lax, options=ChangeOptions(durable=False))
         for name in ("governance.p7s", "governance.xml"):
             shutil.copy(root / "enclaves" / name, tmp_path / name)
-        set_governance(
-            root, Governance.for_domains(Domains.single(0)), options=GovernanceOptions(durable=False)
-        )
+        set_governance(root, Governance.for_domains(Domains.single(0)), options=ChangeOptions(durable=False))
         for name in ("governance.p7s", "governance.xml"):
             shutil.copy(tmp_path / name, root / "enclaves" / name)
         assert "governance signed" in provision(root, [policy("/a")], options=options()).created[0]
