@@ -18,7 +18,7 @@ from enclave_launch.plan import PlanOptions
 from enclave_launch.policy import PolicyOptions
 from enclave_launch.policy.node_permissions import ALSO
 from keystore.errors import KeystoreError
-from keystore.formats.policy_xml import PolicyDocument, read_policy
+from keystore.formats.policy_xml import read_policy
 from keystore.steps.options import ProvisionOptions
 
 if TYPE_CHECKING:
@@ -76,29 +76,17 @@ class ResolveOptions(_ResolveOptions):
 
     def plan_options(self) -> PlanOptions:
         """Return the options of planning; raises ``UsageError`` for a policy file that cannot be used."""
-        document = _read_policy(self.policy) if self.policy else None
-        _check_also(self.also)
+        with translated(KeystoreError, UsageError):
+            document = read_policy(self.policy) if self.policy else None
+        if unknown := [name for name in self.also if name not in ALSO]:
+            raise UsageError(f"--also {unknown[0]}: choose from {', '.join(ALSO)}")
         policy = PolicyOptions(self.accept_patterns, document, also=frozenset(self.also))
         admission = AdmissionOptions(frozenset(self.accept_prefixes), frozenset(self.accept_middlewares))
         return PlanOptions(self.enclave_scope, policy, admission)
 
 
-def _check_also(names: tuple[str, ...]) -> None:
-    if not names:
-        return
-
-    unknown = [name for name in names if name not in ALSO]
-    if unknown:
-        raise UsageError(f"--also {unknown[0]}: choose from {', '.join(ALSO)}")
-
-
 def _several(given: Any) -> tuple[Any, ...]:
     return (given,) if isinstance(given, (str, os.PathLike)) else tuple(given)
-
-
-def _read_policy(path: Path) -> PolicyDocument:
-    with translated(KeystoreError, UsageError):
-        return read_policy(path)
 
 
 class SecurityOptions(NamedTuple):

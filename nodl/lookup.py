@@ -53,7 +53,9 @@ class ManifestLookup:
         """Return the nodes that ``executable`` runs, or the one that ``plugin`` is; raises ``InvalidNoDLError``."""
         fits = partial(_describes, executable=executable, plugin=plugin)
         subject = f"{package}/{executable or plugin}"
-        chosen = [node for node in self._chosen_nodes() if fits(node) and _same_package(node, package)]
+        chosen = [
+            node for node in self._chosen_nodes() if fits(node) and node.interface.package in (None, package)
+        ]
         if chosen:
             return Lookup(_agreed(subject, chosen), self._manifests, named=True)
         installed = self.installed(package, executable=executable, plugin=plugin)
@@ -74,12 +76,12 @@ class ManifestLookup:
 
     def _chosen_nodes(self) -> tuple[ManifestNode, ...]:
         if self._chosen is None:
-            self._chosen = tuple(node for file in self._manifests for node in self._read_manifest(file))
+            self._chosen = tuple(
+                node
+                for file in self._manifests
+                for node in read_document(file, package=self._owner(file), prefixes=self._prefixes)
+            )
         return self._chosen
-
-    def _read_manifest(self, file: str) -> tuple[ManifestNode, ...]:
-        package = self._owner(file)
-        return read_document(file, package=package, prefixes=self._prefixes)
 
     def _owner(self, file: str) -> str | None:
         absolute = os.path.abspath(file)
@@ -156,10 +158,6 @@ def _describes(node: ManifestNode, *, executable: str | None, plugin: str | None
     if interface.plugin is not None or node.explicit_executable:
         return interface.plugin == plugin
     return interface.executable == plugin.rpartition("::")[2]
-
-
-def _same_package(node: ManifestNode, package: str) -> bool:
-    return node.interface.package in (None, package)
 
 
 def _agreed(subject: str, nodes: Sequence[ManifestNode]) -> tuple[NodeInterface, ...]:

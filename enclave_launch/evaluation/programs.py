@@ -18,7 +18,7 @@ def missing_programs(processes: Iterable[ResolvedProcess]) -> list[tuple[Resolve
         if process.cmd and not process.shell:
             key = _program(process), _path(process)
             if key not in known:
-                known[key] = _can_be_executed(*key)
+                known[key] = shutil.which(key[0], path=key[1]) is not None
             if not known[key]:
                 errors.append((process, LaunchFileError(_message(process), process.location)))
     return errors
@@ -29,10 +29,6 @@ def check_programs(processes: Iterable[ResolvedProcess]) -> None:
     missing = missing_programs(process for process in processes if process.on_event is None)
     if missing:
         raise LaunchFileError("\n".join((*(str(error) for _, error in missing), "nothing was started")))
-
-
-def _can_be_executed(program: str, path: str) -> bool:
-    return shutil.which(program, path=path) is not None
 
 
 def _program(process: ResolvedProcess) -> str:

@@ -43,7 +43,10 @@ def likeliest(error: BaseException) -> BaseException:
     attempts = [likeliest(attempt) for attempt in getattr(error, "likely_errors", ())]
     if not attempts:
         return error
-    return attempts[1] if len(attempts) > 1 and _is_no_xml(attempts[0]) else attempts[0]
+    is_no_xml = getattr(attempts[0], "code", None) == _XML_ERROR_SYNTAX and isinstance(
+        attempts[0], SyntaxError
+    )
+    return attempts[1] if len(attempts) > 1 and is_no_xml else attempts[0]
 
 
 def frames(error: BaseException) -> Iterator[TracebackType]:
@@ -52,10 +55,6 @@ def frames(error: BaseException) -> Iterator[TracebackType]:
     while step is not None:
         yield step
         step = step.tb_next
-
-
-def _is_no_xml(error: BaseException) -> bool:
-    return isinstance(error, SyntaxError) and getattr(error, "code", None) == _XML_ERROR_SYNTAX
 
 
 _XML_ERROR_SYNTAX = 2  # expat's number for it; the module is not imported just for that

@@ -332,7 +332,7 @@ class LoadCache:
             summary = summarize(description)
         finally:
             self._in_progress.discard(key)
-        if not _runs_python(key[1]):
+        if not key[1].endswith(".py"):
             description.argument_summary = summary
             self._unvisited[key] = description
         return summary
@@ -348,7 +348,3 @@ class LoadCache:
             self._seen = now
             self._summaries.clear()
             self._unvisited.clear()
-
-
-def _runs_python(location: str) -> bool:
-    return os.path.splitext(location)[1] == ".py"

@@ -28,7 +28,7 @@ from enclave_launch.source_location import SourceLocation
 from keystore.formats.permissions import dds_rules
 from keystore.formats.permissions_names import full_name
 from keystore.formats.permissions_patterns import can_meet
-from keystore.formats.permissions_size import expected_concern
+from keystore.formats.permissions_size import size_concern
 from keystore.formats.policy import EnclavePolicy, Operation, Policy, Profile, Qualifier, Rule
 from keystore.formats.policy_xml import PolicyDocument
 
@@ -149,8 +149,8 @@ def _size_warnings(enclaves: Iterable[EnclavePolicy]) -> list[Diagnostic]:
     if not large:
         return []
 
-    concerns = ((enclave.path, expected_concern(enclave)) for enclave in large)
-    return [permissions_large(path, concern.text) for path, concern in concerns if concern]
+    concerns = ((enclave.path, size_concern(enclave)) for enclave in large)
+    return [permissions_large(path, concern) for path, concern in concerns if concern]
 
 
 def _merged_reasons(

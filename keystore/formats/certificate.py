@@ -159,14 +159,9 @@ def read_certificates(pem: bytes, place: str) -> list[CertificateFacts]:
 def _read_all(pem: bytes) -> tuple[CertificateFacts, ...]:
     """Read every certificate of ``pem``; none if one of them cannot be read."""
     try:
-        return tuple(_read_block(block) for block in _BLOCK.findall(pem))
+        return tuple(_complete(x509.load_pem_x509_certificate(block)) for block in _BLOCK.findall(pem))
     except UNREADABLE:
         return ()
-
-
-def _read_block(block: bytes) -> CertificateFacts:
-    certificate = x509.load_pem_x509_certificate(block)
-    return read_der(certificate.public_bytes(Encoding.DER))
 
 
 def given_certificates(pem: bytes, place: str) -> list[CertificateFacts]:

@@ -151,7 +151,11 @@ def _lost(old: Grant, new: Grant) -> Iterator[Permitted]:
     denied = _permitted(old, Qualifier.DENY)
     for denial in _permitted(new, Qualifier.DENY):
         if not any(_includes(before, denial) for before in denied):
-            yield from (one for one in allowed if _concerns(denial, one))
+            yield from (
+                one
+                for one in allowed
+                if denial.direction == one.direction and can_meet(denial.topic, one.topic)
+            )
 
 
 def _permitted(grant: Grant, qualifier: Qualifier) -> list[Permitted]:
@@ -175,10 +179,6 @@ def _includes(wide: Permitted, narrow: Permitted) -> bool:
 def _within(inner: tuple[int, int | None], outer: tuple[int, int | None]) -> bool:
     last, end = (_HIGHEST_DOMAIN if high is None else high for high in (inner[1], outer[1]))
     return outer[0] <= inner[0] and last <= end
-
-
-def _concerns(denial: Permitted, one: Permitted) -> bool:
-    return denial.direction == one.direction and can_meet(denial.topic, one.topic)
 
 
 def redated(

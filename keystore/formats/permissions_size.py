@@ -7,15 +7,15 @@ matches. Cyclone DDS 0.10.2 handles 140 kB.
 from __future__ import annotations
 
 from collections import Counter
-from typing import NamedTuple
 
 from keystore.formats.permissions_names import dds_topics, full_name
-from keystore.formats.policy import EnclavePolicy, Operation, Profile
+from keystore.formats.policy import EnclavePolicy, Operation
 
 WARN_BYTES = 48_000
 FAST_DDS_LIMIT_BYTES = 62_830
-_SIGNATURE_BYTES = 2_600  # MIME frame, PKCS#7 and one certificate in base64, rounded up
-_FRAME_BYTES = _SIGNATURE_BYTES + 700  # with the head and tail of the document
+_FRAME_BYTES = (
+    3_300  # MIME frame, PKCS#7 and one certificate in base64, rounded up; head and tail of the document
+)
 _TOPIC_BYTES = 17  # <topic></topic> and CRLF
 
 
@@ -28,41 +28,27 @@ def _bytes_without_name(operation: Operation) -> tuple[int, int]:
 _BYTES = {operation: _bytes_without_name(operation) for operation in Operation}
 
 
-class SizeConcern(NamedTuple):
-    """``fatal``: no Fast DDS participant will match this enclave. ``text`` says what to do about it."""
-
-    size: int
-    fatal: bool
-    text: str
-
-
-def signed_size(document: bytes) -> int:
-    """Estimate the bytes of the document once signed: line ends become CRLF, the signature is added."""
-    return len(document) + document.count(b"\n") + _SIGNATURE_BYTES
-
-
-def size_concern(size: int, policy: EnclavePolicy) -> SizeConcern | None:
-    """Return whether a signed document of ``size`` bytes is too large, or near it; ``None`` if all is well."""
-    if size < WARN_BYTES:
-        return None
-    fatal = size > FAST_DDS_LIMIT_BYTES
-    effect = (
-        f"over the {FAST_DDS_LIMIT_BYTES} bytes that Fast DDS can carry: its peers would never match"
-        if fatal
-        else f"close to the {FAST_DDS_LIMIT_BYTES} bytes that Fast DDS can carry"
-    )
-    text = f"the permissions of enclave {policy.path} take {size} bytes, {effect}. {_advice(policy)}"
-    return SizeConcern(size, fatal, text)
-
-
-def expected_concern(policy: EnclavePolicy) -> SizeConcern | None:
-    """Estimate the same before anything is signed, from the names alone. Raises ``PolicyError``."""
+def expected_size(policy: EnclavePolicy) -> int:
+    """Estimate the bytes of the signed document before anything is signed, from the names. Raises ``PolicyError``."""
     names = {
         (rule.operation, full_name(rule.expression, profile))
         for profile in policy.profiles
         for rule in profile.rules
     }
-    return size_concern(_FRAME_BYTES + sum(_bytes_of(operation, name) for operation, name in names), policy)
+    return _FRAME_BYTES + sum(_bytes_of(operation, name) for operation, name in names)
+
+
+def size_concern(policy: EnclavePolicy) -> str | None:
+    """Report a document that will be too large, or near it, and what to do; ``None`` if all is well."""
+    size = expected_size(policy)
+    if size < WARN_BYTES:
+        return None
+    effect = (
+        f"over the {FAST_DDS_LIMIT_BYTES} bytes that Fast DDS can carry: its peers would never match"
+        if size > FAST_DDS_LIMIT_BYTES
+        else f"close to the {FAST_DDS_LIMIT_BYTES} bytes that Fast DDS can carry"
+    )
+    return f"the permissions of enclave {policy.path} take {size} bytes, {effect}. {_advice(policy)}"
 
 
 def _bytes_of(operation: Operation, name: str) -> int:
@@ -71,7 +57,14 @@ def _bytes_of(operation: Operation, name: str) -> int:
 
 
 def _advice(policy: EnclavePolicy) -> str:
-    weights = Counter({f"{p.ns.rstrip('/')}/{p.node}": _weight(p) for p in policy.profiles})
+    weights = Counter(
+        {
+            f"{p.ns.rstrip('/')}/{p.node}": sum(
+                _bytes_of(r.operation, full_name(r.expression, p)) for r in p.rules
+            )
+            for p in policy.profiles
+        }
+    )
     heaviest = ", ".join(f"{fqn} (about {weight} bytes)" for fqn, weight in weights.most_common(3))
     if len(policy.profiles) > 1:
         return f"Give some of its {len(policy.profiles)} nodes their own enclave; the largest: {heaviest}"
@@ -82,7 +75,3 @@ def _advice(policy: EnclavePolicy) -> str:
     )
     common = ", ".join(f"{prefix}/* ({count} names)" for prefix, count in prefixes.most_common(3))
     return f"Split node {heaviest}, or grant a group of names by a wildcard in a --policy file: {common}"
-
-
-def _weight(profile: Profile) -> int:
-    return sum(_bytes_of(rule.operation, full_name(rule.expression, profile)) for rule in profile.rules)

@@ -352,11 +352,12 @@ def _pointed(root: etree._Element, include: etree._Element, where: str) -> list[
     first, *steps = match[1][1:].split("/")
     found = [root] if root.tag == first else []
     for step in steps:
-        found = [child for element in found for child in element if _fits(child, step)]
+        found = [
+            child
+            for element in found
+            for child in element
+            if step in ("*", child.tag) or child.tag in _INCLUDE_TAGS
+        ]
     if not found:
         raise PolicyError(f"{where}: xpointer {printable(pointer)} selects nothing")
     return found
-
-
-def _fits(element: etree._Element, step: str) -> bool:
-    return step in ("*", element.tag) or element.tag in _INCLUDE_TAGS

@@ -40,7 +40,7 @@ def parse_strict(model: type[_Document], text: bytes, where: str) -> _Document:
     except (yaml.YAMLError, ValueError, RecursionError):  # numbers, dates, nesting that Python refuses
         raise InvalidInputError(f"{where}: not YAML text") from None
     if not isinstance(content, dict) or not all(isinstance(key, str) for key in content):
-        keys = " and ".join(name for name in ("version", *_others(model)))
+        keys = " and ".join(dict.fromkeys(("version", *model.__annotations__)))
         raise InvalidInputError(f"{where}: document: not a mapping with the keys {keys}")
     try:
         document = model(**content)
@@ -51,10 +51,6 @@ def parse_strict(model: type[_Document], text: bytes, where: str) -> _Document:
     if document.version != 1:
         raise InvalidInputError(f"{where}: version: {document.version} is not known, only 1 is")
     return document
-
-
-def _others(model: type[Strict]) -> list[str]:
-    return [name for name in model.__annotations__ if name != "version"]
 
 
 def _refuse_aliases_and_repeated_keys(root: yaml.Node | None) -> None:

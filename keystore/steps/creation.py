@@ -114,7 +114,7 @@ def complete(opened: Store, options: CreateOptions) -> CreateReport:
     if not view.is_complete:
         if _write_settings(opened, options):
             actions.append("settings written")
-            if _in_git_work_tree(opened.root):
+            if any((folder / ".git").exists() for folder in opened.root.absolute().parents):
                 with opened.batch() as batch:
                     batch.file(layout.GITIGNORE, b"*\n")
                 actions.append("kept out of git by its .gitignore, since it holds keys")
@@ -139,10 +139,6 @@ def _write_settings(opened: Store, options: CreateOptions) -> bool:
     with opened.batch() as batch:
         batch.file(layout.SETTINGS, options.settings.to_json())
     return True
-
-
-def _in_git_work_tree(root: Path) -> bool:
-    return any((folder / ".git").exists() for folder in root.absolute().parents)
 
 
 def _add_ca(opened: Store, role: Role, options: CreateOptions) -> tuple[str, list[str]]:

@@ -94,17 +94,15 @@ class EnclaveWriter:
         fresh = {state.enclave for state in states if state.reissue is not Reissue.NOTHING}
         if self._scheme is SubjectScheme.EXACT or not fresh or self._options.allow_subject_overlap:
             return
-        names = {enclave: self._present_name(enclave) for enclave in self._view.enclaves()}
-        names |= {enclave: common_name(enclave, self._scheme) for enclave in fresh}
+        names = {enclave: common_name(enclave, self._scheme) for enclave in (*self._view.enclaves(), *fresh)}
+        present = {enclave: self._view.common_name(enclave) for enclave in self._view.enclaves()}
+        names |= {enclave: name for enclave, name in present.items() if name and enclave not in fresh}
         pairs = [pair for pair in borrowable(names) if fresh & set(pair)]
         if pairs:
             raise InvalidInputError(
                 f"with compatible subjects, on Cyclone DDS {indistinguishable(pairs)}; use exact "
                 "subjects, rename the enclaves, or accept it with --allow-subject-overlap"
             )
-
-    def _present_name(self, enclave: str) -> str:
-        return self._view.common_name(enclave) or common_name(enclave, self._scheme)
 
     def write(self, batch: Batch, state: EnclaveState, permissions: PermissionsSource) -> EnclaveReport:
         """Adds the enclave's missing files; returns what was done.

@@ -145,7 +145,8 @@ def _trust(opened: Store, role: Role, bundle: bytes) -> str:
 
 def _switch(opened: Store, role: Role, creation: CreateOptions) -> str:
     if not opened.is_directory(_waiting(role)):
-        if len(KeystoreView(opened.root).ca_bundle(role)) > 1 or _retired(opened, role):
+        retired = any((opened.root / layout.RETIRED).glob(f"{role.value}-*.cert.pem"))
+        if len(KeystoreView(opened.root).ca_bundle(role)) > 1 or retired:
             return ""  # switched already
         raise InvalidInputError(f"there is no new {role.label} yet: first --ca start, and deploy")
     view = KeystoreView(opened.root)
@@ -173,10 +174,6 @@ def retire(opened: Store, role: Role) -> bytes:
     with opened.batch() as batch:
         batch.file(f"{layout.RETIRED}/{role.value}-{facts.serial:040x}.cert.pem", pem)
     return pem
-
-
-def _retired(opened: Store, role: Role) -> bool:
-    return any((opened.root / layout.RETIRED).glob(f"{role.value}-*.cert.pem"))
 
 
 def _forget_installed(opened: Store, role: Role) -> None:

@@ -11,7 +11,6 @@ from __future__ import annotations
 import argparse
 import os
 import socket
-from pathlib import Path
 
 from enclave_common.command_line import FLAG, PATH, TEXT, TEXTS
 from keystore.disk.units import Unit, in_restart_order
@@ -66,13 +65,10 @@ def run(arguments: argparse.Namespace) -> int:
     )
     common.print_answer(arguments, content, lines)
     found = unit_options(arguments)
-    units = [one for one in installed_units(found) if _is_of(one, arguments.keystore)]
+    keystore = os.path.abspath(arguments.keystore)
+    units = [one for one in installed_units(found) if one.target == one.name or one.keystore == keystore]
     common.warn((*report.notes, *differences(units, report.manifest)), arguments)
     return _restart(report, units, found) if arguments.restart else 0
-
-
-def _is_of(unit: Unit, keystore: Path) -> bool:
-    return unit.target == unit.name or unit.keystore == os.path.abspath(keystore)
 
 
 def _restart(report: ImportReport, units: list[Unit], options: UnitOptions) -> int:

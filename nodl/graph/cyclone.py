@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 import socket
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr
@@ -81,8 +82,8 @@ class CycloneObserver:
             (BuiltinDataReader(self._participant, topic), read)
             for topic, read in (
                 (BuiltinTopicDcpsParticipant, self._participant_seen),
-                (BuiltinTopicDcpsPublication, self._writer_seen),
-                (BuiltinTopicDcpsSubscription, self._reader_seen),
+                (BuiltinTopicDcpsPublication, partial(self._endpoint_seen, writes=True)),
+                (BuiltinTopicDcpsSubscription, partial(self._endpoint_seen, writes=False)),
             )
         ]
         self._guids: dict[int, str] = {}  # by handle of the instance, for the notice that it ended
@@ -135,12 +136,6 @@ class CycloneObserver:
             seen = seen._replace(pid=pid, host=socket.gethostname() if pid else seen.host)
         self._vendors[seen.guid] = seen
         self.state.participant(seen)
-
-    def _writer_seen(self, sample: Any) -> None:
-        self._endpoint_seen(sample, writes=True)
-
-    def _reader_seen(self, sample: Any) -> None:
-        self._endpoint_seen(sample, writes=False)
 
     def _endpoint_seen(self, sample: Any, *, writes: bool) -> None:
         participant = sample.participant_key.bytes.hex()
