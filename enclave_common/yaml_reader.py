@@ -40,7 +40,7 @@ class RefusedYaml(yaml.YAMLError):
 
 
 class YamlDocument(NamedTuple):
-    """``lines``: ``id`` of each mapping and list in ``root`` -> its line, counted from 1."""
+    """A composed YAML document. ``lines``: ``id`` of each mapping and list in ``root`` -> its line, counted from 1."""
 
     root: Any
     lines: dict[int, int]

@@ -36,18 +36,20 @@ class LaunchRouter(Protocol):
 
 
 class ZenohPlanning(NamedTuple):
-    """``report`` returns the plan with what to know of its processes on Zenoh; ``explain`` yields what a subject of
-    ``--explain`` means there. Neither performs I/O."""
+    """The part of the Zenoh add-on in planning. ``report`` returns the plan with what to know of its processes on
+    Zenoh; ``explain`` yields what a subject of ``--explain`` means there. Neither performs I/O."""
 
     report: Callable[[LaunchPlan, Mapping[str, str]], LaunchPlan]
     explain: Callable[[LaunchPlan, str], Iterator[str]]
 
 
 class ZenohStart(NamedTuple):
-    """``check`` raises ``RuntimeFailure``, before keys are made, if no router can be started and none answers.
+    """The part of the Zenoh add-on in the start of a launch. ``check`` raises ``RuntimeFailure``, before keys are
+    made, if no router can be started and none answers.
 
     ``types`` returns the types of what each enclave communicates (``ProvisionOptions.types``); ``configure`` writes the
-    files of the enclaves and of their router, and raises ``KeystoreError``."""
+    files of the enclaves and of their router, and raises ``KeystoreError``.
+    """
 
     check: Callable[[LaunchPlan, str], None]
     types: Callable[[LaunchPlan, Collection[str]], Mapping[str, tuple[tuple[str, tuple[str, ...]], ...]]]

@@ -56,7 +56,7 @@ class SettlingTimes(NamedTuple):
 
 
 class Change(NamedTuple):
-    """``over``: what was reported and is no longer so."""
+    """The findings that came and went. ``over``: what was reported and is no longer so."""
 
     new: tuple[DriftFinding, ...] = ()
     over: tuple[DriftFinding, ...] = ()
@@ -100,8 +100,8 @@ _CANNOT_TELL = 4  # as secure-plan drift
 
 
 class WatchOptions(NamedTuple):
-    """``security``, ``enclave_directory`` and ``enclaves_now`` (reads the keystore again): of a secured launch.
-    ``report``: where findings go as JSON lines."""
+    """Options of watching. ``security``, ``enclave_directory`` and ``enclaves_now`` (reads the keystore again): of a
+    secured launch. ``report``: where findings go as JSON lines."""
 
     security: Security | None = None
     enclave_directory: Path | None = None
@@ -112,7 +112,8 @@ class WatchOptions(NamedTuple):
 
 
 class DriftWatch(LaunchCompanion):
-    """``alarms``: how many there were; ``blind``: what was planned could not be seen at some time."""
+    """Compares the running domains with the plan during a launch. ``alarms``: how many there were; ``blind``: what was
+    planned could not be seen at some time."""
 
     def __init__(self, plan: DryRun, options: WatchOptions) -> None:
         self._options = options

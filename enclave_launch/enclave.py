@@ -31,7 +31,7 @@ from keystore.formats.enclave_name import validate_enclave_name
 
 
 class EnclaveScope(str, Enum):
-    """``--enclave-scope``: the enclave of a process whose launch file names none."""
+    """Values of ``--enclave-scope``: the enclave of a process whose launch file names none."""
 
     __str__ = str.__str__
 
@@ -57,8 +57,8 @@ class AssignmentReason(str, Enum):
 
 
 class EnclaveAssignment(NamedTuple):
-    """``path`` is absolute and valid for rcl; ``scope`` is what a relative attribute was resolved against;
-    ``too_deep`` says why no certificate can be made for it."""
+    """The enclave of a process, and why. ``path`` is absolute and valid for rcl; ``scope`` is what a relative
+    attribute was resolved against; ``too_deep`` says why no certificate can be made for it."""
 
     path: str
     reason: AssignmentReason

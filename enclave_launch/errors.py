@@ -33,7 +33,8 @@ class UsageError(EnclaveLaunchError):
 
 
 class LaunchFileError(EnclaveLaunchError):
-    """``cause`` is the exception that real launch would have raised, where it has one."""
+    """A launch file that cannot be used. ``cause`` is the exception that real launch would have raised, where it has
+    one."""
 
     def __init__(
         self, message: str, location: SourceLocation | None = None, cause: BaseException | None = None

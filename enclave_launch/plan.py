@@ -192,8 +192,8 @@ class LaunchPlan(NamedTuple):
 
 
 class PlanOptions(NamedTuple):
-    """``enclave_scope``: where processes without an ``enclave`` attribute go; ``policy``: how permissions derive;
-    ``admission``: what may start though it is not known to keep its enclave."""
+    """Options of planning. ``enclave_scope``: where processes without an ``enclave`` attribute go; ``policy``: how
+    permissions derive; ``admission``: what may start though it is not known to keep its enclave."""
 
     enclave_scope: EnclaveScope = EnclaveScope.NAMESPACE
     policy: PolicyOptions = PolicyOptions()

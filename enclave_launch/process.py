@@ -30,7 +30,7 @@ class EnclaveRequest(NamedTuple):
 
 
 class RemapRule(NamedTuple):
-    """``source:=target`` as passed to rcl, with the place it was written.
+    """A remap rule, ``source:=target`` as passed to rcl, with the place it was written.
 
     ``word``: the index of ``source:=target`` in the command of a process; a load request has no words.
     """

@@ -26,7 +26,8 @@ NO_KEYSTORE = "/dev/null/an_executable_without_an_enclave"
 
 
 class SecuritySettings(NamedTuple):
-    """``keystore``: absolute path of the keystore's root (rcl appends ``enclaves`` itself)."""
+    """The settings of secured processes. ``keystore``: absolute path of the keystore's root (rcl appends ``enclaves``
+    itself)."""
 
     keystore: str
     strategy: str = "Enforce"

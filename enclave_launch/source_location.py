@@ -6,7 +6,8 @@ from typing import NamedTuple
 
 
 class SourceLocation(NamedTuple):
-    """``line`` counts from 1, 0 when unknown. ``element`` is the launch element (``node``) or class."""
+    """A place in a launch file. ``line`` counts from 1, 0 when unknown. ``element`` is the launch element (``node``)
+    or class."""
 
     file: str
     line: int = 0

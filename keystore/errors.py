@@ -29,7 +29,7 @@ class KeystoreError(Exception):
 
 
 class InvalidEnclaveNameError(KeystoreError, ValueError):
-    """``reason`` alone, for callers that know better where the name was written."""
+    """A name that no enclave can have. ``reason`` alone, for callers that know better where the name was written."""
 
     exit_status = 2
 

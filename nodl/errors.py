@@ -57,7 +57,7 @@ class ExecutableNotFoundError(NoDLError):
 
 
 class ConflictingNoDLError(NoDLError):
-    """``sources``: the definitions that do not agree."""
+    """Definitions that contradict each other. ``sources``: the definitions that do not agree."""
 
     def __init__(self, subject: str, sources: Iterable[SourceRef]):
         self.sources = tuple(sources)

@@ -28,8 +28,9 @@ from nodl.node_interface import ManifestNode, NodeInterface
 
 
 class Lookup(NamedTuple):
-    """``found`` is empty when no document describes the executable; ``searched`` says where we looked. ``named``: the
-    user named the document; ``described``: the programs of the documents that were named in vain."""
+    """The answer of a lookup. ``found`` is empty when no document describes the executable; ``searched`` says where we
+    looked. ``named``: the user named the document; ``described``: the programs of the documents that were named in
+    vain."""
 
     found: tuple[NodeInterface, ...]
     searched: tuple[str, ...]

@@ -55,7 +55,7 @@ class InvalidRemapRuleError(ValueError):
 
 
 class ParsedRule(NamedTuple):
-    """``node`` restricts the rule to nodes of that name; ``match`` is empty for ``__node`` and ``__ns``."""
+    """A remap rule. ``node`` restricts it to nodes of that name; ``match`` is empty for ``__node`` and ``__ns``."""
 
     kind: RemapKind
     match: str

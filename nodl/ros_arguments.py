@@ -21,13 +21,13 @@ _WITH_VALUE = frozenset(
 
 
 class ParameterFileArgument(NamedTuple):
-    """``--params-file PATH``."""
+    """The argument ``--params-file PATH``."""
 
     path: str
 
 
 class ParameterRule(NamedTuple):
-    """``-p [NODE:]NAME:=VALUE``; ``value`` is YAML."""
+    """The argument ``-p [NODE:]NAME:=VALUE``; ``value`` is YAML."""
 
     name: str
     value: str

@@ -20,7 +20,7 @@ _SCALAR_TAGS = frozenset(f"tag:yaml.org,2002:{name}" for name in ("str", "int", 
 
 
 class YamlScalar(NamedTuple):
-    """``value`` is a ``str``, ``int``, ``float``, ``bool`` or ``None``."""
+    """A scalar with its place. ``value`` is a ``str``, ``int``, ``float``, ``bool`` or ``None``."""
 
     value: str | int | float | bool | None
     source: SourceRef
@@ -34,7 +34,7 @@ class YamlList(NamedTuple):
 
 
 class YamlMap(NamedTuple):
-    """``items`` in document order; ``keys`` says where each key is written."""
+    """A mapping with its place. ``items`` in document order; ``keys`` says where each key is written."""
 
     items: dict[str, YamlValue]
     keys: dict[str, SourceRef]

@@ -82,7 +82,8 @@ class EnclaveProcess(NamedTuple):
 
 
 class Pair(NamedTuple):
-    """``fast`` and ``cyclone`` are enclaves. Of one and the same enclave chance decides."""
+    """Two enclaves on two DDS implementations in one domain. ``fast`` and ``cyclone`` are enclaves. Of one and the
+    same enclave chance decides."""
 
     fast: str
     cyclone: str

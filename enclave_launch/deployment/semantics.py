@@ -24,7 +24,7 @@ class Engine(str, Enum):
 
 
 class Unexpressed(NamedTuple):
-    """``place`` is file:line of the launch file."""
+    """A part of a launch that an engine cannot express. ``place`` is file:line of the launch file."""
 
     what: str
     place: str

@@ -29,7 +29,8 @@ class Condition:
 
 
 class InvalidConditionExpressionError(ValueError):
-    """``reason``: without the substitutions, which upstream's text shows as objects."""
+    """A condition that is neither true nor false. ``reason``: without the substitutions, which upstream's text shows
+    as objects."""
 
     def __init__(
         self, expression: str, unexpanded_expression: Iterable[Substitution], valid_expressions: Iterable[str]

@@ -253,7 +253,8 @@ class LaunchContext:
 
 
 class WatchedConfigurations(dict[str, Any]):
-    """``looked_at`` gets each name that is read or asked for, found or not; who goes through all has seen all."""
+    """Launch configurations that note which of them are read. ``looked_at`` gets each name that is read or asked for,
+    found or not; who goes through all has seen all."""
 
     def __init__(self, looked_at: set[str]) -> None:
         super().__init__()

@@ -33,7 +33,8 @@ def get_output_loggers(process_name: str, output_config: object) -> tuple[loggin
 
 
 class LaunchConfig:
-    """``level`` of the root logger, ``log_dir`` of this run. Other settings are kept and have no effect here."""
+    """Settings of launch's logging. ``level`` of the root logger, ``log_dir`` of this run. Other settings are kept and
+    have no effect here."""
 
     def __init__(self) -> None:
         self.reset()

@@ -111,8 +111,8 @@ class Code(str, Enum):
 
 
 class Diagnostic(NamedTuple):
-    """``subject``: the node, program, enclave or file it is about; ``remedy``: what to do next, empty when nothing
-    is wrong. ``str`` is the whole as one message for a person."""
+    """One thing that a person should know of a launch. ``subject``: the node, program, enclave or file it is about;
+    ``remedy``: what to do next, empty when nothing is wrong. ``str`` is the whole as one message for a person."""
 
     code: Code
     subject: str

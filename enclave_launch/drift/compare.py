@@ -42,9 +42,10 @@ class Security(NamedTuple):
 
 
 class Circumstances(NamedTuple):
-    """``security`` ``None``: the system runs unsecured. ``accepted``: names of nodes, with wildcards, that may run
-    beside the plan. ``strangers``: pids on this machine that the launch did not start; empty where nobody knows.
-    ``forged``: lists of nodes that one participant published for another."""
+    """What a comparison knows beside plan and graph. ``security`` ``None``: the system runs unsecured. ``accepted``:
+    names of nodes, with wildcards, that may run beside the plan. ``strangers``: pids on this machine that the
+    launch did not start; empty where nobody knows. ``forged``: lists of nodes that one participant published for
+    another."""
 
     security: Security | None = None
     accepted: tuple[str, ...] = ()

@@ -20,7 +20,8 @@ _LIFECYCLE = "/change_state"
 
 
 class ExpectedInterface(NamedTuple):
-    """``certain``: a node that runs has it. ``qos``: what is known of it, by NoDL v2's names."""
+    """An interface that a node may have. ``certain``: a node that runs has it. ``qos``: what is known of it, by NoDL
+    v2's names."""
 
     grant: GrantedName
     type: str
@@ -29,8 +30,8 @@ class ExpectedInterface(NamedTuple):
 
 
 class ExpectedNode(NamedTuple):
-    """``described``: its interfaces are known; ``open``: not all of them; ``always``: it starts with the launch, not on
-    an event; ``times``: how many of this name."""
+    """A node that the plan has. ``described``: its interfaces are known; ``open``: not all of them; ``always``: it
+    starts with the launch, not on an event; ``times``: how many of this name."""
 
     fqn: str
     enclave: str
@@ -43,8 +44,8 @@ class ExpectedNode(NamedTuple):
 
 
 class Expected(NamedTuple):
-    """``opaque``: enclaves, and places without one, in which programs run of which no node is known; ``unnamed``:
-    namespaces in which nodes run whose names are not."""
+    """Everything that plans expect in one domain. ``opaque``: enclaves, and places without one, in which programs run
+    of which no node is known; ``unnamed``: namespaces in which nodes run whose names are not."""
 
     nodes: Mapping[str, ExpectedNode]
     opaque: frozenset[str]

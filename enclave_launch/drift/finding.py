@@ -36,8 +36,8 @@ class Kind(str, Enum):
 
 
 class Level(str, Enum):
-    """``CANNOT_TELL``: the observer does not see enough to compare. ``NOTE``: descriptions leave it open, so it may be
-    as planned."""
+    """The weight of a finding. ``CANNOT_TELL``: the observer does not see enough to compare. ``NOTE``: descriptions
+    leave it open, so it may be as planned."""
 
     ALARM = "alarm"
     CANNOT_TELL = "cannot-tell"
@@ -56,8 +56,9 @@ class FindingCertainty(Enum):
 
 
 class DriftFinding(NamedTuple):
-    """``subject``: the node or participant it is about, ``name`` the topic, service or action; ``who``: where it was
-    seen, for a person (a pid, a host). Two findings with one ``key`` are the same at two times."""
+    """One difference between plan and running system. ``subject``: the node or participant it is about, ``name`` the
+    topic, service or action; ``who``: where it was seen, for a person (a pid, a host). Two findings with one
+    ``key`` are the same at two times."""
 
     kind: Kind
     subject: str

@@ -19,7 +19,7 @@ MODULE_NAME = "python_launch_file"
 
 
 class PythonRefused(RuntimeError):
-    """``--no-python`` is in force."""
+    """A Python launch file was not run: ``--no-python`` is in force."""
 
 
 def run(path: str, *, allowed: bool) -> ModuleType:

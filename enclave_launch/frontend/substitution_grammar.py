@@ -27,8 +27,8 @@ Template: TypeAlias = tuple[TemplatePart, ...]
 
 
 class SubstitutionCall:
-    """``$(name arg ...)``. ``rule``: upstream's grammar rule, which says in which quotes it stands; calls that differ
-    in nothing else are equal."""
+    """A call in a template: ``$(name arg ...)``. ``rule``: upstream's grammar rule, which says in which quotes it
+    stands; calls that differ in nothing else are equal."""
 
     __slots__ = ("args", "name", "rule")
 

@@ -26,7 +26,8 @@ def environment_snapshot() -> dict[str, str]:
 
 
 class Environment:
-    """``start`` is the environment when the context was made: what ``reset_env`` goes back to."""
+    """The process environment with a stack of saved ones. ``start`` is the environment when the context was made: what
+    ``reset_env`` goes back to."""
 
     def __init__(self) -> None:
         self.start = environment_snapshot()

@@ -63,7 +63,8 @@ ProfileKey = tuple[str, str]  # namespace and node name
 
 
 class DerivedPolicy(NamedTuple):
-    """``reasons``: enclave path -> rule (name absolute) -> why, sorted by node.
+    """The least policy of a launch, with reasons. ``reasons``: enclave path -> rule (name absolute) -> why, sorted by
+    node.
 
     ``problems`` are what ``--secure`` must refuse: a name that is not known or cannot exist.
     """

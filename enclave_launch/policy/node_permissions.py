@@ -68,7 +68,7 @@ recorded node the names that only its other descriptions have (``interfaces.desc
 
 
 class PolicyOptions(NamedTuple):
-    """``accept_patterns``: partly known names become wildcards, each with a warning.
+    """Options of deriving permissions. ``accept_patterns``: partly known names become wildcards, each with a warning.
 
     ``also``: what every node gets beyond what it has by itself (``ALSO``).
     ``policy_file``: merged over the derived policy.
@@ -112,7 +112,8 @@ class Unresolved(NamedTuple):
 
 
 class NodePermissions(NamedTuple):
-    """``permissions`` in the order found, with repetitions; ``unresolved`` must not be passed over."""
+    """The permissions of one node. ``permissions`` in the order found, with repetitions; ``unresolved`` must not be
+    passed over."""
 
     node: RunningNode
     permissions: list[Permission]

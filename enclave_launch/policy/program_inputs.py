@@ -18,7 +18,7 @@ from nodl.ros_arguments import flags, is_bare_rule
 
 
 class ProgramInputs(NamedTuple):
-    """``values`` by input name (``--topic``, ``-t``, ``$VARIABLE``).
+    """Inputs of a program besides ROS arguments. ``values`` by input name (``--topic``, ``-t``, ``$VARIABLE``).
 
     ``bare_words``: there are words that may be positional arguments; ``short_flags``: there are flags
     with one dash, which may be another spelling of any option; ``all_leading``: no word stands behind an option.

@@ -34,7 +34,7 @@ class UnknownNodeName(LaunchFileError):
 
 
 class RunningNode(NamedTuple):
-    """``name`` and ``namespace`` are final; ``original_name`` is what the program calls itself."""
+    """A node that runs. ``name`` and ``namespace`` are final; ``original_name`` is what the program calls itself."""
 
     interface: NodeInterface
     original_name: str

@@ -9,7 +9,8 @@ from keystore.formats.policy import Qualifier, Rule
 
 
 class Gain(NamedTuple):
-    """``gained``: rules of its enclave that ``node`` does not need itself. ``composed``: in a container."""
+    """Permissions that a node has only because it shares an enclave. ``gained``: rules of its enclave that ``node``
+    does not need itself. ``composed``: in a container."""
 
     enclave: str
     node: str

@@ -38,7 +38,8 @@ class Refusal(NamedTuple):
 
 
 class AuditReport(NamedTuple):
-    """``never_requested``: rules by enclave that no recorded endpoint needed. ``complete``: all could be seen."""
+    """The result of an audit. ``never_requested``: rules by enclave that no recorded endpoint needed. ``complete``:
+    all could be seen."""
 
     refusals: tuple[Refusal, ...]
     never_requested: dict[str, tuple[Rule, ...]]

@@ -82,7 +82,7 @@ class QuietWatch(Listener):
 
 
 class LearntFolder(NamedTuple):
-    """``files``: manifests by path; ``notes``: what a person should know of them."""
+    """The manifests that were written. ``files``: manifests by path; ``notes``: what a person should know of them."""
 
     files: dict[Path, LearntNode]
     notes: tuple[str, ...]

@@ -33,7 +33,8 @@ _LARGEST_TABLE = 1 << 20
 
 
 class ProgramToRecord(NamedTuple):
-    """``obstacle``: why it cannot be recorded, empty if it can; ``sanitizer``: a runtime that must be loaded first."""
+    """A program about to be recorded. ``obstacle``: why it cannot be recorded, empty if it can; ``sanitizer``: a
+    runtime that must be loaded first."""
 
     path: str
     obstacle: str = ""

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 
 class Cause(NamedTuple):
-    """``said``: the words it was recognised by."""
+    """A cause and its remedy. ``said``: the words it was recognised by."""
 
     what: str
     remedy: str

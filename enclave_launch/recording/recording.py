@@ -89,8 +89,8 @@ class Listener:
 
 
 class Recording:
-    """``record`` is complete when the launch is over; ``data`` is its text. ``optional``: the launch goes on where
-    nothing can be recorded, which is said."""
+    """Records one launch. ``record`` is complete when the launch is over; ``data`` is its text. ``optional``: the
+    launch goes on where nothing can be recorded, which is said."""
 
     def __init__(
         self,

@@ -137,7 +137,8 @@ _HISTORY = {1: "KEEP_LAST", 2: "KEEP_ALL"}
 
 
 class Patch(NamedTuple):
-    """``file`` is what it changes or makes, ``text`` what stands there then; ``use``: how it takes effect."""
+    """A change of one file. ``file`` is what it changes or makes, ``text`` what stands there then; ``use``: how it
+    takes effect."""
 
     file: str
     diff: str

@@ -32,7 +32,7 @@ class Influence(NamedTuple):
 
 
 class ReportContents(NamedTuple):
-    """``endings`` is ``None`` without a keystore."""
+    """The contents of a report. ``endings`` is ``None`` without a keystore."""
 
     title: str
     graph: EnclaveGraph

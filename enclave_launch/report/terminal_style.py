@@ -17,8 +17,8 @@ _FOLDED = 3  # lines of one list of names
 
 
 class TerminalStyle(NamedTuple):
-    """``width``: columns, ``None`` for lines of any length; ``full``: nothing is folded or counted; ``folder``: a
-    path that is left out where it begins one."""
+    """The layout of text for people. ``width``: columns, ``None`` for lines of any length; ``full``: nothing is folded
+    or counted; ``folder``: a path that is left out where it begins one."""
 
     width: int | None = None
     full: bool = False

@@ -20,7 +20,7 @@ _LABELS: dict[str, str] = {listed: operation.verb for operation, listed in LIST_
 
 
 class Branch(NamedTuple):
-    """``names``: the text is a list of names, which may be folded."""
+    """A line of a tree with the lines below it. ``names``: the text is a list of names, which may be folded."""
 
     text: str
     below: Sequence[Branch] = ()

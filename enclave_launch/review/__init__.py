@@ -6,5 +6,4 @@ information_flow.py   a plan -> which enclave can influence which, over any numb
 similarity.py         a plan -> enclaves worth merging or splitting, with what that costs
 signed.py             a plan's permissions as they come back from being signed, to compare with a keystore
 checks/               a plan -> findings, each with a code
-expectations.py       rules that a repository keeps ("the camera never reaches /cmd_vel") and accepted findings
 """

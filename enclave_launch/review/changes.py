@@ -13,7 +13,8 @@ from enclave_launch.review.information_flow import FlowGraph, flow_graph
 
 
 class EnclaveChange(NamedTuple):
-    """``added`` and ``removed`` are sorted; ``built_in``: those among them that every node has and none requests.
+    """The differences of one enclave. ``added`` and ``removed`` are sorted; ``built_in``: those among them that every
+    node has and none requests.
 
     ``is_new`` and ``is_gone``: the enclave as a whole.
     """

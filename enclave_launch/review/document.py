@@ -70,8 +70,8 @@ _GAPS = frozenset({
 
 
 class PlanDocument(NamedTuple):
-    """``enclaves``: path -> all that its middleware lets it do, the union of its nodes; ``on_zenoh``: those of which a
-    process is on Zenoh."""
+    """A plan as a review reads it. ``enclaves``: path -> all that its middleware lets it do, the union of its nodes;
+    ``on_zenoh``: those of which a process is on Zenoh."""
 
     enclaves: Mapping[str, frozenset[GrantedName]]
     nodes: tuple[NodeView, ...]

@@ -15,7 +15,8 @@ _ALIKE = 0.5  # least similarity of two enclaves that could be one
 
 
 class Merge(NamedTuple):
-    """``similarity``: permissions that both have over those that either has, 0 to 1. ``excess``: what each gains."""
+    """Two enclaves that could be one. ``similarity``: permissions that both have over those that either has, 0 to 1.
+    ``excess``: what each gains."""
 
     one: str
     two: str
@@ -28,7 +29,8 @@ class Merge(NamedTuple):
 
 
 class Split(NamedTuple):
-    """``saved``: for each node of the enclave what it may do today and neither it nor its process requests."""
+    """An enclave that could be several. ``saved``: for each node of the enclave what it may do today and neither it
+    nor its process requests."""
 
     enclave: str
     saved: tuple[tuple[str, tuple[GrantedName, ...]], ...]

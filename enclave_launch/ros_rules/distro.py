@@ -54,7 +54,7 @@ _LAUNCH_ROS_LOG = "launch_ros/CHANGELOG.rst"
 
 
 class _Table(type):
-    """``Enum`` would do, but takes twice as long to define one with so many members."""
+    """A table of features. ``Enum`` would do, but takes twice as long to define one with so many members."""
 
     def __iter__(cls) -> Iterator[Since]:
         return (row for row in vars(cls).values() if isinstance(row, Since))

@@ -34,7 +34,7 @@ class Watched(NamedTuple):
 
 
 class Unplanned(NamedTuple):
-    """``pid`` is the process itself or a descendant of it."""
+    """A process with another environment than planned. ``pid`` is the process itself or a descendant of it."""
 
     watched: Watched
     pid: int
@@ -73,7 +73,8 @@ def environment_of(pid: int) -> dict[str, str] | None:
 
 
 class EnvironmentWatch:
-    """``running`` returns the processes that run; ``ended`` is called with each that had to be killed."""
+    """Checks the environment of running processes from time to time. ``running`` returns the processes that run;
+    ``ended`` is called with each that had to be killed."""
 
     def __init__(self, running: Callable[[], list[Watched]], ended: Callable[[Unplanned], None]) -> None:
         self._running = running

@@ -83,7 +83,8 @@ def component_identity(component: ResolvedComponent) -> tuple[object, ...]:
 
 
 class PlannedGate:
-    """``say_late`` is called with each process that ``allow_late`` lets through."""
+    """Lets processes start that the plan has. ``say_late`` is called with each process that ``allow_late`` lets
+    through."""
 
     def __init__(
         self,

@@ -31,8 +31,9 @@ from enclave_launch.runtime.run_events import Observer, ProcessOver, ProcessPlan
 
 
 class LiveHost(Host):
-    """``secrets``: variables that no child may see. ``fail`` is called with why the launch cannot go on. ``services``
-    raises ``RuntimeFailure`` if a launch that was not evaluated before needs rclpy, and there is none."""
+    """The host of a live launch. ``secrets``: variables that no child may see. ``fail`` is called with why the launch
+    cannot go on. ``services`` raises ``RuntimeFailure`` if a launch that was not evaluated before needs rclpy, and
+    there is none."""
 
     loop: asyncio.AbstractEventLoop
 

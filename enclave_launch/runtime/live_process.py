@@ -35,7 +35,10 @@ from enclave_launch.runtime.supervision import LifeRules, Patience, ProcessEnd, 
 
 
 class LiveProcess:
-    """:raises ValueError: an output setting, ``emulate_tty`` value or ``output_format`` that launch cannot use."""
+    """One process action of a live launch.
+
+    :raises ValueError: an output setting, ``emulate_tty`` value or ``output_format`` that launch cannot use.
+    """
 
     def __init__(
         self,

@@ -9,7 +9,8 @@ from contextlib import AbstractContextManager, contextmanager
 
 
 class Overlap:
-    """``with overlap():`` as often as one likes, in any order; ``change`` is entered once meanwhile."""
+    """A change that overlapping users share: ``with overlap():`` as often as one likes, in any order; ``change`` is
+    entered once meanwhile."""
 
     def __init__(self, change: Callable[[], AbstractContextManager[None]]) -> None:
         self._make = change

@@ -26,8 +26,8 @@ CHUNK = 1 << 16  # bytes; what a Linux pipe holds by default
 
 
 class ProcessSpec(NamedTuple):
-    """``environment`` is complete: nothing is inherited. ``shell``: the words, joined, are a shell's
-    command line.
+    """A program to execute. ``environment`` is complete: nothing is inherited. ``shell``: the words, joined, are a
+    shell's command line.
     """
 
     cmd: tuple[str, ...]

@@ -46,7 +46,10 @@ def require_rclpy() -> None:
 
 
 class RosServices:
-    """:raises RuntimeFailure: no rclpy, or none that works; said before anything starts."""
+    """The launcher's own ROS node.
+
+    :raises RuntimeFailure: no rclpy, or none that works; said before anything starts.
+    """
 
     def __init__(self, grant: StartAdditions | None, say: Callable[[Level, str], None]) -> None:
         require_rclpy()

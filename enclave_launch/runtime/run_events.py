@@ -24,7 +24,8 @@ class ProcessPlanned(NamedTuple):
 
 
 class ProcessStarted(NamedTuple):
-    """``name`` is the process name (``talker-1``), unique within the launch. A respawned process starts again."""
+    """A process was started. ``name`` is the process name (``talker-1``), unique within the launch. A respawned
+    process starts again."""
 
     name: str
     pid: int
@@ -39,7 +40,7 @@ class ProcessOutput(NamedTuple):
 
 
 class ProcessExited(NamedTuple):
-    """``returncode`` as of ``subprocess``: negative for a signal."""
+    """A process has exited. ``returncode`` as of ``subprocess``: negative for a signal."""
 
     name: str
     pid: int

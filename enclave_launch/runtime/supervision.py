@@ -75,8 +75,8 @@ class ProcessEnd(NamedTuple):
 
 
 class SupervisedProcess:
-    """``prepare`` is awaited before every start, so that the enclave is complete each time; it gives what
-    to run.
+    """One process from its first start to its last exit. ``prepare`` is awaited before every start, so that the
+    enclave is complete each time; it gives what to run.
 
     :raises EnclaveLaunchError: from ``run``, when ``prepare`` refuses.
     """

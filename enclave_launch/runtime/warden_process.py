@@ -25,7 +25,8 @@ Message = str | int | bytes | list[bytes] | dict[bytes, bytes]
 
 
 class WardenChannel:
-    """``on_message`` gets (kind, id, rest); ``on_lost`` is called once, when the other end is gone."""
+    """Our end of the warden's socket. ``on_message`` gets (kind, id, rest); ``on_lost`` is called once, when the other
+    end is gone."""
 
     def __init__(
         self,

@@ -17,7 +17,8 @@ from nodl import ament_index
 
 
 class LaunchTarget(NamedTuple):
-    """``arguments``: name and value of each ``name:=value``, the last of a repeated name."""
+    """The launch file and arguments of a command line. ``arguments``: name and value of each ``name:=value``, the last
+    of a repeated name."""
 
     launch_file: str
     arguments: tuple[tuple[str, str], ...]

@@ -15,7 +15,8 @@ from enclave_launch.verb.options import DENIALS, LATE, PASSPHRASE, POLICY, SECUR
 
 
 class CommandLine(NamedTuple):
-    """``options``: every option with its value; ``given``: the names of those that were written."""
+    """A parsed command line. ``options``: every option with its value; ``given``: the names of those that were
+    written."""
 
     options: argparse.Namespace
     given: frozenset[str]

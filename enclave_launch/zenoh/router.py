@@ -36,8 +36,8 @@ _PLAIN = {"ZENOH_CONFIG_OVERRIDE": "", "NO_COLOR": "1"}
 
 
 class RouterPlace(NamedTuple):
-    """``address``: host and port; the others are absolute paths. ``differences``: why the configuration must not be
-    used; called before each start."""
+    """The files of a router and where it listens. ``address``: host and port; the others are absolute paths.
+    ``differences``: why the configuration must not be used; called before each start."""
 
     address: tuple[str, int]
     configuration: str

@@ -20,7 +20,7 @@ _VERSION = 1
 
 @dataclass(frozen=True, slots=True)
 class KeystoreSettings:
-    """``lifetime`` is for new certificates of enclaves."""
+    """The settings that a keystore keeps. ``lifetime`` is for new certificates of enclaves."""
 
     subjects: SubjectScheme = SubjectScheme.EXACT
     lifetime: timedelta = DEFAULT_LIFETIME

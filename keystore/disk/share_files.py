@@ -38,7 +38,8 @@ def enclaves_with_shares(root: Path) -> Iterator[str]:
 
 
 class LaunchHold:
-    """``owner`` counts as running on this keystore from ``take`` on, while this object or the process lives.
+    """The hold of a running launch on a keystore. ``owner`` counts as running on this keystore from ``take`` on, while
+    this object or the process lives.
 
     ``enclaves``: those it was given already and may have processes in; from them nothing is taken any more.
     """

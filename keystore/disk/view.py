@@ -42,7 +42,7 @@ def keystore_at(keystore: Path | str) -> KeystoreView:
 
 
 class KeystoreView:
-    """``root`` should be resolved by the caller: links above the keystore are the user's business."""
+    """Reads a keystore. ``root`` should be resolved by the caller: links above the keystore are the user's business."""
 
     def __init__(self, root: Path):
         self.root = root

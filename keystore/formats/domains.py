@@ -19,7 +19,7 @@ class _Ranges(NamedTuple):
 
 
 class Domains(_Ranges):
-    """``ranges``: pairs (first, last), both included, sorted, neither touching nor overlapping.
+    """A set of domain ids. ``ranges``: pairs (first, last), both included, sorted, neither touching nor overlapping.
 
     Raises InvalidInputError for what are not domain ids.
     """

@@ -36,7 +36,8 @@ _DATA_KINDS = (Protection.NONE, Protection.SIGN, Protection.ENCRYPT)
 
 @dataclass(frozen=True, slots=True)
 class TopicRule:
-    """``topic_expression`` is an fnmatch pattern over DDS names (``rt/chatter``); the first match wins."""
+    """The protection of topics. ``topic_expression`` is an fnmatch pattern over DDS names (``rt/chatter``); the first
+    match wins."""
 
     topic_expression: str = "*"
     enable_discovery_protection: bool = True
@@ -80,7 +81,7 @@ class DomainRule:
 
 
 class NoGovernanceRuleError(InvalidInputError):
-    """``domains`` are not among the several rules of the governance."""
+    """Domains without a rule: ``domains`` are not among the several rules of the governance."""
 
     def __init__(self, domains: Domains, message: str) -> None:
         self.domains = domains

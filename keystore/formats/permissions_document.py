@@ -35,7 +35,8 @@ class DdsRule:
 
 @dataclass(frozen=True, slots=True)
 class Grant:
-    """``not_before`` and ``not_after`` as written; their zone depends on the DDS implementation."""
+    """A grant of a permissions document. ``not_before`` and ``not_after`` as written; their zone depends on the DDS
+    implementation."""
 
     name: str
     subject_name: str

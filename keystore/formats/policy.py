@@ -51,8 +51,8 @@ class Qualifier(str, Enum):
 
 
 class Rule(NamedTuple):
-    """``expression`` is absolute (``/a/b``), relative or private to the profile; it may hold wildcards
-    only where a policy file had them."""
+    """A rule of a policy. ``expression`` is absolute (``/a/b``), relative or private to the profile; it may hold
+    wildcards only where a policy file had them."""
 
     operation: Operation
     qualifier: Qualifier

@@ -43,8 +43,9 @@ class AuthorityState(str, Enum):
 
 
 class IssuedCertificate(NamedTuple):
-    """``subject`` is the common name, ``key`` the SHA-256 of the public key (SubjectPublicKeyInfo, hex), ``issuer``
-    the SHA-256 of the CA's certificate. ``replaced``: another one of the enclave is in force, or it was removed."""
+    """A certificate that was issued. ``subject`` is the common name, ``key`` the SHA-256 of the public key
+    (SubjectPublicKeyInfo, hex), ``issuer`` the SHA-256 of the CA's certificate. ``replaced``: another one of the
+    enclave is in force, or it was removed."""
 
     serial: int
     enclave: str
@@ -64,7 +65,8 @@ class IssuedCertificate(NamedTuple):
 
 
 class SignedPermissions(NamedTuple):
-    """``document`` is the SHA-256 of the signed XML, ``rules`` of what it grants apart from subject and dates."""
+    """Permissions that were signed. ``document`` is the SHA-256 of the signed XML, ``rules`` of what it grants apart
+    from subject and dates."""
 
     enclave: str
     subject: str
@@ -75,8 +77,9 @@ class SignedPermissions(NamedTuple):
 
 @dataclass(frozen=True)
 class Register:
-    """``authorities``: role and DER certificate -> state. ``crl_published``: whether there is a CRL by the CA in use.
-    ``written``: the machine's clock when it was written last. Each change gives a new register."""
+    """The contents of a register; each change gives a new one. ``authorities``: role and DER certificate -> state.
+    ``crl_published``: whether there is a CRL by the CA in use. ``written``: the machine's clock when it was written
+    last. Each change gives a new register."""
 
     authorities: Mapping[tuple[Role, bytes], AuthorityState] = field(default_factory=dict)
     certificates: Mapping[int, IssuedCertificate] = field(default_factory=dict)

@@ -34,8 +34,9 @@ class ToolTarget(Enum):
 
 
 class Tool(NamedTuple):
-    """``node``: the name of the tool's own node, empty where it is none. ``own``: what it needs whatever its target,
-    ``each``: for each target, which stands for ``{}``. ``example``: a command line that works with it."""
+    """A ROS tool and its permissions. ``node``: the name of the tool's own node, empty where it is none. ``own``: what
+    it needs whatever its target, ``each``: for each target, which stands for ``{}``. ``example``: a command line
+    that works with it."""
 
     name: str
     what: str

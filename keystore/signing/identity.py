@@ -54,7 +54,7 @@ USABLE_KINDS = frozenset({"P-256", "P-384", "RSA-2048"})
 
 
 class RequestedKey(NamedTuple):
-    """``spki``: DER of the SubjectPublicKeyInfo."""
+    """The key and name of a certificate request. ``spki``: DER of the SubjectPublicKeyInfo."""
 
     key: PublicKey
     spki: bytes

@@ -46,7 +46,8 @@ class ImportedCa:
 
 @dataclass(frozen=True, slots=True)
 class CreateOptions(ChangeOptions):
-    """``ca_lifetime``, ``lifetime`` (of enclaves) start at ``now``; ``names`` are the CAs' common names."""
+    """Options of creating a keystore. ``ca_lifetime``, ``lifetime`` (of enclaves) start at ``now``; ``names`` are the
+    CAs' common names."""
 
     domains: Domains = field(default_factory=lambda: Domains.single(0))
     governance: Governance | None = None
@@ -65,7 +66,7 @@ class CreateOptions(ChangeOptions):
 
 @dataclass(frozen=True, slots=True)
 class CreateReport:
-    """``actions`` in words, empty when the keystore was complete already."""
+    """The result of creating a keystore. ``actions`` in words, empty when the keystore was complete already."""
 
     keystore: Path
     actions: tuple[str, ...]

@@ -51,7 +51,7 @@ class Reissue(Enum):
 
 
 class EnclaveState(NamedTuple):
-    """``reasons`` are for reports; without them nothing is to be done.
+    """The state of one enclave on disk. ``reasons`` are for reports; without them nothing is to be done.
 
     ``validity``: from when until when certificate and permissions hold, where they were seen to say the same.
     """

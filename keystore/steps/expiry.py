@@ -22,8 +22,8 @@ _DATE = rb"<not_(before|after)>\s*([^<]{1,40}?)\s*</not_"
 
 
 class Expiry(NamedTuple):
-    """``what``: ``identity CA``, ``permissions CA``, ``certificate``, ``permissions`` or ``CRL``; ``enclave``
-    for the two that belong to one."""
+    """The end of a validity. ``what``: ``identity CA``, ``permissions CA``, ``certificate``, ``permissions`` or
+    ``CRL``; ``enclave`` for the two that belong to one."""
 
     not_after: datetime
     what: str
@@ -43,7 +43,7 @@ class Expiry(NamedTuple):
 
 
 class StatusReport(NamedTuple):
-    """``expiries``: everything with an end, the earliest first."""
+    """The expiries of a keystore. ``expiries``: everything with an end, the earliest first."""
 
     keystore: Path
     now: datetime

@@ -25,8 +25,8 @@ from keystore.verification.governance import weaknesses
 
 
 class KeyEntry(NamedTuple):
-    """``use``: ``identity CA``, ``permissions CA`` or ``enclave``. ``private_key``: where it is, as far as this copy of
-    the keystore says. Dates as ISO 8601; fingerprint and key identifier as SHA-256 in hex."""
+    """A key of a keystore. ``use``: ``identity CA``, ``permissions CA`` or ``enclave``. ``private_key``: where it is,
+    as far as this copy of the keystore says. Dates as ISO 8601; fingerprint and key identifier as SHA-256 in hex."""
 
     use: str
     name: str
@@ -104,7 +104,7 @@ _NAMES = {
 
 
 class GovernanceFacts(NamedTuple):
-    """``rules``: one for each set of domains, by the attribute names of DDS-Security."""
+    """The governance in force. ``rules``: one for each set of domains, by the attribute names of DDS-Security."""
 
     rules: list[dict[str, Any]]
     weaknesses: tuple[str, ...]
@@ -130,7 +130,8 @@ def _plain(value: Any) -> Any:
 
 
 class Granted(NamedTuple):
-    """``allowed`` and ``denied``: rules with final names, sorted; ``topics``: DDS topics that no ROS rule explains."""
+    """The permissions of one enclave. ``allowed`` and ``denied``: rules with final names, sorted; ``topics``: DDS
+    topics that no ROS rule explains."""
 
     allowed: tuple[Rule, ...]
     denied: tuple[Rule, ...]

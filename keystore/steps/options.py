@@ -31,12 +31,13 @@ class Signing(Protocol):
 
 
 class ProvisionOptions(NamedTuple):
-    """``enclave_domains``: enclaves whose permissions are for fewer of the ``domains``.
+    """Options of provisioning. ``enclave_domains``: enclaves whose permissions are for fewer of the ``domains``.
 
     ``domains`` None: those of the keystore's governance, 0 for a new one. ``lifetime``, ``subjects`` None:
     what the keystore was created with. ``renew_within``: certificates that end sooner are re-issued, by
     default only the expired. ``ca_lifetime``: of CAs that are made. A keystore that is made on the way gets
-    ``subjects`` as its own; ``create_keystore`` has more to choose."""
+    ``subjects`` as its own; ``create_keystore`` has more to choose.
+    """
 
     domains: Domains | None = None
     create: bool = True
@@ -68,8 +69,8 @@ class ProvisionOptions(NamedTuple):
 
 
 class EnclaveReport(NamedTuple):
-    """``actions``: ``created``, ``certificate``, ``permissions``, ``links``, ``mode``; or none. ``validity``: of
-    certificate and permissions, where they were found to be as wanted or are new."""
+    """The result for one enclave. ``actions``: ``created``, ``certificate``, ``permissions``, ``links``, ``mode``; or
+    none. ``validity``: of certificate and permissions, where they were found to be as wanted or are new."""
 
     enclave: str
     actions: tuple[str, ...]

@@ -46,7 +46,8 @@ DEFAULT_WITHIN = timedelta(days=30)
 
 @dataclass(frozen=True, slots=True)
 class RenewOptions:
-    """``within``: what ends sooner is due. ``provisioning`` carries lifetime, subjects, access and more."""
+    """Options of a renewal. ``within``: what ends sooner is due. ``provisioning`` carries lifetime, subjects, access
+    and more."""
 
     within: timedelta = DEFAULT_WITHIN
     everything: bool = False

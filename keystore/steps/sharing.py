@@ -115,7 +115,8 @@ def _words(profiles: Iterable[Profile]) -> set[str]:
 
 
 class SharedEnclave(NamedTuple):
-    """``others``: launches that have shares of it too; ``added``: what their shares let it do beyond ours."""
+    """An enclave that several launches use. ``others``: launches that have shares of it too; ``added``: what their
+    shares let it do beyond ours."""
 
     enclave: str
     others: tuple[str, ...]
@@ -137,7 +138,7 @@ def shared_enclaves(
 
 
 class LaunchShares(NamedTuple):
-    """``running``: a process of this launch holds the keystore now."""
+    """The shares of one launch. ``running``: a process of this launch holds the keystore now."""
 
     owner: str
     running: bool

@@ -26,7 +26,8 @@ DEFAULT_LIFETIME = timedelta(hours=8)
 
 
 class ToolEnclave(NamedTuple):
-    """``environment``: what rcl reads, so that any command uses it; ``command``: an example of one."""
+    """An enclave made for a tool. ``environment``: what rcl reads, so that any command uses it; ``command``: an
+    example of one."""
 
     enclave: str
     policy: EnclavePolicy

@@ -28,7 +28,7 @@ from keystore.verification.issued import check_anchors, check_published, load_re
 
 @dataclass(frozen=True, slots=True)
 class VerifyReport:
-    """``findings``: worst first, then by place."""
+    """The result of a verification. ``findings``: worst first, then by place."""
 
     keystore: Path
     enclaves: int

@@ -25,8 +25,8 @@ class Severity(str, Enum):
 
 @dataclass(frozen=True, slots=True)
 class Finding:
-    """``code`` is stable, for scripts; ``place`` a file of the keystore or an enclave; ``repair`` a
-    command or what to do, empty when nothing needs doing."""
+    """One finding of a verification. ``code`` is stable, for scripts; ``place`` a file of the keystore or an enclave;
+    ``repair`` a command or what to do, empty when nothing needs doing."""
 
     severity: Severity
     code: str

@@ -158,7 +158,7 @@ _ADDRESS = re.compile(
 
 
 class RouterAddress(NamedTuple):
-    """``host`` is what sessions connect to, and what the router's certificate says."""
+    """The address of a router. ``host`` is what sessions connect to, and what the router's certificate says."""
 
     host: str = "localhost"
     port: int = DEFAULT_PORT

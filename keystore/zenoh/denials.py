@@ -131,8 +131,8 @@ _APPLY = (
 
 
 class Explanation(NamedTuple):
-    """``who`` may not do ``what``; ``why``, and ``remedy`` as commands or steps. ``policy``: a policy file that
-    grants just this; empty where granting more would not help."""
+    """A refusal of the router, explained. ``who`` may not do ``what``; ``why``, and ``remedy`` as commands or steps.
+    ``policy``: a policy file that grants just this; empty where granting more would not help."""
 
     who: str
     what: str
@@ -300,8 +300,9 @@ _HISTORY = {
 
 
 class Meaning(NamedTuple):
-    """``use``: None for a node itself and for looking at the graph; ``name``: absolute, with ``*`` for what a key
-    leaves open, "" without; ``type``: such as ``std_msgs/msg/String``, "" for any; ``domain``: ``*`` for all.
+    """The ROS meaning of a message on a key. ``use``: None for a node itself and for looking at the graph; ``name``:
+    absolute, with ``*`` for what a key leaves open, "" without; ``type``: such as ``std_msgs/msg/String``, "" for
+    any; ``domain``: ``*`` for all.
 
     Of a token also who it says is there: ``node`` (its final name) and ``enclave``.
     """

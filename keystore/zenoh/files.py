@@ -47,8 +47,8 @@ _WRITTEN_BY = "secure-keystore"
 
 
 class RouterFile(NamedTuple):
-    """``subjects``: the enclaves that the router lets in. ``gaps``: what of their permissions Zenoh cannot grant, and
-    enclaves that are shut out, in words."""
+    """The configuration of a router. ``subjects``: the enclaves that the router lets in. ``gaps``: what of their
+    permissions Zenoh cannot grant, and enclaves that are shut out, in words."""
 
     content: bytes
     subjects: tuple[Subject, ...]

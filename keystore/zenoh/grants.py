@@ -41,7 +41,8 @@ Types = Mapping[tuple[Use, str], tuple[str, ...]]
 
 
 class Grants(NamedTuple):
-    """``names``: by use, sorted. ``gaps``: what is granted on DDS and cannot be granted here, in words."""
+    """The permissions of an enclave on Zenoh. ``names``: by use, sorted. ``gaps``: what is granted on DDS and cannot
+    be granted here, in words."""
 
     names: Mapping[Use, tuple[str, ...]]
     types: Types = MappingProxyType({})

@@ -19,7 +19,7 @@ GRAPH_KINDS = {"MP": Use.PUBLISH, "MS": Use.SUBSCRIBE, "SC": Use.CALL, "SS": Use
 
 
 class AccessRule(NamedTuple):
-    """``name`` is unique within its enclave; ``flow`` is ``ingress`` or ``egress``."""
+    """A rule of the router. ``name`` is unique within its enclave; ``flow`` is ``ingress`` or ``egress``."""
 
     name: str
     flow: str

@@ -42,8 +42,8 @@ from keystore.zenoh.files import (
 
 
 class ZenohReport(NamedTuple):
-    """``written``: files that were not as they are now. ``gaps``: what Zenoh cannot grant, and who is shut out.
-    ``restart``: a router that runs has to be restarted to know of it."""
+    """The result of writing Zenoh's configuration. ``written``: files that were not as they are now. ``gaps``: what
+    Zenoh cannot grant, and who is shut out. ``restart``: a router that runs has to be restarted to know of it."""
 
     keystore: Path
     router: RouterAddress

@@ -39,7 +39,7 @@ class Test(NamedTuple):
 
 
 class When(NamedTuple):
-    """``any_of`` groups of tests, each of which must hold as a whole; none at all: always.
+    """A condition: ``any_of`` groups of tests, each of which must hold as a whole; none at all: always.
 
     ``since`` and ``until``: first and last distribution.
     """

@@ -47,7 +47,8 @@ class Documents(Protocol):
 
 
 class Applied(NamedTuple):
-    """``further``: nodes of the same process, to be applied in situations of their own."""
+    """A description applied to one start. ``further``: nodes of the same process, to be applied in situations of their
+    own."""
 
     interface: NodeInterface
     further: tuple[NodeInterface, ...] = ()

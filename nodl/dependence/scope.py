@@ -29,7 +29,7 @@ _HELD = re.compile("\x00([0-9]+)\x00")
 
 
 class Filled(NamedTuple):
-    """``parts`` of a name; ``notes``: where its pieces came from, for a reader."""
+    """A template filled in: ``parts`` of a name; ``notes``: where its pieces came from, for a reader."""
 
     parts: tuple[Part, ...]
     notes: tuple[str, ...] = ()

@@ -40,7 +40,8 @@ _Fields = dict[str, "str | int | float | bool | None"]
 
 
 class LearntName(NamedTuple):
-    """``readings``: what the name may be as well; ``note``: how it was learnt, for the reader of a plan."""
+    """A learnt name. ``readings``: what the name may be as well; ``note``: how it was learnt, for the reader of a
+    plan."""
 
     template: NameTemplate
     introspected: bool = False
@@ -49,7 +50,7 @@ class LearntName(NamedTuple):
 
 
 class LearntFrom(NamedTuple):
-    """``runs``: how many; ``incomplete``: why they may not have shown everything."""
+    """The runs behind a learnt manifest. ``runs``: how many; ``incomplete``: why they may not have shown everything."""
 
     runs: int = 0
     incomplete: tuple[str, ...] = ()

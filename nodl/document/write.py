@@ -34,7 +34,7 @@ _PARAMETER_TYPES = {
 
 
 class Written(NamedTuple):
-    """``notes``: what had to be invented or left out, for the person who converts."""
+    """A document as text. ``notes``: what had to be invented or left out, for the person who converts."""
 
     text: str
     notes: tuple[str, ...] = ()

@@ -29,8 +29,9 @@ _NAMED_BY = "/get_parameters"  # every node has it, unless its program switches 
 
 
 class SeenParticipant(NamedTuple):
-    """``guid``: 32 hexadecimal digits. ``enclave`` is what it says in clear; ``pid`` is of its own pid namespace, and
-    ``None`` where it does not say; ``own_history``: it announces how much it keeps (Cyclone DDS)."""
+    """A participant that was announced. ``guid``: 32 hexadecimal digits. ``enclave`` is what it says in clear; ``pid``
+    is of its own pid namespace, and ``None`` where it does not say; ``own_history``: it announces how much it keeps
+    (Cyclone DDS)."""
 
     guid: str
     enclave: str = ""

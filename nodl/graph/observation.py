@@ -20,8 +20,8 @@ class ObservationError(NoDLError):
 
 
 class Observed(NamedTuple):
-    """``commands``: command lines by participant, of processes on the observer's machine. ``starts``: those of a launch
-    file, where one was given."""
+    """One observed run. ``commands``: command lines by participant, of processes on the observer's machine.
+    ``starts``: those of a launch file, where one was given."""
 
     run: RecordedRun
     graph: Graph

@@ -27,7 +27,8 @@ _ROS_TYPE_PARTS = 3
 
 
 class LearntFromGraph(NamedTuple):
-    """``left_out``: nodes and interfaces that are in no manifest, each with the reason."""
+    """The manifests that observations teach. ``left_out``: nodes and interfaces that are in no manifest, each with the
+    reason."""
 
     learnt: Learnt
     left_out: tuple[str, ...]

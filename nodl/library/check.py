@@ -25,8 +25,9 @@ _MOST = 10_000
 
 
 class LibraryVerdict(NamedTuple):
-    """``only_document`` and ``only_source``: names that the other side does not have; ``not_compared``: why there was
-    nothing to compare with. ``version``: of the package whose source was read."""
+    """The comparison of one document with its source. ``only_document`` and ``only_source``: names that the other side
+    does not have; ``not_compared``: why there was nothing to compare with. ``version``: of the package whose source
+    was read."""
 
     document: LibraryDocument
     only_document: tuple[str, ...] = ()

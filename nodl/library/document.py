@@ -32,9 +32,9 @@ class Evidence(NamedTuple):
 
 
 class LibraryDocument(NamedTuple):
-    """``stem``: ``package/name`` of the file. ``programs``: executables and plugins that run this node;
-    ``classes``: names of the class if other nodes load it. ``versions``: a series by distribution. ``recorded``: learnt
-    from runs."""
+    """A document of the library. ``stem``: ``package/name`` of the file. ``programs``: executables and plugins that
+    run this node; ``classes``: names of the class if other nodes load it. ``versions``: a series by distribution.
+    ``recorded``: learnt from runs."""
 
     interface: NodeInterface
     stem: str

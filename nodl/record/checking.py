@@ -27,7 +27,7 @@ class Verdict(Enum):
 
 
 class Difference(NamedTuple):
-    """``kind`` ``None``: about the node as a whole."""
+    """A difference between description and record. ``kind`` ``None``: about the node as a whole."""
 
     verdict: Verdict
     node: str
@@ -41,7 +41,7 @@ class Difference(NamedTuple):
 
 
 class Comparison(NamedTuple):
-    """``agreed``: how many endpoints both have."""
+    """The comparison of a node with its description. ``agreed``: how many endpoints both have."""
 
     agreed: int
     differences: tuple[Difference, ...]

@@ -81,7 +81,8 @@ class LearntNode(NamedTuple):
 
 
 class Learnt(NamedTuple):
-    """``unforeseeable``: nodes whose names differ in each run, as patterns; no manifest can name them."""
+    """Everything that records teach. ``unforeseeable``: nodes whose names differ in each run, as patterns; no manifest
+    can name them."""
 
     nodes: tuple[LearntNode, ...]
     unforeseeable: tuple[str, ...] = ()

@@ -31,7 +31,7 @@ class Loaded(NamedTuple):
 
 
 class Initialised(NamedTuple):
-    """``rcl_init``: the process uses ROS."""
+    """A call of ``rcl_init``: the process uses ROS."""
 
     pid: int
     at: int
@@ -42,7 +42,7 @@ class Initialised(NamedTuple):
 
 
 class NodeMade(NamedTuple):
-    """``rcl_node_init``: ``name`` and ``namespace`` as the source gives them, ``fqn`` the final name."""
+    """A call of ``rcl_node_init``: ``name`` and ``namespace`` as the source gives them, ``fqn`` the final name."""
 
     pid: int
     thread: int

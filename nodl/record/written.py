@@ -18,8 +18,8 @@ _PARTS = "/_action/"
 
 
 class Meant(NamedTuple):
-    """``moved``: the launch's rules do not lead to the final name, so rules of the program itself do; ``name`` is then
-    the final name."""
+    """A name as the source means it. ``moved``: the launch's rules do not lead to the final name, so rules of the
+    program itself do; ``name`` is then the final name."""
 
     name: str
     moved: bool = False

@@ -47,7 +47,8 @@ OPTIONS: tuple[Option, ...] = (
 
 
 class Judgement(NamedTuple):
-    """``described_by``: one of ``JUDGED``; ``comparison`` ``None``: it says nothing of the node."""
+    """The comparison of a node with one description. ``described_by``: one of ``JUDGED``; ``comparison`` ``None``: it
+    says nothing of the node."""
 
     node: RequestedNode
     described_by: str

@@ -188,7 +188,7 @@ def _install_timer_handler(context: LaunchContext) -> None:
 
 @expose_action("ros_timer")
 class ROSTimer(TimerAction):
-    """``period`` is in seconds of ROS time."""
+    """A timer on ROS time. ``period`` is in seconds of ROS time."""
 
     def __init__(
         self,

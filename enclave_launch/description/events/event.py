@@ -32,7 +32,7 @@ class Event:
 
 @read_only("action")
 class ExecutionComplete(Event):
-    """``action`` has been executed; for processes and timers: has ended."""
+    """The end of an action. ``action`` has been executed; for processes and timers: has ended."""
 
     name = "launch.events.ExecutionComplete"
     action: Action
@@ -47,7 +47,7 @@ class ExecutionComplete(Event):
 
 @read_only("launch_description")
 class IncludeLaunchDescription(Event):
-    """``launch_description`` is to be visited."""
+    """A request to visit a description. ``launch_description`` is to be visited."""
 
     name = "launch.events.IncludeLaunchDescription"
     launch_description: LaunchDescription
@@ -58,7 +58,7 @@ class IncludeLaunchDescription(Event):
 
 @read_only("reason", "due_to_sigint")
 class Shutdown(Event):
-    """``reason`` for the log; ``due_to_sigint``: the children got the signal as well."""
+    """The launch shuts down. ``reason`` for the log; ``due_to_sigint``: the children got the signal as well."""
 
     name = "launch.events.Shutdown"
     reason: Any = "reason not given"
@@ -95,7 +95,7 @@ def event_named(name: str) -> Callable[[Event], bool]:
 
 @read_only("process_name", "cwd", "env", "pid", "action", "cmd")
 class RunningProcessEvent(Event):
-    """``process_name`` is NAME-N; ``cmd``, ``cwd``, ``env`` are final."""
+    """An event of one process. ``process_name`` is NAME-N; ``cmd``, ``cwd``, ``env`` are final."""
 
     name = "launch.events.process.RunningProcessEvent"
     process_name: str = ""
@@ -150,7 +150,7 @@ class ProcessExited(RunningProcessEvent):
 
 @read_only("text")
 class ProcessIO(RunningProcessEvent):
-    """``text`` (bytes) came from, or goes to, the stream with this file descriptor."""
+    """Output or input of a process. ``text`` (bytes) came from, or goes to, the stream with this file descriptor."""
 
     name = "launch.events.process.ProcessIO"
     text: bytes = b""
@@ -174,7 +174,7 @@ class ProcessIO(RunningProcessEvent):
 
 
 class ProcessStdin(ProcessIO):
-    """``text`` goes to the standard input of the process."""
+    """Input of a process. ``text`` goes to the standard input of the process."""
 
     name = "launch.events.process.ProcessStdin"
 
@@ -183,7 +183,7 @@ class ProcessStdin(ProcessIO):
 
 
 class ProcessStdout(ProcessIO):
-    """``text`` came from the standard output of the process."""
+    """Standard output of a process. ``text`` came from the standard output of the process."""
 
     name = "launch.events.process.ProcessStdout"
 
@@ -192,7 +192,7 @@ class ProcessStdout(ProcessIO):
 
 
 class ProcessStderr(ProcessIO):
-    """``text`` came from the standard error output of the process."""
+    """Standard error output of a process. ``text`` came from the standard error output of the process."""
 
     name = "launch.events.process.ProcessStderr"
 
@@ -247,7 +247,7 @@ class ShutdownProcess(ProcessTargetedEvent):
 
 @read_only("signal")
 class SignalProcess(ProcessTargetedEvent):
-    """``signal_number``: one of ``signal.Signals``, or the text ``SIGKILL``."""
+    """A request to signal processes. ``signal_number``: one of ``signal.Signals``, or the text ``SIGKILL``."""
 
     name = "launch.events.process.SignalProcess"
     signal: str | signals.Signals

@@ -18,7 +18,8 @@ def _constants(message: type, prefix: str) -> dict[int, str]:
 
 @read_only("transition_id", "lifecycle_node_matcher")
 class ChangeState(Event):
-    """``transition_id`` is one of the constants of ``lifecycle_msgs/msg/Transition``."""
+    """A request for a lifecycle transition. ``transition_id`` is one of the constants of
+    ``lifecycle_msgs/msg/Transition``."""
 
     name = "launch_ros.events.lifecycle.ChangeState"
     valid_transitions: ClassVar[dict[int, str]] = {
@@ -44,7 +45,8 @@ class ChangeState(Event):
 
 @read_only("msg", "action")
 class StateTransition(Event):
-    """``msg`` is a ``lifecycle_msgs/msg/TransitionEvent`` that ``action``'s node published."""
+    """A lifecycle node has changed its state. ``msg`` is a ``lifecycle_msgs/msg/TransitionEvent`` that ``action``'s
+    node published."""
 
     name = "launch_ros.events.lifecycle.StateTransition"
     msg: Any = None

@@ -30,7 +30,7 @@ FilePath = str | bytes | os.PathLike[str]
 
 
 class InvalidLaunchFileError(Exception):
-    """``likely_errors``: what each loader said, the likeliest first."""
+    """A launch file that no loader can read. ``likely_errors``: what each loader said, the likeliest first."""
 
     def __init__(self, extension: str = "", *, likely_errors: Sequence[BaseException] | None = None) -> None:
         self._extension = extension

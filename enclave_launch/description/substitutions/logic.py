@@ -42,7 +42,7 @@ def _text(value: bool) -> str:
 
 @expose_substitution("not")
 class NotSubstitution(TemplateSubstitution):
-    """``true`` when the value is false."""
+    """Negation: ``true`` when the value is false."""
 
     value = template()
     refusal = (TypeError, "not substitution expects 1 argument")
@@ -70,7 +70,7 @@ class _Binary(TemplateSubstitution):
 
 @expose_substitution("and")
 class AndSubstitution(_Binary):
-    """``true`` when both are."""
+    """Conjunction: ``true`` when both are."""
 
     def perform(self, context: LaunchContext) -> str:
         return _text(all(self._operands(context)))
@@ -78,7 +78,7 @@ class AndSubstitution(_Binary):
 
 @expose_substitution("or")
 class OrSubstitution(_Binary):
-    """``true`` when one of two is."""
+    """Disjunction: ``true`` when one of two is."""
 
     def perform(self, context: LaunchContext) -> str:
         return _text(any(self._operands(context)))
@@ -111,7 +111,7 @@ class _Variadic(Substitution):
 
 @expose_substitution("any", feature=Feature.EQUALS_IF)
 class AnySubstitution(_Variadic):
-    """``true`` when at least one is."""
+    """Disjunction of any number of values: ``true`` when at least one is."""
 
     def __init__(self, *args: SomeSubstitutionsType) -> None:  # its own: Python's error names it, as upstream
         super().__init__(*args)
@@ -122,7 +122,7 @@ class AnySubstitution(_Variadic):
 
 @expose_substitution("all", feature=Feature.EQUALS_IF)
 class AllSubstitution(_Variadic):
-    """``true`` when each is."""
+    """Conjunction of any number of values: ``true`` when each is."""
 
     def __init__(self, *args: SomeSubstitutionsType) -> None:  # its own: Python's error names it, as upstream
         super().__init__(*args)
@@ -145,7 +145,7 @@ def _read(value: Any) -> list[Substitution]:
 
 @expose_substitution("equals", feature=Feature.EQUALS_IF)
 class EqualsSubstitution(TemplateSubstitution):
-    """``true`` when both are the same boolean, else the same number, else the same text."""
+    """Equality: ``true`` when both are the same boolean, else the same number, else the same text."""
 
     left = template(read=_read)
     right = template(read=_read)
@@ -172,7 +172,7 @@ def _equal(left: str, right: str) -> bool:
 
 @expose_substitution("not-equals", feature=Feature.EQUALS_IF)
 class NotEqualsSubstitution(EqualsSubstitution):
-    """``true`` when ``equals`` is not."""
+    """Inequality: ``true`` when ``equals`` is not."""
 
     def perform(self, context: LaunchContext) -> str:
         return _text(super().perform(context) == "false")

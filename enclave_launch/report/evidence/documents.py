@@ -200,8 +200,8 @@ def _resource(name: str, data: bytes) -> dict[str, Any]:
 
 
 class Row(NamedTuple):
-    """``node`` is empty where only a policy file says so. ``built_in``: every node has it. ``enforced_by``: ``DDS`` by
-    each participant, ``Zenoh`` by the router."""
+    """One permission in the evidence. ``node`` is empty where only a policy file says so. ``built_in``: every node has
+    it. ``enforced_by``: ``DDS`` by each participant, ``Zenoh`` by the router."""
 
     enclave: str
     node: str

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 
 class EvidencePart(NamedTuple):
-    """``files`` of the evidence, what they show, and the requirements that this supports."""
+    """One part of the evidence: ``files`` of the evidence, what they show, and the requirements that this supports."""
 
     name: str
     files: tuple[str, ...]

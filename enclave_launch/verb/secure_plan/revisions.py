@@ -40,7 +40,7 @@ class Revised(NamedTuple):
 
 
 class Checkout(NamedTuple):
-    """``top`` of the repository as it is, and ``folder`` with all its files as they were."""
+    """A revision of a repository: ``top`` of the repository as it is, ``folder`` with all its files as they were."""
 
     top: Path
     folder: Path

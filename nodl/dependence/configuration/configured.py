@@ -25,7 +25,8 @@ class ConfiguredPlugin(NamedTuple):
 
 
 class Configured(NamedTuple):
-    """``nodes``: names of further nodes that the program makes, of which nothing else is known to differ.
+    """The contents of a configuration file. ``nodes``: names of further nodes that the program makes, of which nothing
+    else is known to differ.
 
     ``plugins``: what documents describe, if they do.
     """
