@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import os
 import socket
+from collections.abc import Mapping
 from datetime import datetime
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -56,7 +57,7 @@ class LaunchConfig:
     def log_dir(self) -> str:
         """Return the folder of this run below ``ROS_LOG_DIR``, else ``ROS_HOME/log``, else ``~/.ros/log``."""
         if self._log_dir is None:
-            self._log_dir = os.path.join(_base(), _run_name())
+            self._log_dir = os.path.join(log_base_directory(os.environ), _run_name())
         return self._log_dir
 
     @log_dir.setter
@@ -86,10 +87,11 @@ def reset() -> None:
     launch_config.reset()
 
 
-def _base() -> str:
-    chosen = os.environ.get("ROS_LOG_DIR")
+def log_base_directory(environment: Mapping[str, str]) -> str:
+    """Return ``$ROS_LOG_DIR``, else ``$ROS_HOME/log``, else ``~/.ros/log``; an empty variable counts as unset."""
+    chosen = environment.get("ROS_LOG_DIR")
     if not chosen:
-        chosen = os.path.join(os.environ.get("ROS_HOME") or os.path.join("~", ".ros"), "log")
+        chosen = os.path.join(environment.get("ROS_HOME") or os.path.join("~", ".ros"), "log")
     return os.path.normpath(os.path.expanduser(chosen))
 
 

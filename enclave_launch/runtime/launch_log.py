@@ -188,14 +188,6 @@ def _format_of_records(text: str) -> Format:
     return render
 
 
-def log_base_directory(environment: Mapping[str, str]) -> Path:
-    """Return ``$ROS_LOG_DIR``, else ``$ROS_HOME/log``, else ``~/.ros/log``; an empty variable counts as unset."""
-    chosen = environment.get("ROS_LOG_DIR")
-    if not chosen:
-        chosen = os.path.join(environment.get("ROS_HOME") or os.path.join("~", ".ros"), "log")
-    return Path(os.path.normpath(os.path.expanduser(chosen)))
-
-
 def make_log_directory(base: Path, now: datetime, host: str, pid: int) -> Path:
     """Create ``<date>-<host>-<pid>`` and point the link ``latest`` there; raises RuntimeFailure."""
     directory = base / f"{now.strftime('%Y-%m-%d-%H-%M-%S-%f')}-{host}-{pid}"

@@ -19,12 +19,14 @@ import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AsyncExitStack, contextmanager
 from datetime import datetime, timezone
+from pathlib import Path
 from signal import SIG_IGN, SIGHUP, SIGINT, SIGQUIT, SIGTERM, Signals, getsignal
 from typing import Any
 
 from enclave_launch.description.events.event import IncludeLaunchDescription, Shutdown
 from enclave_launch.description.events.handlers import OnIncludeLaunchDescription, OnShutdown
 from enclave_launch.description.launch_context import LaunchContext
+from enclave_launch.description.logging import log_base_directory
 from enclave_launch.description.visit import handle_next
 from enclave_launch.errors import EnclaveLaunchError, RuntimeFailure
 from enclave_launch.evaluation.active_environment import ENVIRONMENT_SWITCH, LaunchEnvironment
@@ -40,14 +42,7 @@ from enclave_launch.prefixes import prepend_prefixes
 from enclave_launch.runtime.back_pressure import BackPressure
 from enclave_launch.runtime.companion import companion_first
 from enclave_launch.runtime.gate import EnclaveGate
-from enclave_launch.runtime.launch_log import (
-    LaunchLog,
-    Level,
-    Writers,
-    captured_logging,
-    log_base_directory,
-    make_log_directory,
-)
+from enclave_launch.runtime.launch_log import LaunchLog, Level, Writers, captured_logging, make_log_directory
 from enclave_launch.runtime.live_host import LiveHost
 from enclave_launch.runtime.overlap import many_descriptors
 from enclave_launch.runtime.process_tree import ProcessTree
@@ -332,9 +327,8 @@ class LiveLaunch:
             self._services.close()
 
     def _open_log(self, tree: ProcessTree) -> LaunchLog:
-        directory = make_log_directory(
-            log_base_directory(os.environ), datetime.now(), socket.gethostname(), os.getpid()
-        )
+        base = Path(log_base_directory(os.environ))
+        directory = make_log_directory(base, datetime.now(), socket.gethostname(), os.getpid())
         pressure = BackPressure(tree)
         writers = Writers(
             screen=SinkWriter(pressure.on_screen_full, pressure.on_screen_drained),

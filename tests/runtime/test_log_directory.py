@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from enclave_launch import RuntimeFailure
-from enclave_launch.runtime.launch_log import log_base_directory, make_log_directory
+from enclave_launch.description.logging import log_base_directory
+from enclave_launch.runtime.launch_log import make_log_directory
 
 NOW = datetime(2024, 2, 3, 4, 5, 6, 78)
 
@@ -25,7 +26,7 @@ NOW = datetime(2024, 2, 3, 4, 5, 6, 78)
     ],
 )
 def test_base(environment: dict[str, str], expected: str) -> None:
-    assert log_base_directory(environment) == Path(os.path.expanduser(expected))
+    assert log_base_directory(environment) == os.path.expanduser(expected)
 
 
 def test_name_and_latest_link(tmp_path: Path) -> None:
