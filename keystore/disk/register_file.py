@@ -1,14 +1,16 @@
-"""Read the register from disk, cheaply, before each launch; ``store`` writes it, first of each batch."""
+"""Read the register from disk, and compare the trusted CAs with it: cheap, before each launch. ``store`` writes it."""
 
 from __future__ import annotations
 
+import hashlib
 import os
 from functools import lru_cache
 from pathlib import Path
 
 from keystore.disk import layout, safe_files
 from keystore.disk.view import KeystoreView
-from keystore.errors import printable
+from keystore.errors import UnsafeKeystoreError, printable
+from keystore.formats.certificate import CertificateFacts
 from keystore.formats.register import Register, parse_register
 from keystore.formats.role import Role
 
@@ -31,3 +33,35 @@ def needs_register(view: KeystoreView) -> bool:
         and all(os.path.isfile(view.root / layout.ca_cert(role)) for role in Role)
         and any(view.key_file(role) is not None for role in Role)
     )
+
+
+def foreign_authorities(view: KeystoreView, register: Register | None) -> list[tuple[Role, CertificateFacts]]:
+    """Return trusted CAs that this keystore neither made nor was given, or has retired; none without a register."""
+    if register is None:
+        return []
+    return [
+        (role, ca)
+        for role in Role
+        for ca in view.ca_bundle(role)
+        if not register.trusts_authority(role, ca.der)
+    ]
+
+
+def refuse_foreign_authorities(view: KeystoreView, register: Register | None) -> None:
+    """Raise UnsafeKeystoreError for a trusted CA that this keystore did not make.
+
+    Whoever holds the key of such a CA can make enclaves that Fast DDS lets in.
+    """
+    for role, ca in foreign_authorities(view, register):
+        place = printable(view.root / layout.ca_cert(role))
+        raise UnsafeKeystoreError(
+            f"{place} holds a CA that this keystore did not make, or has retired: {describe(ca)}. Find out who put it "
+            f"there; to remove it: secure-keystore renew {printable(view.root)}"
+        )
+
+
+def describe(ca: CertificateFacts) -> str:
+    """Return its name and the SHA-256 fingerprint that openssl and browsers show."""
+    digest = hashlib.sha256(ca.der).hexdigest().upper()
+    pairs = ":".join(digest[at : at + 2] for at in range(0, len(digest), 2))
+    return f"{printable(ca.common_name or 'without a common name')}, SHA-256 {pairs}"

@@ -26,6 +26,7 @@ from pathlib import Path
 
 from keystore.disk import layout, lock, safe_files
 from keystore.disk.register_file import read_register
+from keystore.disk.view import KeystoreView
 from keystore.errors import StorageError
 from keystore.formats.register import Register, register_json
 
@@ -330,3 +331,19 @@ def _sync_file_system(path: Path) -> bool:
     finally:
         os.close(descriptor)
     return True
+
+
+def refresh_copies(opened: Store) -> None:
+    """Copy trust anchors and the governance again after a change, on a file system without links."""
+    view = KeystoreView(opened.root)
+    stale = [
+        (f"{layout.enclave_directory(enclave)}/{name}", target, layout.link_source(name))
+        for enclave in view.enclaves()
+        for name, target in layout.enclave_links(enclave).items()
+    ]
+    with opened.batch() as batch:
+        for relative, target, source in stale:
+            if safe_files.link_target(opened.root, relative) is not None:
+                continue
+            if safe_files.read_if_there(opened.root, relative) != safe_files.read(opened.root, source):
+                batch.link(relative, Link(target, source))

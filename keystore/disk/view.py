@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import json
 import os
 import shlex
 from collections.abc import Iterable
-from datetime import datetime
+from dataclasses import dataclass
+from datetime import datetime, timedelta
 from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from keystore.disk import layout, safe_files
-from keystore.disk.settings import KeystoreSettings
 from keystore.errors import (
     DamagedKeystoreError,
     InvalidEnclaveNameError,
@@ -24,6 +26,8 @@ from keystore.errors import (
 from keystore.formats.certificate import CertificateFacts, read_certificate, read_certificates
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.role import Role
+from keystore.formats.subject import SubjectScheme
+from keystore.formats.validity import DEFAULT_LIFETIME
 from keystore.signing.authority import Authority, authority_of
 from keystore.signing.ca_access import CaAccess
 from keystore.signing.pkcs11_signer import open_signer
@@ -204,3 +208,42 @@ def _collect(directory: Path | str, prefix: str, found: list[str]) -> None:
         except InvalidEnclaveNameError:
             continue  # a stray, which verify reports
         _collect(entry.path, f"{prefix}/{entry.name}", found)
+
+
+_VERSION = 1
+
+
+@dataclass(frozen=True, slots=True)
+class KeystoreSettings:
+    """The settings that a keystore keeps in ``secure-keystore.json``; keystores made by SROS2 have the defaults.
+
+    The file also marks a directory as a keystore in the making, so that an interrupted ``create`` can be completed
+    while a foreign directory is left alone. ``lifetime`` is for new certificates of enclaves.
+    """
+
+    subjects: SubjectScheme = SubjectScheme.EXACT
+    lifetime: timedelta = DEFAULT_LIFETIME
+
+    def to_json(self) -> bytes:
+        content = {
+            "version": _VERSION,
+            "subjects": self.subjects.value,
+            "lifetime_seconds": int(self.lifetime.total_seconds()),
+        }
+        return json.dumps(content, indent=2, sort_keys=True).encode() + b"\n"
+
+    @classmethod
+    def from_json(cls, text: bytes, place: str) -> KeystoreSettings:
+        """Parse what ``to_json`` writes; raises DamagedKeystoreError for anything else."""
+        try:
+            content: Any = json.loads(text)
+            if content["version"] != _VERSION:
+                raise DamagedKeystoreError(f"{place} was written by a newer version; update secure-keystore")
+            return cls(
+                SubjectScheme(content["subjects"]),
+                timedelta(seconds=int(content["lifetime_seconds"])),
+            )
+        except (ValueError, KeyError, TypeError, OverflowError, RecursionError):
+            raise DamagedKeystoreError(
+                f"{place} is not the settings file of a keystore; restore or remove it"
+            ) from None

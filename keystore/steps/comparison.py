@@ -8,10 +8,9 @@ from datetime import datetime, timedelta
 from pathlib import Path
 
 from keystore.disk import layout
-from keystore.disk.authorities import refuse_foreign_authorities
 from keystore.disk.crl_file import crl_problem, crl_validity
 from keystore.disk.deployed import deployment_problem, refuse_changed_deployment
-from keystore.disk.register_file import needs_register, read_register
+from keystore.disk.register_file import needs_register, read_register, refuse_foreign_authorities
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.signed_documents import governance_stands
 from keystore.disk.view import KeystoreView

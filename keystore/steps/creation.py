@@ -12,9 +12,8 @@ from pathlib import Path
 from enclave_common.dependencies import require
 from keystore.disk import layout, safe_files, store
 from keystore.disk.safe_files import resolve_root
-from keystore.disk.settings import KeystoreSettings
 from keystore.disk.store import Store
-from keystore.disk.view import KeystoreView
+from keystore.disk.view import KeystoreSettings, KeystoreView
 from keystore.errors import DamagedKeystoreError, InvalidInputError, printable
 from keystore.formats.certificate import CertificateFacts, given_certificates
 from keystore.formats.domains import Domains

@@ -7,9 +7,8 @@ from datetime import datetime
 from pathlib import Path
 
 from keystore.disk import layout, safe_files
-from keystore.disk.copies import refresh_copies
 from keystore.disk.signed_documents import governance_stands, signed_governance, trusted_document
-from keystore.disk.store import Store
+from keystore.disk.store import Store, refresh_copies
 from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import DamagedKeystoreError, printable
 from keystore.formats.domains import Domains

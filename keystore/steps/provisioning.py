@@ -17,7 +17,7 @@ from enclave_common.dependencies import require
 from enclave_common.words import counted, some_of
 from keystore.add_ons import follow
 from keystore.disk import layout, store
-from keystore.disk.authorities import refuse_foreign_authorities
+from keystore.disk.register_file import refuse_foreign_authorities
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.share_files import read_shares
 from keystore.disk.signed_documents import governance_domains

@@ -17,10 +17,8 @@ from pathlib import Path
 
 from enclave_common.words import counted, some_of
 from keystore.disk import layout, safe_files
-from keystore.disk.authorities import describe
-from keystore.disk.copies import refresh_copies
-from keystore.disk.register_file import read_register
-from keystore.disk.store import Store
+from keystore.disk.register_file import describe, read_register
+from keystore.disk.store import Store, refresh_copies
 from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import DamagedKeystoreError, InvalidInputError, printable
 from keystore.formats.certificate import CertificateFacts, read_certificate, read_der

@@ -24,9 +24,8 @@ from pathlib import Path
 
 from keystore.add_ons import follow
 from keystore.disk import layout, safe_files, store
-from keystore.disk.copies import refresh_copies
 from keystore.disk.signed_documents import governance_stands
-from keystore.disk.store import Content, Store
+from keystore.disk.store import Content, Store, refresh_copies
 from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import DamagedKeystoreError, InvalidInputError
 from keystore.formats.certificate import read_certificate

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from datetime import datetime
 
 from keystore.disk import layout, safe_files
-from keystore.disk.authorities import describe
 from keystore.disk.crl_file import crl_validity, load_crl
+from keystore.disk.register_file import describe
 from keystore.disk.view import KeystoreView
 from keystore.errors import KeystoreError, SigningUnavailableError, UnsafeKeystoreError
 from keystore.formats.certificate import CertificateFacts

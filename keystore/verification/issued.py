@@ -9,10 +9,9 @@ from contextlib import suppress
 from datetime import datetime
 
 from keystore.disk import layout
-from keystore.disk.authorities import describe, foreign_authorities
 from keystore.disk.crl_file import crl_problem
 from keystore.disk.deployed import deployed_manifest
-from keystore.disk.register_file import needs_register, read_register
+from keystore.disk.register_file import describe, foreign_authorities, needs_register, read_register
 from keystore.disk.view import KeystoreView
 from keystore.errors import KeystoreError
 from keystore.formats.certificate import CertificateFacts
