@@ -8,6 +8,7 @@ out as by launch, too (``_get_logging_directory``, ``_make_unique_log_dir``, ``_
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import os
 import time
@@ -21,6 +22,7 @@ from enclave_common.terminal import printable, printable_lines
 from enclave_common.words import counted
 from enclave_launch.errors import RuntimeFailure
 from enclave_launch.runtime.overlap import Overlap
+from enclave_launch.runtime.process_tree import ProcessTree
 from enclave_launch.runtime.sinks import FileSink, ScreenSink, Sink, SinkWriter
 
 Level = Literal["DEBUG", "INFO", "WARNING", "ERROR", "CRITICAL"]
@@ -212,3 +214,49 @@ def _renew_latest(link: Path, directory: Path) -> None:
         fresh.replace(link)
     except OSError:
         fresh.unlink(missing_ok=True)
+
+
+PATIENCE = 5.0  # seconds
+
+
+class BackPressure:
+    """Decides who waits if lines come faster than they can be written. Call ``attach`` before anything is written.
+
+    Streams that go to a file wait for the files, streams that go to the screen for the screen; but one that stays full
+    for ``PATIENCE`` seconds (Ctrl-S, a slow link) holds up only the streams that go nowhere else. The others go on into
+    their logs, and the screen shows how many lines it lacks.
+    """
+
+    def __init__(self, tree: ProcessTree) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._tree = tree
+        self._giving_up: asyncio.TimerHandle | None = None
+        self._log: LaunchLog
+
+    def attach(self, log: LaunchLog) -> None:
+        self._log = log
+
+    def on_files_full(self) -> None:
+        self._tree.hold_output("files")
+
+    def on_files_drained(self) -> None:
+        """Release the output paused for the files; called in the writer's thread."""
+        self._loop.call_soon_threadsafe(self._tree.release_output, "files")
+
+    def on_screen_full(self) -> None:
+        self._tree.hold_output("screen")
+        self._giving_up = self._loop.call_later(PATIENCE, self._give_up)
+
+    def on_screen_drained(self) -> None:
+        self._loop.call_soon_threadsafe(self._go_on)
+
+    def _give_up(self) -> None:
+        self._log.show_less(True)
+        self._tree.hold_output("screen only")
+        self._tree.release_output("screen")
+
+    def _go_on(self) -> None:
+        if self._giving_up is not None:
+            self._giving_up.cancel()
+        self._log.show_less(False)
+        self._tree.release_output("screen", "screen only")

@@ -39,10 +39,16 @@ from enclave_launch.host.current import active_host
 from enclave_launch.options import RunSettings
 from enclave_launch.plan import LaunchSource
 from enclave_launch.prefixes import prepend_prefixes
-from enclave_launch.runtime.back_pressure import BackPressure
 from enclave_launch.runtime.companion import companion_first
 from enclave_launch.runtime.gate import EnclaveGate
-from enclave_launch.runtime.launch_log import LaunchLog, Level, Writers, captured_logging, make_log_directory
+from enclave_launch.runtime.launch_log import (
+    BackPressure,
+    LaunchLog,
+    Level,
+    Writers,
+    captured_logging,
+    make_log_directory,
+)
 from enclave_launch.runtime.live_host import LiveHost
 from enclave_launch.runtime.overlap import many_descriptors
 from enclave_launch.runtime.process_tree import ProcessTree

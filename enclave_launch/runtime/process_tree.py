@@ -18,7 +18,7 @@ from enclave_launch.runtime.survivors import Survivors
 from enclave_launch.runtime.warden_process import Message, WardenChannel, WardenProcess
 
 Stream = Literal["stdout", "stderr"]
-Hold = Literal["files", "screen", "screen only"]  # why a stream may have to wait (back_pressure)
+Hold = Literal["files", "screen", "screen only"]  # why a stream may have to wait (BackPressure)
 OnOutput = Callable[[Stream, bytes], None]
 
 NO_HOLDS: Mapping[Stream, frozenset[Hold]] = MappingProxyType({})

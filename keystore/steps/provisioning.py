@@ -6,6 +6,7 @@ interrupted run is completed by the next one, because the comparison finds every
 
 from __future__ import annotations
 
+import os
 import shlex
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -20,12 +21,14 @@ from keystore.disk import layout, store
 from keystore.disk.register_file import refuse_foreign_authorities
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.share_files import read_shares
-from keystore.disk.signed_documents import governance_domains
+from keystore.disk.signed_documents import governance_domains, signed_governance
 from keystore.disk.store import Store
 from keystore.disk.view import KeystoreView, keystore_at
-from keystore.errors import InvalidInputError, printable
+from keystore.errors import InvalidInputError, KeystoreError, printable
 from keystore.formats.enclave_name import check_distinct, validate_enclave_name
+from keystore.formats.governance import Governance, governance_document, parse_governance
 from keystore.formats.policy import EnclavePolicy, Operation, Policy, Profile, Qualifier, Rule
+from keystore.formats.role import Role
 from keystore.formats.subject import SubjectScheme
 from keystore.formats.validity import DEFAULT_LIFETIME, Validity, utc_now
 from keystore.steps.comparison import as_found, compare, inspect_wanted, refuse_without_keys
@@ -44,7 +47,8 @@ from keystore.steps.wanted import (
     wanted_enclave,
     with_domains,
 )
-from keystore.verification.before_launch import exposures
+from keystore.verification.files import check_parents
+from keystore.verification.governance import weaknesses
 
 
 def provision(
@@ -287,3 +291,35 @@ def _write_all(
                     progress(position, len(todo))
             writer.record(batch)
     return tuple(reports.values())
+
+
+def exposures(view: KeystoreView) -> Iterator[str]:
+    """Yield what works and exposes the keystore all the same; a cheap part of ``verify``, without an XML parser."""
+    if not view.is_complete:
+        return
+    if view.shares_one_ca:
+        yield (
+            "this keystore has one CA for identities and permissions (CVE-2023-24010, CVE-2023-24011); "
+            "secure-keystore renew separates them"
+        )
+    files = [name for role in Role if (name := view.key_file(role)) is not None]
+    if any(os.stat(view.root / name).st_mode & 0o077 for name in files):
+        yield (
+            "the CA keys can be read by others; secure-keystore renew closes them. Whoever read them can make any "
+            "enclave: secure-keystore renew --ca start replaces them"
+        )
+    for finding in check_parents(view.root):
+        if finding.severity.fails:
+            yield f"{finding.place} {finding.message}; {finding.repair}"
+    for weakness in _weak_governance(view):
+        yield f"the governance is weaker than the default: {weakness}"
+
+
+def _weak_governance(view: KeystoreView) -> Iterator[str]:
+    try:
+        document = signed_governance(view).document
+        if document == governance_document(Governance.for_domains(governance_domains(view))):
+            return
+        yield from weaknesses(parse_governance(document, layout.GOVERNANCE))
+    except KeystoreError:
+        return  # a governance that cannot be read is repaired or refused by the comparison

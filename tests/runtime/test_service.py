@@ -652,7 +652,7 @@ def test_a_stopped_screen_holds_up_neither_the_processes_nor_their_logs(tmp_path
     """As Ctrl-S does it: nobody reads what the launcher shows."""
     file = tmp_path / "test.launch.py"
     file.write_text(
-        f"{PRELUDE}\nfrom enclave_launch.runtime import back_pressure\nback_pressure.PATIENCE = 0.2\n"
+        f"{PRELUDE}\nfrom enclave_launch.runtime import launch_log\nlaunch_log.PATIENCE = 0.2\n"
         "def generate_launch_description():\n    return LaunchDescription(["
         f"sh('seq 1 2000000; touch {tmp_path}/both', output='both'), "
         f"sh('seq 1 2000000; touch {tmp_path}/log', output='log', name='b')])\n"
