@@ -12,7 +12,6 @@ from enclave_launch.source_location import SourceLocation
 def container_elsewhere(
     component: str, container: str, alike: tuple[str, ...], place: SourceLocation
 ) -> Diagnostic:
-    """Report a component whose container this launch does not start."""
     text = (
         f"container {container!r} of component {component} is not started by this launch file; its permissions are "
         "not part of this plan"
@@ -25,7 +24,6 @@ def container_elsewhere(
 
 
 def enclave_attribute_unused(process: str, enclave: str, attribute: str, place: SourceLocation) -> Diagnostic:
-    """Report that ``--enclave`` among a process's own ROS arguments takes precedence over the attribute."""
     own = f"{process} has --enclave {enclave} in its own ROS arguments"
     text = f"{own}; its enclave attribute {attribute!r} is not used"
     return Diagnostic(Code.ENCLAVE_ATTRIBUTE_UNUSED, process, text, place)
@@ -49,7 +47,6 @@ def enclave_shared_with_launcher(enclave: str) -> Diagnostic:
 
 
 def enclave_too_deep(process: str, why: str, place: SourceLocation) -> Diagnostic:
-    """Report an enclave that no certificate can be made for."""
     return Diagnostic(Code.ENCLAVE_TOO_DEEP, process, f"{process}: {why}", place, "give it a shorter one")
 
 
@@ -65,7 +62,6 @@ def enclave_ungranted(enclave: str, processes: tuple[str, ...], place: SourceLoc
 
 
 def executable_without_enclave(process: str, place: SourceLocation) -> Diagnostic:
-    """Report an ``executable`` that is started with a keystore in which its enclave cannot be found."""
     text = (
         f"{process} runs without an enclave: an executable gets one only through its enclave attribute or --enclave; "
         "a ROS program in it could not start"
@@ -74,7 +70,6 @@ def executable_without_enclave(process: str, place: SourceLocation) -> Diagnosti
 
 
 def machine_elsewhere(process: str, machine: str, place: SourceLocation) -> Diagnostic:
-    """Report that ``machine``, a hint for ``secure-plan``, has no effect on a launch."""
     text = f"{process} is assigned to machine {machine!r}, but a launch starts everything on this host"
     return Diagnostic(
         Code.MACHINE_ELSEWHERE,
@@ -117,12 +112,10 @@ def handshake_fails(fast: str, cyclone: str, *, planned: bool) -> Diagnostic:
 
 
 def domain_invalid(process: str, why: str, place: SourceLocation) -> Diagnostic:
-    """Report a ``ROS_DOMAIN_ID`` that rcl refuses."""
     return Diagnostic(Code.DOMAIN_INVALID, process, f"{process}: {why}", place, "it could not start")
 
 
 def domain_not_served(process: str, domain: int, served: str, place: SourceLocation) -> Diagnostic:
-    """Report a process in a domain that the permissions do not cover."""
     option = "--domain-id (ProvisionOptions.domains)"
     text = f"{process} is in domain {domain}, but {option} permits {served} only"
     return Diagnostic(
@@ -140,7 +133,6 @@ def domains_shared(enclave: str, domains: str, processes: tuple[str, ...]) -> Di
 
 
 def library_preloaded(process: str, variable: str, value: str, place: SourceLocation) -> Diagnostic:
-    """Report a variable such as ``LD_PRELOAD``."""
     text = (
         f"{variable} puts {value!r} into {process} before its own libraries: that code has all permissions of the "
         "enclave"
@@ -151,7 +143,6 @@ def library_preloaded(process: str, variable: str, value: str, place: SourceLoca
 def middleware_refused(
     process: str, middleware: str, why: str, place: SourceLocation, *, by_launch_file: bool
 ) -> Diagnostic:
-    """Report a process whose middleware would not be secured."""
     origin = "the launch file" if by_launch_file else "the environment"
     text = f"{process} would run on {middleware} (RMW_IMPLEMENTATION of {origin}) and not be secured: {why}"
     known = (
@@ -163,7 +154,6 @@ def middleware_refused(
 
 
 def prefix_refused(process: str, wrapper: str, why: str, place: SourceLocation) -> Diagnostic:
-    """Report a launch prefix that may not keep the security environment."""
     text = f"{process} would be started through {wrapper!r} and might not be secured: {why}"
     return Diagnostic(
         Code.PREFIX_REFUSED, process, text, place, f"if it keeps ROS_SECURITY_*, --accept-prefix {wrapper}"
@@ -171,7 +161,6 @@ def prefix_refused(process: str, wrapper: str, why: str, place: SourceLocation) 
 
 
 def security_configured(process: str, variable: str, value: str, place: SourceLocation) -> Diagnostic:
-    """Report DDS security settings in a variable such as ``CYCLONEDDS_URI``."""
     shown = value if len(value) <= 60 else f"{value[:57]}..."
     text = f"{variable} of {process} has security settings of its own, beside those of its enclave: {shown}"
     return Diagnostic(
@@ -180,13 +169,11 @@ def security_configured(process: str, variable: str, value: str, place: SourceLo
 
 
 def variable_overridden(process: str, variable: str, value: str, place: SourceLocation) -> Diagnostic:
-    """Report a variable of the launch file that ``--secure`` sets for every process."""
     text = f"{variable}={value} of the launch file has no effect on {process} under --secure"
     return Diagnostic(Code.VARIABLE_OVERRIDDEN, process, text, place)
 
 
 def names_apart(what: str, name: str, on_dds: str, on_zenoh: str) -> Diagnostic:
-    """Report a name with ends on both middlewares."""
     text = f"{what} {name}: {on_dds} is on DDS and {on_zenoh} on Zenoh (RMW_IMPLEMENTATION); they cannot communicate"
     remedy = "give both the same middleware, or put a bridge between them and give it an enclave on each"
     return Diagnostic(Code.MIDDLEWARES_APART, name, text, None, remedy)
@@ -195,7 +182,6 @@ def names_apart(what: str, name: str, on_dds: str, on_zenoh: str) -> Diagnostic:
 def launcher_apart(
     service: str, launcher: str, process: str, middleware: str, place: SourceLocation
 ) -> Diagnostic:
-    """Report that launch loads components and changes states by service calls of its own."""
     text = (
         f"launch itself runs on {launcher} and must call {service} of {process}, which runs on {middleware}"
     )
@@ -213,7 +199,6 @@ def enclave_on_both(enclave: str) -> Diagnostic:
 
 
 def zenoh_cannot_grant(enclave: str, gap: str) -> Diagnostic:
-    """Report a permission that Zenoh cannot express."""
     text = f"enclave {enclave} is on Zenoh, where this cannot be granted and is denied: {gap}"
     return Diagnostic(Code.ZENOH_CANNOT_GRANT, enclave, text, None, "name what is meant, one by one")
 

@@ -11,13 +11,11 @@ from enclave_launch.source_location import SourceLocation
 
 
 def argument_unknown(name: str, alike: str) -> Diagnostic:
-    """Report an argument that no launch file declares or reads."""
     text = f"no launch file declares or reads the argument {name!r}{alike}"
     return Diagnostic(Code.ARGUMENT_UNKNOWN, name, text, None, "secure-launch --show-args lists them")
 
 
 def command_stderr(message: str, command: str) -> Diagnostic:
-    """Report what ``$(command ...)`` wrote to stderr with ``on_stderr="warn"``."""
     return Diagnostic(Code.COMMAND_STDERR, command, message)
 
 
@@ -31,14 +29,12 @@ def function_called_again(function: str, event: str, location: SourceLocation) -
 
 
 def include_left_out(path: str) -> Diagnostic:
-    """Warn, with ``--allow-missing-packages``, that evaluation goes on without the file."""
     return Diagnostic(
         Code.INCLUDE_LEFT_OUT, path, f"not included, because its package is not installed or lacks it: {path}"
     )
 
 
 def launch_file_deprecated(file: str | None, reason: str) -> Diagnostic:
-    """Report a deprecated launch description, of a ``file`` or of code."""
     what = "deprecated launch description" if file is None else f"launch file [{file}] is deprecated"
     return Diagnostic(Code.LAUNCH_FILE_DEPRECATED, file or "", f"{what}: {reason}")
 
@@ -51,7 +47,6 @@ def log_level_missing() -> Diagnostic:
 
 
 def ros_timer_on_wall_time(seconds: float, location: SourceLocation | None) -> Diagnostic:
-    """Report that launch's own clock was set to simulated time, which a timer does not follow here."""
     text = (
         f"set_use_sim_time is in effect: real launch waits {seconds:g} s of the simulated time on /clock, "
         f"here the timer fires after {seconds:g} s of wall time"
@@ -70,7 +65,6 @@ def node_name_repeated(node: str, count: int, started_by: str) -> Diagnostic:
 
 
 def not_foreseeable(what: str, location: SourceLocation) -> Diagnostic:
-    """Report what a callback of the launch file starts only when it is called."""
     return Diagnostic(Code.NOT_FORESEEABLE, what, f"not foreseeable: {what}", location)
 
 
@@ -87,12 +81,10 @@ def package_not_installed(package: str, placeholder: str) -> Diagnostic:
 
 
 def parameter_file_missing(path: str) -> Diagnostic:
-    """Report a missing parameter file in the words of launch_ros, which continues without it."""
     return Diagnostic(Code.PARAMETER_FILE_MISSING, path, f"Parameter file path is not a file: {path}")
 
 
 def parameters_unknown(process: str, path: str, why: str, place: SourceLocation) -> Diagnostic:
-    """Report an unreadable parameter file; names that depend on its parameters are gaps."""
     text = f"the parameters that {process} would read from {path} are not known: {why}"
     return Diagnostic(
         Code.PARAMETERS_UNKNOWN,
@@ -104,24 +96,20 @@ def parameters_unknown(process: str, path: str, why: str, place: SourceLocation)
 
 
 def program_not_installed(program: str) -> Diagnostic:
-    """Warn, with ``--allow-missing-packages``, for ``$(command ...)``."""
     text = f"program '{program}' is not installed; a placeholder replaces its output"
     return Diagnostic(Code.PROGRAM_NOT_INSTALLED, program, text)
 
 
 def command_without_its_file(program: str, path: str) -> Diagnostic:
-    """Warn, with ``--allow-missing-packages``, for a ``$(command ...)`` that failed on a file of an absent package."""
     text = f"'{program}' failed, as {path} is not installed; a placeholder replaces its output"
     return Diagnostic(Code.PROGRAM_NOT_INSTALLED, program, text)
 
 
 def program_not_executable(program: str, text: str, location: SourceLocation | None) -> Diagnostic:
-    """Report a process whose start will fail."""
     return Diagnostic(Code.PROGRAM_NOT_EXECUTABLE, program, text, location)
 
 
 def ros_distro_unknown(name: str, known: Sequence[str], taken: str) -> Diagnostic:
-    """Report an unknown ``ROS_DISTRO``, and the distribution whose rules are used."""
     text = f"ROS_DISTRO={quoted(name)} is not a known distribution: the rules of {taken} are followed"
     remedy = f"set it, or give --distro{did_you_mean(name, known)}"
     return Diagnostic(Code.ROS_DISTRO_UNKNOWN, name, text, None, remedy)

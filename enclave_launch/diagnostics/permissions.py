@@ -19,13 +19,11 @@ _LEARN = (
 
 
 def library_version(program: str, doubt: str, location: SourceLocation) -> Diagnostic:
-    """Report a library document made for another version of a package."""
     remedy = "compare them (secure-nodl library show), and keep a corrected copy in a folder for --library"
     return Diagnostic(Code.LIBRARY_VERSION, program, f"library document {doubt}", location, remedy)
 
 
 def manifest_lacks(program: str, manifest: str, lacks: Sequence[str], place: SourceLocation) -> Diagnostic:
-    """Report names that a manifest lacks."""
     text = (
         f"the manifest of {program} ({manifest}) lacks {counted(len(lacks), 'interface')} that another description "
         f"has, so {_they_are(lacks)} not permitted: {some_of(lacks, _INTERFACES, '; ')}"
@@ -37,7 +35,6 @@ def manifest_lacks(program: str, manifest: str, lacks: Sequence[str], place: Sou
 def record_lacks(
     program: str, record: str, lacks: Sequence[str], unknown: Sequence[str], place: SourceLocation
 ) -> Diagnostic:
-    """Report what other descriptions have beyond a record, and what they leave open."""
     texts = []
     if lacks:
         texts.append(
@@ -68,7 +65,6 @@ def record_undecided(
 def descriptions_differ(
     program: str, used: str, other: str, differing: Sequence[str], place: SourceLocation
 ) -> Diagnostic:
-    """Report that the source of a program and the library's document differ."""
     names = some_of(differing, _INTERFACES, "; ")
     text = f"{program}: its source and the library document ({other}) differ, {used}: {names}"
     remedy = "correct the one that is wrong (secure-nodl library check shows all)"
@@ -80,7 +76,6 @@ def _they_are(names: Sequence[str]) -> str:
 
 
 def recording_incomplete(node: str, why: str, manifest: str, place: SourceLocation) -> Diagnostic:
-    """Report an incomplete record."""
     remedy = "record it again in a run that gets so far (--learn); runs are merged"
     return Diagnostic(
         Code.RECORDING_INCOMPLETE,
@@ -101,7 +96,6 @@ def action_remap_idle(node: str, rule: str, action: str, distro: str, place: Sou
 
 
 def interface_unknown(node: str, why: str, program: str, place: SourceLocation) -> Diagnostic:
-    """Report a gap in a node's interfaces."""
     remedy = (
         "let it run once with --learn; grant what is known of the name as a wildcard with --accept-patterns; or "
         f"describe {program} in a NoDL manifest (--nodl), or the node in a policy file (--policy)"
@@ -110,7 +104,6 @@ def interface_unknown(node: str, why: str, program: str, place: SourceLocation) 
 
 
 def policy_answers(unknown: Diagnostic) -> Diagnostic:
-    """Report a gap of the manifest that the policy file closes, as a note."""
     text = f"{unknown.text}; the policy file says what it may do"
     return Diagnostic(Code.POLICY_ANSWERS, unknown.subject, text, unknown.location)
 
@@ -122,24 +115,20 @@ def name_unremappable(node: str, name: str, place: SourceLocation) -> Diagnostic
 
 
 def no_manifest(subject: str, why: str, place: SourceLocation) -> Diagnostic:
-    """Report that no description was found."""
     return Diagnostic(Code.NO_MANIFEST, subject, f"no NoDL manifest for {subject}: {why}", place, _LEARN)
 
 
 def node_name_unknown(subject: str, why: str, place: SourceLocation) -> Diagnostic:
-    """Report a node without a known name: no permission can be derived for it."""
     return Diagnostic(
         Code.NODE_NAME_UNKNOWN, subject, f"{subject}: {why}", place, "give it a name: set name="
     )
 
 
 def node_name_impossible(node: str, why: str, place: SourceLocation) -> Diagnostic:
-    """Report a node name that rcl refuses."""
     return Diagnostic(Code.NODE_NAME_IMPOSSIBLE, node, f"node {node}: {why}", place, _OTHER_NAME)
 
 
 def pattern_accepted(node: str, operation: str, name: str, note: str, place: SourceLocation) -> Diagnostic:
-    """Report, with ``--accept-patterns``, that ``name`` is granted as a wildcard."""
     return Diagnostic(Code.PATTERN_ACCEPTED, node, f"node {node} may {operation} {name}: {note}", place)
 
 
