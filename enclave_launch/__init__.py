@@ -8,6 +8,7 @@ from enclave_common.lazy_names import lazy_names
 __version__ = VERSION
 
 _MODULES = {
+    "enclave_launch.dry_run": ("DryRun",),
     "enclave_launch.enclave": ("EnclaveScope",),
     "enclave_launch.errors": (
         "EnclaveLaunchError",
@@ -15,6 +16,7 @@ _MODULES = {
         "ManifestError",
         "ProvisionError",
         "RuntimeFailure",
+        "UsageError",
     ),
     "enclave_launch.flow": (
         "evaluate_launch",
@@ -28,6 +30,7 @@ _MODULES = {
     ),
     "enclave_launch.options": ("ResolveOptions", "RunSettings", "SecurityOptions"),
     "enclave_launch.plan": ("LaunchPlan",),
+    "enclave_launch.running": ("Launch",),
     "enclave_launch.runtime.running_launch": (
         "RunningLaunch",
         "RunningProcess",
@@ -35,7 +38,6 @@ _MODULES = {
         "printed",
         "started",
     ),
-    "enclave_launch.running": ("Launch",),
     "enclave_launch.secured": ("ProvisionedLaunch",),
 }
 """The public names of each module. ``__init__.pyi`` says the same to type checkers; a test compares the two."""

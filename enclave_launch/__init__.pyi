@@ -27,3 +27,5 @@ from enclave_launch.runtime.running_launch import started as started
 from enclave_launch.secured import ProvisionedLaunch as ProvisionedLaunch
 
 __version__: str
+from enclave_launch.dry_run import DryRun as DryRun
+from enclave_launch.errors import UsageError as UsageError

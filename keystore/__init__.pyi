@@ -1,10 +1,32 @@
 """The public names of keystore for type checkers."""
 
 from keystore.disk.share_files import LaunchHold as LaunchHold
+from keystore.errors import DamagedKeystoreError as DamagedKeystoreError
+from keystore.errors import InvalidEnclaveNameError as InvalidEnclaveNameError
+from keystore.errors import InvalidInputError as InvalidInputError
+from keystore.errors import KeystoreBusyError as KeystoreBusyError
 from keystore.errors import KeystoreError as KeystoreError
+from keystore.errors import NotAKeystoreError as NotAKeystoreError
+from keystore.errors import SigningUnavailableError as SigningUnavailableError
+from keystore.errors import StorageError as StorageError
+from keystore.errors import UnsafeKeystoreError as UnsafeKeystoreError
+from keystore.formats.domains import Domains as Domains
+from keystore.formats.governance import DomainRule as DomainRule
+from keystore.formats.governance import Governance as Governance
+from keystore.formats.governance import Protection as Protection
+from keystore.formats.governance import TopicRule as TopicRule
 from keystore.formats.hosts import Hosts as Hosts
 from keystore.formats.hosts import load_hosts as load_hosts
+from keystore.formats.policy import EnclavePolicy as EnclavePolicy
+from keystore.formats.policy import Operation as Operation
+from keystore.formats.policy import Policy as Policy
+from keystore.formats.policy import Profile as Profile
+from keystore.formats.policy import Qualifier as Qualifier
+from keystore.formats.policy import Rule as Rule
+from keystore.formats.policy_xml import read_policy as read_policy
+from keystore.formats.role import Role as Role
 from keystore.formats.subject import SubjectScheme as SubjectScheme
+from keystore.formats.validity import Validity as Validity
 from keystore.signing.ca_access import CaAccess as CaAccess
 from keystore.signing.ca_access import Secret as Secret
 from keystore.steps.bundle import PublicFiles as PublicFiles
@@ -23,6 +45,7 @@ from keystore.steps.governance import set_governance as set_governance
 from keystore.steps.host_bundles import BundleOptions as BundleOptions
 from keystore.steps.host_bundles import HostBundle as HostBundle
 from keystore.steps.host_bundles import export_hosts as export_hosts
+from keystore.steps.host_bundles import pinned as pinned
 from keystore.steps.host_keys import RequestOptions as RequestOptions
 from keystore.steps.host_keys import request as request
 from keystore.steps.importing import ImportOptions as ImportOptions

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from enclave_launch import UsageError
 from enclave_launch.admission.variables import domain_of
 from enclave_launch.enclave import AssignmentReason, EnclaveAssignment
-from enclave_launch.errors import UsageError
 from enclave_launch.plan import PlannedProcess
 from enclave_launch.process import EnclaveRequest, ProcessKind, ResolvedProcess
 from enclave_launch.security_environment import (

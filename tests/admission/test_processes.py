@@ -9,8 +9,7 @@ import pytest
 from enclave_launch import EnclaveLaunchError, LaunchPlan, SecurityOptions, provision
 from enclave_launch.diagnostics import Code
 from enclave_launch.report.tree import plan_tree
-from keystore import ProvisionOptions
-from keystore.formats.domains import Domains
+from keystore import Domains, ProvisionOptions
 
 from .conftest import Plan
 

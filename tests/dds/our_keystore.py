@@ -6,8 +6,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import keystore
-from keystore.formats.domains import Domains
-from keystore.formats.policy import EnclavePolicy, Operation, Profile, Qualifier, Rule
+from keystore import Domains, EnclavePolicy, Operation, Profile, Qualifier, Rule
 from tests.dds.sros2_style import Grant
 
 PARAMETER_SERVICES = (

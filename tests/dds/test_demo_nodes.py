@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from keystore.formats.policy import EnclavePolicy, Operation
+from keystore import EnclavePolicy, Operation
 from tests.dds.demo import Node, environment
 from tests.dds.our_keystore import allow, node, provision
 from tests.dds.probe import Probe

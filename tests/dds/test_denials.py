@@ -10,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from keystore import EnclavePolicy, Operation, Profile, Qualifier, Rule
 from keystore.formats.permissions import dds_rules
-from keystore.formats.policy import EnclavePolicy, Operation, Profile, Qualifier, Rule
 from tests.dds.our_keystore import provision
 from tests.dds.probe import Participant, Probe
 

@@ -7,9 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from keystore import CaAccess, RemoveOptions, remove, verify
+from keystore import CaAccess, RemoveOptions, Role, remove, verify
 from keystore.disk.view import KeystoreView
-from keystore.formats.role import Role
 from keystore.signing import smime
 from tests.dds import our_keystore
 from tests.dds.probe import Participant, Probe

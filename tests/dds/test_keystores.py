@@ -9,10 +9,7 @@ from pathlib import Path
 import pytest
 
 import keystore
-from keystore import Step, roll_over
-from keystore.formats.domains import Domains
-from keystore.formats.governance import DomainRule, Governance, Protection, TopicRule
-from keystore.formats.role import Role
+from keystore import DomainRule, Domains, Governance, Protection, Role, Step, TopicRule, roll_over
 from tests.dds import our_keystore
 from tests.dds.probe import Participant, Probe
 from tests.dds.sros2_style import Grant

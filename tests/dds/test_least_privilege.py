@@ -13,9 +13,7 @@ import pytest
 
 from enclave_launch import ResolveOptions, SecurityOptions, resolve
 from enclave_launch import provision as provision_launch
-from keystore import ProvisionOptions
-from keystore.formats.domains import Domains
-from keystore.formats.policy import EnclavePolicy, Operation, Profile, Qualifier, Rule
+from keystore import Domains, EnclavePolicy, Operation, Profile, ProvisionOptions, Qualifier, Rule
 from tests.dds.demo import DEMO_WS, LAUNCH_FILES
 from tests.dds.our_keystore import PARAMETER_SERVICES, allow, node, provision
 from tests.dds.probe import Participant, Probe

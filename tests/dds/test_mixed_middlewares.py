@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import keystore
-from keystore.formats.domains import Domains
+from keystore import Domains
 from keystore.formats.subject import Half, common_name, half_of
 from tests.dds import our_keystore
 from tests.dds.probe import Participant, Probe

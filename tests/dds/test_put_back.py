@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 
 import keystore
-from keystore import RemoveOptions, RenewOptions, remove, renew
-from keystore.formats.domains import Domains
+from keystore import Domains, RemoveOptions, RenewOptions, remove, renew
 from tests.dds import our_keystore
 from tests.dds.probe import Participant, Probe
 from tests.dds.sros2_style import Grant

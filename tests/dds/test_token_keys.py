@@ -15,14 +15,15 @@ from pathlib import Path
 import pytest
 
 from keystore import (
+    EnclavePolicy,
     ImportOptions,
+    Operation,
     ProvisionOptions,
     export_hosts,
     import_bundle,
+    pinned,
     sign_requests,
 )
-from keystore.formats.policy import EnclavePolicy, Operation
-from keystore.steps.host_bundles import pinned
 from keystore.steps.host_keys import parse_requests
 from tests.dds.conftest import missing
 from tests.dds.our_keystore import allow, node, provision

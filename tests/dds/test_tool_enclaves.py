@@ -14,9 +14,7 @@ from typing import NamedTuple
 import pytest
 
 import keystore
-from keystore import create_tool_enclave
-from keystore.formats.domains import Domains
-from keystore.formats.policy import EnclavePolicy, Operation, Profile
+from keystore import Domains, EnclavePolicy, Operation, Profile, create_tool_enclave
 from nodl.graph.cyclone import CycloneObserver, ObserverError
 from nodl.graph.model import Graph
 from tests.dds.our_keystore import PARAMETER_SERVICES, allow, provision

@@ -8,8 +8,8 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from keystore import BundleOptions, HostBundle, export_hosts, list_enclaves, load_hosts
-from keystore.steps.host_bundles import enclaves_of_hosts, pinned
+from keystore import BundleOptions, HostBundle, export_hosts, list_enclaves, load_hosts, pinned
+from keystore.steps.host_bundles import enclaves_of_hosts
 from tests.deployment.booted import Machine
 from tests.deployment.kit import export, launch_file, provisioned, set_up_ros
 from tests.deployment.networks import LOOPBACK, Network

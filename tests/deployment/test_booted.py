@@ -11,9 +11,7 @@ from datetime import timedelta
 
 import pytest
 
-from keystore import RemoveOptions, RenewOptions, Step, remove, renew, roll_over
-from keystore.formats.role import Role
-from keystore.steps.host_bundles import pinned
+from keystore import RemoveOptions, RenewOptions, Role, Step, pinned, remove, renew, roll_over
 from tests.deployment.booted import booted
 from tests.deployment.robot import KS, Host, node, robot, until, up
 from tests.keystore.kit import options

@@ -19,13 +19,13 @@ from keystore import (
     RenewOptions,
     export_hosts,
     import_bundle,
+    pinned,
     remove,
     renew,
     request,
     sign_requests,
 )
 from keystore.disk import layout
-from keystore.steps.host_bundles import pinned
 from tests.deployment.kit import DEMO_WS, TALK, export, fleet_of_fifty, launch_file, made, provisioned, tool
 from tests.deployment.systemd_stand_in import Unit, words
 from tests.keystore.kit import mode, options

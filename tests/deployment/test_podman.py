@@ -17,8 +17,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from keystore import BundleOptions, RenewOptions, export_hosts, renew
-from keystore.steps.host_bundles import pinned
+from keystore import BundleOptions, RenewOptions, export_hosts, pinned, renew
 from tests.deployment.booted import Machine, booted, repository_folders
 from tests.deployment.kit import export, launch_file, provisioned, tool
 from tests.deployment.robot import HEARD, until

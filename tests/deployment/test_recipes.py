@@ -13,16 +13,16 @@ import pytest
 from keystore import (
     BundleOptions,
     ImportOptions,
+    Policy,
     RenewOptions,
     export_hosts,
     import_bundle,
+    pinned,
     renew,
     request,
     verify,
 )
-from keystore.formats.policy import Policy
 from keystore.formats.policy_xml import policy_xml
-from keystore.steps.host_bundles import pinned
 from tests.deployment.kit import TALK, made, tool
 from tests.keystore.kit import filled, openssl, options, policy
 from tests.keystore.test_external_ca import ExternalCa

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from keystore import RemoveOptions, Step, remove, roll_over
-from keystore.formats.role import Role
+from keystore import RemoveOptions, Role, Step, remove, roll_over
 from tests.deployment.booted import booted
 from tests.deployment.networks import Network
 from tests.deployment.robot import Host, node, robot, until, up

@@ -14,8 +14,7 @@ from xml.sax.saxutils import quoteattr
 
 import pytest
 
-from keystore import ImportOptions, export_hosts, import_bundle, load_hosts
-from keystore.steps.host_bundles import pinned
+from keystore import ImportOptions, export_hosts, import_bundle, load_hosts, pinned
 from tests.dds.conftest import cyclone as cyclone
 from tests.dds.conftest import domain_id as domain_id
 from tests.dds.conftest import fastdds as fastdds

@@ -10,8 +10,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from keystore import Operation
 from keystore.formats.permissions_names import dds_topics
-from keystore.formats.policy import Operation
 from tests.graph.made import Made
 
 ROOT = Path(__file__).parents[2]

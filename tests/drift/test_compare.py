@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
+from enclave_launch import DryRun
 from enclave_launch.drift.compare import Circumstances, Security, compare
 from enclave_launch.drift.expected import expected_in
 from enclave_launch.drift.finding import DriftFinding, FindingCertainty, Kind, Level
-from enclave_launch.dry_run import DryRun
 from nodl.graph.model import Graph
 from nodl.graph.quality import Quality
 from tests.drift.planned import commands, plan, running

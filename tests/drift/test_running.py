@@ -15,8 +15,7 @@ from typing import Any
 import pytest
 
 import keystore
-from keystore import create_tool_enclave
-from keystore.formats.domains import Domains
+from keystore import Domains, create_tool_enclave
 from tests.drift.planned import DEMO_WS, ROOT
 from tests.graph.conftest import Start
 from tests.graph.conftest import cyclone as cyclone

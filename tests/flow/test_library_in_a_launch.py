@@ -9,8 +9,7 @@ from typing import Any
 
 import pytest
 
-from enclave_launch import LaunchPlan, ManifestError, ResolveOptions, resolve
-from enclave_launch.errors import UsageError
+from enclave_launch import LaunchPlan, ManifestError, ResolveOptions, UsageError, resolve
 from enclave_launch.policy.derivation import allowed_names
 from enclave_launch.report.explained import explained
 from enclave_launch.report.plan_json import plan_json
@@ -276,7 +275,7 @@ def test_a_name_that_ends_at_random_is_a_pattern_unless_launch_names_the_node(la
 
 
 def test_a_broken_document_is_told_with_file_and_line(launch: Launch, document: Callable[..., Path]) -> None:
-    from enclave_launch.errors import ManifestError
+    from enclave_launch import ManifestError
 
     folder = document("pkg/prog", "a", "{surprise: 1}")
     with pytest.raises(ManifestError, match=r"prog\.nodl\.yaml:2.*surprise"):

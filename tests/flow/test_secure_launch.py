@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from enclave_launch.dry_run import DryRun
+from enclave_launch import DryRun
 
 from .conftest import DEMO, SecureLaunch
 

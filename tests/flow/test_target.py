@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from enclave_launch.errors import UsageError
+from enclave_launch import UsageError
 from enclave_launch.verb.target import LaunchTarget, find_target, parse_arguments
 
 

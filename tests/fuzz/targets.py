@@ -16,12 +16,11 @@ from enclave_common.yaml_reader import load_yaml
 from enclave_launch.description.markup.xml import parse_launch_xml as parse_launch_xml
 from enclave_launch.frontend.substitution_grammar import TemplateSyntaxError, parse_template
 from enclave_launch.ros_rules.parameter_file import RefusedParameters, sections_of_text
-from keystore import KeystoreError, request
+from keystore import Domains, KeystoreError, request
 from keystore.disk.archive import archive_bytes, read_archive
 from keystore.disk.store import Content
 from keystore.formats.bundle import parse_manifest
 from keystore.formats.certificate import read_certificates
-from keystore.formats.domains import Domains
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.governance import parse_governance
 from keystore.formats.governance_yaml import parse_governance_yaml

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from keystore.formats.policy_xml import read_policy
+from keystore import read_policy
 from nodl.document import read_document
 from tests.graph.conftest import Start
 from tests.graph.nodes import LOOPBACK, Implementation, service, topic

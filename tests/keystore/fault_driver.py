@@ -21,6 +21,7 @@ from keystore import (
     LaunchHold,
     RemoveOptions,
     RenewOptions,
+    Role,
     Step,
     create_keystore,
     provision,
@@ -28,7 +29,6 @@ from keystore import (
     renew,
     roll_over,
 )
-from keystore.formats.role import Role
 from tests.keystore.kit import filled, options, policy
 
 KILLED = 97

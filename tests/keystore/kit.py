@@ -9,8 +9,18 @@ from collections.abc import Iterable
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
-from keystore import CreateOptions, ProvisionOptions, ProvisionReport, create_keystore, provision
-from keystore.formats.policy import EnclavePolicy, Operation, Profile, Qualifier, Rule
+from keystore import (
+    CreateOptions,
+    EnclavePolicy,
+    Operation,
+    Profile,
+    ProvisionOptions,
+    ProvisionReport,
+    Qualifier,
+    Rule,
+    create_keystore,
+    provision,
+)
 
 NOW = datetime(2031, 5, 1, 12, tzinfo=timezone.utc)
 DAY = timedelta(days=1)

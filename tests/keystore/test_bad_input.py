@@ -9,10 +9,16 @@ from pathlib import Path
 
 import pytest
 
-from keystore import Secret, create_keystore, provision
+from keystore import (
+    DamagedKeystoreError,
+    InvalidInputError,
+    Secret,
+    UnsafeKeystoreError,
+    create_keystore,
+    provision,
+)
 from keystore.disk import lock
 from keystore.disk.store import opened
-from keystore.errors import DamagedKeystoreError, InvalidInputError, UnsafeKeystoreError
 from keystore.formats.governance_yaml import parse_governance_yaml
 from keystore.formats.validity import parse_end
 from keystore.verb import main

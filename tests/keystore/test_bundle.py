@@ -10,10 +10,17 @@ from pathlib import Path
 
 import pytest
 
-from keystore import PublicFiles, RemoveOptions, export, remove, verify
+from keystore import (
+    DamagedKeystoreError,
+    InvalidInputError,
+    PublicFiles,
+    RemoveOptions,
+    Role,
+    export,
+    remove,
+    verify,
+)
 from keystore.disk import layout
-from keystore.errors import DamagedKeystoreError, InvalidInputError
-from keystore.formats.role import Role
 from keystore.verb import main
 from tests.keystore.kit import DAY, NOW, contents, filled, mode, openssl
 

@@ -12,11 +12,9 @@ from cryptography.hazmat.primitives.asymmetric import ec, rsa
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from keystore import DamagedKeystoreError, InvalidInputError, Role, SigningUnavailableError, Validity
 from keystore.disk.crl_file import is_crl
-from keystore.errors import DamagedKeystoreError, InvalidInputError, SigningUnavailableError
 from keystore.formats import certificate
-from keystore.formats.role import Role
-from keystore.formats.validity import Validity
 from keystore.signing import authority
 from keystore.signing.authority import Authority, IdentityIssuer
 from keystore.signing.identity import new_identity, new_request, request_key

@@ -14,11 +14,19 @@ from pathlib import Path
 import pytest
 
 from keystore import (
+    DamagedKeystoreError,
+    Domains,
+    EnclavePolicy,
     LaunchHold,
+    NotAKeystoreError,
+    Policy,
     ProvisionOptions,
     ProvisionReport,
     RemoveOptions,
+    Role,
+    SigningUnavailableError,
     Step,
+    UnsafeKeystoreError,
     apply_policy,
     create_enclaves,
     export,
@@ -27,15 +35,6 @@ from keystore import (
     roll_over,
 )
 from keystore.disk import layout
-from keystore.errors import (
-    DamagedKeystoreError,
-    NotAKeystoreError,
-    SigningUnavailableError,
-    UnsafeKeystoreError,
-)
-from keystore.formats.domains import Domains
-from keystore.formats.policy import EnclavePolicy, Policy
-from keystore.formats.role import Role
 from keystore.formats.validity import later, utc_now
 from keystore.steps.comparison import differences
 from tests.dds import sros2_style

@@ -10,13 +10,25 @@ from pathlib import Path
 import pytest
 from cryptography.hazmat.primitives.asymmetric import ec
 
-from keystore import CaAccess, CreateOptions, ImportedCa, Secret, create_keystore, provision, verify
+from keystore import (
+    CaAccess,
+    CreateOptions,
+    DomainRule,
+    Domains,
+    Governance,
+    ImportedCa,
+    InvalidInputError,
+    NotAKeystoreError,
+    Protection,
+    Role,
+    Secret,
+    SigningUnavailableError,
+    Validity,
+    create_keystore,
+    provision,
+    verify,
+)
 from keystore.disk.view import KeystoreView
-from keystore.errors import InvalidInputError, NotAKeystoreError, SigningUnavailableError
-from keystore.formats.domains import Domains
-from keystore.formats.governance import DomainRule, Governance, Protection
-from keystore.formats.role import Role
-from keystore.formats.validity import Validity
 from keystore.signing import authority
 from keystore.signing.authority import Authority
 from keystore.signing.signer import FileSigner, key_pem

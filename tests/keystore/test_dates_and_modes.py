@@ -8,8 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from keystore import Step, roll_over
-from keystore.formats.role import Role
+from keystore import Role, Step, roll_over
 from keystore.formats.validity import utc_now
 from tests.keystore import kit
 

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from keystore import InvalidEnclaveNameError
 from keystore.disk import layout
-from keystore.errors import InvalidEnclaveNameError
 from keystore.formats.enclave_name import MAX_LENGTH, check_distinct, segments, validate_enclave_name
 
 GOOD = ["/", "/a", "/_", "/a/_b", "/Front/camera_2", "/" + "a" * 244, "/" + "/".join("abcdefghijklmnopqrs")]

@@ -10,16 +10,17 @@ import pytest
 from keystore import (
     BundleOptions,
     ImportOptions,
+    InvalidInputError,
     Severity,
+    SigningUnavailableError,
     accept_certificates,
     export_hosts,
     import_bundle,
+    pinned,
     provision,
     request,
     verify,
 )
-from keystore.errors import InvalidInputError, SigningUnavailableError
-from keystore.steps.host_bundles import pinned
 from keystore.steps.host_keys import Request, parse_requests, requests_text
 from keystore.verb import main
 from tests.keystore.kit import actions, openssl, options, policy

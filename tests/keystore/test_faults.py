@@ -158,7 +158,7 @@ def _complete(name: str, root: Path) -> None:
     if name != "remove":
         work(name, root)
         return
-    from keystore.steps.removal import RemoveOptions, remove
+    from keystore import RemoveOptions, remove
 
     left = [enclave for enclave in NAMES[:2] if enclave in KeystoreView(root).enclaves()]
     if left:
@@ -255,8 +255,8 @@ def test_a_dead_run_does_not_hold_the_lock(tmp_path: Path) -> None:
 
 
 def test_the_holder_of_the_lock_is_named(tmp_path: Path) -> None:
+    from keystore import KeystoreBusyError
     from keystore.disk.lock import exclusive
-    from keystore.errors import KeystoreBusyError
 
     root = tmp_path / "ks"
     create_keystore(root, CreateOptions(durable=False))

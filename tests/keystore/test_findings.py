@@ -17,12 +17,18 @@ from cryptography.hazmat.primitives.asymmetric import ec
 
 from keystore import (
     CaAccess,
+    DomainRule,
+    Domains,
     Finding,
+    Governance,
+    Protection,
     RemoveOptions,
     RenewOptions,
     Requirements,
+    Role,
     Severity,
     SubjectScheme,
+    Validity,
     provision,
     remove,
     renew,
@@ -31,10 +37,7 @@ from keystore import (
 from keystore.disk import layout
 from keystore.disk.view import KeystoreView
 from keystore.formats.certificate import read_certificate, read_der
-from keystore.formats.domains import Domains
-from keystore.formats.governance import DomainRule, Governance, Protection
-from keystore.formats.role import Role
-from keystore.formats.validity import Validity, utc_now
+from keystore.formats.validity import utc_now
 from keystore.signing import smime
 from keystore.signing.authority import Authority, IdentityIssuer
 from keystore.signing.identity import public_half

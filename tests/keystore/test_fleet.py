@@ -13,20 +13,20 @@ from keystore import (
     BundleOptions,
     HostBundle,
     ImportOptions,
+    InvalidInputError,
     RemoveOptions,
     RenewOptions,
+    Role,
     Step,
     export_hosts,
     fleet_status,
     import_bundle,
+    pinned,
     remove,
     renew,
     roll_over,
 )
-from keystore.errors import InvalidInputError
-from keystore.formats.role import Role
 from keystore.formats.validity import utc_now
-from keystore.steps.host_bundles import pinned
 from keystore.verb import main
 from tests.keystore.kit import DAY, filled, options
 

@@ -19,9 +19,14 @@ from hypothesis import strategies as st
 
 from keystore import (
     CaAccess,
+    DamagedKeystoreError,
+    DomainRule,
+    Governance,
     KeystoreError,
+    Protection,
     RemoveOptions,
     RenewOptions,
+    Role,
     export,
     export_hosts,
     provision,
@@ -32,10 +37,8 @@ from keystore import (
 from keystore.disk import layout
 from keystore.disk.crl_file import is_crl
 from keystore.disk.view import KeystoreView
-from keystore.errors import DamagedKeystoreError
 from keystore.formats.certificate import read_certificate, read_certificates
-from keystore.formats.governance import DomainRule, Governance, Protection, governance_document
-from keystore.formats.role import Role
+from keystore.formats.governance import governance_document
 from keystore.signing import smime
 from keystore.signing.public_key import is_our_form, key_matches
 from keystore.steps.comparison import differences

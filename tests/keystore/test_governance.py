@@ -8,17 +8,20 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from keystore import ChangeOptions, Requirements, provision, set_governance, verify
-from keystore.errors import InvalidInputError
-from keystore.formats.domains import Domains
-from keystore.formats.governance import (
+from keystore import (
+    ChangeOptions,
     DomainRule,
+    Domains,
     Governance,
+    InvalidInputError,
     Protection,
+    Requirements,
     TopicRule,
-    governance_document,
-    parse_governance,
+    provision,
+    set_governance,
+    verify,
 )
+from keystore.formats.governance import governance_document, parse_governance
 from keystore.formats.governance_yaml import parse_governance_yaml
 from tests.dds.sros2_style import GOVERNANCE
 from tests.keystore.kit import contents, filled, options, policy, snapshot

@@ -13,15 +13,21 @@ import pytest
 
 from keystore import (
     BundleOptions,
+    DamagedKeystoreError,
     HostBundle,
     ImportOptions,
     ImportReport,
+    InvalidInputError,
     KeystoreError,
+    NotAKeystoreError,
     RemoveOptions,
     RenewOptions,
+    Role,
     Step,
+    UnsafeKeystoreError,
     export_hosts,
     import_bundle,
+    pinned,
     remove,
     renew,
     roll_over,
@@ -31,10 +37,8 @@ from keystore.disk import layout
 from keystore.disk.archive import archive_bytes, read_archive
 from keystore.disk.container_copies import ContainerUser
 from keystore.disk.store import Content
-from keystore.errors import DamagedKeystoreError, InvalidInputError, NotAKeystoreError, UnsafeKeystoreError
 from keystore.formats.hosts import parse_hosts
-from keystore.formats.role import Role
-from keystore.steps.host_bundles import enclaves_of_hosts, pinned
+from keystore.steps.host_bundles import enclaves_of_hosts
 from keystore.steps.importing import Restart
 from keystore.verb import main
 from tests.keystore.fault_driver import KILLED, install_fault

@@ -9,14 +9,18 @@ import pytest
 
 from keystore import (
     BundleOptions,
+    DamagedKeystoreError,
     HostBundle,
     ImportOptions,
     ImportReport,
+    InvalidInputError,
     RemoveOptions,
     RenewOptions,
+    UnsafeKeystoreError,
     export,
     export_hosts,
     import_bundle,
+    pinned,
     provision,
     remove,
     renew,
@@ -26,9 +30,7 @@ from keystore import (
 )
 from keystore.disk import layout
 from keystore.disk.archive import read_archive
-from keystore.errors import DamagedKeystoreError, InvalidInputError, UnsafeKeystoreError
 from keystore.formats.certificate import read_certificate
-from keystore.steps.host_bundles import pinned
 from keystore.steps.host_keys import parse_requests, requests_text
 from keystore.verb import main
 from tests.keystore.kit import actions, filled, mode, openssl, options, policy

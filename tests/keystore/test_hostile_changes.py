@@ -18,11 +18,24 @@ from cryptography.hazmat.primitives import hashes, serialization
 from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID
 
-from keystore import CaAccess, PublicFiles, RemoveOptions, Requirements, Severity, export, remove, verify
+from keystore import (
+    CaAccess,
+    DomainRule,
+    Domains,
+    Governance,
+    Protection,
+    PublicFiles,
+    RemoveOptions,
+    Requirements,
+    Role,
+    Severity,
+    TopicRule,
+    export,
+    remove,
+    verify,
+)
 from keystore.disk.view import KeystoreView
-from keystore.formats.domains import Domains
-from keystore.formats.governance import DomainRule, Governance, Protection, TopicRule, governance_document
-from keystore.formats.role import Role
+from keystore.formats.governance import governance_document
 from tests.dds import sros2_style
 from tests.keystore.kit import filled, options, policy, snapshot
 from tests.keystore.test_verification import resign, sign
@@ -35,7 +48,7 @@ ANCHOR = "public/identity_ca.cert.pem"
 @pytest.fixture(scope="module")
 def past(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The keystore before enclave /gone was removed and /a lost a topic."""
-    from keystore.steps.provisioning import provision
+    from keystore import provision
 
     root = filled(tmp_path_factory.mktemp("past") / "ks", ["/a", "/b", "/a/c", "/gone", "/old"])
     provision(root, [policy("/a", "/chatter", "/secret")], options=options())
@@ -45,7 +58,7 @@ def past(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def present(past: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    from keystore.steps.provisioning import provision
+    from keystore import provision
 
     root = tmp_path_factory.mktemp("present") / "ks"
     shutil.copytree(past, root, symlinks=True)
@@ -454,7 +467,7 @@ def test_the_cas_of_a_bundle_can_be_pinned(present: Path, tmp_path: Path) -> Non
 
 @pytest.mark.parametrize("name", ["second CA", "key behind a certificate", "default ALLOW", "data in clear"])
 def test_nothing_of_it_is_exported(name: str, present: Path, tmp_path: Path) -> None:
-    from keystore.errors import DamagedKeystoreError
+    from keystore import DamagedKeystoreError
 
     root = copy_of(present, tmp_path)
     HOSTILE[name][1](root)
@@ -473,7 +486,7 @@ EXPOSED_AT_LAUNCH: dict[str, tuple[str, Change]] = {
 def test_a_launch_says_what_is_exposed_though_nothing_is_to_be_done(
     name: str, present: Path, tmp_path: Path
 ) -> None:
-    from keystore.steps.provisioning import provision
+    from keystore import provision
 
     told, change = EXPOSED_AT_LAUNCH[name]
     root = copy_of(present, tmp_path)
@@ -484,9 +497,7 @@ def test_a_launch_says_what_is_exposed_though_nothing_is_to_be_done(
 
 
 def test_a_launch_says_where_its_governance_is_weak(present: Path, tmp_path: Path) -> None:
-    from keystore.steps.governance import set_governance
-    from keystore.steps.opening import ChangeOptions
-    from keystore.steps.provisioning import provision
+    from keystore import ChangeOptions, provision, set_governance
 
     root = copy_of(present, tmp_path)
     weak = Governance((DomainRule(rtps_protection_kind=NONE),))

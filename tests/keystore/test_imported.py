@@ -13,14 +13,21 @@ import pytest
 from keystore import (
     BundleOptions,
     ChangeOptions,
+    DamagedKeystoreError,
+    DomainRule,
+    Governance,
     HostBundle,
     ImportOptions,
     KeystoreError,
+    Protection,
     RemoveOptions,
+    Role,
     Step,
+    UnsafeKeystoreError,
     export_hosts,
     fleet_status,
     import_bundle,
+    pinned,
     provision,
     remove,
     roll_over,
@@ -30,12 +37,8 @@ from keystore import (
 from keystore.disk import layout
 from keystore.disk.archive import archive_bytes, read_archive
 from keystore.disk.store import Content
-from keystore.errors import DamagedKeystoreError, UnsafeKeystoreError
 from keystore.formats.bundle import pin
-from keystore.formats.governance import DomainRule, Governance, Protection
-from keystore.formats.role import Role
 from keystore.steps.comparison import differences
-from keystore.steps.host_bundles import pinned
 from keystore.steps.importing import Restart
 from keystore.verb import main
 from tests.keystore.kit import filled, options, policy

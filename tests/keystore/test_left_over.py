@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from keystore import LaunchHold, create_tool_enclave, list_enclaves, provision
-from keystore.formats.policy import Policy
+from keystore import LaunchHold, Policy, create_tool_enclave, list_enclaves, provision
 from keystore.formats.policy_xml import policy_xml
 from keystore.verb import main
 from tests.keystore.kit import filled, options, policy

@@ -7,11 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from keystore import apply_policy, create_enclaves, export, provision
+from keystore import Policy, apply_policy, create_enclaves, export, provision
 from keystore.disk import layout
 from keystore.formats.certificate import read_certificate
 from keystore.formats.permissions_document import parse_permissions
-from keystore.formats.policy import Policy
 from keystore.steps.comparison import differences
 from keystore.verb import main
 from tests.keystore.kit import DAY, NOW, actions, filled, options, policy, snapshot

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from keystore.formats.domains import Domains
+from keystore import Domains, EnclavePolicy, Operation, Profile, Qualifier, Rule, Validity
 from keystore.formats.permissions import dds_rules, permissions_document
 from keystore.formats.permissions_document import parse_permissions
 from keystore.formats.permissions_names import dds_topics, full_name
@@ -19,8 +19,7 @@ from keystore.formats.permissions_size import (
     expected_size,
     size_concern,
 )
-from keystore.formats.policy import EnclavePolicy, Operation, PolicyError, Profile, Qualifier, Rule
-from keystore.formats.validity import Validity
+from keystore.formats.policy import PolicyError
 
 START = datetime(2026, 1, 1, tzinfo=timezone.utc)
 VALIDITY = Validity(START, START + timedelta(days=365))

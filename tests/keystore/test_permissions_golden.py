@@ -11,11 +11,9 @@ from typing import Any
 
 import pytest
 
-from keystore.formats.domains import Domains
+from keystore import Domains, Validity, read_policy
 from keystore.formats.permissions import permissions_document
 from keystore.formats.permissions_document import Grant, parse_permissions
-from keystore.formats.policy_xml import read_policy
-from keystore.formats.validity import Validity
 
 GOLDEN = Path(__file__).parent / "golden_permissions"
 CASES = sorted(path.name.removesuffix(".policy.xml") for path in GOLDEN.glob("*.policy.xml"))

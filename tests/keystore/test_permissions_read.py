@@ -6,11 +6,9 @@ import re
 
 import pytest
 
-from keystore.errors import InvalidInputError
-from keystore.formats.domains import Domains
+from keystore import Domains, InvalidInputError, Operation, Qualifier
 from keystore.formats.permissions_document import parse_permissions
 from keystore.formats.permissions_names import ros_rules
-from keystore.formats.policy import Operation, Qualifier
 
 RULE = "<allow_rule><domains>{domains}</domains><publish><topics>{topics}</topics></publish></allow_rule>"
 

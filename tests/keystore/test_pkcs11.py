@@ -14,12 +14,17 @@ from keystore import (
     CaAccess,
     ImportedCa,
     ImportOptions,
+    InvalidInputError,
     RemoveOptions,
     RenewOptions,
     RequestOptions,
+    Role,
     Secret,
+    SigningUnavailableError,
+    Validity,
     export_hosts,
     import_bundle,
+    pinned,
     provision,
     remove,
     renew,
@@ -27,12 +32,9 @@ from keystore import (
     sign_requests,
     verify,
 )
-from keystore.errors import InvalidInputError, SigningUnavailableError
-from keystore.formats.role import Role
-from keystore.formats.validity import Validity, utc_now
+from keystore.formats.validity import utc_now
 from keystore.signing import authority
 from keystore.signing.pkcs11_signer import Pkcs11Signer, parse_uri
-from keystore.steps.host_bundles import pinned
 from tests.keystore.kit import DAY, created, filled, openssl, options, policy
 
 MODULES = ("/usr/lib/softhsm/libsofthsm2.so", "/usr/lib/x86_64-linux-gnu/softhsm/libsofthsm2.so")

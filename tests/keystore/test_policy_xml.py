@@ -9,9 +9,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from keystore.errors import InvalidInputError
-from keystore.formats.policy import EnclavePolicy, Operation, Policy, PolicyError, Profile, Qualifier, Rule
-from keystore.formats.policy_xml import parse_policy, policy_xml, read_policy
+from keystore import (
+    EnclavePolicy,
+    InvalidInputError,
+    Operation,
+    Policy,
+    Profile,
+    Qualifier,
+    Rule,
+    read_policy,
+)
+from keystore.formats.policy import PolicyError
+from keystore.formats.policy_xml import parse_policy, policy_xml
 from keystore.formats.safe_xml import check_schema, parse_xml
 
 GROUP = '<topics publish="ALLOW"><topic>chatter</topic></topics>'

@@ -12,15 +12,26 @@ from pathlib import Path
 
 import pytest
 
-from keystore import SubjectScheme, apply_policy, create_enclave, list_enclaves, provision, verify
+from keystore import (
+    Domains,
+    EnclavePolicy,
+    InvalidEnclaveNameError,
+    InvalidInputError,
+    NotAKeystoreError,
+    Policy,
+    Role,
+    SubjectScheme,
+    UnsafeKeystoreError,
+    apply_policy,
+    create_enclave,
+    list_enclaves,
+    provision,
+    verify,
+)
 from keystore.disk import layout
 from keystore.disk.signed_documents import trusted_document
 from keystore.disk.view import KeystoreView
-from keystore.errors import InvalidEnclaveNameError, InvalidInputError, NotAKeystoreError, UnsafeKeystoreError
-from keystore.formats.domains import Domains
 from keystore.formats.permissions_document import parse_permissions
-from keystore.formats.policy import EnclavePolicy, Policy
-from keystore.formats.role import Role
 from tests.keystore.kit import (
     ARTICLE,
     DAY,

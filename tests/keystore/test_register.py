@@ -14,10 +14,18 @@ from hypothesis import strategies as st
 
 from keystore import (
     ChangeOptions,
+    DamagedKeystoreError,
+    DomainRule,
+    Domains,
+    Governance,
+    InvalidInputError,
+    Protection,
     RemoveOptions,
     RenewOptions,
+    Role,
     Step,
     SubjectScheme,
+    UnsafeKeystoreError,
     create_enclaves,
     provision,
     remove,
@@ -28,10 +36,7 @@ from keystore import (
 )
 from keystore.disk import layout
 from keystore.disk.register_file import read_register
-from keystore.errors import DamagedKeystoreError, InvalidInputError, UnsafeKeystoreError
 from keystore.formats.certificate import read_certificate
-from keystore.formats.domains import Domains
-from keystore.formats.governance import DomainRule, Governance, Protection
 from keystore.formats.permissions_document import Grant, parse_permissions
 from keystore.formats.register import (
     AuthorityState,
@@ -41,7 +46,6 @@ from keystore.formats.register import (
     parse_register,
     register_json,
 )
-from keystore.formats.role import Role
 from keystore.formats.subject import common_name, generation_of, names_enclave
 from tests.keystore.kit import DAY, NOW, actions, filled, options, policy, snapshot
 

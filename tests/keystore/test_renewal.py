@@ -8,8 +8,11 @@ from pathlib import Path
 import pytest
 
 from keystore import (
+    DamagedKeystoreError,
+    InvalidInputError,
     RemoveOptions,
     RenewOptions,
+    Role,
     Severity,
     Step,
     create_enclave,
@@ -25,10 +28,8 @@ from keystore import (
 from keystore.disk import layout
 from keystore.disk.signed_documents import trusted_document
 from keystore.disk.view import KeystoreView
-from keystore.errors import DamagedKeystoreError, InvalidInputError
 from keystore.formats.certificate import read_certificates
 from keystore.formats.permissions_document import parse_permissions
-from keystore.formats.role import Role
 from tests.dds import sros2_style
 from tests.keystore.kit import (
     ARTICLE,

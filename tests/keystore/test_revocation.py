@@ -9,6 +9,8 @@ import pytest
 from cryptography import x509
 
 from keystore import (
+    DamagedKeystoreError,
+    InvalidInputError,
     RemoveOptions,
     RenewOptions,
     export,
@@ -22,7 +24,6 @@ from keystore import (
 from keystore.disk import layout
 from keystore.disk.crl_file import crl_validity
 from keystore.disk.view import KeystoreView
-from keystore.errors import DamagedKeystoreError, InvalidInputError
 from keystore.formats.certificate import read_certificate
 from tests.keystore.kit import DAY, NOW, filled, openssl, options, policy, snapshot
 

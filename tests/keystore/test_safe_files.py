@@ -7,9 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from keystore import DamagedKeystoreError, NotAKeystoreError, Role, StorageError, UnsafeKeystoreError
 from keystore.disk import layout, safe_files
-from keystore.errors import DamagedKeystoreError, NotAKeystoreError, StorageError, UnsafeKeystoreError
-from keystore.formats.role import Role
 
 FILE = "enclaves/a/cert.pem"
 KEY = "enclaves/a/key.pem"

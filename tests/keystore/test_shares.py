@@ -12,9 +12,18 @@ from pathlib import Path
 import pytest
 
 from keystore import (
+    DamagedKeystoreError,
+    Domains,
+    EnclavePolicy,
+    InvalidInputError,
     LaunchHold,
+    Operation,
+    Profile,
     ProvisionReport,
+    Qualifier,
     RemoveOptions,
+    Rule,
+    UnsafeKeystoreError,
     drop_shares,
     list_shares,
     provision,
@@ -23,11 +32,8 @@ from keystore import (
 )
 from keystore.disk import layout
 from keystore.disk.share_files import is_running, read_shares
-from keystore.errors import DamagedKeystoreError, InvalidInputError, UnsafeKeystoreError
 from keystore.formats.certificate import read_certificate
-from keystore.formats.domains import Domains
 from keystore.formats.permissions_document import parse_permissions
-from keystore.formats.policy import EnclavePolicy, Operation, Profile, Qualifier, Rule
 from keystore.steps.comparison import differences
 from keystore.steps.sharing import shared_enclaves
 from keystore.verb import main

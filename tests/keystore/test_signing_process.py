@@ -8,10 +8,18 @@ from pathlib import Path
 
 import pytest
 
-from keystore import CaAccess, LaunchHold, ProvisionOptions, Secret, provision, verify
-from keystore.errors import InvalidInputError, SigningUnavailableError
-from keystore.formats.domains import Domains
-from keystore.formats.policy import EnclavePolicy
+from keystore import (
+    CaAccess,
+    Domains,
+    EnclavePolicy,
+    InvalidInputError,
+    LaunchHold,
+    ProvisionOptions,
+    Secret,
+    SigningUnavailableError,
+    provision,
+    verify,
+)
 from keystore.steps import signing_process
 from keystore.steps.signing_process import SigningProcess
 from tests.keystore.kit import actions, created, options, policy

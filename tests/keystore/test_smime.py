@@ -12,10 +12,8 @@ from cryptography.hazmat.primitives.serialization import Encoding, pkcs7
 from hypothesis import given
 from hypothesis import strategies as st
 
-from keystore.errors import DamagedKeystoreError, InvalidInputError
+from keystore import DamagedKeystoreError, InvalidInputError, Role, Validity
 from keystore.formats import certificate
-from keystore.formats.role import Role
-from keystore.formats.validity import Validity
 from keystore.signing import authority, smime
 from keystore.signing.authority import Authority, IdentityIssuer
 from keystore.signing.identity import new_identity

@@ -16,13 +16,22 @@ from typing import Any
 
 import pytest
 
-from keystore import CaAccess, ImportedCa, RequestOptions, Secret, Step, request, roll_over
+from keystore import (
+    CaAccess,
+    ImportedCa,
+    RequestOptions,
+    Role,
+    Secret,
+    Step,
+    StorageError,
+    UnsafeKeystoreError,
+    request,
+    roll_over,
+)
 from keystore.disk import layout, store
 from keystore.disk.store import Content, Link, Store
 from keystore.disk.versions import Versions, make_directories, write_new
-from keystore.errors import StorageError, UnsafeKeystoreError
 from keystore.formats.register import Register
-from keystore.formats.role import Role
 from tests.keystore import kit
 
 UMASKS = (0o000, 0o002, 0o022, 0o027, 0o077)

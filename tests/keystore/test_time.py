@@ -9,6 +9,9 @@ import pytest
 from cryptography import x509
 
 from keystore import (
+    DamagedKeystoreError,
+    InvalidInputError,
+    Policy,
     RemoveOptions,
     RenewOptions,
     Step,
@@ -19,9 +22,7 @@ from keystore import (
     roll_over,
 )
 from keystore.disk import layout
-from keystore.errors import DamagedKeystoreError, InvalidInputError
 from keystore.formats.certificate import read_certificate
-from keystore.formats.policy import Policy
 from keystore.formats.validity import utc_now
 from keystore.steps import opening, provisioning, renewal, tool_enclaves
 from keystore.verb import main

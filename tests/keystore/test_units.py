@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from keystore import BundleOptions, ImportOptions, export_hosts, import_bundle
-from keystore.steps.host_bundles import pinned
+from keystore import BundleOptions, ImportOptions, export_hosts, import_bundle, pinned
 from keystore.verb import main
 from tests.keystore.kit import filled
 

@@ -6,8 +6,8 @@ from datetime import datetime, timedelta, timezone
 
 import pytest
 
-from keystore.errors import InvalidInputError
-from keystore.formats.validity import LATEST, Validity, iso, parse_duration, parse_end, parse_time, utc_now
+from keystore import InvalidInputError, Validity
+from keystore.formats.validity import LATEST, iso, parse_duration, parse_end, parse_time, utc_now
 from tests.keystore.kit import DAY, NOW
 
 

@@ -9,13 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from keystore import CaAccess, Severity, provision, verify
+from keystore import CaAccess, Domains, NotAKeystoreError, Role, Severity, Validity, provision, verify
 from keystore.disk.view import KeystoreView
-from keystore.errors import NotAKeystoreError
-from keystore.formats.domains import Domains
 from keystore.formats.permissions import permissions_document
-from keystore.formats.role import Role
-from keystore.formats.validity import Validity
 from keystore.signing import smime
 from tests.dds import sros2_style
 from tests.keystore.kit import DAY, NOW, filled, options, policy

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from keystore import (
+    InvalidInputError,
     LaunchHold,
     ProvisionOptions,
     RenewOptions,
@@ -21,7 +22,6 @@ from keystore import (
     verify,
 )
 from keystore.disk.register_file import read_register
-from keystore.errors import InvalidInputError
 from keystore.formats.register import UNKNOWN
 from keystore.formats.validity import utc_now
 from keystore.verb import main

@@ -6,8 +6,7 @@ import json
 
 import pytest
 
-from keystore.formats.domains import Domains
-from keystore.formats.policy import EnclavePolicy, Operation, Profile, Qualifier, Rule
+from keystore import Domains, EnclavePolicy, Operation, Profile, Qualifier, Rule
 from keystore.zenoh.configuration import (
     Subject,
     TlsFiles,

@@ -11,10 +11,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from enclave_launch.policy import DerivedPolicy, PolicyOptions, RunningNode, derive_policy
-from keystore.formats.domains import Domains
+from keystore import Domains, Validity
 from keystore.formats.permissions import permissions_document
 from keystore.formats.policy_xml import parse_policy, policy_xml
-from keystore.formats.validity import Validity
 from nodl.builtin_interfaces import DISTROS, TABLE, built_in_interfaces
 from nodl.name_template import NameTemplate, ParameterPart, UnknownPart
 from nodl.names import MAX_NAME_LENGTH

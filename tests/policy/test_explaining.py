@@ -14,8 +14,9 @@ from enclave_launch.policy.sharing import gains_by_sharing
 from enclave_launch.process import LauncherCall
 from enclave_launch.report.explained import explain
 from enclave_launch.source_location import SourceLocation
+from keystore import read_policy
 from keystore.formats.permissions import dds_rules
-from keystore.formats.policy_xml import PolicyDocument, parse_policy, read_policy
+from keystore.formats.policy_xml import PolicyDocument, parse_policy
 from nodl.document.v1 import parse_v1
 from nodl.name_template import NameTemplate, UnknownPart
 from nodl.node_interface import Endpoint, EndpointKind

@@ -22,7 +22,7 @@ from enclave_launch.plan import (
 )
 from enclave_launch.planner import make_plan
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
-from keystore.formats.policy import Operation
+from keystore import Operation
 from nodl.node_interface import RANDOM_ENDING, Gap
 from nodl.source_ref import SourceRef
 

@@ -351,7 +351,7 @@ def test_a_manifest_of_another_shape_is_left_alone(text: str) -> None:
 
 
 def test_a_node_without_manifest_gets_exactly_the_refused_name_in_a_policy_file(tmp_path: Path) -> None:
-    from keystore.formats.policy_xml import read_policy
+    from keystore import read_policy
 
     patch = policy_patch("/e", "/ns/me", endpoint("action_client", "go", "/ns/go"), "p.xml")
     assert patch is not None

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 
 import pytest
 
-from enclave_launch.dry_run import DryRun
+from enclave_launch import DryRun
 from enclave_launch.report.contents import ReportContents, report_contents
 from enclave_launch.review.checks import check_plan
 from tests.report.browser import Page, browser, chromium

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from enclave_launch.dry_run import DryRun
+from enclave_launch import DryRun
 from enclave_launch.report.html.page import html_report
 from tests.report.browser import Page
 from tests.report.conftest import HOSTILE, contents, hostile, large, robot

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from enclave_launch.dry_run import DryRun
+from enclave_launch import DryRun
 from enclave_launch.review.document import PlanDocument, plan_from_document
 
 EVERYWHERE = {"publish": ["/rosout"], "subscribe": ["/parameter_events"]}

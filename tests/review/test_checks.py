@@ -6,8 +6,7 @@ from typing import Any
 
 import pytest
 
-from enclave_launch.dry_run import DryRun
-from enclave_launch.errors import UsageError
+from enclave_launch import DryRun, UsageError
 from enclave_launch.review.checks import RULES, check_plan
 from enclave_launch.review.document import PlanFinding
 from enclave_launch.verb.secure_plan.judging import read_expectations, rule_findings

@@ -8,8 +8,7 @@ from typing import Any
 
 import pytest
 
-from enclave_launch import ResolveOptions, resolve
-from enclave_launch.dry_run import DryRun
+from enclave_launch import DryRun, ResolveOptions, resolve
 from enclave_launch.report.plan_json import plan_document
 from enclave_launch.review.checks import check_plan
 from enclave_launch.review.document import PlanFinding
@@ -75,7 +74,7 @@ def check(tmp_path: Path) -> Check:
 
 
 def _node_scope() -> Any:
-    from enclave_launch.enclave import EnclaveScope
+    from enclave_launch import EnclaveScope
 
     return EnclaveScope.NODE
 

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from enclave_launch.dry_run import DryRun
+from enclave_launch import DryRun
 from enclave_launch.review.document import plan_from_document
 from enclave_launch.review.information_flow import (
     flow_graph,

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from jsonschema import Draft4Validator
 
 from enclave_common.terminal import json_text
-from enclave_launch.dry_run import DryRun
+from enclave_launch import DryRun
 from enclave_launch.report.sarif import sarif_document
 from enclave_launch.review.checks import RULES, check_plan
 from enclave_launch.review.document import PlanFinding

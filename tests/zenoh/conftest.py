@@ -9,9 +9,19 @@ from typing import Any
 
 import pytest
 
-from keystore import CreateOptions, ProvisionOptions, apply_policy, create_keystore
-from keystore.formats.domains import Domains
-from keystore.formats.policy import EnclavePolicy, Operation, Policy, Profile, Qualifier, Rule
+from keystore import (
+    CreateOptions,
+    Domains,
+    EnclavePolicy,
+    Operation,
+    Policy,
+    Profile,
+    ProvisionOptions,
+    Qualifier,
+    Rule,
+    apply_policy,
+    create_keystore,
+)
 from keystore.zenoh.writing import write_zenoh
 from tests.zenoh import kit
 

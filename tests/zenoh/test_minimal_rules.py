@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from keystore.formats.domains import Domains
+from keystore import Domains
 from keystore.zenoh.configuration import Subject, access_control
 from keystore.zenoh.grants import Grants, Use
 from keystore.zenoh.rules import AccessRule, access_rules

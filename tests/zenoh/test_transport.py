@@ -12,10 +12,19 @@ from typing import Any
 import pytest
 import zenoh
 
-from keystore import CaAccess, ProvisionOptions, RemoveOptions, RenewOptions, apply_policy, remove, renew
+from keystore import (
+    CaAccess,
+    ProvisionOptions,
+    RemoveOptions,
+    RenewOptions,
+    Role,
+    Validity,
+    apply_policy,
+    remove,
+    renew,
+)
 from keystore.disk.view import KeystoreView
-from keystore.formats.role import Role
-from keystore.formats.validity import Validity, utc_now
+from keystore.formats.validity import utc_now
 from keystore.signing.authority import (
     Authority,
     IdentityIssuer,

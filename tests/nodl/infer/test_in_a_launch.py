@@ -13,10 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from enclave_launch.errors import ManifestError
-from enclave_launch.flow import provision, resolve
-from enclave_launch.options import ResolveOptions
-from enclave_launch.plan import LaunchPlan
+from enclave_launch import LaunchPlan, ManifestError, ResolveOptions, provision, resolve
 from enclave_launch.report.explained import explain
 from enclave_launch.verb.secure_launch import params_yaml
 

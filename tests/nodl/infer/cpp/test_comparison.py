@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from enclave_launch import LaunchPlan
 from enclave_launch.diagnostics import Code
-from enclave_launch.plan import LaunchPlan
 from nodl.verb import main
 from tests.nodl.infer.cpp.test_in_a_launch import install, may, plan
 from tests.nodl.infer.cpp.workspace import in_class, package, write

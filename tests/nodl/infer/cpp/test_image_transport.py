@@ -6,9 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from enclave_launch.flow import resolve
-from enclave_launch.options import ResolveOptions
-from enclave_launch.plan import LaunchPlan
+from enclave_launch import LaunchPlan, ResolveOptions, resolve
 from nodl.verb import main
 from tests.nodl.infer.cpp.test_in_a_launch import install, may, plan
 from tests.nodl.infer.cpp.workspace import gaps, in_class, infer, names, package, write

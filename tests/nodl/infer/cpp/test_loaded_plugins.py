@@ -7,9 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from enclave_launch.flow import resolve
-from enclave_launch.options import ResolveOptions
-from enclave_launch.plan import LaunchPlan
+from enclave_launch import LaunchPlan, ResolveOptions, resolve
 from tests.nodl.infer.cpp.workspace import HEAD, package
 
 pytest.importorskip("tree_sitter_cpp", reason="the extra cpp is not installed")

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from enclave_launch.flow import resolve
-from enclave_launch.options import ResolveOptions
+from enclave_launch import ResolveOptions, resolve
 from nodl.document import read_document
 from nodl.verb import main
 from tests.nodl.infer.cpp.test_in_a_launch import CMAKE, FILTER, LAUNCH, install, may
