@@ -6,9 +6,14 @@ description has there.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 
-from enclave_launch.policy.program_inputs import own_words
+from enclave_launch.policy.program_inputs import (
+    ProgramInputs,
+    environment_inputs,
+    own_words,
+    program_inputs,
+)
 from enclave_launch.policy.running_node import (
     RunningNode,
     node_of_component,
@@ -90,6 +95,14 @@ class StartedProgram:
         )
         return situation_of(started, self._container, interface, self._distro)
 
+    def inputs(self, names: Iterable[str]) -> Mapping[str, str | None]:
+        """Return what launch gives the options and variables of the program, ``None`` for a default."""
+        if isinstance(self._started, ResolvedProcess):
+            given = program_inputs(self._started)
+        else:
+            given = environment_inputs(self.process) if self.process else ProgramInputs()
+        return {name: given.values.get(name) for name in names if given.is_known(name)}
+
 
 class StartedPlugin:
     """A plugin that a node in ``situation``, one of ``program``, loads under a name."""
@@ -115,3 +128,7 @@ class StartedPlugin:
         if node == CONTROLLER:
             return self._name, self._situation.namespace
         return self._program.final_name(self._name if node == COMPONENT else node)
+
+    def inputs(self, names: Iterable[str]) -> Mapping[str, str | None]:
+        """Return what launch gives the options and variables of the program that loads it."""
+        return self._program.inputs(names)

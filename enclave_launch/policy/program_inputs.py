@@ -33,6 +33,11 @@ class ProgramInputs(NamedTuple):
         """Return ``template`` with an unknown part for each input that the command line may set unseen."""
         return NameTemplate(tuple(self._doubted(part) for part in template.parts))
 
+    def is_known(self, name: str) -> bool:
+        """Return whether ``values`` has the input, or else it certainly has its default."""
+        part = ParameterPart(name)
+        return self._doubted(part) is part
+
     def _doubted(self, part: Part) -> Part:
         if not isinstance(part, ParameterPart) or part.name in self.values:
             return part

@@ -16,9 +16,8 @@ import re
 import sys
 import traceback
 from bisect import bisect_left
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from types import MappingProxyType
 
 from nodl.infer.interpreter.attributes import ATTRIBUTES
 from nodl.infer.interpreter.calls import call_bound, call_function, instantiate
@@ -32,7 +31,7 @@ from nodl.infer.models.foreign import is_node_class
 from nodl.infer.net import unsettled_places, words_read
 from nodl.infer.program import Program, ProgramTarget, SourceModule
 from nodl.infer.results import interfaces_of
-from nodl.infer.start import InferredProgram, LaunchedNode, LaunchKey
+from nodl.infer.start import NO_LAUNCH, InferredProgram, LaunchKey, ProgramLaunch
 from nodl.infer.values import (
     ANY,
     COMMAND_LINE,
@@ -262,35 +261,32 @@ def without_collector() -> Iterator[None]:
             gc.collect()
 
 
-_NO_LAUNCH: Mapping[str, LaunchedNode] = MappingProxyType({})
-
-
 def start(
     program: Program,
     main: SourceModule,
     functions: Iterable[str] = (),
-    launched: Mapping[str, LaunchedNode] = _NO_LAUNCH,
+    launch: ProgramLaunch = NO_LAUNCH,
 ) -> Run:
     """Run ``main`` as a script, then ``functions`` of it (``main`` if the script itself starts nothing)."""
     named = tuple(functions)
-    return _followed(program, main, launched, lambda run: _start(run, main, named))
+    return _followed(program, main, launch, lambda run: _start(run, main, named))
 
 
 def start_function(
     program: Program,
     module: SourceModule,
     path: list[str],
-    launched: Mapping[str, LaunchedNode] = _NO_LAUNCH,
+    launch: ProgramLaunch = NO_LAUNCH,
 ) -> Run:
     """Import ``module`` and call ``path`` in it (``main``, ``Class.method``), as an entry point does."""
-    return _followed(program, module, launched, lambda run: _start_function(run, module, path))
+    return _followed(program, module, launch, lambda run: _start_function(run, module, path))
 
 
 def _followed(
-    program: Program, main: SourceModule, launched: Mapping[str, LaunchedNode], body: Callable[[Run], None]
+    program: Program, main: SourceModule, launch: ProgramLaunch, body: Callable[[Run], None]
 ) -> Run:
     run = new_run(program, main)
-    run.launched = launched
+    run.launch = launch
     _guarded(run, lambda: body(run))
     return run
 
@@ -413,17 +409,17 @@ def infer_program(
     target: ProgramTarget,
     path: str,
     origin: LaunchKey,
-    launched: Mapping[str, LaunchedNode] = _NO_LAUNCH,
+    launch: ProgramLaunch = NO_LAUNCH,
     lost: tuple[Gap, ...] | None = None,
 ) -> InferredProgram:
     """Return the nodes that the program behind ``path`` creates.
 
-    With what a launch makes of its nodes (``launched``) tests of parameters are decided: then the net has nothing to
+    Under a ``launch`` tests of parameters are decided: then the net has nothing to
     look at on the other side, and ``lost`` is what it found where both sides were followed.
     """
     try:
         with without_collector():
-            run = _run(program, target, path, launched)
+            run = _run(program, target, path, launch)
             interfaces = interfaces_of(run.findings, origin)
             found = (*unsettled_places(run),) if lost is None else lost
             for gap in found:
@@ -431,17 +427,19 @@ def infer_program(
     except Exception as error:  # a mistake of ours in one program must not end the plan of all
         return InferredProgram((), f"{path}: {failure(error)}")
     if interfaces:
-        answer = InferredProgram(_with_gaps(interfaces, run), "", run.asks_launch, found)
+        answer = InferredProgram(
+            _with_gaps(interfaces, run), "", run.asks_launch, found, tuple(run.options.names)
+        )
         return answer._replace(asks_launch=run.asks_launch or answer.open_places > 0)
     reasons = "; ".join(f"{source}: {why}" for source, why in run.findings.gaps)
     return InferredProgram((), f"no node was found in {path}" + (f" ({reasons})" if reasons else ""))
 
 
-def _run(program: Program, target: ProgramTarget, path: str, launched: Mapping[str, LaunchedNode]) -> Run:
+def _run(program: Program, target: ProgramTarget, path: str, launch: ProgramLaunch) -> Run:
     source = program.load(target.file, target.module)
     if target.function:
-        return start_function(program, source, list(target.function), launched)
-    run = start(program, source, launched=launched)
+        return start_function(program, source, list(target.function), launch)
+    run = start(program, source, launch=launch)
     if target.missing:
         run.findings.gap(SourceRef(path), target.missing)
     return run

@@ -6,6 +6,7 @@ Everything here only grows, in whatever order branches and loops are analysed; `
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import NamedTuple
 
 from nodl.infer.values import BOTTOM, ContentCells, Unknown, Value, join
@@ -71,6 +72,10 @@ class OptionDefaults:
 
     def default(self, name: str) -> Value:
         return self._defaults.get(name, BOTTOM)
+
+    @property
+    def names(self) -> Iterable[str]:
+        return self._defaults.keys()
 
 
 class Findings:

@@ -149,9 +149,13 @@ class _Reader:
 
     def block(self, body: list[ast.stmt], scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
         """Read statements in order, up to one that control cannot pass."""
-        for statement in body:
+        for index, statement in enumerate(body):
             self.visit(statement, scope, around)
-            if isinstance(statement, (ast.Return, ast.Raise, ast.Continue, ast.Break)):
+            if isinstance(statement, ast.If) and not statement.orelse and _leaves(statement.body):
+                rest = ast.If(statement.test, statement.body, body[index + 1 :])
+                self.block(rest.orelse, scope, (*around, rest))
+                return
+            if isinstance(statement, _LEAVING):
                 scope.may_leave = True
                 return
 
@@ -264,6 +268,14 @@ _VISITORS: dict[type, Callable[[_Reader, Any, FunctionText, tuple[ast.AST, ...]]
     ast.AnnAssign: _Reader.annotated,
     ast.If: _Reader.test,
 }
+
+_LEAVING = (ast.Return, ast.Raise, ast.Continue, ast.Break)
+
+
+def _leaves(body: list[ast.stmt]) -> bool:
+    """Return whether control certainly goes elsewhere at the end of ``body``."""
+    return bool(body) and isinstance(body[-1], _LEAVING)
+
 
 _CONDITIONAL = (
     ast.If, ast.IfExp, ast.BoolOp, ast.For, ast.AsyncFor, ast.While, ast.Try, ast.Match, ast.comprehension, ast.Assert,
@@ -549,7 +561,8 @@ def _literals(scope: FunctionText, entry: ast.AST | None) -> Literals:
     defaults = dict(
         zip(reversed([each.arg for each in arguments]), reversed(node.args.defaults), strict=False)
     )
-    given = len(entry.args) + 1  # with self
+    bound = scope.cls is not None or isinstance(entry.func, ast.Attribute)  # with self, or perhaps
+    given = len(entry.args) + bound
     if any(isinstance(each, ast.Starred) for each in entry.args):
         given = len(arguments)
     values: dict[str, ast.expr | None] = {each.arg: defaults.get(each.arg) for each in arguments[given:]}

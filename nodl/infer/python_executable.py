@@ -11,12 +11,12 @@ import configparser
 import glob
 import os
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 from enclave_common.files import read_text
 from nodl.infer.cache import CachedAnswer
 from nodl.infer.program import Program, ProgramTarget
-from nodl.infer.start import InferredProgram, LaunchedNode, LaunchKey, Start
+from nodl.infer.start import NO_LAUNCH, InferredProgram, LaunchedNode, LaunchKey, ProgramLaunch, Start
 from nodl.node_interface import Gap, NodeInterface
 
 _SITE_PATTERNS = (
@@ -42,25 +42,24 @@ def infer_python(
     finder = _Finder(prefixes)
     target = finder.target(path, package, executable)
 
-    def answered(launched: Mapping[str, LaunchedNode], lost: tuple[Gap, ...] | None) -> InferredProgram:
-        said = [(name, sorted(each.parameters.items()), each[1:]) for name, each in launched.items()]
+    def answered(launch: ProgramLaunch, lost: tuple[Gap, ...] | None) -> InferredProgram:
+        nodes = [(name, sorted(each.parameters.items()), each[1:]) for name, each in launch.nodes.items()]
+        said = (nodes, sorted(launch.inputs.items()))
         cached = CachedAnswer(finder.program, (path, package, executable, target, said))
         answer: InferredProgram | None = cached.find()
         if answer is None:
             from nodl.infer.analysis import infer_program  # the whole analysis of Python comes with it
 
-            answer = infer_program(
-                finder.program, target, path, LaunchKey(package, executable), launched, lost
-            )
+            answer = infer_program(finder.program, target, path, LaunchKey(package, executable), launch, lost)
             cached.store(answer)
         return answer
 
-    found = answered({}, None)
+    found = answered(NO_LAUNCH, None)
     if start is None or not found.asks_launch:
         return found.interfaces, found.why, False
     names = dict.fromkeys(node.name for node in found.interfaces if node.name is not None)
-    launched = {name: LaunchedNode(start.parameters(name), *start.final_name(name)) for name in names}
-    settled = answered(launched, found.lost)
+    nodes = {name: LaunchedNode(start.parameters(name), *start.final_name(name)) for name in names}
+    settled = answered(ProgramLaunch(nodes, start.inputs(found.inputs)), found.lost)
     if not settled.interfaces or settled.open_places > found.open_places:
         return found.interfaces, found.why, False
     return settled.interfaces, "", True

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
 from typing import NamedTuple, Protocol
 
 from nodl.name_template import UnknownPart
@@ -25,6 +26,19 @@ class LaunchedNode(NamedTuple):
     namespace: str | None
 
 
+class ProgramLaunch(NamedTuple):
+    """One launch of a program: its nodes, by the names in the source, and its options and variables.
+
+    ``inputs``: by name (``--fps``, ``$ROBOT``), ``None`` for one that has its default; any other stays open.
+    """
+
+    nodes: Mapping[str, LaunchedNode] = MappingProxyType({})
+    inputs: Mapping[str, str | None] = MappingProxyType({})
+
+
+NO_LAUNCH = ProgramLaunch()
+
+
 class Start(Protocol):
     """Nodes are told by the name that the source gives them; ``None`` for one whose name is not known."""
 
@@ -36,17 +50,23 @@ class Start(Protocol):
         """Name and namespace under the rules of the launch."""
         ...
 
+    def inputs(self, names: Iterable[str]) -> Mapping[str, str | None]:
+        """Return what launch gives options and variables (see ``ProgramLaunch``)."""
+        ...
+
 
 class InferredProgram(NamedTuple):
     """The nodes of a program, with its gaps; ``why`` there are none.
 
     ``asks_launch``: with the parameters of a launch more may be known. ``lost``: the net's gaps, also in the nodes.
+    ``inputs``: the options and variables that it asks for.
     """
 
     interfaces: tuple[NodeInterface, ...]
     why: str = ""
     asks_launch: bool = False
     lost: tuple[Gap, ...] = ()
+    inputs: tuple[str, ...] = ()
 
     @property
     def open_places(self) -> int:

@@ -158,6 +158,10 @@ class _RecordedStart(NamedTuple):
             return name, namespace
         return self.node.rules.node_name(node).name, namespace
 
+    def inputs(self, names: Iterable[str]) -> Mapping[str, str | None]:
+        """Return nothing: a record does not say what the command line and the environment were."""
+        return {}
+
 
 @lru_cache(maxsize=4)
 def _sources(prefixes: tuple[str, ...], folders: tuple[str, ...]) -> SourcesInReach:

@@ -220,12 +220,9 @@ def _reads_parameter(run: Run, test: ast.expr, frame: Frame) -> bool:
 
 
 def is_of_launch(atom: object) -> bool:
-    """Return whether a launch decides a text: it has a parameter in it, or what the node is called."""
+    """Return whether a launch decides a text: it has an input in it, or what the node is called."""
     pieces = atom.pieces if isinstance(atom, Text) else ()
-    return any(
-        isinstance(piece, NodePart) or (isinstance(piece, Input) and isinstance(piece.owner, NodeRecord))
-        for piece in pieces
-    )
+    return any(isinstance(piece, NodePart | Input) for piece in pieces)
 
 
 def where_either(first: tuple[Guard, ...], second: tuple[Guard, ...]) -> tuple[Guard, ...]:

@@ -7,14 +7,14 @@ or callable stands in the tables handed in (``Tables``), so that each concern ha
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Any, NamedTuple
 
 from nodl.infer.findings import Findings, OptionDefaults
 from nodl.infer.packages import find_package
 from nodl.infer.program import Program, SourceModule
-from nodl.infer.start import LaunchedNode
+from nodl.infer.start import NO_LAUNCH
 from nodl.infer.state import Allocations, ProgramState
 from nodl.infer.text import Guard, Text
 from nodl.infer.values import (
@@ -231,9 +231,7 @@ class Run(Allocations):
         self.recursions: dict[ast.AST, Any] = {}  # functions that are calling themselves
         self.since_recursion = 0  # how many calls surround the innermost of these
         self.options = OptionDefaults()
-        self.launched: Mapping[
-            str, LaunchedNode
-        ] = {}  # by the name in the source; empty: parameters stay open
+        self.launch = NO_LAUNCH  # with its values inputs do not stay open
         self.asks_launch = False  # the value of a parameter decides more than conditions on names can say
         self.settle: Callable[[Run], None] = lambda run: None  # runs the callbacks; set by who drives the run
         self.guards: tuple[Guard, ...] = ()  # of parameters, that hold at the current point

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from nodl.infer.interpreter.run import Call, Run
+from nodl.infer.interpreter.run import Arguments, Call, Run
 from nodl.infer.text import Input, Text, input_of, make_text
 from nodl.infer.values import (
     ANY,
@@ -17,6 +17,7 @@ from nodl.infer.values import (
     Sequence,
     Value,
     constant_strings,
+    external,
     join,
     join_all,
     sole,
@@ -76,6 +77,8 @@ def _place(run: Run, parser: Instance, name: str, call: Call) -> str:
 
 def _parsed(run: Run, name: str, call: Call) -> Value:
     """Return what the option holds: its text, or whether a flag is there; unknown if it is made into anything else."""
+    if name in run.launch.inputs:
+        return _settled(run, name, call)
     given = call.args.keywords
     action, nargs = sole(given.get("action", ("store",))), sole(given.get("nargs", NONE))
     if action in ("store_true", "store_false"):
@@ -85,9 +88,26 @@ def _parsed(run: Run, name: str, call: Call) -> Value:
         flag = Input(name, run.options, None, (("given", (str(there), str(default))),))
         return (make_text((flag,)),) if isinstance(default, bool) else BOOLEAN
     kept = all(isinstance(atom, External) and atom.path in _KEEP_TEXT for atom in given.get("type", BOTTOM))
+    run.asks_launch = run.asks_launch or not kept
     if action != "store" or nargs not in (None, "?") or not kept:
         return unknown(f"what is made of the command line option {name}")
     return (make_text((Input(name, run.options),)),)
+
+
+def _settled(run: Run, name: str, call: Call) -> Value:
+    """Return what the option holds in this launch."""
+    keywords, word = call.args.keywords, run.launch.inputs[name]
+    action, nargs = sole(keywords.get("action", ("store",))), sole(keywords.get("nargs", NONE))
+    if action in ("store_true", "store_false"):
+        there = action == "store_true"
+        return keywords.get("default", (not there,)) if word is None else (there,)
+    if action != "store" or nargs not in (None, "?") or (word == "" and nargs == "?"):
+        return unknown(f"what is made of the command line option {name}")
+    values = keywords.get("default", NONE) if word is None else (word,)
+    texts = tuple(atom for atom in values if isinstance(atom, str))
+    others = tuple(atom for atom in values if not isinstance(atom, str))
+    made = keywords.get("type", external("builtins.str"))
+    return join(run.call(made, Arguments([texts]), call.node, call.frame) if texts else BOTTOM, others)
 
 
 def _set_defaults(run: Run, parser: Instance, call: Call) -> Value:

@@ -434,9 +434,9 @@ def _launched(run: Run, record: NodeRecord) -> LaunchedNode | None:
     name = sole(record.names)
     if not isinstance(name, str) or record.arguments or run.findings.global_arguments:
         return None
-    if run.launched and record.use_global_arguments == (False,):
+    if run.launch.nodes and record.use_global_arguments == (False,):
         return LaunchedNode({}, None, None)
-    return run.launched.get(name) if record.use_global_arguments == (True,) else None
+    return run.launch.nodes.get(name) if record.use_global_arguments == (True,) else None
 
 
 def _settled(run: Run, record: NodeRecord, name: str, call: Call) -> Value:

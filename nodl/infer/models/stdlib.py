@@ -5,15 +5,17 @@ from __future__ import annotations
 import os.path
 from collections.abc import Callable
 from functools import partial
+from typing import Any
 
-from nodl.infer.interpreter.conditions import is_instance
+from nodl.infer.interpreter.conditions import is_instance, truth
 from nodl.infer.interpreter.define import expect_methods, linearized, new_instance, program_classes
 from nodl.infer.interpreter.elements import copy_dictionary, elements, store_attribute
 from nodl.infer.interpreter.formatting import as_texts, is_whole_number, text_value
 from nodl.infer.interpreter.imports import import_module
 from nodl.infer.interpreter.run import Arguments, Call, Model, Run
 from nodl.infer.models import options
-from nodl.infer.text import Input, Text, concatenations, input_of, make_text, may_be, with_edit
+from nodl.infer.start import NO_LAUNCH
+from nodl.infer.text import Input, Text, concatenations, constant_text, input_of, make_text, may_be, with_edit
 from nodl.infer.values import (
     ABSENT,
     ANY,
@@ -62,9 +64,41 @@ def _str(run: Run, call: Call) -> Value:
 
 def _int(run: Run, call: Call) -> Value:
     atom = sole(call.args.at(0))
-    if type(atom) is int or is_whole_number(atom):
-        return (atom,)
-    return ANY
+    return (atom,) if is_whole_number(atom) else _number(int, run, call)
+
+
+def _number(kind: Callable[[Any], object], run: Run, call: Call) -> Value:
+    """Return a number made of a number, or in a launch of a text: there it is what the command line says.
+
+    Where that ends in an error, or takes long, nothing is known.
+    """
+    atom = constant_text(sole(call.args.at(0)))
+    readable = isinstance(atom, int | float) or (isinstance(atom, str) and run.launch is not NO_LAUNCH)
+    if not readable or len(call.args.positional) != 1 or len(str(atom)) > _LONGEST_NUMBER:
+        return ANY
+    try:
+        return (kind(atom),)
+    except (ValueError, OverflowError):
+        return ANY
+
+
+_LONGEST_NUMBER = 40
+
+
+def _bool(run: Run, call: Call) -> Value:
+    known = truth(call.args.at(0) or (False,))
+    return BOOLEAN if known is None else (known,)
+
+
+def _len(run: Run, call: Call) -> Value:
+    """Return the number of letters, or of elements where all are known."""
+    atom = constant_text(sole(call.args.at(0)))
+    if isinstance(atom, str):
+        return (len(atom),)
+    if not isinstance(atom, Sequence | Dictionary) or (isinstance(atom, Sequence) and atom.kind == "set"):
+        return ANY
+    exact = elements(run, (atom,), call.node, call.frame).exact
+    return ANY if exact is None else (len(exact),)
 
 
 # --- containers ---------------------------------------------------------------------------------------------
@@ -325,6 +359,9 @@ _BUILT_IN: dict[str, Callable[[Run, Call], Value]] = {
     for name, model in {
         "str": _str,
         "int": _int,
+        "float": lambda run, call: _number(float, run, call),
+        "bool": _bool,
+        "len": _len,
         "range": _range,
         "list": _made("list"),
         "tuple": _made("tuple"),
@@ -373,6 +410,10 @@ def _environment(run: Run, call: Call) -> Value:
         if ABSENT[0] not in held:
             continue
         run.options.declare("$" + name, tuple(atom for atom in default if atom is not None))
+        settled = run.launch.inputs.get("$" + name)
+        if settled is not None or ("$" + name in run.launch.inputs and default):
+            result = join(result, default if settled is None else (settled,))
+            continue
         result = join(result, (make_text((Input("$" + name, run.options),)),))
     return result or unknown("an environment variable")
 

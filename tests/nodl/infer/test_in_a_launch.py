@@ -433,3 +433,66 @@ def test_parameters_of_the_launch_decide_for_a_node_that_listens_to_it(
     plan = launch('<launch><node pkg="demo" exec="decided"><param name="rate" value="30.0"/></node></launch>')
     assert bool(plan.problems) is (fast is None)
     assert (("publish", "/fast") in permissions(plan)) is (fast is not False)
+
+
+NUMBERS = """
+import argparse
+import os
+import rclpy
+from std_msgs.msg import String
+parser = argparse.ArgumentParser()
+parser.add_argument("--fps", type=float, default=30.0)
+parser.add_argument("--device", type=int, default=0)
+given, _ = parser.parse_known_args()
+rclpy.init()
+node = rclpy.create_node("numbers")
+
+def make(name, twice=False):
+    if twice:
+        return [node.create_publisher(String, name + "/" + side, 10) for side in ("left", "right")]
+    return node.create_publisher(String, name, 10)
+
+if given.fps > 20:
+    make("fast")
+make(f"camera{given.device}", twice=True)
+if int(os.environ.get("ARMS", "1")) > 1:
+    make("second_arm")
+names = node.declare_parameter("names", ["one"]).value
+if len(names) > 1:
+    make("several")
+rclpy.spin(node)
+"""
+
+
+@pytest.mark.parametrize(
+    ("words", "inside", "published"),
+    [
+        ("", "", {"/fast", "/camera0/left", "/camera0/right"}),
+        ("--fps 5 --device=2", "", {"/camera2/left", "/camera2/right"}),
+        (
+            "--fps 20.5",
+            '<env name="ARMS" value="2"/>',
+            {"/fast", "/camera0/left", "/camera0/right", "/second_arm"},
+        ),
+        ("--fps 1", '<param name="names" value="[a, b]"/>', {"/camera0/left", "/camera0/right", "/several"}),
+    ],
+)
+def test_numbers_of_the_command_line_variables_and_lengths_decide(
+    words: str, inside: str, published: set[str], launch: Launch, prefix: Path
+) -> None:
+    install_program(prefix, PYTHON + NUMBERS, "numbers")
+    plan = launch(f'<launch><node pkg="demo" exec="numbers" args="{words}">{inside}</node></launch>')
+    assert [str(problem) for problem in plan.problems] == []
+    own = {name for operation, name in permissions(plan) if operation == "publish"}
+    assert own - {"/rosout", "/parameter_events"} == published
+
+
+@pytest.mark.parametrize("words", ["-f 5", "--fp 5", "stray"])
+def test_an_option_that_the_command_line_may_set_unseen_decides_nothing(
+    words: str, launch: Launch, prefix: Path
+) -> None:
+    """``-f`` may be any option, argparse takes ``--fp`` for ``--fps``; a bare word is no option."""
+    install_program(prefix, PYTHON + NUMBERS, "numbers")
+    plan = launch(f'<launch><node pkg="demo" exec="numbers" args="{words}"/></launch>')
+    assert bool(plan.problems) is (words == "-f 5")
+    assert ("publish", "/fast") in permissions(plan)

@@ -36,10 +36,19 @@ class WatchedStart:
         self.asked.setdefault(_said(self._start, "name", node))
         return self._start.final_name(node)
 
+    def inputs(self, names: Iterable[str]) -> Mapping[str, str | None]:
+        for name in names:
+            self.asked.setdefault(_said(self._start, "input", name))
+        return self._start.inputs(names)
+
 
 def _said(start: Start, what: str, node: str | None) -> Asked:
-    """Return what a launch says of a node: of its ``parameters``, or of its final ``name``."""
-    answer = sorted(start.parameters(node).items()) if what == "parameters" else start.final_name(node)
+    """Return what a launch says of a node: of its ``parameters``, its final ``name``; or of an ``input``."""
+    answer: object
+    if what == "input":
+        answer = dict(start.inputs([node or ""]))
+    else:
+        answer = sorted(start.parameters(node).items()) if what == "parameters" else start.final_name(node)
     return what, json.dumps(node), repr(answer)
 
 
