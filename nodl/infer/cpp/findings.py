@@ -40,6 +40,7 @@ class AllocatedNode:
     source: SourceRef
     parameters: Notes
     overrides: Notes
+    set_values: Notes  # what the program gives parameters later
     lifecycle: bool
     names: Value = BOTTOM
     namespaces: Value = BOTTOM

@@ -45,7 +45,7 @@ def become_node(run: Machine, call: Call, *, lifecycle: bool = False) -> Allocat
     record = run.nodes.get(this)
     if record is None:
         source, log = run.place(call.node, call.frame), run.store.log
-        record = AllocatedNode(source, Notes(log), Notes(log), lifecycle)
+        record = AllocatedNode(source, Notes(log), Notes(log), Notes(log), lifecycle)
         run.nodes[this] = record
         run.size["nodes"] = len(run.nodes)
     this.node, this.is_node = record, True

@@ -55,7 +55,7 @@ def read(run: Machine, record: AllocatedNode, name: Value, default: Value = BOTT
             continue
         if default:
             record.declare(filled, tuple(_with_defaults(run, atom) for atom in default))
-        found.append(Param(record, filled))
+        found += [Param(record, filled), *record.set_values.get(filled, BOTTOM)]
     return tuple(dict.fromkeys(found))
 
 
@@ -120,13 +120,17 @@ def _set(run: Machine, call: Call) -> Value:
     stack = list(call.values)
     while stack:
         for atom in stack.pop():
-            if isinstance(atom, Seq):
-                stack += atom.items
-            elif isinstance(atom, Obj) and atom.type.name == "rclcpp::Parameter":
+            given = atom.items if isinstance(atom, Seq) else ()
+            if isinstance(atom, Obj) and atom.type.name == "rclcpp::Parameter":
                 given = atom.data.get("arguments", [])
-                for name in parameter_names(run, given[0]) if len(given) > 1 else []:
-                    if name is not None:
-                        call.record.declare(name, given[1])
+            if len(given) != 2 or not all(isinstance(each, Text | Param) for each in given[0]):
+                stack += given
+                continue
+            for name in parameter_names(run, given[0]):
+                if name is not None:
+                    record = call.record
+                    record.declare(name, BOTTOM)
+                    record.set_values[name] = join(record.set_values.get(name, BOTTOM), given[1])
     return unknown("the result of a parameter call")
 
 

@@ -38,7 +38,7 @@ from nodl.infer.cpp.running.values import (
     unknown,
 )
 from nodl.infer.cpp.running.variables import static_member
-from nodl.infer.cpp.syntax import Node, children, field_of, text, unwrapped
+from nodl.infer.cpp.syntax import Node, children, field_of, text, unwrapped, walk
 from nodl.name_template import UnknownPart
 
 
@@ -207,6 +207,10 @@ def _gives_reference(run: Machine, callee: Node | None) -> bool:
 def _through_pointer(run: Machine, pointer: Node, value: Value, frame: Frame) -> None:
     """Run ``*p = x`` where ``p`` is an iterator, or a pointer of which nobody knows to what."""
     kind, owner = declared_type(run, pointer, frame)[0], frame.owner_of(text(pointer))
+    before = run.evaluate(pointer, frame)
+    shared = "shared_ptr" in owner.types.get(text(pointer), "") if owner is not None else False
+    if any(run.methods_of(atom, "operator*") for atom in before) or (shared and is_plain(value)):
+        through(run, pointer, frame)
     if (
         owner is None
         and is_plain(value)
@@ -219,9 +223,22 @@ def _through_pointer(run: Machine, pointer: Node, value: Value, frame: Frame) ->
         return
     if owner.function is not None and any(p.name == text(pointer) for p in owner.function.parameters):
         return
-    before = run.evaluate(pointer, frame)
     if is_plain(before) and is_plain(value) and set(before) != set(value):
         through(run, pointer, frame)
+    elif not all(isinstance(atom, Obj) for atom in (*before, *value)):
+        _element_written(run, pointer, frame)
+
+
+def _element_written(run: Machine, iterator: Node, frame: Frame) -> None:
+    """Forget what the containers hold that an iterator was made of: one of their elements is written."""
+    owner = frame.owner_of(text(iterator))
+    initial = owner.initial.get(text(iterator)) if owner is not None else None
+    if owner is None or initial is None:
+        return
+    for each in walk(initial):
+        held = run.evaluate(each, owner) if each.type == "identifier" else BOTTOM
+        if is_plain(held):
+            assign(run, each, join(held, unknown("what is written to an element")), owner)
 
 
 def _assign_name(run: Machine, target: Node, value: Value, frame: Frame) -> None:
@@ -266,6 +283,11 @@ def _writes_through(field: Field, value: Value) -> bool:
 
 def _assign_field(run: Machine, node: Node, value: Value, frame: Frame) -> None:
     owners = run.evaluate(field_of(node, "argument"), frame)
+    operator = text(field_of(node, "operator"))
+    if "*" in operator or node.has_error:
+        through(run, node, frame)
+    if operator == "->" and any(run.methods_of(atom, "operator->") for atom in owners):
+        owners = run.calls.pointed_to(run, owners, "operator->", node, frame)
     name = text(field_of(node, "field")).rpartition("::")[2]
     objects = [atom for atom in owners if isinstance(atom, Obj)]
     if is_plain(value) and re.search(r"->second\.", text(node)) and not objects:
@@ -302,6 +324,8 @@ def _write_element(
             found.append((with_entry(atom, keys[0], value),))
         elif isinstance(atom, Seq):
             found.append((_with_item(atom, keys[0] if keys else BOTTOM, value),))
+        elif isinstance(atom, Text | Param):
+            found.append(unknown("a text of which a letter is written"))
         else:
             found.append((atom,))
     if found:

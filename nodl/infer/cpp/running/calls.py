@@ -96,6 +96,8 @@ def _cast(run: Machine, name: str, site: CallSite) -> Value:
         if name == "std::ref":
             assign(run, site.given[0], later, site.frame)
         return later
+    if name == "std::move" and is_plain(value):
+        assign(run, site.given[0], join(value, unknown("what is left after std::move")), site.frame)
     return cast(run, site.types[0], value) if name == "static_cast" else value
 
 

@@ -20,7 +20,7 @@ from nodl.infer.cpp.running.foreign import unmodelled
 from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
 from nodl.infer.cpp.running.overloads import candidates
 from nodl.infer.cpp.running.references import as_referred_to
-from nodl.infer.cpp.running.static_types import check_hidden, seen_type, written_as
+from nodl.infer.cpp.running.static_types import check_hidden, seen_class, seen_type, written_as
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     END,
@@ -44,7 +44,7 @@ SEQUENCES = frozenset({
     "vector", "std::multiset", "std::queue", "std::stack",
 })  # fmt: skip
 ORDERED = frozenset({"std::set", "std::unordered_set", "set", "std::multiset", "std::priority_queue"})
-MAPS = frozenset({"std::map", "std::unordered_map", "std::multimap", "map"})
+MAPS = frozenset({"std::map", "std::unordered_map", "map"})
 _TEXTS = frozenset({
     "std::string", "string", "std::string_view", "std::stringstream", "std::ostringstream", "std::filesystem::path",
 })  # fmt: skip
@@ -98,7 +98,10 @@ def initial_value(run: Machine, value: Node, frame: Frame, reference: bool = Fal
         return found
     if any(isinstance(atom, Seq | Map) for atom in found):
         return elements_copied(run, seen_type(run, value, frame), found, value, frame)
-    return copied(run, found, value, frame)
+    cls = (
+        seen_class(run, value, frame) if text(value).startswith("*") else None
+    )  # behind a pointer lies an object
+    return copied(run, found, value, frame, cls)
 
 
 def _gives_pointer(run: Machine, value: Node) -> bool:
@@ -329,6 +332,8 @@ def construct(
     cls = run.class_of(kind, frame)
     if cls is None and kind.name in SEQUENCES | MAPS and not arguments:
         run.handle(node, frame)
+        if heap:
+            return unknown("what several pointers may show")
         return (Seq(()),) if kind.name in SEQUENCES else (Map(()),)
     if cls is None:
         kind = _in_used_namespace(run, kind, frame)
@@ -416,9 +421,10 @@ def construct_class(
         return
     this.bindings[cls] = run.names.bindings(cls, kind)
     own = run.names.find_methods(cls, cls.name) if cls.name in run.names.methods[cls] else []
-    fitting = candidates(own, arguments, written=partial(written_as, run, node, frame))
-    if len(fitting) > 1:
-        run.gap(node, frame, f"which constructor of {cls.name} a text is for is not known")
+    fitting = candidates(own, arguments, partial(written_as, run, node, frame))
+    is_of_text = any(isinstance(atom, Text) for value in arguments for atom in value)
+    if len(fitting) > 1 and (is_of_text or any(run.makes_interfaces(f) or _holds_text(f) for f in fitting)):
+        run.gap(node, frame, f"which constructor of {cls.name} is meant here is not known")
     constructor = next(iter(fitting), None)
     path = (*frame.path[-24:], (frame.file.file, node.start_byte))
     inner = run.frame(
@@ -458,6 +464,11 @@ def construct_class(
         run.active.pop()
     elif arguments and not this.data["members"] and not cls.inherits_constructors:
         _made_unseen(run, cls, arguments, node, frame)
+
+
+def _holds_text(constructor: Function) -> bool:
+    """Return whether there is a text behind the parameters of a constructor."""
+    return '"' in text(constructor.node).partition(")")[2]
 
 
 def _made_unseen(run: Machine, cls: Class, arguments: Sequence[Value], node: Node, frame: Frame) -> None:
@@ -619,6 +630,8 @@ def _class_of_parameter(
     if inner.function is not None and not {*re.findall(r"\w+", parameter.type)}.isdisjoint(
         inner.function.templates
     ):
-        return None  # may be a pointer
+        body = text(inner.function.body)
+        is_object = re.search(rf"\b{parameter.name}\s*\.\s*\w", body) is not None
+        return next((atom.cls for atom in value if isinstance(atom, Obj)), None) if is_object else None
     kind = run.type_of(parameter.type, inner)
     return run.held_class(kind, inner)

@@ -323,7 +323,7 @@ def binary(run: Machine, node: Node, frame: Frame) -> Value:
         return _streamed(run, left_node, left, right_node, right, frame)
     if operator == "+" and (has_text(left) or has_text(right)):
         return added(left, right)
-    if operator == "/" and (has_text(left) or has_text(right)):
+    if operator == "/" and any(isinstance(atom, Text) for atom in (*left, *right)):
         return concatenated(left, literal("/"), right)
     if len(left) == 1 and len(right) == 1:
         return computed(operator, settled(run, left)[0], settled(run, right)[0])
@@ -444,7 +444,8 @@ def update(run: Machine, node: Node, frame: Frame) -> Value:
     """Evaluate ``++x`` or ``x--``; an ``x`` that was not one known integer becomes unknown."""
     argument = field_of(node, "argument")
     before = run.evaluate(argument, frame)
-    own = by_operator(run, "++" if "++" in text(node) else "--", before, [], node, frame)
+    of_postfix = [] if text(node).startswith(("++", "--")) else [(0,)]  # which it takes to be told apart
+    own = by_operator(run, "++" if "++" in text(node) else "--", before, of_postfix, node, frame)
     if own is not None:
         return own
     step = 1 if "++" in text(node) else -1

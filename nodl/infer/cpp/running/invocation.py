@@ -14,6 +14,7 @@ from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.constructors import as_parameter, bind_parameters
 from nodl.infer.cpp.running.contents import copied, handed_over
+from nodl.infer.cpp.running.effects import effects_of, looked_at
 from nodl.infer.cpp.running.left_out import leave_out
 from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
 from nodl.infer.cpp.running.memory import MEMORY_DEPTH, CallOutcome, Changes
@@ -160,10 +161,27 @@ def call_functions(
     special = _one_of_special(run, functions, node, frame)
     if special is not None:
         return special
-    fitting = candidates(functions, values, run.makes_interfaces, partial(written_as, run, node, frame))
+    fitting = candidates(functions, values, partial(written_as, run, node, frame))
     if not fitting:
         return unknown_call(run, functions[0].name, values, node, [], frame)
+    if len(fitting) > MAX_OVERLOADS and not any(map(run.makes_interfaces, fitting)):
+        return _one_of_many(run, fitting, node, frame)
     return _any_of(run, [partial(invoke, run, each, None, values, node, frame, types) for each in fitting])
+
+
+MAX_OVERLOADS = 3
+
+
+def _one_of_many(run: Machine, functions: Sequence[Function], node: Node, frame: Frame) -> Value:
+    """Return an unknown for one of many overloads, nobody knows which; a gap if they change what matters."""
+    run.handle(node, frame)
+    run.called.update(functions)
+    every = [effects_of(run, each).written for each in functions]
+    changed = frozenset[str]().union(*(each.assigned | each.changed | each.seen for each in every))
+    name = functions[0].name
+    if not looked_at(run).isdisjoint(changed):
+        run.gap(node, frame, f"which of {len(functions)} functions {name}() is called is not known")
+    return unknown(f"the result of {name}()")
 
 
 def _in_place(
@@ -231,9 +249,11 @@ def call_methods(
     special = _one_of_special(run, methods, node, frame)
     if special is not None:
         return special
-    fitting = candidates(methods, values, run.makes_interfaces, partial(written_as, run, node, frame))
+    fitting = candidates(methods, values, partial(written_as, run, node, frame))
     if not fitting:
         return unknown_call(run, f"{methods[0].owner}::{methods[0].name}", values, node, [], frame)
+    if len(fitting) > MAX_OVERLOADS and not any(map(run.makes_interfaces, fitting)):
+        return _one_of_many(run, fitting, node, frame)
     if this_object is not None and not exactly and len(values) < len(fitting[0].parameters):
         _check_defaults(run, fitting[0], this_object, len(values), node, frame)
     calls = [

@@ -86,6 +86,8 @@ class Calls(Protocol):
         self, run: Machine, callee: Value, values: Sequence[Value], node: Node, frame: Frame
     ) -> Value: ...
 
+    def pointed_to(self, run: Machine, value: Value, operator: str, node: Node, frame: Frame) -> Value: ...
+
     def call_lambda(
         self, run: Machine, atom: Lambda, values: Sequence[Value], node: Node, frame: Frame
     ) -> Value: ...
@@ -148,8 +150,10 @@ class Machine:
         handler = EXPRESSIONS.get(node.type)
         if handler is None:
             what = f"the C++ {node.type.replace('_', ' ')}"
-            if node.type in _CALLS_ALL and self.subtree_matters(node):
-                self.gap(node, frame, f"{what} is not followed; it may make interfaces")
+            if node.type in _CALLS_ALL and (self.subtree_matters(node) or b"=" in (node.text or b"")):
+                self.gap(
+                    node, frame, f"{what} is not followed; it may make interfaces, or write to their names"
+                )
             return unknown(what)
         return handler(self, node, frame)
 

@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Sequence
 
 from nodl.infer.cpp.reading.declarations import Function, FunctionParameter
-from nodl.infer.cpp.running.values import Bound, Lambda, Map, Obj, Seq, Text, Unknown, Value
+from nodl.infer.cpp.running.values import Bound, Lambda, Map, Obj, Seq, Text, Value
 
 
 def chosen(functions: Sequence[Function], arguments: Sequence[Value]) -> Function | None:
@@ -15,28 +15,19 @@ def chosen(functions: Sequence[Function], arguments: Sequence[Value]) -> Functio
     return found[0] if found else None
 
 
-MAX_OVERLOADS = 3
-
-
 def candidates(
     functions: Sequence[Function],
     arguments: Sequence[Value],
-    makes: Callable[[Function], bool] = lambda function: False,
     written: Callable[[], Sequence[str]] = tuple,
 ) -> Sequence[Function]:
-    """Find the overloads that fit best: several where a text may be meant in several ways, or where one
-    that ``makes`` interfaces may be meant by an argument that is not known. ``written``: see ``written_as``."""
+    """Find the overloads that fit best: all of them where their looks do not tell them apart, as ``f() const`` and
+    ``f()``. ``written``: see ``written_as``."""
     fitting = [each for each in functions if _takes(each, len(arguments))]
     if len(fitting) <= 1:
         return fitting or (functions if len(functions) == 1 else ())
     kinds = [*written(), *[""] * len(arguments)]
     scores = [sum(map(_likeness, each.parameters, arguments, kinds)) for each in fitting]
-    best = [each for each, score in zip(fitting, scores, strict=True) if score == max(scores)]
-    atoms = [atom for value in arguments for atom in value or (Unknown("nothing"),)]
-    if any(isinstance(atom, Text) for atom in atoms) and len(best) <= MAX_OVERLOADS:
-        return best
-    is_open = any(isinstance(atom, Unknown) for atom in atoms)
-    return best if is_open and any(map(makes, best)) else best[:1]
+    return [each for each, score in zip(fitting, scores, strict=True) if score == max(scores)]
 
 
 def _of_text(kind: str, written: str, is_generic: bool) -> float:

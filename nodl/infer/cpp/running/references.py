@@ -7,6 +7,7 @@ to is not known.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 from nodl.infer.cpp.reading.writes import writes_of
@@ -28,6 +29,10 @@ def as_referred_to(value: Value) -> Value:
 def bind_reference(run: Machine, name: str, kind: str, initial: Node | None, frame: Frame) -> None:
     """Bind ``T & name = initial`` or ``T * name = &initial``, which was declared and has its value."""
     target = unwrapped(initial)
+    if _VIEW.search(kind) and target is not None and target.type in ("identifier", "field_expression"):
+        last = field_of(target, "field") or target
+        if frame.function is not None and text(last) in writes_of(frame.function.node):
+            run.store.set((frame, name), (Unknown(f"what a view of {text(target)} shows later"),))
     if (
         target is None
         or not kind.endswith(("&", "*"))
@@ -43,6 +48,9 @@ def bind_reference(run: Machine, name: str, kind: str, initial: Node | None, fra
         not in text(initial.parent.parent if initial is not None and initial.parent else None).split("=")[0]
     ):
         frame.aliases[name] = None
+
+
+_VIEW = re.compile(r"\b(?:string_view|span)\b")
 
 
 def _is_fixed(target: Node) -> bool:

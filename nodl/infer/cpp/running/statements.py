@@ -24,7 +24,7 @@ from nodl.infer.cpp.running.machine import (
     statement,
 )
 from nodl.infer.cpp.running.memory import Changes
-from nodl.infer.cpp.running.references import bind_reference, elements_written
+from nodl.infer.cpp.running.references import bind_reference, elements_written, is_plain
 from nodl.infer.cpp.running.static_types import element_type, seen_type
 from nodl.infer.cpp.running.values import (
     BOTTOM,
@@ -291,6 +291,10 @@ def declaration(run: Machine, node: Node, frame: Frame) -> int:
     if structured is not None:
         names = [text(each) for each in children(structured[0]) if each.type == "identifier"]
         bind_names(run, names, run.evaluate(structured[1], frame), frame)
+        if "&" in text(node).partition("[")[0] and "const" not in text(node).partition("[")[0]:
+            frame.aliases.update(
+                {name: None for name in names if is_plain(run.store.get((frame, name)) or BOTTOM)}
+            )
         return NEXT
     path = frame.path
     for name, value, pointer, written in declared_names(node):
@@ -419,6 +423,8 @@ def for_range_loop(run: Machine, node: Node, frame: Frame) -> int:
     right, body = field_of(node, "right"), field_of(node, "body")
     subject = run.evaluate(right, frame)
     items, exact = iterated(run, subject)
+    if seen_type(run, right, frame).last == "map":
+        items = _by_key(items)
     declarator, written = field_of(node, "declarator"), type_text(node)
     parts = list(walk(declarator)) if declarator is not None else []
     names = [text(part) for part in parts if part.type == "identifier"]
@@ -443,6 +449,17 @@ def for_range_loop(run: Machine, node: Node, frame: Frame) -> int:
     ):
         assign(run, right, unknown("what a loop writes to the elements"), frame)
     return outcome
+
+
+def _by_key(entries: Sequence[Value]) -> list[Value]:
+    """Return the entries of a map in the order of their keys, if these are known."""
+    keys = [atom.items[0] for entry in entries for atom in entry if isinstance(atom, Group)]
+    known = [key[0] if type(key[0]) is int else plain(key[0]) for key in keys if len(key) == 1]
+    kind = int if any(type(each) is int for each in known) else str
+    in_order = {key: entry for key, entry in zip(known, entries, strict=False) if type(key) is kind}
+    if len(in_order) != len(entries):
+        return list(entries)
+    return [in_order[key] for key in sorted(in_order)]
 
 
 _VARIABLES = ("identifier", "field_expression", "subscript_expression", "pointer_expression")

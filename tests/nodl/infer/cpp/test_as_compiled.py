@@ -1,0 +1,147 @@
+"""Programs that were compiled and run: each name that a run made is listed, or there is a gap or an open name.
+
+``KNOWN`` are the neighbours that must stay known: what is listed there is exactly what the run made.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.nodl.infer.cpp.workspace import gaps, in_class, infer, names
+
+pytest.importorskip("tree_sitter_cpp", reason="the extra cpp is not installed")
+
+PUB = "void pub(std::string t) { create_publisher<std_msgs::msg::String>(t, 1); }\n"
+CONFIG = 'struct C { std::string t = "plain"; };\n'
+
+# what the constructor does, members and classes before it, what the run made
+COVERED: dict[str, tuple[str, str, str, set[str]]] = {
+    "a number is no whole number alone: overloads that look alike may all be meant": (
+        "long l = 2; pub(k(l)); pub(k(2));",
+        'std::string k(long) { return "long_"; } std::string k(int) { return "int_"; }', "", {"long_", "int_"},
+    ),
+    "an object or its address": (
+        "C c; pub(k(&c)); pub(k(c));", "",
+        CONFIG + 'std::string k(C *) { return "pointer"; } std::string k(const C &) { return "object"; }',
+        {"pointer", "object"},
+    ),
+    "one of many overloads": (
+        "pub(k({1, 2})); pub(k(nullptr));", "",
+        'std::string k(std::vector<int>) { return "v"; } std::string k(std::initializer_list<int>) { return "i"; }'
+        'std::string k(std::list<int>, int = 0) { return "l"; } std::string k(int *) { return "p"; }',
+        {"i", "p"},
+    ),
+    "an element that std::find gives is written": (
+        'std::vector<std::string> v{"a", "b"}; auto it = std::find(v.begin(), v.end(), "b"); *it = "c";'
+        "for (auto & s : v) pub(s);",
+        "", "", {"a", "c"},
+    ),
+    "elements are written in a loop over iterators": (
+        'std::vector<std::string> v{"a"}; for (auto it = v.begin(); it != v.end(); ++it) *it += "_x";'
+        "for (auto & s : v) pub(s);",
+        "", "", {"a_x"},
+    ),
+    "a member is written through a pointer to members": (
+        'std::string Demo::* p = &Demo::m_; this->*p = "set"; pub(m_);', 'std::string m_ = "plain";', "", {"set"},
+    ),
+    "a pointer shares what another one owns": (
+        'auto c = std::make_shared<C>(); std::shared_ptr<std::string> part(c, &c->t); *part = "set"; pub(c->t);',
+        "", CONFIG, {"set"},
+    ),
+    "two pointers show one list": (
+        'auto a = std::make_shared<std::vector<std::string>>(); auto b = a; a->push_back("x");'
+        "for (auto & s : *b) pub(s);",
+        "", "", {"x"},
+    ),
+    "a view shows what its text holds later": (
+        'std::string s = "before"; std::string_view v = s; s = "afterx"; pub(std::string(v));', "", "", {"afterx"},
+    ),
+    "a list that was moved is empty": (
+        'std::vector<std::string> v{"a"}; auto w = std::move(v); pub("n" + std::to_string(v.size()));',
+        "", "", {"n0"},
+    ),
+    "a letter of a text is written": ('std::string s = "bye"; s[0] = \'B\'; pub(s);', "", "", {"Bye"}),
+    "a multimap has a key twice": (
+        'std::multimap<std::string, std::string> m; m.insert({"k", "a"}); m.insert({"k", "b"});'
+        "for (auto & e : m) pub(e.second);",
+        "", "", {"a", "b"},
+    ),
+    "a fold expression writes": (
+        'pub(joined(std::string("x"), std::string("y")));', "",
+        "template <typename... A> std::string joined(A... a) { std::string s; ((s += a), ...); return s; }", {"xy"},
+    ),
+    "names of a structured binding refer to members": (
+        'C c; auto & [t] = c; t = "set"; pub(c.t);', "", CONFIG, {"set"},
+    ),
+    "the program sets a parameter itself": (
+        'declare_parameter<std::string>("a", "first"); set_parameter(rclcpp::Parameter("a", "second"));'
+        'set_parameter({"a", "third"}); pub(get_parameter("a").as_string());',
+        "", "", {"third"},
+    ),
+    "a text that a template writes by its own pointer operator": (
+        'P p; p->t = "set"; pub(p->t); (*p).t = "again"; pub(p->t);', "",
+        CONFIG + "struct P { C c; C * operator->() { return &c; } C & operator*() { return c; } };",
+        {"set", "again"},
+    ),
+}  # fmt: skip
+
+KNOWN: dict[str, tuple[str, str, str, set[str]]] = {
+    "overloads that looks tell apart": (
+        'pub(k(1)); pub(k(std::string("x"))); pub(k(true));',
+        'std::string k(int) { return "i"; } std::string k(const std::string &) { return "s"; }'
+        'std::string k(bool) { return "b"; }',
+        "", {"i", "s", "b"},
+    ),
+    "a getter in two forms": (
+        "pub(name()); const Demo & c = *this; pub(c.name());",
+        'const std::string & name() const { return n_; } std::string & name() { return n_; } std::string n_ = "n";',
+        "", {"n"},
+    ),
+    "of an object behind a pointer a variable has a copy": (
+        'auto c = std::make_shared<C>(); auto copy = *c; c->t = "set"; pub(copy.t + "_copy"); pub(c->t);',
+        "", CONFIG, {"plain_copy", "set"},
+    ),
+    "a template gets a copy of the object behind a pointer": (
+        "auto c = std::make_shared<C>(); f(*c); pub(c->t);", "",
+        CONFIG + 'template <typename T> void f(T c) { c.t = "lost"; }', {"plain"},
+    ),
+    "of x++ and ++x each has its operator": (
+        'K k; k++; pub("a" + std::to_string(k.n)); ++k; pub("b" + std::to_string(k.n));', "",
+        "struct K { int n = 0; K & operator++() { n += 2; return *this; }"
+        " K operator++(int) { n += 3; return *this; } };",
+        {"a3", "b5"},
+    ),
+    "a map goes by its keys": (
+        'std::map<int, std::string> m{{3, "three"}, {1, "one"}}; std::string j;'
+        "for (auto & e : m) j += e.second; pub(j);",
+        "", "", {"onethree"},
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("title", COVERED)
+def test_what_the_run_made_is_listed_or_a_gap(title: str, tmp_path: Path) -> None:
+    body, members, before, made = COVERED[title]
+    system = infer(tmp_path, in_class(body, PUB + members, before))
+    listed = [re.compile(re.escape(name).replace(r"\?", ".*")) for name in names(system)]
+    missing = {name for name in made if not any(each.fullmatch(name) for each in listed)}
+    assert not missing or gaps(system)
+
+
+@pytest.mark.parametrize("title", KNOWN)
+def test_what_the_run_made_is_known(title: str, tmp_path: Path) -> None:
+    body, members, before, made = KNOWN[title]
+    system = infer(tmp_path, in_class(body, PUB + members, before))
+    assert not gaps(system)
+    assert set(names(system)) == made
+
+
+def test_a_whole_number_is_divided_and_is_no_path(tmp_path: Path) -> None:
+    body = 'int id = declare_parameter("id", 4); pub("h" + std::to_string(id / 2));'
+    body += 'std::filesystem::path p("dir"); pub((p / "x").string());'
+    listed = names(infer(tmp_path, in_class(body, PUB)))
+    assert "hparam:id/2" not in listed
+    assert "dir/x" in listed
