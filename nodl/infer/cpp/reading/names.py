@@ -142,10 +142,14 @@ class Names:
         return found
 
     @cached_property
-    def pointers_to_plain(self) -> frozenset[str]:
-        """The names of members that are pointers or references to texts, numbers or containers."""
-        fields = [each for listed in self.classes.values() for cls in listed for each in cls.fields.values()]
-        return frozenset(each.name for each in fields if each.pointer and _PLAIN.fullmatch(each.type))
+    def pointers_to_plain(self) -> dict[str, set[str]]:
+        """The names of members that are pointers or references to texts, numbers or containers, with their classes."""
+        found: dict[str, set[str]] = {}
+        for cls in (each for listed in self.classes.values() for each in listed):
+            for field in cls.fields.values():
+                if field.pointer and _PLAIN.fullmatch(field.type):
+                    found.setdefault(field.name, set()).add(cls.name)
+        return found
 
     @_once
     def spoken_of(self, function: Function) -> frozenset[str]:

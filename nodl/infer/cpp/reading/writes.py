@@ -44,11 +44,12 @@ class VariableWrites(NamedTuple):
 
 
 _REPLACES = frozenset({"reset", "swap", "emplace", "assign", "store", "exchange", "release", "tie"})
-_FILLS = frozenset({
+FILLS = frozenset({
     "push_back", "emplace_back", "push_front", "emplace_front", "insert", "insert_or_assign", "emplace", "try_emplace",
     "erase", "clear", "resize", "append", "pop_back", "pop_front", "pop", "push", "assign", "fill", "sort", "merge",
     "splice", "remove", "remove_if", "unique", "reverse", "replace", "swap", "reset",
 })  # fmt: skip
+"""Methods that change what their text or container holds."""
 _READS_ARGUMENTS = re.compile(r"RCLCPP_\w+|lookupTransform|canTransform|publish|get_logger")
 
 
@@ -74,7 +75,7 @@ def written_by(node: Node) -> VariableWrites:
             last = re.split(r"::|\.|->", callee_name(callee))[-1] if callee is not None else ""
             receivers = _receivers(callee)
             seen |= receivers
-            changed |= receivers if last in _FILLS else set()
+            changed |= receivers if last in FILLS else set()
             assigned |= words if last in _REPLACES else set()
             if not _READS_ARGUMENTS.fullmatch(last):
                 passed += _passed(last, field_of(each, "arguments"))
@@ -87,13 +88,29 @@ def written_by(node: Node) -> VariableWrites:
             changed |= words
             if each.type == "init_declarator":
                 aliases.append((_in(field_of(each, "declarator")), _iterated(field_of(each, "value"))))
-            lasting |= writes_of(each) if each.type == "lambda_expression" else set()
+            lasting |= (
+                writes_of(each) if each.type == "lambda_expression" and not _runs_at_once(each) else set()
+            )
     for names, behind in aliases:
         assigned |= behind if names & assigned else set()
         changed |= behind if names & changed else set()
     return VariableWrites(
         frozenset(assigned), frozenset(changed), frozenset(seen), tuple(passed), frozenset(lasting)
     )
+
+
+_ALGORITHM = re.compile(
+    r"std::(?:ranges::)?(?:for_each(?:_n)?|transform|(?:stable_|partial_)?sort|(?:find|count|remove|replace|copy)_if|"
+    r"(?:any|all|none)_of|accumulate|generate(?:_n)?|(?:stable_)?partition|(?:min|max|minmax)_element|"
+    r"(?:lower|upper)_bound|unique|visit|invoke|apply)"
+)
+
+
+def _runs_at_once(closure: Node) -> bool:
+    """Return whether a closure is an argument of an algorithm of the standard library, which keeps none."""
+    call = closure.parent.parent if closure.parent is not None else None
+    callee = field_of(call, "function") if call is not None and call.type == "call_expression" else None
+    return callee is not None and _ALGORITHM.fullmatch(callee_name(callee)) is not None
 
 
 def _iterated(value: Node | None) -> set[str]:

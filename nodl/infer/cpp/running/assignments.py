@@ -13,9 +13,12 @@ from nodl.infer.cpp.running.contents import copied, elements_copied, overwrite
 from nodl.infer.cpp.running.machine import Frame, Machine, expression
 from nodl.infer.cpp.running.references import is_plain, through
 from nodl.infer.cpp.running.static_types import (
+    TEXTS,
+    WHOLE_NUMBERS,
     current_object,
     declared_type,
     is_pointer,
+    points_to_plain,
     seen_class,
     seen_type,
     static_by_name,
@@ -211,7 +214,11 @@ def _through_pointer(run: Machine, pointer: Node, value: Value, frame: Frame) ->
     shared = "shared_ptr" in owner.types.get(text(pointer), "") if owner is not None else False
     if any(run.methods_of(atom, "operator*") for atom in before) or (shared and is_plain(value)):
         through(run, pointer, frame)
-    if (
+    if points_to_plain(run, pointer, frame, TEXTS) or (
+        is_plain(value) and points_to_plain(run, pointer, frame, WHOLE_NUMBERS)
+    ):
+        through(run, pointer, frame)
+    elif (
         owner is None
         and is_plain(value)
         and kind.name

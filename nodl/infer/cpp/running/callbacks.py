@@ -117,7 +117,7 @@ def _run(run: Machine, atom: object, frame: Frame) -> None:
 
 
 def _matters(rounds: _Rounds, atom: object) -> bool:
-    """Return whether it may make an interface, give away a node, or change what a callback that runs has read."""
+    """Return whether it may make an interface or a node, give one away, or change what a callback has read."""
     if not isinstance(atom, Lambda | Bound):
         return False
     effects = effects_of(rounds.run, atom.function if isinstance(atom, Bound) else atom)
@@ -125,6 +125,7 @@ def _matters(rounds: _Rounds, atom: object) -> bool:
     return (
         _makes(rounds.run, atom)
         or effects.leaving.gives_node
+        or effects.leaving.makes_node
         or not rounds.names_read.isdisjoint(written.assigned | written.changed | written.seen)
     )
 

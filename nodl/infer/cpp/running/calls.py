@@ -20,21 +20,24 @@ from nodl.infer.cpp.libraries import (
 from nodl.infer.cpp.reading.declarations import Class, Function
 from nodl.infer.cpp.reading.names import STANDARD_TYPES
 from nodl.infer.cpp.reading.type_names import NO_TYPE
+from nodl.infer.cpp.reading.writes import FILLS
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.constructors import cast, construct, is_plain_type, made
 from nodl.infer.cpp.running.containers import CONTAINER_METHODS, container_call, is_standard
 from nodl.infer.cpp.running.contents import handed_over
 from nodl.infer.cpp.running.invocation import CallSite, call_functions, call_values, pointed_to
 from nodl.infer.cpp.running.machine import Frame, Machine, expression
-from nodl.infer.cpp.running.references import is_plain
+from nodl.infer.cpp.running.references import is_plain, through
 from nodl.infer.cpp.running.standard import CASTS, STANDARD, as_algorithm, may_write, writes_elements
 from nodl.infer.cpp.running.static_types import (
     GIVES_INNER,
+    TEXTS,
     class_around,
     class_of_member,
     class_of_method,
     current_object,
     declared_type,
+    points_to_plain,
 )
 from nodl.infer.cpp.running.unknown_calls import changed_by_standard, unknown_call, without_source
 from nodl.infer.cpp.running.values import BOTTOM, Bound, Lambda, Obj, Unknown, Value, join, unknown
@@ -254,6 +257,8 @@ def method_call(run: Machine, site: CallSite) -> Value:
             found_at = (frame.file.file, site.node.start_byte)
             run.unset[found_at] = (run.place(site.node, frame), text(subject)[:40], name)
         return BOTTOM
+    if name in FILLS and points_to_plain(run, subject, frame, TEXTS):
+        through(run, subject, frame)
     found: list[Value] = []
     before = run.store.mark()
     alternatives = []

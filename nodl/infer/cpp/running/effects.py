@@ -15,20 +15,25 @@ from nodl.infer.cpp.reading.writes import VariableWrites, written_by
 from nodl.infer.cpp.running.foreign import Leaving, leaving
 from nodl.infer.cpp.running.memory import Cell
 from nodl.infer.cpp.running.values import Lambda
-from nodl.infer.cpp.syntax import field_of, walk, words_in
+from nodl.infer.cpp.syntax import Node, callee_name, field_of, text, walk, words_in
 
 if TYPE_CHECKING:
     from nodl.infer.cpp.running.machine import Machine
 
 _BEYOND_VARIABLES = re.compile(
     r"\w*declare\w*|set_\w*parameter\w*|NodeOptions|arguments|init|thread|jthread|async|bind|spin\w*|"
-    r"execute_\w+|handle_(?:message|request|response|loaned_message)|create_\w*timer|add_\w*callback\w*|\w+Listener"
+    r"execute_\w+|handle_(?:message|request|response|loaned_message)|create_\w*timer|add_\w*callback\w*|\w+Listener|"
+    r"_?exit|quick_exit|_Exit|abort|terminate"
 )
-"""Functions that do more than change variables: they declare parameters, keep closures or run callbacks."""
+"""Functions that do more than change variables: they declare parameters, keep closures, run callbacks or end it all."""
 _PLAIN = re.compile(
     r"string|vector|double|float|bool|int|size_t|char|msg::|Msg|Eigen|Time|Duration|unsigned|long|Point|Pose"
 )
 _AS_A_VALUE, _CHANGED, _REPLACED = 0, 1, 2
+
+
+_PLAIN_VALUES = frozenset({"Parameter", "ParameterValue", "Node", "LifecycleNode"})
+"""Classes of rclcpp whose name alone does nothing; whether a node is made is asked of ``leaving``."""
 
 
 class CallEffects:
@@ -54,19 +59,22 @@ class CallEffects:
 
     @cached_property
     def leaving(self) -> Leaving:
-        """How it leaves the program: it gives a node to unknown code, or makes an object of an unknown class."""
+        """How it leaves the program, with everything that it may call."""
         every = [_leaving(self._run, each) for each in self.functions]
         if isinstance(self._of, Lambda):
             outer = self._of.frame.function
             every.append(
-                leaving(self._run.names, outer, self._of.node) if outer is not None else Leaving(True, True)
+                leaving(self._run.names, outer, self._of.node)
+                if outer is not None
+                else Leaving(True, True, True)
             )
-        return Leaving(any(each.gives_node for each in every), any(each.makes_unknown for each in every))
+        return Leaving(*map(any, zip(*every, strict=True))) if every else Leaving()
 
     @cached_property
     def only_variables(self) -> bool:
         """Whether all that it does is to change variables."""
-        modelled = {name.rpartition("::")[2] for name in LIBRARY_CLASSES} - self._run.names.classes.keys()
+        modelled = {name.rpartition("::")[2] for name in LIBRARY_CLASSES} - _PLAIN_VALUES
+        modelled -= self._run.names.classes.keys()
         return (
             self.words.isdisjoint(modelled)
             and not any(map(_BEYOND_VARIABLES.fullmatch, self.words))
@@ -200,15 +208,65 @@ def _may_lead(names: Names) -> frozenset[Function]:
 
 
 def _not_local(function: Function) -> frozenset[str]:
-    """Return the words of a function but for those that are its own variables alone."""
+    """Return the variables of others whose value a function may use: not its own, nor those that it only replaces."""
     own = {each.name for each in function.parameters}
-    for each in walk(function.node):
+    found: set[str] = set()
+    waiting = [function.node]
+    while waiting:
+        each = waiting.pop()
         if each.type in ("declaration", "for_range_loop", "parameter_declaration"):
-            for declarator in each.children_by_field_name("declarator"):
-                inner = declarator
-                while inner.type in ("init_declarator", "reference_declarator", "pointer_declarator"):
-                    inner = field_of(inner, "declarator") or inner.named_children[-1]
-                if inner.type == "identifier":
-                    own.add((inner.text or b"").decode("utf-8", "replace"))
+            own |= _declared(each)
+        if each.type in _NAMES:
+            found.add(text(each))
+        callee = field_of(each, "function") if each.type == "call_expression" else None
+        if callee is not None and _READS_ALONE.fullmatch(callee_name(callee)):
+            continue
+        replaced = _replaced(each)
+        waiting += [field for field in each.named_children if replaced is None or field.id != replaced.id]
     source = (function.node.text or b"").decode("utf-8", "replace")
-    return (function.words - own) | frozenset(_MEMBER.findall(source))
+    return frozenset(found - own) | (found & frozenset(_MEMBER.findall(source)))
+
+
+_NAMES = ("identifier", "field_identifier", "type_identifier", "namespace_identifier")
+_READS_ALONE = re.compile(r"RCLCPP_\w+|RCUTILS_\w+|.*(?:\.|->)publish")
+
+
+def _replaced(node: Node) -> Node | None:
+    """Return the part of a node that names a variable whose earlier value does not count: ``x`` of ``x = 1``."""
+    if node.type == "field_initializer":
+        return node.named_children[0]
+    if node.type == "assignment_expression" and text(field_of(node, "operator")) == "=":
+        target = field_of(node, "left")
+    elif node.type == "expression_statement" and node.named_children:
+        callee = field_of(node.named_children[0], "function")
+        target = (
+            callee if callee is not None and text(field_of(callee, "field")) in ("clear", "reset") else None
+        )
+        return (
+            node.named_children[0]
+            if target is not None and _is_variable(field_of(target, "argument"))
+            else None
+        )
+    else:
+        return None
+    return target if _is_variable(target) else None
+
+
+def _is_variable(target: Node | None) -> bool:
+    """Return whether it is a variable or a member of the same object."""
+    if target is not None and target.type == "field_expression":
+        target = field_of(target, "argument")
+        return target is not None and target.type == "this"
+    return target is not None and target.type == "identifier"
+
+
+def _declared(declaration: Node) -> set[str]:
+    """Return the names that a declaration gives to variables."""
+    found: set[str] = set()
+    for declarator in declaration.children_by_field_name("declarator"):
+        inner = declarator
+        while inner.type in ("init_declarator", "reference_declarator", "pointer_declarator"):
+            inner = field_of(inner, "declarator") or inner.named_children[-1]
+        if inner.type == "identifier":
+            found.add(text(inner))
+    return found

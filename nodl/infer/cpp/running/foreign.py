@@ -27,6 +27,7 @@ from nodl.infer.cpp.syntax import (
 
 _NODE = re.compile(r"(?:\w+_)?(?:[Nn]ode|nh|parent)(?:_?[Pp]tr|_handle)?_?")
 """Usual names of variables that hold a node."""
+_NODES = ("Node", "LifecycleNode")
 _GIVES_NODE = re.compile(r"(?:shared|weak)_from_this|get_node\w*|getNode\w*")
 _HANDS_ON = re.compile(r"lock|get|move|forward|c?ref|(?:static|dynamic)_pointer_cast")
 _KNOWN = re.compile(rf"(?:add|remove|get|spin)_\w+|spin|{_HANDS_ON.pattern}")
@@ -55,25 +56,27 @@ def unmodelled(names: Names, name: str, file: FileIndex, deliberate: bool) -> st
 
 
 class Leaving(NamedTuple):
-    """How code leaves the program: it gives a node to unknown code, or makes an object of an unknown class."""
+    """How code leaves the program: it gives a node to unknown code, makes an object of an unknown class, or a node."""
 
     gives_node: bool = False
     makes_unknown: bool = False
+    makes_node: bool = False
 
 
 def leaving(names: Names, function: Function, part: Node | None = None) -> Leaving:
     """Return how a function, or a part of it, leaves the program."""
     is_node = _may_be_node(names, function)
-    gives_node = makes_unknown = False
+    gives_node = makes_unknown = makes_node = False
     for each in walk(part if part is not None else function.node):
         written, given = _made(each)
         if written and written not in function.templates:
             unknown, known = _class_of(names, written, function, given is not None)
             makes_unknown = makes_unknown or unknown
+            makes_node = makes_node or (written.rpartition("::")[2] in _NODES and given is not None)
             gives_node = gives_node or ((unknown or known) and _node_among(given, is_node))
         elif each.type == "call_expression" and not written:
             gives_node = gives_node or (_is_unknown_call(names, each) and _node_among(given, is_node))
-    return Leaving(gives_node, makes_unknown)
+    return Leaving(gives_node, makes_unknown, makes_node)
 
 
 def _made(node: Node) -> tuple[str, Node | None]:

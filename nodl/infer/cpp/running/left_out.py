@@ -15,6 +15,7 @@ from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.memory import Cell
 from nodl.infer.cpp.running.values import (
     BOTTOM,
+    Atom,
     Group,
     Map,
     Obj,
@@ -28,11 +29,12 @@ from nodl.infer.cpp.running.values import (
 )
 from nodl.infer.cpp.syntax import Node, children, field_of, unwrapped
 
-LEAST_SIZE = 10_000
+LEAST_SIZE = 3_000
 """Bytes of source, with everything that it may call, from which on leaving a call out is worth its look."""
 _NUMBERS = re.compile(
     r"(?:const\s+)?(?:void|bool|int|double|float|(?:std::)?size_t|unsigned|unsigned int|unsigned char|u?int\d+_t)"
 )
+_FRACTION = re.compile(r"(?:const\s+)?(?:double|float)")
 _LEADS_ELSEWHERE = re.compile(r"\b(?:auto|It)\b|[Ii]ter")
 """Parameters through which a call may write to variables that are not its arguments."""
 _VARIABLES = ("identifier", "field_expression", "subscript_expression")
@@ -46,7 +48,11 @@ def leave_out(run: Machine, function: Function, values: Sequence[Value], node: N
     """
     if run.makes_interfaces(function) or function.name == function.owner.rpartition("::")[2]:
         return False
-    if function.templates or any(_LEADS_ELSEWHERE.search(each.type) for each in function.parameters):
+    if (
+        _never_returns(function)
+        or function.templates
+        or any(_LEADS_ELSEWHERE.search(each.type) for each in function.parameters)
+    ):
         return False
     effects = effects_of(run, function)
     if effects.size < LEAST_SIZE or not effects.only_variables or not _is_unused(function, node):
@@ -70,6 +76,12 @@ def leave_out(run: Machine, function: Function, values: Sequence[Value], node: N
     return True
 
 
+def _never_returns(function: Function) -> bool:
+    """Return whether the last thing that a function does is to throw."""
+    statements = children(function.body)
+    return bool(statements) and statements[-1].type == "throw_statement"
+
+
 def _is_unused(function: Function, call: Node) -> bool:
     """Return whether nobody looks at what the call gives, or it is a number or condition."""
     is_statement = call.type != "call_expression" or (
@@ -81,14 +93,16 @@ def _is_unused(function: Function, call: Node) -> bool:
 def _changes(run: Machine, effects: CallEffects) -> dict[Cell, Value] | None:
     """Return the variables that may change, with their values; ``None`` if one of them matters and is known now."""
     store, written, matters = run.store, effects.written, looked_at(run)
-    if not matters.isdisjoint(written.lasting) or not run.names.pointers_to_plain.isdisjoint(
-        written.assigned | written.changed
+    pointers = run.names.pointers_to_plain
+    behind = pointers.keys() & (written.assigned | written.changed)
+    if not matters.isdisjoint(written.lasting) or any(
+        not pointers[name].isdisjoint(run.used_classes()) for name in behind
     ):
         return None
     if effects.kept_by is not None:
         cell, is_assigned, is_changed = effects.kept_by
         value = store.get(cell) or BOTTOM
-        if _would_change(value, is_assigned, is_changed) and _decides(value):
+        if _would_change(value, is_assigned, is_changed) and _decides(run, value):
             return None
     every = written.assigned | written.changed | written.seen
     found: dict[Cell, Value] = {}
@@ -105,7 +119,7 @@ def _changes(run: Machine, effects: CallEffects) -> dict[Cell, Value] | None:
         done.add(cell)
         value = store.get(cell) or BOTTOM
         if _would_change(value, is_assigned, is_changed):
-            if name in matters and _decides(value):
+            if name in matters and _decides(run, value):
                 effects.kept_by = (cell, is_assigned, is_changed)
                 return None
             found[cell] = value
@@ -125,9 +139,24 @@ def _would_change(value: Value, is_assigned: bool, is_changed: bool) -> bool:
     return is_assigned or not _of_objects(value, containers=not is_changed)
 
 
-def _decides(value: Value) -> bool:
+def _decides(run: Machine, value: Value) -> bool:
     """Return whether ``value`` may be part of a name or decide a condition."""
-    return may_name(value) or any(type(atom) in (bool, int) for atom in value)
+    return any(
+        type(atom) in (bool, int) or (may_name((atom,)) and not _is_of_fractions(run, atom)) for atom in value
+    )
+
+
+def _is_of_fractions(run: Machine, atom: Atom) -> bool:
+    """Return whether it is a structure of ``double`` members alone, as a point is, or a list of such."""
+    if isinstance(atom, Seq):
+        return all(_is_of_fractions(run, inner) for item in atom.items for inner in item)
+    if not isinstance(atom, Obj) or atom.cls is None or atom.node is not None:
+        return False
+    classes = run.names.ancestry(atom.cls)
+    fields = [field for each in classes for field in each.fields.values()]
+    return not any(run.names.methods.get(each) for each in classes) and all(
+        not each.pointer and _FRACTION.fullmatch(each.type) for each in fields
+    )
 
 
 def _members(run: Machine, value: Value) -> Iterator[tuple[Obj, str]]:

@@ -197,6 +197,25 @@ def seen_type(run: Machine, node: Node | None, frame: Frame) -> Type:
     return NO_TYPE
 
 
+TEXTS = re.compile(r"^(?!const\b).*\bstring\b")
+WHOLE_NUMBERS = re.compile(r"^(?!const\b).*\b(?:char|u?int\w*|bool|size_t|long)\b")
+"""Types of which a pointer or reference can be written through; fractions decide nothing."""
+
+
+def points_to_plain(run: Machine, node: Node, frame: Frame, what: re.Pattern[str]) -> bool:
+    """Return whether an expression names a member that is a pointer or reference to a type like ``what``."""
+    inner = unwrapped(node) or node
+    owner = field_of(inner, "argument") if inner.type == "field_expression" else None
+    if owner is None and (inner.type != "identifier" or frame.owner_of(text(inner)) is not None):
+        return False
+    this = current_object(frame)
+    own = this.cls if this is not None else None
+    cls = own if owner is None or owner.type == "this" else seen_class(run, owner, frame)
+    name = text(field_of(inner, "field") or inner)
+    field = next((each.fields[name] for each in run.names.ancestry(cls) if name in each.fields), None)
+    return field is not None and field.pointer and what.search(field.type) is not None
+
+
 def _of_call(run: Machine, node: Node, frame: Frame) -> Type:
     """Return the type of what is made, of an element, or of what the only function of that name gives."""
     callee = unwrapped(field_of(node, "function")) or node

@@ -120,7 +120,7 @@ def changed_by_standard(run: Machine, name: str, given: Sequence[Node], frame: F
     seen: set[str] = set()
     targets = [target for each in given for target in _variables(each)]
     if name == "std::swap":
-        if any(each.type == "subscript_expression" for each in given):
+        if any(each.type in ("subscript_expression", "pointer_expression") for each in given):
             targets = list(given)
         values = [run.evaluate(target, frame) for target in targets]
         crossed = values[::-1] if len(values) == len(given) == 2 else [join(*values)] * len(values)

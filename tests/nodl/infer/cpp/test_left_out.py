@@ -48,6 +48,35 @@ def test_a_name_that_the_call_may_change_is_never_taken_for_the_earlier_one(
     assert names(system) != ["a"] or gaps(system)
 
 
+def test_what_a_closure_writes_that_an_algorithm_runs_is_not_known_afterwards(tmp_path: Path) -> None:
+    change = 'void change() { std::for_each(list.begin(), list.end(), [this](auto &) { topic = "b"; }); }'
+    system = infer(tmp_path, with_method(change, f"change(); {MAKES}"))
+    assert names(system) != ["a"] or gaps(system)
+
+
+def test_what_a_pointer_of_an_object_may_lead_to_is_never_taken_for_unchanged(tmp_path: Path) -> None:
+    members = "int count = 0; struct Box { int * number; }; Box box;"
+    methods = f"{members} void change() {{ *box.number = 1; }}"
+    body = f"box.number = &count; change(); if (count == 1) {{ {MAKES} }}"
+    system = infer(tmp_path, with_method(methods, body))
+    assert names(system) == ["a"] or gaps(system)
+
+
+def test_nothing_follows_a_call_that_throws_at_its_end(tmp_path: Path) -> None:
+    fail = 'void fail() { sum = sum + 1; throw std::runtime_error("no"); }'
+    system = infer(
+        tmp_path, with_method(fail, f'{MAKES} fail(); create_publisher<std_msgs::msg::String>("b", 1);')
+    )
+    assert names(system) == ["a"]
+
+
+def test_a_node_that_a_callback_makes_is_found_though_it_has_no_interface(tmp_path: Path) -> None:
+    members = "std::shared_ptr<rclcpp::Node> helper;"
+    tick = 'void tick() { helper = std::make_shared<rclcpp::Node>("helper"); }'
+    system = infer(tmp_path, with_method(f"{members} {tick}", LATER))
+    assert "helper" in {node.name for node in system.nodes} or gaps(system)
+
+
 def test_what_an_argument_holds_afterwards_is_not_the_earlier_value_either(tmp_path: Path) -> None:
     body = f"change(topic); {MAKES}"
     system = infer(tmp_path, with_method('void change(std::string & x) { x = "b"; }', body))

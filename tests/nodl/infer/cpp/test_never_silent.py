@@ -656,6 +656,26 @@ BEHIND = {
         'std::string l[1] = {"a"};',
         "what p refers to is written",
     ),
+    "through a pointer that another object has": (
+        'h.p = &t; *h.p = "b";',
+        "struct H { std::string * p; }; H h;",
+        "what h.p refers to is written",
+    ),
+    "by a method, through a pointer that is a member": (
+        'p = &t; p->append("b");',
+        "std::string * p = nullptr;",
+        "what p refers to is written",
+    ),
+    "by an exchange through a pointer that is a member": (
+        'p = &t; std::string other = "b"; std::swap(*p, other);',
+        "std::string * p = nullptr;",
+        "what p refers to is written",
+    ),
+    "from a stream, through a pointer that is a member": (
+        "p = &t; std::cin >> *p;",
+        "std::string * p = nullptr;",
+        "what p refers to is written",
+    ),
 }
 
 
@@ -665,6 +685,12 @@ def test_a_text_that_is_written_behind_its_variable_is_told(
 ) -> None:
     source = in_class(f"{body} create_publisher<{S}>(t, 1);", f'std::string t = "a"; {members}')
     assert [gap.partition(":")[0] for gap in gaps(infer(tmp_path, source))] == [why]
+
+
+def test_a_text_that_a_member_only_reads_through_a_pointer_stays_known(tmp_path: Path) -> None:
+    members = 'std::string t = "a"; const std::string * p = nullptr; size_t n = 0;'
+    found = infer(tmp_path, in_class(f"p = &t; n = p->size(); create_publisher<{S}>(t, 1);", members))
+    assert (names(found), gaps(found)) == (["a"], [])
 
 
 def test_a_number_that_unknown_code_gets_as_a_variable_may_be_another_one(tmp_path: Path) -> None:
