@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -25,11 +26,22 @@ CONDITIONS: dict[str, Callable[..., bool]] = {
     "only if not among": lambda text, *others: text not in others,
     "only if above": lambda text, bound: is_whole_number(text) and int(text) > int(bound),
     "only if not above": lambda text, bound: not is_whole_number(text) or int(text) <= int(bound),
+    "only if either": lambda text, *sides: any(_holds_all(text, side) for side in sides),
+    "only if neither": lambda text, *sides: not any(_holds_all(text, side) for side in sides),
 }
 """Edits that keep a name where they hold and drop it elsewhere."""
 
 ONLY_IF_UNSET: Edit = ("only if unset", ())
 """The same for a parameter that launch does not set: the name is made of what the code takes then."""
+
+
+def either_of(*sides: Iterable[Edit]) -> Edit:
+    """Return the condition that holds where all conditions of one of ``sides`` do."""
+    return "only if either", tuple(json.dumps(list(side)) for side in sides)
+
+
+def _holds_all(text: str, side: str) -> bool:
+    return all(CONDITIONS[edit](text, *given) for edit, given in json.loads(side))
 
 
 PARAMETER_REFERENCE = re.compile(r"\$\(param ([^ ()$]+)(?: ([^ ()$]*))?\)")

@@ -30,6 +30,7 @@ from nodl.node_interface import Gap
 from nodl.source_ref import SourceRef
 
 Function = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda
+_NAMED = (ast.FunctionDef, ast.AsyncFunctionDef)
 Import = ast.Import | ast.ImportFrom
 CREATING_NAMES = frozenset(NODE_ENDPOINTS) | ros.CREATING_NAMES
 _CREATING_TEXT = re.compile("|".join(sorted(map(re.escape, CREATING_NAMES))))
@@ -84,6 +85,11 @@ class CallPlace(NamedTuple):
     around: tuple[ast.AST, ...]
     certain: bool
 
+    @property
+    def is_bare(self) -> bool:
+        """Return True if it calls a name alone, which cannot be a method."""
+        return isinstance(self.node.func, ast.Name)
+
 
 class FunctionText:
     """The text of one function without the functions in it; ``node`` is ``None`` for a module with its class bodies."""
@@ -106,9 +112,14 @@ class FunctionText:
         return "" if self.node is None else getattr(self.node, "name", "a lambda")
 
     @functools.cached_property
-    def mentioned(self) -> frozenset[str]:
-        """What the function reads or calls, by last names."""
-        return frozenset({*self.names, *self.attributes, *(place.name for place in self.calls)})
+    def bare(self) -> frozenset[str]:
+        """What the function reads or calls by a name alone."""
+        return frozenset({*self.names, *(place.name for place in self.calls if place.is_bare)})
+
+    @functools.cached_property
+    def dotted(self) -> frozenset[str]:
+        """What it reads or calls of something, by last names, and what a text may name."""
+        return frozenset({*self.attributes, *(place.name for place in self.calls if not place.is_bare)})
 
 
 def _with_inner(scope: FunctionText) -> Iterator[FunctionText]:
@@ -135,7 +146,7 @@ def _text_of(module: SourceModule) -> _Text:
 @functools.lru_cache(maxsize=256)
 def words_read(module: SourceModule) -> dict[ast.AST | None, frozenset[str]]:
     """Return what each function of a module reads or calls, by the last names in its text."""
-    return {scope.node: scope.mentioned for scope in _text_of(module).scopes}
+    return {scope.node: scope.bare | scope.dotted for scope in _text_of(module).scopes}
 
 
 class _Reader:
@@ -331,7 +342,7 @@ class _Net:
             for name, nodes in text.classes.items():
                 self._classes.setdefault(name, []).extend(nodes)
         self._callers = {place.node: scope for scope in self._scopes for place in scope.calls}
-        self._makers = self._reaching()
+        self._find_makers()
 
     def settle(self) -> None:
         """Look at every place in what is live."""
@@ -352,30 +363,26 @@ class _Net:
 
     # --- which names reach an interface ---------------------------------------------------------------------
 
-    def _reaching(self) -> set[str]:
-        """Return the names of functions and classes whose text reaches an interface, by names."""
-        classes = self._class_makers(set())
-        self._node_classes = frozenset(classes)
-        makers = set(CREATING_NAMES) | classes
+    def _find_makers(self) -> None:
+        """Find the names of functions and classes whose text reaches an interface, by names."""
+        self._node_classes = frozenset(self._class_makers(set()))
+        self._makers = {*CREATING_NAMES, *self._node_classes}
+        self._bare_makers = set(self._makers)  # what a name alone can mean: no methods
+        functions = [scope for scope in self._scopes if isinstance(scope.node, _NAMED)]
         while True:
-            found = {
-                scope.name
-                for scope in self._scopes
-                if scope.node is not None
-                and not isinstance(scope.node, ast.Lambda)
-                and scope.name not in makers
-                if any(not makers.isdisjoint(each.mentioned) for each in _with_inner(scope))
-            }
+            known = len(self._makers), len(self._bare_makers)
+            found = [scope for scope in functions if any(map(self._mentions_maker, _with_inner(scope)))]
             constructed = {
-                scope.cls.name
-                for scope in self._scopes
-                if scope.cls is not None and scope.name in _CONSTRUCTORS
-                if not makers.isdisjoint(scope.mentioned)
+                scope.cls.name for scope in found if scope.cls is not None and scope.name in _CONSTRUCTORS
             }
-            more = (found | self._class_makers(constructed)) - makers - _CONSTRUCTORS
-            if not more:
-                return makers
-            makers |= more
+            classes = self._class_makers(constructed)
+            self._makers.update(classes, (scope.name for scope in found if scope.name not in _CONSTRUCTORS))
+            self._bare_makers.update(classes, (scope.name for scope in found if scope.cls is None))
+            if known == (len(self._makers), len(self._bare_makers)):
+                return
+
+    def _mentions_maker(self, scope: FunctionText) -> bool:
+        return not (self._bare_makers.isdisjoint(scope.bare) and self._makers.isdisjoint(scope.dotted))
 
     def _class_makers(self, known: set[str]) -> set[str]:
         """Return classes with a base, near or far, that makes a node, or is among ``known``."""
@@ -394,7 +401,7 @@ class _Net:
     def _makes(self, place: CallPlace, scope: FunctionText) -> bool:
         if place.name == "__init__":  # of a base class, which makes the node
             return scope.cls is not None and scope.cls.name in self._makers
-        return place.name in self._makers
+        return place.name in (self._bare_makers if place.is_bare else self._makers)
 
     # --- what is live ---------------------------------------------------------------------------------------
 

@@ -44,7 +44,7 @@ from nodl.infer.values import (
     join_all,
     sole,
 )
-from nodl.name_template import EDITS
+from nodl.name_template import EDITS, either_of
 
 T = TypeVar("T")
 
@@ -53,6 +53,7 @@ OPPOSITE = {
     "only if equal": "only if different", "only if different": "only if equal",
     "only if among": "only if not among", "only if not among": "only if among",
     "only if above": "only if not above", "only if not above": "only if above",
+    "only if either": "only if neither", "only if neither": "only if either",
 }  # fmt: skip
 
 
@@ -228,10 +229,17 @@ def is_of_launch(atom: object) -> bool:
 def where_either(first: tuple[Guard, ...], second: tuple[Guard, ...]) -> tuple[Guard, ...]:
     """Return what is certain of parameters where all of ``first`` or all of ``second`` hold."""
     found = {each: None for each in first if each in second}
+    left = [each for each in first if each not in found], [each for each in second if each not in found]
     for asked in dict.fromkeys(each.asked for each in first if each.asked.item is None):
         texts = [_texts_left(asked, guards) for guards in (first, second)]
+        sides = sorted(([each for each in guards if each.asked == asked] for guards in left), key=len)
         if all(texts):
             found[Guard(asked, "only if among", tuple(dict.fromkeys((*texts[0], *texts[1]))))] = None
+        elif len(sides[0]) == 1:  # ``a``, or ``not a`` and ``b``, is ``a`` or ``b``
+            others = [each for each in sides[1] if each != opposite(sides[0][0])]
+            if others:
+                edits = [[(each.edit, each.given) for each in side] for side in (sides[0], others)]
+                found[Guard(asked, *either_of(*edits))] = None
     return tuple(found)
 
 

@@ -19,7 +19,7 @@ from nodl.infer.interpreter.elements import assign, delete
 from nodl.infer.interpreter.expressions import binary_operation
 from nodl.infer.interpreter.run import Arguments, Executor, Frame, Run
 from nodl.infer.models import foreign
-from nodl.infer.text import Guard, Text
+from nodl.infer.text import Guard, Text, is_one_of_several
 from nodl.infer.values import (
     ANY,
     NONE,
@@ -97,6 +97,8 @@ def _if(run: Run, node: ast.If, frame: Frame) -> bool:
         passes = run.execute(node.body if holds else node.orelse, frame)
         if passes:
             passing.append(run.guards_at_end)
+        elif condition and is_one_of_several(condition.asked) and _leaves_loop(node, holds):
+            run.gap(node, frame, f"how many elements of {condition.asked.name} come before this is not known")
         return passes
 
     condition, sides = sides_of(run, node.test, frame, side)
@@ -104,6 +106,13 @@ def _if(run: Run, node: ast.If, frame: Frame) -> bool:
     if passing:
         run.guards = where_either(passing[0], passing[-1])  # to the end of this block
     return passes
+
+
+@cache
+def _leaves_loop(node: ast.If, holds: bool) -> bool:
+    """Return True if this side of a test may end the loop around it."""
+    body = node.body if holds else node.orelse
+    return any(isinstance(each, (ast.Return, ast.Break)) for part in body for each in ast.walk(part))
 
 
 def _return(run: Run, node: ast.Return, frame: Frame) -> bool:

@@ -174,3 +174,19 @@ def test_a_call_of_what_hands_a_creating_function_on_counts(
         "setup() is called on something that is not understood" in why
         for why in _gaps(infer, "setup(self)", before=before)
     )
+
+
+@pytest.mark.parametrize(
+    ("body", "main", "is_gap"),
+    [
+        ("pass", "N().on_set(); print({*set([1])}, 0 and set([1]))", False),
+        ("pass", "N().on_set(); open('x').set()", True),
+        ("self.kind == 'other' and self.set()", "N()", True),
+    ],
+)
+def test_a_method_is_not_meant_by_a_name_alone(body: str, main: str, is_gap: bool, infer: Infer) -> None:
+    """``set`` creates as a method; ``set(...)`` is Python's own."""
+    methods = "def set(self):\n            self.make('a')\n        def on_set(self):\n            self.set()"
+    program = PROGRAM.replace("def make(", f"{methods}\n        def make(")
+    gaps = infer(program.format(body=body, main=main, before="pass")).gaps
+    assert any("set() " in gap.why for gap in gaps) is is_gap
