@@ -26,6 +26,10 @@ CONDITIONS: dict[str, Callable[..., bool]] = {
     "only if not among": lambda text, *others: text not in others,
     "only if above": lambda text, bound: is_whole_number(text) and int(text) > int(bound),
     "only if not above": lambda text, bound: not is_whole_number(text) or int(text) <= int(bound),
+    "only if starting": lambda text, *heads: text.startswith(heads),
+    "only if not starting": lambda text, *heads: not text.startswith(heads),
+    "only if ending": lambda text, *tails: text.endswith(tails),
+    "only if not ending": lambda text, *tails: not text.endswith(tails),
     "only if either": lambda text, *sides: any(_holds_all(text, side) for side in sides),
     "only if neither": lambda text, *sides: not any(_holds_all(text, side) for side in sides),
 }

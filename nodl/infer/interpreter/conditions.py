@@ -53,6 +53,8 @@ OPPOSITE = {
     "only if equal": "only if different", "only if different": "only if equal",
     "only if among": "only if not among", "only if not among": "only if among",
     "only if above": "only if not above", "only if not above": "only if above",
+    "only if starting": "only if not starting", "only if not starting": "only if starting",
+    "only if ending": "only if not ending", "only if not ending": "only if ending",
     "only if either": "only if neither", "only if neither": "only if either",
 }  # fmt: skip
 
@@ -153,10 +155,16 @@ def condition_of(run: Run, test: ast.expr, frame: Frame) -> Guard | None:
     """Return what ``test`` requires of a parameter; ``None`` if that cannot be said."""
     if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not):
         return opposite(condition_of(run, test.operand, frame))
+    if isinstance(test, ast.BoolOp):
+        return _combined(
+            [condition_of(run, part, frame) for part in test.values], isinstance(test.op, ast.And)
+        )
     if not _may_ask(test):
         return None
     if isinstance(test, ast.Compare):
-        return _comparison(run, test, frame) if len(test.ops) == 1 else None
+        return _combined([_comparison(run, each, frame) for each in _links(test)], True)
+    if isinstance(test, ast.Call) and isinstance(test.func, ast.Attribute) and test.func.attr in _AFFIXES:
+        return _of_affix(run, test, test.func, frame)
     asked, defaults = _asked(run, test, frame)
     if asked is None:
         return None
@@ -165,6 +173,40 @@ def condition_of(run: Run, test: ast.expr, frame: Frame) -> Guard | None:
     if all(isinstance(default, str) for default in defaults):
         return Guard(asked, "only if different", ("",))
     return Guard(asked, "only if different", ("0",)) if _whole_numbers(defaults) else None
+
+
+def _combined(parts: list[Guard | None], all_of: bool) -> Guard | None:
+    """Return the condition that holds where all ``parts`` do, or one of them; they must ask for one parameter."""
+    known = [part for part in parts if part is not None]
+    if len(known) < len(parts) or any(part.asked != known[0].asked for part in known):
+        return None
+    if len(known) == 1:
+        return known[0]
+    edits = [(part.edit, part.given) for part in known]
+    return Guard(known[0].asked, *(either_of(edits) if all_of else either_of(*([each] for each in edits))))
+
+
+@functools.lru_cache(maxsize=8192)
+def _links(test: ast.Compare) -> tuple[ast.Compare, ...]:
+    """Return the comparisons of a chain: of ``1 < n < 3``, ``1 < n`` and ``n < 3``."""
+    sides = [test.left, *test.comparators]
+    return tuple(
+        ast.Compare(left, [op], [right])
+        for left, op, right in zip(sides, test.ops, test.comparators, strict=False)
+    )
+
+
+_AFFIXES = {"startswith": "only if starting", "endswith": "only if ending"}
+
+
+def _of_affix(run: Run, test: ast.Call, method: ast.Attribute, frame: Frame) -> Guard | None:
+    if not (isinstance(method.value, ast.Call) or _only_reads(method.value)) or len(test.args) != 1:
+        return None
+    asked, defaults = _asked(run, method.value, frame)
+    affix = test.args[0].value if isinstance(test.args[0], ast.Constant) else None
+    if asked is None or not isinstance(affix, str) or not all(type(each) is str for each in defaults):
+        return None
+    return Guard(asked, _AFFIXES[method.attr], (affix,))
 
 
 def opposite(condition: Guard | None) -> Guard | None:
@@ -182,9 +224,9 @@ def conditions_of(run: Run, test: ast.expr, holds: bool, frame: Frame) -> tuple[
         parts = test.values
         if isinstance(test.op, ast.And) != holds:  # of several parts nobody knows which
             neutral = isinstance(test.op, ast.And)
-            open_parts = [part for part in parts if _truth_again(run, part, frame) is not neutral]
-            parts = open_parts if len(open_parts) == 1 else []
-        return tuple(each for part in parts for each in conditions_of(run, part, holds, frame))
+            parts = [part for part in parts if _truth_again(run, part, frame) is not neutral]
+        if isinstance(test.op, ast.And) == holds or len(parts) == 1:
+            return tuple(each for part in parts for each in conditions_of(run, part, holds, frame))
     condition = condition_of(run, test, frame)
     found = condition if holds else opposite(condition)
     return () if found is None else (found,)
