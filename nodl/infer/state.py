@@ -43,8 +43,8 @@ class ProgramState:
         self._trail: list[tuple[Cells, object, Value | None]] = []
         self.stamp = 0  # of the latest write; a branch that is undone takes it back
         self._stamps = itertools.count(1)
-        self.learned = 0  # containers opened to foreign code, which no branch takes back
-        # Stamps of the latest writes: by name of a variable or field, and by ``id`` of the cells of a container.
+        # Stamps of the latest writes, the last one at the end: by name of a variable or field, and by ``id`` of the
+        # cells of a container.
         self.changed: dict[str | int, int] = {}
         self.base = sys.maxsize  # how many undecided branches surround a write that stays
         self.fresh: set[int] = (
@@ -65,7 +65,7 @@ class ProgramState:
             self.stamp = next(self._stamps)
             if self.forks <= self.base and id(cells) not in self.fresh:
                 by_name = isinstance(key, str) and key != ITEMS and type(cells) is not ContentCells
-                self.changed[str(key) if by_name else id(cells)] = self.stamp
+                self._note_change(str(key) if by_name else id(cells), self.stamp)
 
     def store(self, obj: HeapObject, key: object, value: Value) -> None:
         """Write to an object: strong if it is one concrete object, else weak."""
@@ -76,21 +76,21 @@ class ProgramState:
     def open(self, obj: HeapObject) -> None:
         """Note that code which is not analysed got a container; no branch takes that back."""
         obj.escaped = True
-        self.learned += 1
         if id(obj.cells) not in self.fresh:
-            self.changed[id(obj.cells)] = next(self._stamps)
+            self._note_change(id(obj.cells), next(self._stamps))
+
+    def _note_change(self, key: str | int, stamp: int) -> None:
+        self.changed.pop(key, None)
+        self.changed[key] = stamp
 
     def forget(self) -> None:
         """Drop the trail; only between top-level steps, when nobody holds a mark."""
         self._trail.clear()
 
-    def version(self) -> tuple[int, int]:
-        """Return the version: equal versions, equal state."""
-        return self.stamp, self.learned
-
     def changes(self, since: int) -> set[str | int]:
         """Return what was written after the stamp ``since``, as in ``changed``."""
-        return {key for key, stamp in self.changed.items() if stamp > since}
+        later = itertools.takewhile(lambda each: each[1] > since, reversed(self.changed.items()))
+        return {key for key, _ in later}
 
     def mark(self) -> int:
         return len(self._trail)

@@ -406,9 +406,10 @@ class Run(Allocations):
         if depth < 3 and len(obj.cells) < 64:
             HeapObject.looked_into.add(id(obj.cells))
             for value in list(obj.cells.values()):
-                for atom in value:
-                    inner = atom.any_element() if isinstance(atom, Items) else (atom,)
-                    self.escape_value(inner, opened, objects, depth + 1)
+                if value and type(value[0]) is Items:
+                    value = value[0].any_element()
+                if len(value) != 1 or type(value[0]) not in _INERT:
+                    self.escape_value(value, opened, objects, depth + 1)
 
     def gap(self, node: ast.AST, frame: Frame, why: str) -> None:
         self.findings.gap(SourceRef(frame.module.source.path, getattr(node, "lineno", 0)), why)

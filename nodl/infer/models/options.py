@@ -10,11 +10,13 @@ from nodl.infer.values import (
     ANY,
     BOOLEAN,
     BOTTOM,
+    COMMAND_LINE,
     NONE,
     External,
     Instance,
     Items,
     Sequence,
+    Unknown,
     Value,
     constant_strings,
     external,
@@ -28,6 +30,19 @@ PARSER = "argparse.ArgumentParser"
 NAMESPACE = "argparse.Namespace"
 _COUNT = "positional arguments"
 _NOT_TOLD = unknown("which word of the command line it is")
+_TAKES_ROS_WORDS = "an option that ROS has, too"
+_ROS_WORDS = (
+    "--ros-args",
+    "-r",
+    "--remap",
+    "-p",
+    "--param",
+    "-e",
+    "--enclave",
+    "--log-",
+    "--enable-",
+    "--disable-",
+)
 _KEEP_TEXT = frozenset({"builtins.str", "builtins.int"})  # types that leave a well-written value as it is
 
 
@@ -41,6 +56,9 @@ def made_parser(run: Run, call: Call) -> Value:
 
 def _add_argument(run: Run, parser: Instance, call: Call) -> Value:
     flags = [flag for value in call.args.positional for flag in constant_strings(value)]
+    known = len(flags) == len(call.args.positional) and not call.args.more
+    if not known or any(flag.startswith(_ROS_WORDS) for flag in flags):
+        run.state.store(parser, _TAKES_ROS_WORDS, (True,))
     if not flags:
         return ANY
     long = next((flag for flag in flags if flag.startswith("--")), flags[0])
@@ -134,9 +152,22 @@ def _parse_args(run: Run, parser: Instance, call: Call) -> Value:
     return (namespace,)
 
 
+def _add_subparsers(run: Run, parser: Instance, call: Call) -> Value:
+    run.state.store(parser, _COUNT, _NOT_TOLD)
+    return unknown("the sub-commands of a command line")
+
+
 def _parse_known_args(run: Run, parser: Instance, call: Call) -> Value:
+    """Return the namespace, and what the parser leaves: the command line as ROS reads it, unless it takes words of it.
+
+    argparse takes an abbreviated option for one of its own, and any word for a positional argument.
+    """
     namespace = _parse_args(run, parser, call)
-    rest = run.sequence(call.node, "list", Items(None, unknown("command line arguments")))
+    rest = unknown(COMMAND_LINE)
+    parsed = call.args.at(0, "args") or NONE
+    whole = all(atom is None or (isinstance(atom, Unknown) and atom.why == COMMAND_LINE) for atom in parsed)
+    if not whole or parser.cells.get(_COUNT) != (0,) or _TAKES_ROS_WORDS in parser.cells:
+        rest = run.sequence(call.node, "list", Items(None, rest))
     return run.tuple_of((namespace, rest))
 
 
@@ -154,6 +185,7 @@ METHODS: dict[tuple[str, str], Callable[[Run, Instance, Call], Value]] = {
     (PARSER, "add_argument"): _add_argument,
     (PARSER, "set_defaults"): _set_defaults,
     (PARSER, "add_argument_group"): _argument_group,
+    (PARSER, "add_subparsers"): _add_subparsers,
     (PARSER, "add_mutually_exclusive_group"): _argument_group,
     (PARSER, "parse_args"): _parse_args,
     (PARSER, "parse_known_args"): _parse_known_args,

@@ -364,6 +364,35 @@ def test_an_optional_word_of_argparse_before_another_is_a_gap(infer: Infer) -> N
     assert not infer(program.format(words=f"{second}; {first}")).gaps
 
 
+@pytest.mark.parametrize(
+    ("option", "parsed", "reads_launch"),
+    [
+        ("add_argument('--robot')", "", True),
+        ("add_argument('--robot')", "sys.argv[1:]", True),
+        ("add_argument('--robot')", "['--robot', 'a']", False),
+        ("add_argument('--remap')", "", False),
+        ("add_argument('-rate')", "", False),
+        ("add_argument('topic')", "", False),
+        ("add_argument('--robot', *some)", "", False),
+        ("add_subparsers()", "", False),
+    ],
+)
+def test_what_argparse_leaves_is_the_launchs_unless_it_takes_words_of_ros(
+    option: str, parsed: str, reads_launch: bool, infer: Infer
+) -> None:
+    program = f"""
+        import argparse, rclpy, sys
+        from somewhere import some
+        parser = argparse.ArgumentParser()
+        parser.{option}
+        known, rest = parser.parse_known_args({parsed})
+        rclpy.init(args=rest)
+        rclpy.create_node("n")
+        """
+    (node,) = infer(program).nodes
+    assert any("given in code" in gap.why for gap in node.gaps) is not reads_launch
+
+
 _HANDED = """
     import rclpy, somewhere
     from std_msgs.msg import String
