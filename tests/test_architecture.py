@@ -184,8 +184,8 @@ def test_each_room_stands_on_the_rooms_below_it(package: str) -> None:
     assert upward_types == {arrow for arrow in UPWARD_TYPES if arrow[0] == package}
 
 
-# Inference, whose modules may know each other's types in a circle; they import in none when they run.
-WITH_CIRCLES_OF_TYPES = ROOT / "nodl" / "infer"
+# Inference of C++, whose modules may know each other's types in a circle; they import in none when they run.
+WITH_CIRCLES_OF_TYPES = ROOT / "nodl" / "infer" / "cpp"
 
 
 def test_no_modules_need_each_other_in_a_circle_not_even_as_types_or_inside_of_functions() -> None:

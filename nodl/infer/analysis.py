@@ -24,7 +24,7 @@ from nodl.infer.interpreter.calls import call_bound, call_function, instantiate
 from nodl.infer.interpreter.define import expect_methods, linearized
 from nodl.infer.interpreter.expressions import EXPRESSIONS
 from nodl.infer.interpreter.imports import execute_module
-from nodl.infer.interpreter.run import Arguments, BudgetExceeded, Call, Called, Caller, Frame, Run, Tables
+from nodl.infer.interpreter.run import Arguments, BudgetExceeded, Call, Called, Caller, Run, Tables
 from nodl.infer.interpreter.statements import STATEMENTS
 from nodl.infer.models import foreign
 from nodl.infer.models.foreign import is_node_class
@@ -42,6 +42,7 @@ from nodl.infer.values import (
     ClassValue,
     External,
     ForeignMethod,
+    Frame,
     FunctionValue,
     HeapObject,
     Instance,
@@ -391,8 +392,9 @@ def _guarded(run: Run, body: Callable[[], None]) -> None:
     finally:
         sys.setrecursionlimit(limit)
     for instance, source in run.handed.items():
-        if instance.node is not None and instance.node.created:
-            instance.node.gaps.setdefault((source, "the node is handed to code that is not analysed"))
+        record = run.findings.node_of.get(instance)
+        if record is not None and record.created:
+            record.gaps.setdefault((source, "the node is handed to code that is not analysed"))
 
 
 def failure(error: Exception) -> str:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import NamedTuple
 
-from nodl.infer.values import BOTTOM, ContentCells, Unknown, Value, join
+from nodl.infer.values import BOTTOM, ContentCells, Instance, Unknown, Value, join
 from nodl.node_interface import EndpointKind, QosPolicies
 from nodl.source_ref import SourceRef
 
@@ -83,6 +83,7 @@ class Findings:
 
     def __init__(self) -> None:
         self.nodes: dict[NodeRecord, None] = {}
+        self.node_of: dict[Instance, NodeRecord] = {}
         self.gaps: dict[tuple[SourceRef, str], None] = {}
         self.homeless: NodeRecord | None = None
         self.global_arguments: Value = BOTTOM  # a list handed to rclpy.init(args=...)

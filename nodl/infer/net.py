@@ -22,10 +22,11 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from nodl.infer.interpreter.imports import absolute_name
-from nodl.infer.interpreter.run import FunctionEntry, Run
+from nodl.infer.interpreter.run import Run
 from nodl.infer.models import ros
 from nodl.infer.models.signatures import NODE_ENDPOINTS
 from nodl.infer.program import Program, SourceModule
+from nodl.infer.values import FunctionEntry
 from nodl.node_interface import Gap
 from nodl.source_ref import SourceRef
 

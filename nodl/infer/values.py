@@ -15,8 +15,6 @@ from typing import TYPE_CHECKING, ClassVar, NamedTuple, TypeAlias
 from nodl.infer.text import Guard, Text, common_text, constant_text
 
 if TYPE_CHECKING:
-    from nodl.infer.findings import NodeRecord
-    from nodl.infer.interpreter.run import Frame
     from nodl.infer.program import SourceModule
 
 Value: TypeAlias = tuple[object, ...]
@@ -265,14 +263,63 @@ class Instance(HeapObject):
 
     ``guards``: what held of parameters wherever it was made, so wherever it is used."""
 
-    __slots__ = ("cls", "guards", "node")
+    __slots__ = ("cls", "guards")
 
     def __init__(self, cls: ClassValue | External):
         super().__init__()
         self.cells = FieldCells() if isinstance(cls, ClassValue) else ContentCells()
         self.cls = cls
         self.guards: tuple[Guard, ...] = ()
-        self.node: NodeRecord | None = None
+
+
+class FunctionEntry(NamedTuple):
+    """What runs a function: the call, in its calling context."""
+
+    call: ast.AST
+    context: int
+
+
+class Frame:
+    """The variables of a running function, class body or module."""
+
+    __slots__ = (
+        "again", "cells", "closure", "depth", "early", "entry", "forks", "function", "globals",
+        "guards", "is_class", "is_comprehension", "jump", "loop_forks", "module", "nonlocals",
+        "returned", "unsettled", "yielded",
+    )  # fmt: skip
+
+    def __init__(self, module: ModuleValue, cells: dict[object, Value], closure: Frame | None, depth: int):
+        self.module = module
+        self.cells = cells
+        self.closure = closure
+        self.depth = depth  # of branches when the frame was entered
+        self.function: FunctionValue | None = None
+        self.entry: FunctionEntry | None = None
+        self.returned: Value = BOTTOM
+        self.yielded: Value | None = None
+        self.early = False  # some path left before the end
+        self.unsettled = ""  # the break or continue that may have happened, since the loop asked last
+        self.jump = ""  # the break or continue that certainly ended the latest statement
+        self.forks = 0  # undecided branches when the frame was entered, and when its innermost loop was
+        self.loop_forks = 0
+        self.guards = 0  # how many conditions held when the frame was entered
+        self.again = False  # the cells also hold an earlier call, whose inner functions live on
+        self.is_class = False
+        self.is_comprehension = False
+        self.globals: set[str] = set()
+        self.nonlocals: set[str] = set()
+
+    @property
+    def captured(self) -> bool:
+        return type(self.cells) is LocalCells and self.cells.shared
+
+    def capture(self) -> None:
+        """Let inner functions see the cells, and those around them, from now on."""
+        frame: Frame | None = self
+        while frame is not None and not frame.captured:
+            if type(frame.cells) is LocalCells:
+                frame.cells.shared = True
+            frame = frame.closure
 
 
 # Equal only to themselves, or strings: ``in`` then says the same as comparing one by one, and faster.

@@ -7,7 +7,7 @@ import functools
 
 from nodl.infer.interpreter import imports
 from nodl.infer.interpreter.define import enumeration_member, is_enumeration, linearized, program_classes
-from nodl.infer.interpreter.run import Arguments, AttributeReader, Frame, Run
+from nodl.infer.interpreter.run import Arguments, AttributeReader, Run
 from nodl.infer.models import foreign
 from nodl.infer.text import Text
 from nodl.infer.values import (
@@ -21,6 +21,7 @@ from nodl.infer.values import (
     Dictionary,
     External,
     ForeignMethod,
+    Frame,
     FunctionValue,
     HeapObject,
     Instance,
@@ -75,7 +76,7 @@ def _of_instance(run: Run, obj: Instance, name: str, node: ast.AST, frame: Frame
 
 def _variables(run: Run, obj: Instance, node: ast.AST, frame: Frame) -> Value:
     """Return what ``obj.__dict__`` holds: unknown where the program only reads or copies it, else also a gap."""
-    if obj.node is not None or node not in _read_in_place(frame.module.source.tree):
+    if obj in run.findings.node_of or node not in _read_in_place(frame.module.source.tree):
         return run.variables_of(node, frame)
     for held in list(obj.cells.values()):
         run.escape_value(held)

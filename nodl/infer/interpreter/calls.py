@@ -17,7 +17,7 @@ from nodl.infer.interpreter.define import (
     program_classes,
 )
 from nodl.infer.interpreter.loops import fixpoint
-from nodl.infer.interpreter.run import MAX_DEPTH, Arguments, Call, Frame, FunctionEntry, Run
+from nodl.infer.interpreter.run import MAX_DEPTH, Arguments, Call, Run
 from nodl.infer.models import foreign
 from nodl.infer.text import constant_text
 from nodl.infer.values import (
@@ -31,6 +31,8 @@ from nodl.infer.values import (
     Dictionary,
     External,
     ForeignMethod,
+    Frame,
+    FunctionEntry,
     FunctionValue,
     Instance,
     Items,
@@ -342,5 +344,5 @@ def _expect_callbacks(run: Run, cls: ClassValue, instance: Instance) -> None:
                 and (every or name in wanted)
             ):
                 seen.add(name)
-                since = None if instance.node else run.state.mark()
+                since = None if instance in run.findings.node_of else run.state.mark()
                 run.register_callback(methods_in(value, instance, cls), None, since)

@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 
 from nodl.infer.findings import NodeRecord, OptionDefaults
 from nodl.infer.interpreter.define import is_enumeration
-from nodl.infer.interpreter.run import Frame, Run
+from nodl.infer.interpreter.run import Run
 from nodl.infer.text import (
     Guard,
     Input,
@@ -35,6 +35,7 @@ from nodl.infer.values import (
     ClassValue,
     Dictionary,
     External,
+    Frame,
     FunctionValue,
     Instance,
     ModuleValue,

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import ast
 
-from nodl.infer.interpreter.run import Arguments, Call, Frame, Run
+from nodl.infer.interpreter.run import Arguments, Call, Run
 from nodl.infer.values import (
     BoundMethod,
     ClassMethod,
     ClassValue,
     External,
+    Frame,
     FunctionValue,
     Instance,
     PropertyValue,

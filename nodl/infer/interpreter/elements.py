@@ -9,7 +9,7 @@ from functools import partial
 from nodl.infer.interpreter.conditions import is_of_launch, is_parameter, only_if
 from nodl.infer.interpreter.define import enumeration_members, is_constant, is_enumeration, setter_of
 from nodl.infer.interpreter.formatting import is_whole_number
-from nodl.infer.interpreter.run import Arguments, Frame, Run
+from nodl.infer.interpreter.run import Arguments, Run
 from nodl.infer.text import Guard, Input, Text, constant_text, input_of, is_one_of_several, make_text
 from nodl.infer.values import (
     ABSENT,
@@ -23,6 +23,7 @@ from nodl.infer.values import (
     ClassValue,
     Dictionary,
     External,
+    Frame,
     Instance,
     Items,
     Key,

@@ -30,7 +30,7 @@ from nodl.infer.interpreter.elements import (
 )
 from nodl.infer.interpreter.formatting import as_texts, f_string, is_whole_number, percent
 from nodl.infer.interpreter.loops import comprehension, dict_comprehension
-from nodl.infer.interpreter.run import Arguments, Evaluator, Frame, Run
+from nodl.infer.interpreter.run import Arguments, Evaluator, Run
 from nodl.infer.text import (
     Guard,
     Hole,
@@ -49,6 +49,7 @@ from nodl.infer.values import (
     OTHER,
     ClassValue,
     Dictionary,
+    Frame,
     Instance,
     Items,
     Sequence,

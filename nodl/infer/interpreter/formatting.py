@@ -11,13 +11,14 @@ from contextlib import suppress
 from typing import TypeGuard
 
 from nodl.infer.findings import NodeRecord, OptionDefaults
-from nodl.infer.interpreter.run import Arguments, Frame, Run
+from nodl.infer.interpreter.run import Arguments, Run
 from nodl.infer.text import Hole, Input, Text, TextAtom, common_text, concatenations, make_text
 from nodl.infer.values import (
     ANY,
     BOTTOM,
     RESULT,
     External,
+    Frame,
     Items,
     Sequence,
     Unknown,

@@ -5,9 +5,9 @@ from __future__ import annotations
 import ast
 import os
 
-from nodl.infer.interpreter.run import Frame, Run
+from nodl.infer.interpreter.run import Run
 from nodl.infer.program import SourceModule
-from nodl.infer.values import ModuleValue, Value, external
+from nodl.infer.values import Frame, ModuleValue, Value, external
 from nodl.source_ref import SourceRef
 
 

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 from nodl.infer.interpreter.conditions import conditions_of, decide, narrowed, under
 from nodl.infer.interpreter.elements import assign, elements, store_item
-from nodl.infer.interpreter.run import Frame, Run
-from nodl.infer.values import LAZY, Dictionary, Items, LocalCells, Value, join_all
+from nodl.infer.interpreter.run import Run
+from nodl.infer.values import LAZY, Dictionary, Frame, Items, LocalCells, Value, join_all
 
 MAX_UNROLLED = 64  # turns, those of the loops around multiplied
 MAX_UNROLLED_AGAIN = 16  # in what is repeated itself

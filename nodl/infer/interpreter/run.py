@@ -27,6 +27,8 @@ from nodl.infer.values import (
     Dictionary,
     External,
     ForeignMethod,
+    Frame,
+    FunctionEntry,
     FunctionValue,
     HeapObject,
     Instance,
@@ -43,56 +45,6 @@ from nodl.infer.values import (
     unknown,
 )
 from nodl.source_ref import SourceRef
-
-
-class FunctionEntry(NamedTuple):
-    """What runs a function: the call, in its calling context."""
-
-    call: ast.AST
-    context: int
-
-
-class Frame:
-    """The variables of a running function, class body or module."""
-
-    __slots__ = (
-        "again", "cells", "closure", "depth", "early", "entry", "forks", "function", "globals",
-        "guards", "is_class", "is_comprehension", "jump", "loop_forks", "module", "nonlocals",
-        "returned", "unsettled", "yielded",
-    )  # fmt: skip
-
-    def __init__(self, module: ModuleValue, cells: dict[object, Value], closure: Frame | None, depth: int):
-        self.module = module
-        self.cells = cells
-        self.closure = closure
-        self.depth = depth  # of branches when the frame was entered
-        self.function: FunctionValue | None = None
-        self.entry: FunctionEntry | None = None
-        self.returned: Value = BOTTOM
-        self.yielded: Value | None = None
-        self.early = False  # some path left before the end
-        self.unsettled = ""  # the break or continue that may have happened, since the loop asked last
-        self.jump = ""  # the break or continue that certainly ended the latest statement
-        self.forks = 0  # undecided branches when the frame was entered, and when its innermost loop was
-        self.loop_forks = 0
-        self.guards = 0  # how many conditions held when the frame was entered
-        self.again = False  # the cells also hold an earlier call, whose inner functions live on
-        self.is_class = False
-        self.is_comprehension = False
-        self.globals: set[str] = set()
-        self.nonlocals: set[str] = set()
-
-    @property
-    def captured(self) -> bool:
-        return type(self.cells) is LocalCells and self.cells.shared
-
-    def capture(self) -> None:
-        """Let inner functions see the cells, and those around them, from now on."""
-        frame: Frame | None = self
-        while frame is not None and not frame.captured:
-            if type(frame.cells) is LocalCells:
-                frame.cells.shared = True
-            frame = frame.closure
 
 
 class Arguments:
@@ -395,7 +347,7 @@ class Run(Allocations):
             node, frame = self.at
             source = SourceRef(frame.module.source.path, getattr(node, "lineno", 0))
             self.handed.setdefault(atom, source)  # it may be a node, or become one
-        if isinstance(atom, Instance) and not (of_program and (atom.node is None or trusted)):
+        if isinstance(atom, Instance) and not (of_program and (atom not in self.findings.node_of or trusted)):
             return
         if atom not in self.escaped:
             self.escaped[atom] = self.state.mark()

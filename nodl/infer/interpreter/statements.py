@@ -17,7 +17,7 @@ from nodl.infer.interpreter.conditions import (
 from nodl.infer.interpreter.define import define_class, define_function, program_classes
 from nodl.infer.interpreter.elements import assign, delete
 from nodl.infer.interpreter.expressions import binary_operation
-from nodl.infer.interpreter.run import Arguments, Executor, Frame, Run
+from nodl.infer.interpreter.run import Arguments, Executor, Run
 from nodl.infer.models import foreign
 from nodl.infer.text import Guard, Text, is_one_of_several
 from nodl.infer.values import (
@@ -25,6 +25,7 @@ from nodl.infer.values import (
     NONE,
     ClassValue,
     External,
+    Frame,
     Instance,
     Sequence,
     Unknown,

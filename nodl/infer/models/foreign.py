@@ -211,9 +211,10 @@ def _hand_over(run: Run, path: str, call: Call) -> None:
         return
     for value in call.args.all_values():
         for atom in value:
-            if isinstance(atom, Instance) and atom.node is not None and atom.node.created:
+            record = run.findings.node_of.get(atom) if isinstance(atom, Instance) else None
+            if record is not None and record.created:
                 why = f"the node is handed to {path}, which is not analysed and may create endpoints on it"
-                atom.node.gaps.setdefault((call.source, why))
+                record.gaps.setdefault((call.source, why))
 
 
 def call_foreign_method(run: Run, method: ForeignMethod, call: Call) -> Value:

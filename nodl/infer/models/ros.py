@@ -122,9 +122,10 @@ def strings_in(run: Run, value: Value, call: Call) -> Value:
 
 def record_of_instance(run: Run, instance: Instance, call: Call) -> NodeRecord:
     """Return the node record of ``instance``; if it has none, a new one, not yet marked as created."""
-    if instance.node is None:
-        instance.node = run.findings.add_node(NodeRecord(call.source))
-    return instance.node
+    record = run.findings.node_of.get(instance)
+    if record is None:
+        record = run.findings.node_of[instance] = run.findings.add_node(NodeRecord(call.source))
+    return record
 
 
 def create_node(run: Run, path: str, call: Call) -> Value:

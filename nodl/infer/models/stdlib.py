@@ -250,7 +250,7 @@ def _getattr(run: Run, call: Call) -> Value:
                 call.frame,
                 "something of a module or class is looked up by a name made at run time",
             )
-        is_node = any(isinstance(atom, Instance) and atom.node is not None for atom in owner)
+        is_node = any(atom in run.findings.node_of for atom in owner)
         found = join(found, unknown(OF_A_NODE if is_node else "an attribute whose name is made at run time"))
     default = call.args.at(2)
     return found if default is None else join(found, default)
@@ -268,16 +268,16 @@ def _setattr(run: Run, call: Call) -> Value:
     if len(known) < len(names):
         run.escape_value(value)
         for atom in owner:
-            if isinstance(atom, Instance) and _only_holds(atom) and _set_any(run, atom, names, value):
+            if isinstance(atom, Instance) and _only_holds(run, atom) and _set_any(run, atom, names, value):
                 continue
             if isinstance(atom, HeapObject):
                 run.gap(call.node, call.frame, "an attribute whose name is made at run time is set")
     return NONE
 
 
-def _only_holds(obj: Instance) -> bool:
+def _only_holds(run: Run, obj: Instance) -> bool:
     """Return True for an object of the program alone, that is no node and has no ``__setattr__``."""
-    if not isinstance(obj.cls, ClassValue) or obj.node is not None:
+    if not isinstance(obj.cls, ClassValue) or obj in run.findings.node_of:
         return False
     return all(
         "__setattr__" not in base.cells
