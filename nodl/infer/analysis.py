@@ -113,12 +113,12 @@ def new_run(program: Program, main: SourceModule) -> Run:
     return Run(program, TABLES, main)
 
 
-MAX_ROUNDS = 13
+MAX_ROUNDS = 12
 WIDEN_TEXTS_FROM = 4
 
 
 def settle(run: Run, at_end: bool = True) -> None:
-    """Call all callbacks until none of them may find more; ``at_end``: the program itself has ended."""
+    """Call all callbacks until neither state nor findings change; ``at_end``: the program itself has ended."""
     run.repeated += 1
     guards, run.guards = run.guards, ()
     base, run.state.base = run.state.base, run.state.forks
@@ -130,14 +130,13 @@ def settle(run: Run, at_end: bool = True) -> None:
         _call_at_any_time(run)
     for turn in range(MAX_ROUNDS):
         _expect_escaped(run, expected)
-        settled = True
-        for callback, arity in list(run.callbacks.items()):
+        before = run.state.version(), dict(run.callbacks)
+        for callback, arity in before[1].items():
             if _may_find_more(run, callback, arity):
-                settled = False
                 if at_end:
                     run.state.forget()
                 _call_back(run, callback, arity, turn >= WIDEN_TEXTS_FROM)
-        if settled and expected.issuperset(run.escaped):
+        if before == (run.state.version(), run.callbacks) and expected.issuperset(run.escaped):
             break
     else:
         run.findings.gap(SourceRef(run.main.path), "the callbacks do not settle; names may be missing")

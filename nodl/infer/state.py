@@ -43,6 +43,7 @@ class ProgramState:
         self._trail: list[tuple[Cells, object, Value | None]] = []
         self.stamp = 0  # of the latest write; a branch that is undone takes it back
         self._stamps = itertools.count(1)
+        self.learned = 0  # containers opened to foreign code, which no branch takes back
         # Stamps of the latest writes, the last one at the end: by name of a variable or field, and by ``id`` of the
         # cells of a container.
         self.changed: dict[str | int, int] = {}
@@ -76,6 +77,7 @@ class ProgramState:
     def open(self, obj: HeapObject) -> None:
         """Note that code which is not analysed got a container; no branch takes that back."""
         obj.escaped = True
+        self.learned += 1
         if id(obj.cells) not in self.fresh:
             self._note_change(id(obj.cells), next(self._stamps))
 
@@ -86,6 +88,10 @@ class ProgramState:
     def forget(self) -> None:
         """Drop the trail; only between top-level steps, when nobody holds a mark."""
         self._trail.clear()
+
+    def version(self) -> tuple[int, int]:
+        """Return the version: equal versions, equal state."""
+        return self.stamp, self.learned
 
     def changes(self, since: int) -> set[str | int]:
         """Return what was written after the stamp ``since``, as in ``changed``."""
