@@ -8,7 +8,7 @@ from __future__ import annotations
 import ast
 import functools
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Any, TypeVar
 
@@ -157,13 +157,12 @@ def condition_of(run: Run, test: ast.expr, frame: Frame) -> Guard | None:
     if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not):
         return opposite(condition_of(run, test.operand, frame))
     if isinstance(test, ast.BoolOp):
-        return _combined(
-            [condition_of(run, part, frame) for part in test.values], isinstance(test.op, ast.And)
-        )
+        parts = (condition_of(run, part, frame) for part in test.values)
+        return _combined(parts, isinstance(test.op, ast.And))
     if not _may_ask(test):
         return None
     if isinstance(test, ast.Compare):
-        return _combined([_comparison(run, each, frame) for each in _links(test)], True)
+        return _combined((_comparison(run, each, frame) for each in _links(test)), True)
     if isinstance(test, ast.Call) and isinstance(test.func, ast.Attribute) and test.func.attr in _AFFIXES:
         return _of_affix(run, test, test.func, frame)
     asked, defaults = _asked(run, test, frame)
@@ -176,11 +175,13 @@ def condition_of(run: Run, test: ast.expr, frame: Frame) -> Guard | None:
     return Guard(asked, "only if different", ("0",)) if _whole_numbers(defaults) else None
 
 
-def _combined(parts: list[Guard | None], all_of: bool) -> Guard | None:
+def _combined(parts: Iterable[Guard | None], all_of: bool) -> Guard | None:
     """Return the condition that holds where all ``parts`` do, or one of them; they must ask for one parameter."""
-    known = [part for part in parts if part is not None]
-    if len(known) < len(parts) or any(part.asked != known[0].asked for part in known):
-        return None
+    known: list[Guard] = []
+    for part in parts:
+        if part is None or (known and part.asked != known[0].asked):
+            return None
+        known.append(part)
     if len(known) == 1:
         return known[0]
     edits = [(part.edit, part.given) for part in known]
