@@ -12,7 +12,7 @@ from nodl.infer.cpp.reading.declarations import Class
 from nodl.infer.cpp.running.effects import effects_of
 from nodl.infer.cpp.running.invocation import HOOKS, call_lambda, invoke
 from nodl.infer.cpp.running.machine import NEXT, Frame, Machine
-from nodl.infer.cpp.running.memory import Reads
+from nodl.infer.cpp.running.memory import Reads, name_of
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     Bound,
@@ -101,7 +101,7 @@ def _call(rounds: _Rounds, key: Key, atom: object, frame: Frame, certainly: bool
     def go() -> int:
         reads = run.store.watched(partial(_run, run, atom, frame))
         rounds.last[key] = _Ran(reads, len(run.nodes))
-        rounds.names_read.update(name for _, name in reads.cells)
+        rounds.names_read.update(map(name_of, reads.cells))
         return NEXT
 
     run.branches([go] if certainly else [go, lambda: NEXT])

@@ -7,6 +7,7 @@ from contextlib import suppress
 from dataclasses import replace
 
 from nodl.infer.cpp.reading.type_names import Type
+from nodl.infer.cpp.reading.writes import FILLS
 from nodl.infer.cpp.running.arithmetic import added, computed
 from nodl.infer.cpp.running.assignments import as_declared, assign
 from nodl.infer.cpp.running.constructors import as_map, cast, construct, default_value, initial_value, made
@@ -14,6 +15,7 @@ from nodl.infer.cpp.running.contents import copied, elements_copied, items_of
 from nodl.infer.cpp.running.invocation import by_operator, pointed_to
 from nodl.infer.cpp.running.launch_values import decided, settled, settled_text
 from nodl.infer.cpp.running.machine import NEXT, Frame, Machine, expression
+from nodl.infer.cpp.running.references import as_referred_to
 from nodl.infer.cpp.running.static_types import class_of_member, current_object, seen_type
 from nodl.infer.cpp.running.values import (
     BOTTOM,
@@ -405,7 +407,19 @@ def pointer(run: Machine, node: Node, frame: Frame) -> Value:
     if not text(node).startswith("&"):
         return pointed_to(run, found, "operator*", node, frame)
     own = by_operator(run, "&", found, [], node, frame)
-    return found if own is None else own
+    if own is not None:
+        return own
+    return as_referred_to(found) if _is_kept(node) else found
+
+
+def _is_kept(address: Node) -> bool:
+    """Return whether an address becomes an element of a list: ``{&a, &b}``, ``list.push_back(&a)``."""
+    parent = address.parent
+    call = parent.parent if parent is not None and parent.type == "argument_list" else None
+    callee = field_of(call, "function") if call is not None else None
+    return (parent is not None and parent.type == "initializer_list") or (
+        callee is not None and text(field_of(callee, "field")) in FILLS
+    )
 
 
 def method_pointer(run: Machine, node: Node, frame: Frame) -> Value | None:

@@ -408,6 +408,7 @@ class Frame:
     aliases: dict[str, Node | None] = field(default_factory=dict)
     """References and pointers to plain values: the expression that each stands for, ``None`` if not known."""
     depth: int = 0
+    lasts: bool = False  # holds a static variable, from call to call
     finished: bool = False  # nobody can see its variables any more
     captured: bool = False  # a lambda can
     active: bool = False  # runs now

@@ -104,10 +104,10 @@ class AbstractStore:
         old = self._cells.get(cell, _ABSENT)
         if old is not value:
             value = bounded(value)
-            if old is _ABSENT and not hasattr(cell[0], "finished"):
-                self._by_name.setdefault(_name(cell), {})[cell] = None
+            if old is _ABSENT and not _is_of_a_call(cell):
+                self._by_name.setdefault(name_of(cell), {})[cell] = None
             if any(map(holds_callable, value)):
-                self.callable_names.add(_name(cell))
+                self.callable_names.add(name_of(cell))
             self._trail.append((cell, old, self._since.get(cell, -1)))
             self._since[cell] = len(self._trail) - 1
             self._cells[cell] = value
@@ -193,7 +193,7 @@ class AbstractStore:
             self.set(cell, join(*(changes.get(cell, present) for changes in alternatives)))
 
 
-def _name(cell: Cell) -> str:
+def name_of(cell: Cell) -> str:
     """Return the name of a variable; that of a global stands in its owner."""
     return cell[1] or str(getattr(cell[0], "name", ""))
 
@@ -203,12 +203,17 @@ def _is_over(cell: Cell) -> bool:
     return bool(getattr(cell[0], "finished", False))
 
 
+def _is_of_a_call(cell: Cell) -> bool:
+    """Return whether it is a variable of a call, which is gone after it: not one that is ``static``."""
+    return not getattr(cell[0], "lasts", True)
+
+
 def _is_new(cell: Cell) -> bool:
     """Return whether nobody sees a cell before it is set: a variable of a call, a member of an object.
 
     Who reads a member of an object that was not there before has read before who holds it.
     """
-    return isinstance(cell[0], Obj) or hasattr(cell[0], "finished")
+    return isinstance(cell[0], Obj) or _is_of_a_call(cell)
 
 
 class CallOutcome(NamedTuple):

@@ -22,8 +22,10 @@ def is_plain(value: Value) -> bool:
 
 
 def as_referred_to(value: Value) -> Value:
-    """Return what a member that is a reference or pointer holds: objects; a plain value may change meanwhile."""
-    return tuple(Unknown("what a member refers to") if is_plain((atom,)) else atom for atom in value)
+    """Return what a member or element that is a reference or pointer holds: objects; a plain value may change."""
+    return tuple(
+        Unknown("what a reference or pointer stands for") if is_plain((atom,)) else atom for atom in value
+    )
 
 
 def bind_reference(run: Machine, name: str, kind: str, initial: Node | None, frame: Frame) -> None:

@@ -342,7 +342,7 @@ def _static_local(
 ) -> None:
     """Make a variable once; it keeps its value from call to call."""
     key = ("static", frame.file.file, node.start_byte, name, str(sorted(frame.bindings.items())))
-    kept = run.frames.setdefault(key, Frame(frame.file, frame.scope))
+    kept = run.frames.setdefault(key, Frame(frame.file, frame.scope, lasts=True))
     if run.store.get((kept, name)) is None:
         run.local(kept, name, initial(), kind)
     frame.names.discard(name)

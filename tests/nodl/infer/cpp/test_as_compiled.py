@@ -17,8 +17,27 @@ pytest.importorskip("tree_sitter_cpp", reason="the extra cpp is not installed")
 PUB = "void pub(std::string t) { create_publisher<std_msgs::msg::String>(t, 1); }\n"
 CONFIG = 'struct C { std::string t = "plain"; };\n'
 
+EVERY_SECOND = "create_wall_timer(std::chrono::seconds(1), [this]() { %s });"
+
 # what the constructor does, members and classes before it, what the run made
 COVERED: dict[str, tuple[str, str, str, set[str]]] = {
+    "a callback counts in a static variable": (
+        EVERY_SECOND % 'static int n = 0; if (n++ == 3) pub("third");', "", "", {"third"},
+    ),
+    "a callback lengthens a static text": (
+        EVERY_SECOND % 'static std::string s = "a"; pub(s); s += "b";', "", "", {"a", "ab", "abb"},
+    ),
+    "a callback changes what another one reads outside of the class": (
+        EVERY_SECOND % 'shared = "b";' + EVERY_SECOND % "pub(shared);", "", 'std::string shared = "a";', {"a", "b"},
+    ),
+    "a list of addresses shows what its variables hold later": (
+        'std::string a = "a"; std::string * all[] = {&a}; a = "b"; for (auto * each : all) pub(*each);',
+        "", "", {"b"},
+    ),
+    "a list that is given addresses, too": (
+        'std::string a = "a"; std::vector<std::string *> all; all.push_back(&a); a = "b"; pub(*all[0]);',
+        "", "", {"b"},
+    ),
     "a number is no whole number alone: overloads that look alike may all be meant": (
         "long l = 2; pub(k(l)); pub(k(2));",
         'std::string k(long) { return "long_"; } std::string k(int) { return "int_"; }', "", {"long_", "int_"},
