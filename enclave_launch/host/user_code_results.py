@@ -1,8 +1,6 @@
 """Record the results of the user's code in a dry run, so that the live run that follows need not run it again.
 
-A secured launch visits its file twice: first to know what will start, then to start it. Running user code twice would
-break files with side effects: a folder made twice, a port taken twice, a prompt asked twice, another random name.
-So the first visit records what each piece of user code returned and changed, in order; the second replays it:
+The first visit of the file records what each piece of user code returned and changed, in order; the second replays it:
 
 - a Python launch file is run once; its description is restored to its state before the first visit, and visited again;
 - a function of the visit (``OpaqueFunction``, an action or a substitution of the user's own class) is called once;
@@ -10,8 +8,8 @@ So the first visit records what each piece of user code returned and changed, in
 - ``$(command)``, ``$(eval)`` and random names are computed once.
 
 The result of a function that an event or a timer calls is replayed only if there is one and all that the function read
-is unchanged (``observed_state``). A function that itself started something runs again as well, for that is what it is
-for. Used once: a further run evaluates again.
+is unchanged (``observed_state``); one that itself started something runs again. Used once: a further run evaluates
+again.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """The differences of ROS 2 releases, in one table.
 
-A feature belongs to the version of ``launch``, ``launch_ros`` or ``rcl`` that brought it, not to the
-distribution: every release gets fixes. Where the ament index holds the installed packages their version
-decides; else the version below, which is the one the rule was checked with (humble, jazzy, rolling) or the
-newest in the change logs (kilted, lyrical: not run against real launch).
+A feature belongs to the version of ``launch``, ``launch_ros`` or ``rcl`` that brought it, not to the distribution:
+every release gets fixes. Where the ament index holds the installed packages their version decides; else the version
+below: the one the rule was checked with (humble, jazzy, rolling) or the newest in the change logs (kilted, lyrical:
+not run).
 
 ``rolling`` stands for the snapshot that was run (launch 3.7.1). It also accepts later *names* - actions,
 substitutions, classes that the snapshot would refuse - because they can change nothing that it accepts.

@@ -1,24 +1,6 @@
 """Governance as a person writes it: YAML -> ``Governance``. Strict, with file and place in errors.
 
-    version: 1
-    domain_rules:                        # the first rule that lists a domain counts
-      - domains: 0-10,42                 # or "all"; default 0
-        allow_unauthenticated_participants: false
-        enable_join_access_control: true
-        discovery_protection_kind: ENCRYPT       # NONE, SIGN, ENCRYPT, SIGN_WITH_ORIGIN_AUTHENTICATION,
-        liveliness_protection_kind: ENCRYPT      # ENCRYPT_WITH_ORIGIN_AUTHENTICATION
-        rtps_protection_kind: SIGN
-        topic_rules:                     # first match wins; the default rule for * is added at the end
-          - topic_expression: rt/camera/*        # DDS name with prefix, fnmatch pattern
-            enable_discovery_protection: true
-            enable_liveliness_protection: true
-            enable_read_access_control: true
-            enable_write_access_control: true
-            metadata_protection_kind: SIGN
-            data_protection_kind: NONE           # NONE, SIGN, ENCRYPT
-
-Names are those of the governance document; everything left out is SROS2's default, shown above except for
-the topic rule's last two (ENCRYPT).
+docs/keystore.md shows the file. Names are those of the governance document; what is left out is SROS2's default.
 """
 
 from __future__ import annotations

@@ -1,21 +1,7 @@
-"""Read the hosts file, which says to which host an enclave or a node belongs.
+"""Read the hosts file, which says to which host an enclave or a node belongs, and what a node needs there.
 
-    version: 1
-    hosts:
-      base:
-        enclaves: [/base, "/base/*"]       # names or fnmatch patterns; * also covers further /
-      arm:
-        enclaves: ["/arm*"]
-        nodes: ["/camera/*"]               # final node names; for secure-plan, which knows nodes
-    needs:                                 # what the hardening of secure-plan export must leave open
-      - nodes: ["/camera/*"]
-        devices: [/dev/video0]
-        groups: [video]                    # that the devices belong to
-        realtime: false                    # may choose its own scheduling
-        writable_code: false               # makes code while it runs (JIT compilers)
-        memory: 256Mi                      # limit
-
-A name that is written out takes precedence over patterns. If the patterns of two hosts match, or both write a name out,
+docs/deployment.md shows the file. Enclaves and nodes are names or fnmatch patterns (``*`` also covers further ``/``). A
+name that is written out takes precedence over patterns. If the patterns of two hosts match, or both write a name out,
 that is an error: nobody should have to know which line wins.
 """
 

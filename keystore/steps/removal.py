@@ -1,12 +1,10 @@
 """Remove enclaves: revoke their certificates, delete their files.
 
-Which implementations look at the CRL (``crl.pem`` in each enclave directory, there only after a
-revocation): rmw_cyclonedds_cpp passes it as ``org.eclipse.cyclonedds.sec.auth.crl``, rmw_fastrtps_* as
-``dds.sec.auth.builtin.PKI-DH.identity_crl``; both refuse a listed peer at handshake, and read the file
-only when a participant starts. rmw_connextdds does not pass one. Every enclave needs the new file, so
-deploy after removing. Permissions cannot be revoked, they are useless without a valid identity.
-
-A CRL past its nextUpdate makes every participant fail: ``status`` lists it and ``renew`` renews it in time.
+rmw_cyclonedds_cpp passes ``crl.pem`` as ``org.eclipse.cyclonedds.sec.auth.crl``, rmw_fastrtps_* as
+``dds.sec.auth.builtin.PKI-DH.identity_crl``; both refuse a listed peer at handshake, and read the file only when a
+participant starts. rmw_connextdds does not pass one. Every enclave needs the new file, so deploy after removing.
+Permissions cannot be revoked, they are useless without a valid identity. A CRL past its nextUpdate makes every
+participant fail: ``status`` lists it and ``renew`` renews it in time.
 """
 
 from __future__ import annotations

@@ -4,13 +4,10 @@
     switch   everything is signed by the new CA; the old one is still trusted
     finish   the old CA is trusted no more
 
-Deploy after each step. What the overlap gives, as measured: Fast DDS trusts every certificate in
-``identity_ca.cert.pem``, so after ``start`` is deployed everywhere, robots can take ``switch`` one by
-one, as far as the identity CA goes. Cyclone DDS reads only the first certificate of the file, and neither bridges
-a change of the permissions CA: there ``switch`` is a change of all participants together, the earlier and
-later steps are harmless. A CRL names one CA and both
-implementations read only one, so a keystore with revocations skips the overlap: the CRL goes with the old
-CA.
+Deploy after each step. As measured: Fast DDS trusts every certificate in ``identity_ca.cert.pem``, so robots can take
+``switch`` one by one, as far as the identity CA goes. Cyclone DDS reads only the first, and neither bridges a change of
+the permissions CA: there ``switch`` is a change of all participants together. A CRL names one CA and both read only
+one, so a keystore with revocations skips the overlap: the CRL goes with the old CA.
 """
 
 from __future__ import annotations

@@ -115,17 +115,7 @@ class Broken(NamedTuple):
 
 
 def read_expectations(content: Any, place: str) -> Expectations:
-    """Read a parsed YAML document; raises ``UsageError`` if it is not such a file.
-
-    never:
-      - from: /camera          # an enclave or a node; wildcards as in permissions
-        to: /base              # the same, or a topic, service or action: whoever may receive on it
-        why: images come from a vendor's binary
-    accept:
-      - code: name-unremappable
-        subject: /camera*      # optional: what it is about
-        why: the driver writes the double underscore
-    """
+    """Read a parsed YAML document (docs/secure-plan.md); raises ``UsageError`` if it is not such a file."""
     if not isinstance(content, Mapping) or content.keys() - {"never", "accept"}:
         raise UsageError(f"{place}: expected a mapping with 'never' and 'accept'")
     return Expectations(
