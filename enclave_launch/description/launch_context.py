@@ -41,9 +41,9 @@ class ContextState(NamedTuple):
 class Locals:
     """Read-only attribute access to the locals of the event being handled."""
 
-    def __init__(self, values: dict[str, Any], looked_at: Callable[[str], None]) -> None:
+    def __init__(self, values: dict[str, Any], names_read: Callable[[str], None]) -> None:
         self.__dict__["_values"] = values
-        self.__dict__["_looked_at"] = looked_at
+        self.__dict__["_names_read"] = names_read
 
     def __getattr__(self, key: str) -> Any:
         values: dict[str, Any] = self.__dict__["_values"]
@@ -51,7 +51,7 @@ class Locals:
             raise AttributeError(
                 f"context.locals does not contain attribute '{key}', it contains: [{', '.join(values)}]"
             )
-        self.__dict__["_looked_at"](key)
+        self.__dict__["_names_read"](key)
         return values[key]
 
     def __setattr__(self, key: str, value: object) -> None:
@@ -86,9 +86,9 @@ class LaunchContext:
         self.__locals: dict[str, Any] = {}
         self.__locals_stack: list[dict[str, Any]] = []
         self.__combined: dict[str, Any] | None = None
-        self.event_looked_at = False  # by code that asks about the event being handled
-        self.configurations_looked_at: set[str] = set()
-        self.__launch_configurations: dict[str, Any] = WatchedConfigurations(self.configurations_looked_at)
+        self.event_read = False  # by code that asks about the event being handled
+        self.configurations_read: set[str] = set()
+        self.__launch_configurations: dict[str, Any] = WatchedConfigurations(self.configurations_read)
         self.__configurations_stack: list[dict[str, Any]] = []
         self.process_environment = Environment()
         self._event_queue = EventQueue()
@@ -160,11 +160,11 @@ class LaunchContext:
 
     @property
     def locals(self) -> Locals:
-        return Locals(self.get_locals_as_dict(), self.__note_look)
+        return Locals(self.get_locals_as_dict(), self.__note_read)
 
-    def __note_look(self, key: str) -> None:
+    def __note_read(self, key: str) -> None:
         if key in self.__locals and not key.startswith("current_launch_file_"):
-            self.event_looked_at = True
+            self.event_read = True
 
     # Environment: ``os.environ`` itself, as Python launch files rely on it
 
@@ -239,7 +239,7 @@ class LaunchContext:
         )
 
     def restore(self, saved: ContextState) -> None:
-        self.__launch_configurations = WatchedConfigurations(self.configurations_looked_at)
+        self.__launch_configurations = WatchedConfigurations(self.configurations_read)
         self.__launch_configurations.update(saved.configurations)
         self.__configurations_stack = saved.configurations_stack
         self.__locals = saved.locals
@@ -253,39 +253,39 @@ class LaunchContext:
 
 
 class WatchedConfigurations(dict[str, Any]):
-    """Launch configurations that note which of them are read. ``looked_at`` gets each name that is read or asked for,
+    """Launch configurations that note which of them are read. ``names_read`` gets each name that is read or asked for,
     found or not; who goes through all has seen all."""
 
-    def __init__(self, looked_at: set[str]) -> None:
+    def __init__(self, names_read: set[str]) -> None:
         super().__init__()
-        self._looked_at = looked_at
+        self._names_read = names_read
 
     def __contains__(self, name: object) -> bool:
         if isinstance(name, str):
-            self._looked_at.add(name)
+            self._names_read.add(name)
         return super().__contains__(name)
 
     def __getitem__(self, name: str) -> Any:
-        self._looked_at.add(name)
+        self._names_read.add(name)
         return super().__getitem__(name)
 
     def get(self, name: str, default: Any = None) -> Any:
-        self._looked_at.add(name)
+        self._names_read.add(name)
         return super().get(name, default)
 
     def keys(self) -> Any:
-        self._looked_at.update(dict(self))
+        self._names_read.update(dict(self))
         return super().keys()
 
     def values(self) -> Any:
-        self._looked_at.update(dict(self))
+        self._names_read.update(dict(self))
         return super().values()
 
     def items(self) -> Any:
-        self._looked_at.update(dict(self))
+        self._names_read.update(dict(self))
         return super().items()
 
     def copy(self) -> WatchedConfigurations:
-        same = WatchedConfigurations(self._looked_at)
+        same = WatchedConfigurations(self._names_read)
         same.update(self)
         return same

@@ -72,7 +72,7 @@ def evaluate(
             context.register_event_handler(OnIncludeLaunchDescription())
             context.emit_event_sync(IncludeEvent(top_description(path, arguments)))
             Explorer(context, host).run()
-            host.warnings.extend(_unknown_arguments(arguments, context.configurations_looked_at))
+            host.warnings.extend(_unknown_arguments(arguments, context.configurations_read))
         except EnclaveLaunchError:
             raise
         except Exception as error:  # launch files run code of their own: any exception is theirs
@@ -134,10 +134,10 @@ def parse_arguments(words: Sequence[str]) -> list[tuple[str, str]]:
     return list(parsed.items())
 
 
-def _unknown_arguments(arguments: Arguments, looked_at: Collection[str]) -> Iterator[Diagnostic]:
+def _unknown_arguments(arguments: Arguments, names_read: Collection[str]) -> Iterator[Diagnostic]:
     for name, _ in arguments:
-        if name not in looked_at:
-            yield argument_unknown(name, did_you_mean(name, looked_at))
+        if name not in names_read:
+            yield argument_unknown(name, did_you_mean(name, names_read))
 
 
 def _evaluation(host: PlanHost) -> Evaluation:

@@ -97,14 +97,14 @@ def observing(context: LaunchContext | None) -> Iterator[CallObservation]:
     for name, function in functions.items():
         setattr(os, name, _noting(observation, function))
     if context is not None:
-        context.event_looked_at = False
+        context.event_read = False
     try:
         yield observation
     finally:
         _observation = None
         for name, function in functions.items():
             setattr(os, name, function)
-        if context is not None and context.event_looked_at:
+        if context is not None and context.event_read:
             observation.untraceable = True
 
 

@@ -99,10 +99,10 @@ class EnvironmentWatch:
                 self._started.clear()
                 pause = FIRST_INTERVAL
                 await asyncio.sleep(pause)
-            self.look()
+            self.check()
             pause = min(2 * pause, LONGEST_INTERVAL)
 
-    def look(self) -> None:
+    def check(self) -> None:
         watched = self._running()
         if not watched:
             return

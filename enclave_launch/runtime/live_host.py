@@ -161,7 +161,7 @@ class LiveHost(Host):
         failed = True
         try:
             outcome = await live.run()
-            failed = outcome.returncode != 0 and not outcome.asked_to_end
+            failed = outcome.returncode != 0 and not outcome.requested_to_end
             if failed:
                 self.failed.append(name)
         except EnclaveLaunchError as error:

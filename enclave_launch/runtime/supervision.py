@@ -71,7 +71,7 @@ class ProcessEnd(NamedTuple):
     """The end of the last incarnation. ``returncode`` is None when none could be started."""
 
     returncode: int | None
-    asked_to_end: bool
+    requested_to_end: bool
 
 
 class SupervisedProcess:

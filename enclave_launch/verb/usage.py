@@ -45,30 +45,30 @@ def read_command_line(parser: CommandParser, argv: Sequence[str] | None) -> Comm
 def check_options(line: CommandLine, actions: Sequence[argparse.Action]) -> None:
     """Refuse options without effect: ``UsageError`` names the flag that is missing."""
     given, options = line.given, line.options
-    looks = check_views(line, actions)
+    is_view = check_views(line, actions)
     if options.learn is None:
         check_needs_secure(actions, given & _FOR_LEARN, "--learn")
-    elif looks:
+    elif is_view:
         raise UsageError("--learn runs the launch; nothing else is looked at")
     if not options.audit:
         check_needs_secure(actions, given & {"audit_report"}, "--audit")
-    elif options.secure or options.learn is not None or looks:
+    elif options.secure or options.learn is not None or is_view:
         raise UsageError(
             "--audit runs the launch unsecured and reports what --secure would refuse: give it alone"
         )
     if not options.watch:
         check_needs_secure(actions, given & {"watch_report", "watch_accept"}, "--watch")
-    elif looks or options.audit or options.learn is not None:
+    elif is_view or options.audit or options.learn is not None:
         raise UsageError(
             "--watch is for a launch that runs as planned: it is not for --dry-run, --audit or --learn"
         )
-    if options.provision_only and (looks or options.learn is not None or options.watch):
+    if options.provision_only and (is_view or options.learn is not None or options.watch):
         raise UsageError(
             "--provision-only writes the keystore and starts nothing: give it with --secure alone"
         )
     if not options.secure:
         check_needs_secure(actions, given & FOR_SECURE)
-        if not (looks or options.audit or options.watch):
+        if not (is_view or options.audit or options.watch):
             check_needs_secure(actions, given & FOR_PLAN, "--secure (or --dry-run, --audit, --watch)")
 
 

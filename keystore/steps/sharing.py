@@ -82,7 +82,7 @@ class EnclaveShare:
         else:
             opened.remove(layout.shares(self.enclave))
 
-    def kept(self) -> tuple[str, ...]:
+    def retained(self) -> tuple[str, ...]:
         """Return, for a person, what stays of our own share though it is not requested any more."""
         mine = next((share for share in self.shares if share.owner == self.owner), None)
         if mine is None or self.mine is None or is_part_of(mine.profiles, self.mine.profiles):
@@ -96,11 +96,11 @@ def _loses(before: Share, mine: Share) -> bool:
 
 def shares_in_use(shares: Iterable[EnclaveShare]) -> list[str]:
     """Return what could not be taken away of each share yet, one sentence an enclave."""
-    kept = [(share.enclave, share.kept()) for share in shares]
+    retained = [(share.enclave, share.retained()) for share in shares]
     return [
         f"enclave {enclave} is in use by another running launch, or another run of this one: it keeps what this launch "
         f"no longer needs ({', '.join(rules[:3])}{' ...' if len(rules) > 3 else ''}) until it starts alone"
-        for enclave, rules in kept
+        for enclave, rules in retained
         if rules
     ]
 

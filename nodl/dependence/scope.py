@@ -173,8 +173,8 @@ class _Filling:
         if word in ("remapped", "camera_info"):
             return self._hold(self._remapped(word, name))
         scope = self._scope
-        look = {"param": scope.value, "option": scope.option, "argument": scope.argument}[word]
-        found = look(name, given)
+        value_of = {"param": scope.value, "option": scope.option, "argument": scope.argument}[word]
+        found = value_of(name, given)
         if found is None or isinstance(found.value, (tuple, list)):
             self._why.append(f"{'parameter' if word == 'param' else word} {name!r} has no value")
             return self._hold(None)

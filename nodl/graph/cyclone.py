@@ -54,7 +54,7 @@ class ObserverError(NoDLError):
 
 
 class CycloneObserver:
-    """Is up from its construction until ``close``; ``look`` takes in what was announced since. Raises
+    """Is up from its construction until ``close``; ``poll`` takes in what was announced since. Raises
     ``ObserverError`` where DDS refuses the participant, and ``ImportError`` without the binding."""
 
     def __init__(
@@ -91,8 +91,8 @@ class CycloneObserver:
         self._ports = UdpPorts()
         self.state = GraphState(self._participant.guid.bytes.hex())
 
-    def look(self) -> int:
-        """Look once, and return how many changes there have been in all."""
+    def poll(self) -> int:
+        """Poll once, and return how many changes there have been in all."""
         self._ports = UdpPorts()
         # Endpoints are fetched before participants, so that the participant of each is known when it is read.
         fetched = [(reader.take(N=_MOST_AT_ONCE), read) for reader, read in reversed(self._readers)]

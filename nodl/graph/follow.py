@@ -37,12 +37,12 @@ def main() -> int:
 
 
 def _follow(where: Where, reader: int) -> int:
-    told, last = -1, 0.0
+    reported, last = -1, 0.0
     with observer(where, os.environ) as up:
         while not select.select([reader], [], [], _INTERVAL)[0]:
-            changes = up.look()
-            if changes != told and time.monotonic() - last >= _BETWEEN:
-                told, last = changes, time.monotonic()
+            changes = up.poll()
+            if changes != reported and time.monotonic() - last >= _BETWEEN:
+                reported, last = changes, time.monotonic()
                 line = {"graph": graph_document(up.graph()), "forged": up.forged}
                 try:
                     print(json.dumps(line), flush=True)

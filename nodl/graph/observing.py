@@ -38,7 +38,7 @@ _OF_RCLPY = (
 class Observer(Protocol):
     """What both have."""
 
-    def look(self) -> int: ...
+    def poll(self) -> int: ...
 
     def graph(self, *, past: bool = False) -> Graph: ...
 
@@ -134,10 +134,10 @@ def _answered(observe: Callable[[], Any], answer: Connection) -> None:
 
 def observe_until(up: Observer, done: Callable[[], bool]) -> None:
     """Keep looking until ``done`` says so, once after each look."""
-    up.look()
+    up.poll()
     while not done():
         time.sleep(INTERVAL)
-        up.look()
+        up.poll()
 
 
 class Quiet:
@@ -151,7 +151,7 @@ class Quiet:
         self._changes = -1
 
     def __call__(self) -> bool:
-        now, changes = time.monotonic(), self._up.look()
+        now, changes = time.monotonic(), self._up.poll()
         graph = self._up.graph()
         if changes != self._changes or graph.half_open or not graph.processes:
             self._changes = changes

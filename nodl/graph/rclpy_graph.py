@@ -51,8 +51,8 @@ class RclpyObserver:
         self._now: tuple[GraphProcess, ...] = ()
         self._changes = 0
 
-    def look(self) -> int:
-        """Look once, and return how many changes there have been in all."""
+    def poll(self) -> int:
+        """Poll once, and return how many changes there have been in all."""
         now = tuple(self._processes())
         if now != self._now:
             self._now = now

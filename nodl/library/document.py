@@ -61,9 +61,9 @@ def read_library_document(folder: str, file: str) -> LibraryDocument:
     given = plain(section) if section else {}
     assert isinstance(given, dict)
     classes = tuple(given.get("classes") or ())
-    told = (given.get("evidence") or {}).items()
+    given_evidence = (given.get("evidence") or {}).items()
     evidence: dict[str, Any] = {
-        key: tuple(value) if isinstance(value, list) else value for key, value in told
+        key: tuple(value) if isinstance(value, list) else value for key, value in given_evidence
     }
     node = parse_root(root, path, package=package, name=name).interface
     programs = () if classes or given.get("transport") else (node.executable, node.plugin)

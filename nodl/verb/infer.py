@@ -54,8 +54,8 @@ def run(args: argparse.Namespace) -> int:
     else:
         sys.stdout.write(encodable("".join(documents.values())))
     if not system.nodes:
-        looked_at = counted(len(system.files), "source file")
-        print(f"secure-nodl infer: error: no node was found in {looked_at}", file=sys.stderr)
+        searched = counted(len(system.files), "source file")
+        print(f"secure-nodl infer: error: no node was found in {searched}", file=sys.stderr)
     if expanded.unresolved and (chosen not in ("text", "json") or args.output):
         print(f"{len(expanded.unresolved)} unresolved:", file=sys.stderr)
         for question in expanded.unresolved:

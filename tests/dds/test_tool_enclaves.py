@@ -196,7 +196,7 @@ def test_an_observers_enclave_shows_the_whole_graph_of_a_secured_system_and_a_fo
     try:
         graph = wait_for(observer, lambda graph: len(graph.processes) == 1)
         for _ in range(20):  # the participant is known: time for the rest to come, if it came
-            observer.look()
+            observer.poll()
             time.sleep(0.1)
         (process,) = observer.graph().processes
         assert not process.listed and next(process.endpoints, None) is None

@@ -98,7 +98,7 @@ def wait_for(observer: CycloneObserver, expected: Callable[[Graph], bool], *, pa
     """The first graph that is as ``expected``; after a minute the last one, for the test to say what is wrong."""
     end = time.monotonic() + LONGEST_SECONDS
     while True:
-        observer.look()
+        observer.poll()
         graph = observer.graph(past=past)
         if expected(graph) or time.monotonic() > end:
             return graph

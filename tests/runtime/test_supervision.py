@@ -87,7 +87,7 @@ def lived(
 
 def test_a_clean_end() -> None:
     outcome, story = lived("true")
-    assert outcome == ProcessEnd(0, asked_to_end=False)
+    assert outcome == ProcessEnd(0, requested_to_end=False)
     assert story.lines == [
         ("INFO", "process started with pid [PID]"),
         ("INFO", "process has finished cleanly [pid PID]"),
@@ -96,7 +96,7 @@ def test_a_clean_end() -> None:
 
 def test_a_bad_end() -> None:
     outcome, story = lived("exit 7")
-    assert outcome == ProcessEnd(7, asked_to_end=False)
+    assert outcome == ProcessEnd(7, requested_to_end=False)
     assert story.lines[-1] == ("ERROR", "process has died [pid PID, exit code 7, cmd 'exit 7'].")
 
 
@@ -112,7 +112,7 @@ def test_a_program_that_cannot_be_started() -> None:
                 "a-1", prepare, tree, LifeRules(respawn=True), story, story.say
             ).run()
 
-    assert asyncio.run(main()) == ProcessEnd(None, asked_to_end=False)
+    assert asyncio.run(main()) == ProcessEnd(None, requested_to_end=False)
     assert story.lines == [("ERROR", "cannot start process: No such file or directory: '/no/such/program'")]
 
 
@@ -120,10 +120,10 @@ def test_respawn_until_the_retries_are_used_up() -> None:
     outcome, story = lived("exit 1", LifeRules(respawn=True, max_retries=2))
     assert story.exits == [1, 1, 1]
     assert len(set(story.pids)) == 3
-    assert outcome == ProcessEnd(1, asked_to_end=False)
+    assert outcome == ProcessEnd(1, requested_to_end=False)
 
 
-def test_respawn_under_kill_9_until_asked_to_end() -> None:
+def test_respawn_under_kill_9_until_requested_to_end() -> None:
     async def steps(process: SupervisedProcess, story: Story) -> None:
         for count in range(1, 6):
             await story.until(lambda count=count: len(story.pids) == count)  # type: ignore[misc]
@@ -133,7 +133,7 @@ def test_respawn_under_kill_9_until_asked_to_end() -> None:
 
     outcome, story = lived("exec sleep 60", LifeRules(respawn=True), steps)
     assert story.exits == [-9] * 5 + [-2]
-    assert outcome.asked_to_end
+    assert outcome.requested_to_end
 
 
 def test_the_delay_before_a_respawn_is_kept_and_cut_short_by_the_end() -> None:
@@ -182,7 +182,7 @@ def test_a_child_that_ignores_sigint_and_sigterm_is_killed() -> None:
         process.end(QUICK, quiet=True)
 
     outcome, story = lived(STUBBORN, steps=steps)
-    assert outcome == ProcessEnd(-9, asked_to_end=True)
+    assert outcome == ProcessEnd(-9, requested_to_end=True)
     assert story.lines[1:-1] == [
         (
             "ERROR",
@@ -197,12 +197,12 @@ def test_a_child_that_ignores_sigint_and_sigterm_is_killed() -> None:
     ]
 
 
-def test_asked_to_end_before_it_was_started() -> None:
+def test_requested_to_end_before_it_was_started() -> None:
     async def steps(process: SupervisedProcess, story: Story) -> None:
         process.end(QUICK)
 
     outcome, story = lived("exec sleep 60", steps=steps)
-    assert outcome.asked_to_end
+    assert outcome.requested_to_end
     assert story.exits in ([], [-2])
 
 
@@ -255,6 +255,6 @@ def test_a_nul_character_is_told_and_never_taken_for_a_start(cmd: tuple[str, ...
         async with ProcessTree() as tree:
             return await SupervisedProcess("a-1", prepare, tree, LifeRules(), story, story.say).run()
 
-    assert asyncio.run(main()) == ProcessEnd(returncode=None, asked_to_end=False)
+    assert asyncio.run(main()) == ProcessEnd(returncode=None, requested_to_end=False)
     assert story.pids == []
     assert "holds a NUL character" in story.lines[0][1]

@@ -92,8 +92,8 @@ def _checked(name: str, value: Any) -> Any:
         return value
     if isinstance(value, Sequence):
         return _uniform(name, value)
-    tells_name = current_release().has(Feature.PARAMETER_NAME_IN_ERRORS)
-    names_parameter = f' for "{name}". ' if tells_name else "."
+    is_named = current_release().has(Feature.PARAMETER_NAME_IN_ERRORS)
+    names_parameter = f' for "{name}". ' if is_named else "."
     raise TypeError(
         "Allowed value types are bytes, bool, int, float, str, Sequence[bool], Sequence[int], "
         f"Sequence[float], Sequence[str]. Got {type(value)}{names_parameter}{_WRAP_IT_AS_TEXT}"
@@ -103,10 +103,10 @@ def _checked(name: str, value: Any) -> Any:
 def _uniform(name: str, items: Sequence[Any]) -> tuple[Any, ...]:
     kind = type(items[0]) if items else None
     if kind not in _SCALARS or not all(isinstance(item, kind) for item in items):
-        tells_name = current_release().has(Feature.PARAMETER_NAME_IN_ERRORS)
+        is_named = current_release().has(Feature.PARAMETER_NAME_IN_ERRORS)
         raise TypeError(
             "Expected a non-empty sequence, with items of uniform type. Allowed sequence item types are "
-            "bool, int, float, str." + (f' Got inconsistent input for "{name}"' if tells_name else "")
+            "bool, int, float, str." + (f' Got inconsistent input for "{name}"' if is_named else "")
         )
     return tuple(items)
 

@@ -58,14 +58,14 @@ _NAMED = 5
 
 
 def _missing_ends(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
-    asked, users = _requested_names(plan), _users(document)
+    requested, users = _requested_names(plan), _users(document)
     everywhere: dict[Operation, set[str]] = {}
     for grant in frozenset[GrantedName]().union(*plan.enclaves.values()):
         everywhere.setdefault(grant.operation, set()).add(grant.name)
     for here, there, code, verb in _ENDS:
         others = everywhere.get(there, set())
         patterns = {name for name in others if has_wildcard(name)}
-        for name in sorted(asked.get(here, ())):
+        for name in sorted(requested.get(here, ())):
             candidates = others if has_wildcard(name) else patterns
             if name not in others and not any(can_meet(name, other) for other in candidates):
                 using = users.get((here, name), ())
@@ -99,10 +99,10 @@ def _other_transforms(topic: str) -> str | None:
 
 def near_names(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
     """Yield pairs of names with opposite ends that never meet and differ by a typing error."""
-    asked, users = _requested_names(plan), _users(document)
+    requested, users = _requested_names(plan), _users(document)
     for here, there in _PAIRS:
-        lonely_here = asked.get(here, set()) - asked.get(there, set())
-        lonely_there = asked.get(there, set()) - asked.get(here, set())
+        lonely_here = requested.get(here, set()) - requested.get(there, set())
+        lonely_there = requested.get(there, set()) - requested.get(here, set())
         for one, two in product(sorted(lonely_here), sorted(lonely_there)):
             if _nearly(one, two):
                 uses = f"{one} ({here.replace('_', ' ')}) and {two} ({there.replace('_', ' ')})"
@@ -201,11 +201,11 @@ def _quality(qos: Mapping[str, Any], other: Mapping[str, Any]) -> Quality:
 
 
 def _requested_names(plan: PlanDocument) -> dict[str, set[str]]:
-    asked: dict[str, set[str]] = {}
+    requested: dict[str, set[str]] = {}
     for node in plan.nodes:
         for grant in node.own:
-            asked.setdefault(grant.operation, set()).add(grant.name)
-    return asked
+            requested.setdefault(grant.operation, set()).add(grant.name)
+    return requested
 
 
 def _users(document: DryRun) -> _Users:
