@@ -1,4 +1,4 @@
-"""Read a file that somebody else wrote, in bounded time and memory; write one that a person requested: whole, or not at
+"""Read a file of unknown origin, in bounded time and memory; write one that a person requested: whole, or not at
 all.
 
 A path can name a pipe without a writer or an endless device. Both raise ``OSError``.

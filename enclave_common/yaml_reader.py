@@ -1,4 +1,4 @@
-"""Read YAML that somebody else wrote, with line numbers and within limits.
+"""Read YAML of unknown origin, with line numbers and within limits.
 
 PyYAML composes and constructs, so the values and the errors are those of ``yaml.safe_load``. libyaml, which comes with
 PyYAML, scans every text that it reads as PyYAML's own scanner does.

@@ -200,7 +200,7 @@ class DriftWatch(LaunchCompanion):
 
 
 class _Observer:
-    """The process that looks, and the newest graph that it sent. :raises RuntimeFailure: it cannot look."""
+    """The process that observes, and its newest graph. :raises RuntimeFailure: it cannot observe."""
 
     def __init__(self, domain: int, enclave_directory: Path | None) -> None:
         directory = [f"--enclave-directory={enclave_directory}"] if enclave_directory else []

@@ -1,6 +1,6 @@
-"""Tells in time, while a launch runs, that what its processes use is about to end.
+"""Warn in time, while a launch runs, that what its processes use is about to expire.
 
-Cyclone DDS peers stop receiving at the second in which a writer's certificate or permissions end; Fast DDS 2.9 looks at
+Cyclone DDS peers stop receiving at the second in which a writer's certificate or permissions end; Fast DDS 2.9 reads
 the dates at start and handshake only. Neither says anything, so the supervisor does.
 """
 

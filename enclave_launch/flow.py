@@ -171,7 +171,7 @@ def run(launch: Launch, *, options: RunSettings | None = None) -> int:
 
 
 def start(launch: Launch, *, options: RunSettings | None = None) -> RunningLaunch:
-    """Start what was planned and return at once: a handle to look at it, wait for it and stop it.
+    """Start what was planned and return at once: a handle to inspect it, wait for it and stop it.
 
     Signals stay the caller's. Raises as ``run``.
     """

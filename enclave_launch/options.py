@@ -50,7 +50,7 @@ class ResolveOptions(_ResolveOptions):
 
     ``prefixes`` are searched before ``AMENT_PREFIX_PATH``; ``distro`` ``None``: ``ROS_DISTRO``, else the newest;
     ``manifests`` win where NoDL definitions conflict. Nodes without a manifest: ``infer`` lets their sources be
-    analysed, ``library`` the library be asked, whose documents in ``library_folders`` come first; ``source_folders``:
+    analysed, ``library`` the library be used, whose documents in ``library_folders`` come first; ``source_folders``:
     where sources of compiled nodes lie, besides the workspaces of the prefixes; ``progress`` is called
     with each program that is analysed."""
 

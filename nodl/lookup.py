@@ -1,6 +1,6 @@
 """Find the NoDL that describes the nodes of an executable or component.
 
-Takes package and executable (or plugin), gives their ``NodeInterface`` values, or reports where it looked.
+Takes package and executable (or plugin), gives their ``NodeInterface`` values, or reports where it searched.
 Sources, the first that knows the executable decides:
 
 1. manifests named by the user (``--nodl FILE``, or a folder of them), to settle conflicts or stand in for missing ones;

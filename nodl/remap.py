@@ -143,7 +143,7 @@ class NodeNames:
     def action(self, name: str, *, as_a_whole: bool) -> Resolved:
         """Return the action name; ``as_a_whole`` is true for the distributions that remap it (kilted and later).
 
-        rcl then looks it up among the topic rules. The five names below it are remapped once more, each by itself:
+        rcl then finds it among the topic rules. The five names below it are remapped once more, each by itself:
         ``action_parts``.
         """
         expanded = self.expand(name, "action name")

@@ -51,7 +51,7 @@ def check_required_arguments(description: Any, given: list[str]) -> None:
 
 
 def _complain(required: dict[str, Declared], given: list[str]) -> None:
-    """Raise what upstream raises, in its words: the list of names grows with each argument looked at."""
+    """Raise what upstream raises, in its words: the list of names grows with each argument checked."""
     for name, declared in required.items():
         if declared.given is not None:
             given.extend(_known(declared.given))

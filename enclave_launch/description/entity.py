@@ -38,7 +38,7 @@ class ScanRole(Enum):
 
 
 class LaunchDescriptionEntity:
-    """Visited when launching; described when only looked at.
+    """Visited when launching; described when only printed.
 
     ``source_location`` is where it was written: the element of an XML or YAML file (set by the front end), or
     the statement of a Python file that created the object.

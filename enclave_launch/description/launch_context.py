@@ -202,7 +202,7 @@ class LaunchContext:
         return self._event_handlers.awaits("launch.events.ExecutionComplete")
 
     def register_event_handler(self, event_handler: Handler, append: bool = False) -> None:
-        """Register a handler. The newest is asked first; with ``append`` this one is asked last."""
+        """Register a handler. The newest comes first; with ``append`` this one comes last."""
         self._event_handlers.register(event_handler, append)
 
     def unregister_event_handler(self, event_handler: Handler) -> None:
@@ -253,7 +253,7 @@ class LaunchContext:
 
 
 class WatchedConfigurations(dict[str, Any]):
-    """Launch configurations that note which of them are read. ``names_read`` gets each name that is read or asked for,
+    """Launch configurations that note which of them are read. ``names_read`` gets each name that is read or tested,
     found or not; who goes through all has seen all."""
 
     def __init__(self, names_read: set[str]) -> None:

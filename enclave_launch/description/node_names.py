@@ -88,7 +88,7 @@ def warn_about_repeats(context: LaunchContext, node_name: str, started_by: str) 
 
 
 def _counts(context: LaunchContext) -> Counter[str]:
-    """Return the table of counts, from the context's globals, where third-party code may look for it."""
+    """Return the table of counts, from the context's globals, where third-party code may expect it."""
     counts: Counter[str] | None = getattr(context.locals, _GLOBAL, None)
     if counts is None:
         counts = Counter()

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 @read_only("method")
 class LaunchDescriptionSource:
-    """Loads its description once, when first asked with a context. Subclasses say how."""
+    """Loads its description once, when first requested with a context. Subclasses say how."""
 
     method: str = ""
     is_file = False  # its location is the path of a launch file

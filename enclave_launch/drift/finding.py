@@ -104,7 +104,7 @@ def finding_text(finding: DriftFinding) -> str:
 
 
 def drift_text(findings: Sequence[DriftFinding], graph: Graph) -> str:
-    """Return a report: what is different, alarms first, and what was looked at."""
+    """Return a report: what is different, alarms first, and what was compared."""
     levels = list(Level)
     ordered = sorted(findings, key=lambda each: (levels.index(each.level), each.kind.value, each.subject))
     seen = f"{len(graph.processes)} participants, {sum(1 for _ in graph.nodes)} nodes"

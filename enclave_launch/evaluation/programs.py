@@ -1,4 +1,4 @@
-"""Find missing programs before launch would notice them, when it spawns. Looks at the file system."""
+"""Find missing programs before launch would notice them, when it spawns. Reads the file system."""
 
 from __future__ import annotations
 

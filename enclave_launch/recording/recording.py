@@ -67,7 +67,7 @@ class Unrecorded(NamedTuple):
 
 
 class Listener:
-    """Told in the event loop, ``opened`` first, and does nothing of it: each overrides what it is interested in."""
+    """Called in the event loop, ``opened`` first; does nothing by itself: each overrides what it is interested in."""
 
     _launch: LaunchControl
     _recording: Recording

@@ -5,7 +5,7 @@ calls the user's code once for both; upstream's engine would have to call it aga
 ``--secure`` everything is upstream's.
 
 Beside ``ros2launch_security``, which also defines ``--secure``, ours wins: its options are replaced, its
-extension sees a launch that asked for no security and does nothing. The entry point's name sorts after its
+extension sees a launch without security and does nothing. The entry point's name sorts after its
 name, and ros2launch adds options in that order.
 """
 

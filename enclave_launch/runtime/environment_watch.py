@@ -1,4 +1,4 @@
-"""Looks at the environment of what really runs, from /proc, and ends what is not what was planned.
+"""Check the environment of what really runs, from /proc, and end what is not what was planned.
 
 A program between us and a node (a prefix that was vouched for, a shell, a script's ``#!/usr/bin/env -S -u``) may drop
 the variables that lead to the enclave; the node would then join unsecured. So some time after each start, and every
@@ -82,7 +82,7 @@ class EnvironmentWatch:
         self._started = asyncio.Event()
 
     def process_started(self) -> None:
-        """Look soon."""
+        """Check soon."""
         self._started.set()
 
     async def run(self) -> None:

@@ -22,7 +22,7 @@ class StartAdditions(NamedTuple):
 
 
 class EnclaveGate(Protocol):
-    """Asked before every start, one call at a time: ``granted`` first, else ``ensure`` in a worker thread."""
+    """Called before every start, one call at a time: ``granted`` first, else ``ensure`` in a worker thread."""
 
     def granted(self, process: ResolvedProcess) -> StartAdditions | None:
         """Return what ``ensure`` would if that needs no work: the enclave is unchanged since the last check."""

@@ -1,4 +1,4 @@
-"""A launch that runs beside the program that started it: looked at, waited for and stopped from there.
+"""A launch that runs beside the program that started it: inspected, waited for and stopped from there.
 
     with start(provision(plan, "keystore")) as launch:
         launch.wait_until(printed("talker-1", "ready"), timeout=10)

@@ -55,7 +55,7 @@ class Patience(NamedTuple):
 
 
 class Watcher(Protocol):
-    """Told in the event loop, in the order things happen. ``waits_for``: what may pause the reading of its output."""
+    """Called in the event loop, in the order things happen. ``waits_for``: what may pause the reading of its output."""
 
     @property
     def waits_for(self) -> Mapping[Stream, frozenset[Hold]]: ...

@@ -71,7 +71,7 @@ class Survivors:
 
 
 def _has_ended(child: int) -> bool:
-    """Return whether ``child`` has ended, whoever has reaped it or will. It stays as it is."""
+    """Return whether ``child`` has ended, reaped or not. It stays as it is."""
     try:
         return os.waitid(os.P_PID, child, os.WEXITED | os.WNOHANG | os.WNOWAIT) is not None
     except ChildProcessError:

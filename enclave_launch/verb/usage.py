@@ -1,6 +1,6 @@
 """Check that options make sense together: one that would have no effect is wrong usage.
 
-Somebody who writes ``--keystore`` believes that the robot starts secured. Performs no I/O.
+A user who writes ``--keystore`` believes that the robot starts secured. Performs no I/O.
 """
 
 from __future__ import annotations

@@ -85,7 +85,7 @@ class ZenohRouter:
     """A context: within it a router with the present rules answers. ``program``: None where none is installed.
     ``heard``: gets each line that a router of ours prints, and says whether that was all that it is good for.
 
-    :raises RuntimeFailure: on entering, when none answers and none can be started, or somebody else is there.
+    :raises RuntimeFailure: on entering, when none answers and none can be started, or another program is there.
     """
 
     def __init__(

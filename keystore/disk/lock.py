@@ -39,7 +39,7 @@ def exclusive(root: Path, timeout: float = DEFAULT_TIMEOUT) -> Iterator[None]:
 
 
 def _locked(root: Path, timeout: float, deadline: float) -> int | None:
-    """Return the locked descriptor; None if somebody removed or replaced the file meanwhile, so that others lock it."""
+    """Return the locked descriptor; None if the file was removed or replaced meanwhile, so that others lock it."""
     path = root / layout.LOCK
     try:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)

@@ -4,7 +4,7 @@
     batch.record                      the register; always takes its place first
     batch.commit                      made durable, then renamed into place in the order they were added
 
-A rename is all that ever changes what others see. Whoever holds the lock first clears what a dead run left in
+A rename is all that ever changes what others see. The holder of the lock first clears what a dead run left in
 the staging area; nothing of it was visible.
 
 Durability: a few files are fsynced one by one. For many, one ``syncfs`` before the renames and one after do

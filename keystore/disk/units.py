@@ -23,7 +23,7 @@ class Unit(NamedTuple):
         target: The target that it is part of; of a target, its own name.
         node: Fully qualified name of the node, or the process's name.
         enclave: None if the process has none.
-        keystore: Where it looks for its enclave.
+        keystore: Where its enclave is.
         reads_crl: It loads the CRL of its enclave.
         wants: Of a target, the units it wants, in order.
     """

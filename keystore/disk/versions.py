@@ -4,7 +4,7 @@
     /etc/ros/keystore.d/1763774400/                        a whole keystore without private/
     /etc/ros/keystore.d/pending/                           keys made here that wait for their certificates
 
-A version is written aside, made durable, and put in force by one rename of the link: whoever looks at any time sees
+A version is written aside, made durable, and put in force by one rename of the link: every reader sees
 the old one or the new one, whole. What an interrupted run left is never seen, and the next run removes it.
 """
 

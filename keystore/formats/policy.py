@@ -85,7 +85,7 @@ class Policy(NamedTuple):
     enclaves: tuple[EnclavePolicy, ...]
 
     def wildcards(self) -> dict[str, tuple[str, ...]]:
-        """Map each enclave to what it is allowed by wildcard: granted because somebody wrote it, and worth saying."""
+        """Map each enclave to what it is allowed by wildcard: granted because a person wrote it; to be reported."""
         found = {enclave.path: tuple(sorted(set(_wildcards(enclave)))) for enclave in self.enclaves}
         return {path: expressions for path, expressions in found.items() if expressions}
 

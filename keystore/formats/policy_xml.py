@@ -49,7 +49,7 @@ class PolicyDocument:
     """A policy that was read. ``places``: (enclave, profile ns, profile node, rule) to ``file:line``.
 
     ``warnings``: what is valid but surely not meant. ``notes``: every wildcard and every DENY, which
-    only a policy file can bring in and a person should look at. ``file``: where it was read.
+    only a policy file can bring in and a person should review. ``file``: where it was read.
     """
 
     policy: Policy

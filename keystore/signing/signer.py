@@ -1,4 +1,4 @@
-"""Where a CA's key lives: ``Signer.sign`` is the only thing a CA key is ever asked, in a file or a PKCS#11 token.
+"""Where a CA's key lives: ``Signer.sign`` is the only use of a CA key, in a file or a PKCS#11 token.
 
 Private keys and passphrases stay inside these objects: no ``repr``, message or attribute shows them."""
 

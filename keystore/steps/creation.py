@@ -37,7 +37,7 @@ from keystore.steps.opening import ChangeOptions, opened_for_change
 @dataclass(frozen=True, slots=True)
 class ImportedCa:
     """An existing CA: its PEM certificate and its PEM key, or a file with the key's ``pkcs11:`` URI. Without ``key`` an
-    identity CA of somebody else (Vault, step-ca, cert-manager), which issues certificates for requests."""
+    identity CA of another party (Vault, step-ca, cert-manager), which issues certificates for requests."""
 
     certificate: Path
     key: Path | None = None
@@ -264,7 +264,7 @@ def _complete_governance(opened: Store, options: CreateOptions) -> bool:
 def _unsigned_default(root: Path) -> bytes | None:
     """Return what an interrupted run left beside a missing ``governance.p7s``, unless it is weaker than the default.
 
-    Raises DamagedKeystoreError for any other document: nobody signed it, so somebody must look at it first.
+    Raises DamagedKeystoreError for any other document: nobody signed it, so a person must review it first.
     """
     present = safe_files.read_if_there(root, layout.GOVERNANCE_XML)
     if present is None:

@@ -1,4 +1,4 @@
-"""The CRL, made from the register. Which implementations look at it, and when: see ``keystore.steps.removal``.
+"""The CRL, made from the register. Which implementations read it, and when: see ``keystore.steps.removal``.
 
 A CRL names one CA, and both implementations read only the first of a file: it lists what the identity CA in use
 issued. Its number only grows; one with another number than the register's was put back and is replaced.

@@ -32,7 +32,7 @@ from keystore.steps.host_bundles import SUFFIX, last_signed
 
 
 class HostStatus(NamedTuple):
-    """The state of one host. ``found`` is what a person must look at; ``place`` is where the manifest was read."""
+    """The state of one host. ``found`` is what needs attention; ``place`` is where the manifest was read."""
 
     place: Path
     manifest: Manifest

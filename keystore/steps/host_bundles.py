@@ -153,7 +153,7 @@ def last_signed(view: KeystoreView, host: str) -> tuple[Manifest, bytes] | None:
 def hosts_that_left(keystore: Path | str, hosts: Iterable[str]) -> dict[str, tuple[str, ...]]:
     """Return hosts with a bundle of this keystore that are not among ``hosts`` -> their enclaves.
 
-    Only enclaves whose certificates on that host are neither revoked nor expired: whoever has the host can use them.
+    Only enclaves whose certificates on that host are neither revoked nor expired: who has the host can use them.
     """
     view, at = keystore_at(keystore), utc_now()
     register = read_register(view.root) or Register()

@@ -1,9 +1,8 @@
 """Renewal of what ends soon, and repair of keystores that SROS2 or an accident left exposed.
 
-Certificate and permissions are always renewed together, so that they end together. Keys stay unless
-asked. Repair means: separate CAs where one was shared, certificates that cannot sign documents, subjects
-nobody else's permissions fit, private modes. A new permissions CA makes every document change: deploy all
-enclaves together.
+Certificate and permissions are always renewed together, so that they end together. Keys stay unless new ones are
+requested. Repair means: separate CAs where one was shared, certificates that cannot sign documents, subjects nobody
+else's permissions fit, private modes. A new permissions CA makes every document change: deploy all enclaves together.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Options that several verbs share, and how reports look."""
+"""Options that several verbs share, and the form of reports."""
 
 from __future__ import annotations
 

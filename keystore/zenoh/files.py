@@ -112,7 +112,7 @@ def identity_problem(view: KeystoreView, due: datetime) -> str | None:
     """Return what is wrong with the router's key pair: it has to be whole, private, by the CA in use, and hold until
     ``due``.
 
-    Raises UnsafeKeystoreError for a key that somebody else could have written.
+    Raises UnsafeKeystoreError for a key that others could have written.
     """
     key = router_key(view)
     if key is None:

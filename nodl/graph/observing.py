@@ -1,4 +1,4 @@
-"""Choose an observer, and how long it looks."""
+"""Choose an observer, and how long it observes."""
 
 from __future__ import annotations
 
@@ -133,7 +133,7 @@ def _answered(observe: Callable[[], Any], answer: Connection) -> None:
 
 
 def observe_until(up: Observer, done: Callable[[], bool]) -> None:
-    """Keep looking until ``done`` says so, once after each look."""
+    """Poll until ``done`` returns True, which is called after each poll."""
     up.poll()
     while not done():
         time.sleep(INTERVAL)
@@ -142,7 +142,7 @@ def observe_until(up: Observer, done: Callable[[], bool]) -> None:
 
 class Quiet:
     """Done when nothing has changed, and nothing is half open, for ``settle`` seconds; at the latest after
-    ``longest``. An empty domain is not quiet: somebody may be about to be discovered."""
+    ``longest``. An empty domain is not quiet: a participant may be about to be discovered."""
 
     def __init__(self, up: Observer, settle: float, longest: float) -> None:
         self._up, self._settle = up, settle

@@ -1,8 +1,8 @@
 """Observed runs → what a manifest of each program says. Performs no I/O.
 
 A final name becomes what the source writes (``inverse``). Where several spellings lead to it, those stay that explain
-the most runs; what is still undecided then is written under the likeliest and told. Merging and parameters are those of
-records (``nodl.record.learning``): an observation proves that something is there, never that it is not.
+the most runs; what is still undecided then is written under the likeliest and reported. Merging and parameters are as
+in records (``nodl.record.learning``): an observation proves that something is there, never that it is not.
 """
 
 from __future__ import annotations

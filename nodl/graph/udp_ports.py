@@ -23,7 +23,7 @@ _SOCKET = re.compile(r"socket:\[(\d+)\]\Z")
 
 
 class UdpPorts:
-    """As they are when first asked."""
+    """As they are when first read."""
 
     def pid(self, locators: Iterable[str]) -> int | None:
         """Return the one process that receives at one of ``locators``, such as ``udp/192.0.2.2:7411@4``, or None."""

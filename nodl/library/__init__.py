@@ -223,7 +223,7 @@ def _entry(folder: str, document: LibraryDocument) -> IndexEntry:
 def _files(folder: str) -> Iterator[str]:
     """Yield ``PACKAGE/NAME.nodl.yaml``, and ``PACKAGE__NAME.nodl.yaml`` as ``--learn`` writes them.
 
-    Raises ``NoDLError`` for other documents: to pass over them would look as if they said nothing.
+    Raises ``NoDLError`` for other documents: they are not passed over silently.
     """
     for name in sorted(os.listdir(folder)):
         if os.path.isdir(os.path.join(folder, name)):

@@ -1,7 +1,7 @@
 """The event queue and the table of handlers, shared by the dry run and the live runtime.
 
 Rules (launch's): events are handled one at a time in the order they were emitted; for each one the handlers
-are snapshotted, newest registration first; all entities of a handler are visited before the next is asked.
+are snapshotted, newest registration first; all entities of a handler are visited before the next is called.
 """
 
 from __future__ import annotations
@@ -107,7 +107,7 @@ class HandlerTable:
         return [handler for _, handler in found]
 
     def matching(self, event: Event) -> Iterable[Handler]:
-        """Yield the handlers that match, of a snapshot; each is asked when its turn comes."""
+        """Yield the handlers that match, of a snapshot; each is tested when its turn comes."""
         return (handler for handler in self.candidates(event) if handler.matches(event))
 
     def would_match(self, event: Event) -> bool:

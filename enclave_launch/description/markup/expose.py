@@ -1,7 +1,7 @@
 """Registries of the actions and substitutions that XML and YAML can name (API of ``launch.frontend.expose``).
 
 ``parse`` methods are registered by decorator when their module is imported; ``instantiate_*`` calls them.
-A name that is not registered yet is looked for in our own modules, then in other installed packages
+A name that is not registered yet is searched in our own modules, then in other installed packages
 (``tags``).
 """
 

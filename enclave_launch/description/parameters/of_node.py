@@ -181,7 +181,7 @@ def _applicable(document: Any, section: str) -> tuple[Mapping[str, Any], bool]:
 
 
 def _matching_patterns(sections: Mapping[str, Any], section: str) -> list[str]:
-    """Return sections with wildcards that match, in the order of the file. Older releases do not look at them."""
+    """Return sections with wildcards that match, in the order of the file. Older releases ignore them."""
     if not current_release().has(Feature.WILDCARD_SECTIONS):
         return []
     tokens = section.split("/")
