@@ -307,6 +307,8 @@ def _assign_field(run: Machine, node: Node, value: Value, frame: Frame) -> None:
         declaring = next((cls for cls in run.names.ancestry(each.cls) if name in cls.fields), None)
         if declaring is not None and _writes_through(declaring.fields[name], value):
             through(run, node, frame)
+        if each.cls is None and is_plain(value) and name not in (known := each.data.get("written", ())):
+            each.data["written"] = (*known, name)
         strong = len(owners) == 1 and not each.several
         cell = (each, name)
         before = run.store.get(cell) or BOTTOM

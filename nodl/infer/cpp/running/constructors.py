@@ -20,7 +20,7 @@ from nodl.infer.cpp.running.foreign import unmodelled
 from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
 from nodl.infer.cpp.running.overloads import candidates
 from nodl.infer.cpp.running.references import as_referred_to
-from nodl.infer.cpp.running.static_types import check_hidden, seen_class, seen_type, written_as
+from nodl.infer.cpp.running.static_types import check_hidden, given_to, seen_class, seen_type, written_as
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     END,
@@ -355,7 +355,9 @@ def construct(
         found = model(run, call)
         return (made_object,) if found is None else found
     if not is_harmless_class(kind.name):
-        handed_over(run, f"the constructor of {kind.name}", arguments, node, frame)
+        whom = f"the constructor of {kind.name}"
+        handed_over(run, whom, arguments, node, frame)
+        run.calls.may_be_written(run, whom, arguments, given_to(node, frame), frame)
         _unmodelled(run, kind, node, frame, heap or bool(arguments))
     made_object.data["arguments"] = list(arguments)
     return (made_object,)
@@ -476,6 +478,7 @@ def _made_unseen(run: Machine, cls: Class, arguments: Sequence[Value], node: Nod
     if cls.name in cls.declared:
         whom = f"the constructor of {cls.name}, whose source is not in reach"
         handed_over(run, whom, arguments, node, frame)
+        run.calls.may_be_written(run, whom, arguments, given_to(node, frame), frame)
         run.gap(node, frame, f"the source of the constructor of {cls.name} is not in reach")
     elif len(arguments) > 1 or not all(isinstance(atom, Obj | Unknown) for atom in arguments[0]):
         run.gap(node, frame, f"how {cls.name} is made of what it is given is not known")

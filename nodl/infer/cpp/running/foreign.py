@@ -70,10 +70,10 @@ def leaving(names: Names, function: Function, part: Node | None = None) -> Leavi
     for each in walk(part if part is not None else function.node):
         written, given = _made(each)
         if written and written not in function.templates:
-            unknown, known = _class_of(names, written, function, given is not None)
+            outside, unknown = _class_of(names, written, function, given is not None)
             makes_unknown = makes_unknown or unknown
             makes_node = makes_node or (written.rpartition("::")[2] in _NODES and given is not None)
-            gives_node = gives_node or ((unknown or known) and _node_among(given, is_node))
+            gives_node = gives_node or (outside and any(map(_is_variable, children(given))))
         elif each.type == "call_expression" and not written:
             gives_node = gives_node or (_is_unknown_call(names, each) and _node_among(given, is_node))
     return Leaving(gives_node, makes_unknown, makes_node)
@@ -103,7 +103,7 @@ def _last(callee: Node | None) -> str:
 
 
 def _class_of(names: Names, written: str, function: Function, deliberate: bool) -> tuple[bool, bool]:
-    """Return whether a class is not known, and whether a library is known to make interfaces on a node it gets."""
+    """Return whether a class of a library may make interfaces on a node it gets, and whether it is not known at all."""
     kind = names.resolve(written, function.scope, function.file)
     if (
         not kind.name
@@ -112,10 +112,10 @@ def _class_of(names: Names, written: str, function: Function, deliberate: bool) 
     ):
         return False, False
     if kind.name in LIBRARY_CLASSES:
-        return False, True
-    return not is_harmless_class(kind.name) and bool(
-        unmodelled(names, kind.name, function.file, deliberate)
-    ), False
+        return True, False
+    if is_harmless_class(kind.name):
+        return False, False
+    return True, bool(unmodelled(names, kind.name, function.file, deliberate))
 
 
 def _is_unknown_call(names: Names, call: Node) -> bool:
@@ -142,6 +142,11 @@ def _may_be_node(names: Names, function: Function) -> bool:
                 return True
             waiting.append(base)
     return False
+
+
+def _is_variable(argument: Node) -> bool:
+    """Return whether an argument may be a node, whatever it is called."""
+    return not argument.type.endswith(("literal", "string", "lambda_expression"))
 
 
 def _node_among(arguments: Node | None, is_node: bool) -> bool:

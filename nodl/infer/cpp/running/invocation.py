@@ -20,6 +20,7 @@ from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame
 from nodl.infer.cpp.running.memory import MEMORY_DEPTH, CallOutcome, Changes
 from nodl.infer.cpp.running.overloads import candidates, chosen
 from nodl.infer.cpp.running.static_types import declared_type, written_as
+from nodl.infer.cpp.running.unknown_calls import may_be_written as may_be_written
 from nodl.infer.cpp.running.unknown_calls import unknown_call
 from nodl.infer.cpp.running.values import Bound, Lambda, Obj, Value, join, unknown
 from nodl.infer.cpp.syntax import Node, children, field_of, template_arguments, text, unwrapped

@@ -86,6 +86,10 @@ class Calls(Protocol):
         self, run: Machine, callee: Value, values: Sequence[Value], node: Node, frame: Frame
     ) -> Value: ...
 
+    def may_be_written(
+        self, run: Machine, name: str, values: Sequence[Value], given: Sequence[Node], frame: Frame
+    ) -> None: ...
+
     def pointed_to(self, run: Machine, value: Value, operator: str, node: Node, frame: Frame) -> Value: ...
 
     def call_lambda(

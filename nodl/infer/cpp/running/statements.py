@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import partial
 
+from nodl.infer.cpp.libraries import is_harmless_class
 from nodl.infer.cpp.reading.collect import declared_names
 from nodl.infer.cpp.reading.declarations import type_text
 from nodl.infer.cpp.running.assignments import assign
@@ -356,6 +357,11 @@ def _vexing(run: Machine, node: Node, declarator: Node, frame: Frame) -> None:
     if arguments is not None and arguments.type == "call_expression" and children(given):
         written = type_text(node)
         found = declared_value(run, node, written, given, False, frame)
+        if any(
+            isinstance(each, Obj) and each.cls is None and not is_harmless_class(each.type.name)
+            for each in found
+        ):
+            run.calls.may_be_written(run, f"the constructor of {written}", [], children(given), frame)
         run.local(frame, text(field_of(declarator, "declarator")), found, written)
 
 

@@ -125,7 +125,7 @@ def written_as(run: Machine, call: Node, frame: Frame) -> list[str]:
     ``string`` for a ``std::string``, else nothing.
     """
     found = []
-    for each in children(_given(call, frame)):
+    for each in given_to(call, frame):
         kind, pointer = declared_type(run, each, frame)
         is_string = (kind.name in ("std::string", "string") and not kind.pointer) or text(each).startswith(
             "std::string("
@@ -135,6 +135,11 @@ def written_as(run: Machine, call: Node, frame: Frame) -> list[str]:
         )
         found.append("char" if is_char else "string" if is_string else "")
     return found
+
+
+def given_to(call: Node, frame: Frame) -> list[Node]:
+    """Return the arguments of a call or an object's declaration as they are written."""
+    return children(_given(call, frame))
 
 
 def _given(call: Node, frame: Frame) -> Node | None:

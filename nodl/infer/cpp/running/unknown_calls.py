@@ -13,16 +13,18 @@ from nodl.infer.cpp.running.contents import handed_over, nodes_in
 from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.references import is_plain, through
 from nodl.infer.cpp.running.standard import INTO_FIRST, called_now
-from nodl.infer.cpp.running.static_types import declared_type, element_type, seen_type
+from nodl.infer.cpp.running.static_types import declared_type, element_type, given_to, seen_type
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     Group,
     Map,
     Obj,
     Seq,
+    Unknown,
     Value,
     as_one_map,
     join,
+    may_name,
     open_sequence,
     unknown,
 )
@@ -42,6 +44,7 @@ def without_source(
         run.gap(node, frame, f"the source of {name}() is not in reach; it may make interfaces", record)
     run.handle(node, frame)
     handed_over(run, f"{name}()", [v for v in values if not nodes_in(v)], node, frame)
+    may_be_written(run, name, values, given_to(node, frame), frame)
     return unknown(f"the result of {name}()")
 
 
@@ -88,7 +91,7 @@ def unknown_call(
         return unknown(f"the result of {name}()")
     handed_over(run, f"{name}()", values, node, frame)
     if receiver is None or receiver.cls is not None:
-        _may_be_written(run, name, given, frame)
+        may_be_written(run, name, values, given, frame)
     return unknown(f"the result of {name}()")
 
 
@@ -98,8 +101,16 @@ def _is_of_qt(run: Machine, receiver: Obj) -> bool:
     return any(re.fullmatch(r"Q[A-Z]\w*", base.rpartition("::")[2]) for base in bases)
 
 
-def _may_be_written(run: Machine, name: str, given: Sequence[Node], frame: Frame) -> None:
-    """Note that a text which somebody unknown gets as a variable may be another one afterwards."""
+def may_be_written(
+    run: Machine, name: str, values: Sequence[Value], given: Sequence[Node], frame: Frame
+) -> None:
+    """Note that a text which somebody unknown gets as a variable, or in an object, may be another one afterwards."""
+    for atom in (atom for value in values for atom in value if isinstance(atom, Obj) and atom.node is None):
+        fields = [field for cls in run.names.ancestry(atom.cls) for field in cls.fields]
+        for field in (*fields, *atom.data.get("written", ())):
+            held = run.store.get((atom, field)) or BOTTOM
+            if is_plain(held) and may_name(held) and not any(isinstance(each, Unknown) for each in held):
+                run.store.set((atom, field), join(held, unknown(f"what {name}() may have written")))
     for each in given:
         target = unwrapped(each)
         if target is not None and target.type == "pointer_expression" and text(target).startswith("&"):

@@ -105,6 +105,19 @@ COVERED: dict[str, tuple[str, str, str, set[str]]] = {
         CONFIG + "struct P { C c; C * operator->() { return &c; } C & operator*() { return c; } };",
         {"set", "again"},
     ),
+    "unknown code gets an object": (
+        "C c; acme::edit(c); pub(c.t); acme::Config a; a.t = \"plain\"; acme::edit(a); pub(a.t);",
+        "", CONFIG, {"edited"},
+    ),
+    "an object of an unknown class keeps a reference": (
+        'std::string s = "raw"; acme::Holder h(s); h.write(); pub(s); h_.write(); pub(m_);',
+        'std::string m_ = "raw"; acme::Holder h_{m_};', "", {"held"},
+    ),
+    "a callback gives the node to an unknown class under another name": (
+        "auto robot = this;"
+        "t_ = create_wall_timer(1s, [this, robot] { r_ = std::make_shared<acme::Recorder>(robot); });",
+        "std::shared_ptr<acme::Recorder> r_; rclcpp::TimerBase::SharedPtr t_;", "", {"recorder_status"},
+    ),
 }  # fmt: skip
 
 KNOWN: dict[str, tuple[str, str, str, set[str]]] = {
@@ -132,6 +145,13 @@ KNOWN: dict[str, tuple[str, str, str, set[str]]] = {
         "struct K { int n = 0; K & operator++() { n += 2; return *this; }"
         " K operator++(int) { n += 3; return *this; } };",
         {"a3", "b5"},
+    ),
+    "a text of an object before unknown code gets it": (
+        "C c; pub(c.t); acme::edit(c);", "", CONFIG, {"plain"},
+    ),
+    "a callback makes an object of a library that knows nothing of ROS": (
+        "t_ = create_wall_timer(1s, [this] { Eigen::MatrixXd m(rows_, 2); }); pub(\"b\");",
+        "int rows_ = 3; rclcpp::TimerBase::SharedPtr t_;", "", {"b"},
     ),
     "a map goes by its keys": (
         'std::map<int, std::string> m{{3, "three"}, {1, "one"}}; std::string j;'
