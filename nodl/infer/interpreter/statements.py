@@ -303,7 +303,7 @@ def run_with(run: Run, node: ast.With | ast.AsyncWith, frame: Frame) -> bool:
     run.state.depth += 1
     passes = run.execute(node.body, frame)
     run.state.depth -= 1
-    if not all(isinstance(atom, External) and run.tables.lets_through(atom.path) for atom in managers):
+    if not all(_lets_through(run, atom) for atom in managers):
         for atom in managers:
             foreign.wait(run, "__exit__", atom)
         run.state.join_seen(mark, mixed=True)  # after any part of the body
@@ -314,6 +314,12 @@ def run_with(run: Run, node: ast.With | ast.AsyncWith, frame: Frame) -> bool:
             run.call(leave, Arguments([NONE, NONE, NONE]), node, frame)
             run.register_callback(leave, 3)
     return passes
+
+
+def _lets_through(run: Run, manager: object) -> bool:
+    """Return whether exceptions pass this context manager, one of a library."""
+    of = manager.cls if isinstance(manager, Instance) else manager
+    return isinstance(of, External) and run.tables.lets_through(of.path)
 
 
 def _entered(run: Run, manager: Value, node: ast.AST, frame: Frame) -> Value:

@@ -155,7 +155,7 @@ def keeps_off(path: str) -> bool:
 
 def lets_through(path: str) -> bool:
     """Return True if exceptions pass the context managers of the library of ``path``."""
-    return keeps_off(path) or path.partition(".")[0] in ("threading", "multiprocessing")
+    return keeps_off(path) or path.partition(".")[0] in ("threading", "multiprocessing", "io")
 
 
 def creates(atom: object) -> bool:

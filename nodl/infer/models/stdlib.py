@@ -13,7 +13,7 @@ from nodl.infer.interpreter.elements import copy_dictionary, elements, store_att
 from nodl.infer.interpreter.formatting import as_texts, is_whole_number, text_value
 from nodl.infer.interpreter.imports import import_module
 from nodl.infer.interpreter.run import Arguments, Call, Model, Run
-from nodl.infer.models import options
+from nodl.infer.models import data_files, options
 from nodl.infer.start import NO_LAUNCH
 from nodl.infer.text import Input, Text, concatenations, constant_text, input_of, make_text, may_be, with_edit
 from nodl.infer.values import (
@@ -395,7 +395,6 @@ _BUILT_IN: dict[str, Callable[[Run, Call], Value]] = {
 
 
 Method = Callable[[Run, Instance, Call], Value]
-CONTENTS = "the contents of a file, read when the program runs"
 
 
 # --- environment, paths ---------------------------------------------------------------------------------------
@@ -486,9 +485,12 @@ def _thread_init(run: Run, thread: Instance, call: Call) -> Value:
 # --- containers ---------------------------------------------------------------------------------------------
 
 
-def _loaded(run: Run, call: Call) -> Value:
-    call_now(run, call)
-    return unknown(CONTENTS)
+def _loads(parse: Callable[[str], Any]) -> Model:
+    def model(run: Run, call: Call) -> Value:
+        call_now(run, call)
+        return data_files.loaded(run, call, parse)
+
+    return model
 
 
 def _copy(run: Run, call: Call) -> Value:
@@ -524,11 +526,20 @@ FUNCTIONS: dict[str, Model] = {
     **dict.fromkeys(("copy.copy", "copy.deepcopy"), _copy),
     "random.choice": _BUILT_IN["builtins.next"],
     **dict.fromkeys(("importlib.import_module", "importlib.reload"), import_dynamic),
-    **dict.fromkeys(("yaml.safe_load", "yaml.load", "json.load", "json.loads"), _loaded),
+    **{name: _loads(parse) for name, parse in data_files.PARSERS.items()},
+    "builtins.open": data_files.opened,
+    **dict.fromkeys(("os.path.exists", "os.path.isfile"), data_files.exists),
+    **dict.fromkeys(
+        (f"ament_index_python{module}.get_package_share_directory" for module in ("", ".packages")),
+        data_files.share_directory,
+    ),
 }
 
 METHODS: dict[tuple[str, str], Method] = {
     **options.METHODS,
+    (data_files.FILE, "read"): data_files.read,
+    (data_files.FILE, "__enter__"): data_files.entered,
+    **{(data_files.FILE, name): data_files.closed for name in ("__exit__", "close")},
     ("threading.Thread", "__init__"): _thread_init,
     ("multiprocessing.Process", "__init__"): _thread_init,
 }

@@ -496,3 +496,69 @@ def test_an_option_that_the_command_line_may_set_unseen_decides_nothing(
     plan = launch(f'<launch><node pkg="demo" exec="numbers" args="{words}"/></launch>')
     assert bool(plan.problems) is (words == "-f 5")
     assert ("publish", "/fast") in permissions(plan)
+
+
+CONFIGURED = """
+import json
+import os
+import rclpy
+import yaml
+from ament_index_python.packages import get_package_share_directory
+from std_msgs.msg import String
+rclpy.init()
+node = rclpy.create_node("configured")
+default = os.path.join(get_package_share_directory("demo"), "config", "pins.yaml")
+path = node.declare_parameter("config", default).value
+config = {}
+if os.path.exists(path):
+    with open(path, MODE) as file:
+        config = yaml.safe_load(file)
+for pin in config["pins"]:
+    node.create_publisher(String, f"pins/{pin['name']}", 10)
+for name in json.loads(node.declare_parameter("more", '["led"]').value):
+    node.create_publisher(String, name, 10)
+rclpy.spin(node)
+"""
+
+
+def configured(prefix: Path, mode: str = "'r'") -> Path:
+    install_program(prefix, PYTHON + CONFIGURED.replace("MODE", mode), "configured")
+    file = prefix / "share/demo/config/pins.yaml"
+    file.parent.mkdir(parents=True)
+    file.write_text("pins: [{name: a}, {name: b}]\n")
+    return file
+
+
+def test_an_installed_configuration_file_names_topics(launch: Launch, prefix: Path) -> None:
+    file = configured(prefix)
+    text = '<launch><node pkg="demo" exec="configured">{}</node></launch>'
+
+    def published(inside: str) -> set[str]:
+        plan = launch(text.format(inside))
+        assert [str(problem) for problem in plan.problems] == []
+        own = {name for operation, name in permissions(plan) if operation == "publish"}
+        return own - {"/rosout", "/parameter_events"}
+
+    assert published("") == {"/pins/a", "/pins/b", "/led"}
+    assert published("<param name='more' value='[]' type='str'/>") == {"/pins/a", "/pins/b"}
+    other = file.with_name("other.yaml")
+    other.write_text("pins: [{name: c}]\n")
+    assert published(f"<param name='config' value='{other}'/>") == {"/pins/c", "/led"}
+    file.write_text("pins: []\n")  # after an answer was cached
+    assert published("") == {"/led"}
+
+
+@pytest.mark.parametrize("why", ["outside", "written", "absent", "no YAML"])
+def test_any_other_file_is_open(why: str, launch: Launch, prefix: Path, tmp_path: Path) -> None:
+    file = configured(prefix, "'r+'" if why == "written" else "'r'")
+    outside = tmp_path / "pins.yaml"
+    outside.write_text(file.read_text())
+    if why == "no YAML":
+        file.write_text("pins: [")
+    if why == "absent":
+        file.unlink()
+    value = outside if why == "outside" else file
+    text = (
+        f'<launch><node pkg="demo" exec="configured"><param name="config" value="{value}"/></node></launch>'
+    )
+    assert any("pins/" in str(problem) for problem in launch(text).problems)
