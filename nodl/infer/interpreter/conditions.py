@@ -32,6 +32,7 @@ from nodl.infer.text import (
 from nodl.infer.values import (
     BOTTOM,
     CONSTANTS,
+    BoundMethod,
     ClassValue,
     Dictionary,
     External,
@@ -297,8 +298,15 @@ def _texts_left(asked: Input, guards: tuple[Guard, ...]) -> tuple[str, ...]:
     return tuple(text for text in min(listed, key=len, default=()) if text not in others)
 
 
-def either(condition: Guard, first: Value, second: Value) -> Value:
-    """Return what a variable holds: ``first`` where the condition holds, else ``second``."""
+def either(run: Run, condition: Guard, first: Value, second: Value) -> Value:
+    """Return what a variable holds: ``first`` where the condition holds, else ``second``.
+
+    Only texts carry a condition: which function, class or container is meant only a launch can say.
+    """
+    if any(
+        isinstance(atom, _CHOSEN) and not (atom in first and atom in second) for atom in (*first, *second)
+    ):
+        run.asks_launch = True
     sides = ((condition, first, second), (opposite(condition), second, first))
     return join_all(
         tuple(
@@ -309,6 +317,9 @@ def either(condition: Guard, first: Value, second: Value) -> Value:
         )
         for held, value, other in sides
     )
+
+
+_CHOSEN = (FunctionValue, ClassValue, BoundMethod, Sequence, Dictionary)
 
 
 def _comparison(run: Run, test: ast.Compare, frame: Frame) -> Guard | None:

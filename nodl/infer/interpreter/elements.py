@@ -169,7 +169,8 @@ def _sequence_item(run: Run, sequence: Sequence, key: Value) -> Value:
             found = _part(found, key[0])
         one_of_several = len(found) > 1 and all(type(index) is int for index in key)
         return join(found, ANY) if one_of_several else found or ANY
-    if all(type(index) is int for index in key):
+    run.asks_launch = run.asks_launch or any(map(is_of_launch, key))
+    if all(isinstance(index, int) for index in key):
         length = len(items.exact)
         result: Value = BOTTOM
         for index in key:

@@ -69,7 +69,10 @@ _ARITHMETIC: dict[type, Callable[[object, object], object]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
     ast.Mult: operator.mul,
+    ast.Mod: operator.mod,
+    ast.FloorDiv: operator.floordiv,
 }
+_DIVIDING = (ast.Mod, ast.FloorDiv)
 _COMBINING = (ast.BitOr, ast.BitAnd, ast.BitXor, ast.Sub)
 _NUMBERS = (int, float)
 _LARGE = 1 << 40
@@ -119,6 +122,8 @@ def _arithmetic(run: Run, node: ast.AST, left: Value, op: ast.operator, right: V
 def _arithmetic_atoms(run: Run, node: ast.AST, a: object, op: ast.operator, b: object) -> Value:
     if isinstance(op, ast.Mult) and isinstance(a, Sequence):
         return run.sequence(node, a.kind, Items(None, a.items.any_element()))
+    if isinstance(op, _DIVIDING) and not b:
+        return ANY
     if isinstance(a, _NUMBERS) and isinstance(b, _NUMBERS) and max(abs(a), abs(b)) < _LARGE:
         result = _ARITHMETIC[type(op)](a, b)
         return (result,) if isinstance(result, _NUMBERS) else ANY
@@ -340,7 +345,7 @@ def _conditional(run: Run, node: ast.IfExp, frame: Frame) -> Value:
 
     condition, sides = sides_of(run, node.test, frame, side)
     body, orelse = run.state.each(sides)
-    return either(condition, body, orelse) if condition else join(body, orelse)
+    return either(run, condition, body, orelse) if condition else join(body, orelse)
 
 
 def _boolean(run: Run, node: ast.BoolOp, frame: Frame) -> Value:

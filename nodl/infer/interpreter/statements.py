@@ -103,7 +103,7 @@ def _if(run: Run, node: ast.If, frame: Frame) -> bool:
         return passes
 
     condition, sides = sides_of(run, node.test, frame, side)
-    passes = run.state.branches(sides, partial(either, condition) if condition else None)
+    passes = run.state.branches(sides, partial(either, run, condition) if condition else None)
     if passing:
         run.guards = where_either(passing[0], passing[-1])  # to the end of this block
     return passes

@@ -435,6 +435,48 @@ def test_parameters_of_the_launch_decide_for_a_node_that_listens_to_it(
     assert (("publish", "/fast") in permissions(plan)) is (fast is not False)
 
 
+CHOSEN = """
+import rclpy
+from std_msgs.msg import String
+node = rclpy.create_node("chosen")
+
+def whisper():
+    node.create_publisher(String, "whisper", 10)
+
+def shout():
+    node.create_publisher(String, "shout", 10)
+
+loud = node.declare_parameter("loud", False).value
+count = node.declare_parameter("count", 2).value
+(shout if loud else whisper)()
+node.create_publisher(String, ["low", "high"][loud], 10)
+if count % 2 == 0:
+    node.create_publisher(String, f"pair_{count // 2}", 10)
+for topic in {1: ["one"], 2: ["one", "two"]}.get(count, []):
+    node.create_publisher(String, topic, 10)
+rclpy.spin(node)
+"""
+
+
+@pytest.mark.parametrize(
+    ("given", "published"),
+    [
+        ({}, {"/whisper", "/low", "/pair_1", "/one", "/two"}),
+        ({"loud": "true", "count": "1"}, {"/shout", "/high", "/one"}),
+        ({"count": "4"}, {"/whisper", "/low", "/pair_2"}),
+    ],
+)
+def test_functions_lists_and_remainders_that_a_parameter_chooses_are_decided(
+    given: dict[str, str], published: set[str], launch: Launch, prefix: Path
+) -> None:
+    install_program(prefix, PYTHON + CHOSEN, "chosen")
+    params = "".join(f'<param name="{name}" value="{value}"/>' for name, value in given.items())
+    plan = launch(f'<launch><node pkg="demo" exec="chosen">{params}</node></launch>')
+    assert not plan.problems
+    own = {name for operation, name in permissions(plan) if operation == "publish"}
+    assert own - {"/rosout", "/parameter_events"} == published
+
+
 NUMBERS = """
 import argparse
 import os
