@@ -180,7 +180,8 @@ def _one_of_many(run: Machine, functions: Sequence[Function], node: Node, frame:
     every = [effects_of(run, each).written for each in functions]
     changed = frozenset[str]().union(*(each.assigned | each.changed | each.seen for each in every))
     name = functions[0].name
-    if not looked_at(run).isdisjoint(changed):
+    copies = {each.name for function in functions for each in function.parameters if not each.written_back}
+    if not looked_at(run).isdisjoint(changed - copies):
         run.gap(node, frame, f"which of {len(functions)} functions {name}() is called is not known")
     return unknown(f"the result of {name}()")
 
