@@ -123,7 +123,9 @@ def call_external(run: Run, atom: External, call: Call) -> Value:
         return (Instance(External(path)),)
     if "(" in path and (name in NODE_METHODS):
         return call_native(run, NativeMethod(unknown(f"the result of {owner}")[0], name), call)
-    if "(" not in path:  # a function of a library that does not make interfaces, whatever its name
+    if (
+        "(" not in path or atom in stdlib.LOCKS
+    ):  # a library's own, which makes no interfaces, whatever its name
         run.understood.add(call.node)
     wait(run, name)
     if not ros.interface_type(path) and not keeps_off(path):

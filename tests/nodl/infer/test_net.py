@@ -180,12 +180,13 @@ def test_a_call_of_what_hands_a_creating_function_on_counts(
     ("body", "main", "is_gap"),
     [
         ("pass", "N().on_set(); print({*set([1])}, 0 and set([1]))", False),
-        ("pass", "N().on_set(); open('x').set()", True),
+        ("pass", "N().on_set(); from threading import Event; Event().set()", False),
+        ("pass", "N().on_set(); from elsewhere import make; make().set()", True),
         ("self.kind == 'other' and self.set()", "N()", True),
     ],
 )
 def test_a_method_is_not_meant_by_a_name_alone(body: str, main: str, is_gap: bool, infer: Infer) -> None:
-    """``set`` creates as a method; ``set(...)`` is Python's own."""
+    """``set`` creates as a method; ``set(...)`` is Python's own, and so is ``set`` of an event."""
     methods = "def set(self):\n            self.make('a')\n        def on_set(self):\n            self.set()"
     program = PROGRAM.replace("def make(", f"{methods}\n        def make(")
     gaps = infer(program.format(body=body, main=main, before="pass")).gaps
