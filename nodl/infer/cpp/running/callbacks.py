@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from functools import partial
 
 from nodl.infer.cpp.reading.declarations import Class
-from nodl.infer.cpp.running.effects import effects_of
+from nodl.infer.cpp.running.effects import effects_of, looked_at
 from nodl.infer.cpp.running.invocation import HOOKS, call_lambda, invoke
 from nodl.infer.cpp.running.machine import NEXT, Frame, Machine
 from nodl.infer.cpp.running.memory import Reads, name_of
@@ -73,6 +73,34 @@ def run_callbacks(run: Machine) -> None:
             _widen(run, mark, number >= PATIENCE)
     place = next(iter(run.callbacks.values()))[1].file.file
     run.gap_at(SourceRef(place), "callbacks change variables for more rounds than are followed")
+
+
+def run_meanwhile(run: Machine, frame: Frame) -> None:
+    """Run callbacks where the program spins and goes on: those that change what it, or code that makes interfaces,
+    may look at afterwards.
+    """
+    if run.calls_back:
+        return
+    words = frame.function.words if frame.function is not None else frozenset[str]()
+    read = looked_at(run) | words
+    run.calls_back = True
+    rounds = _Rounds(run, names_read=set(read))
+    for number in range(PATIENCE):
+        mark, ran = run.store.mark(), False
+        for key, (atom, place) in list(run.callbacks.items()):
+            if _changes_one_of(run, atom, read):
+                ran |= _call(rounds, key, atom, place)
+        if not ran:
+            break
+        _widen(run, mark, number == PATIENCE - 1)
+    run.calls_back = False
+
+
+def _changes_one_of(run: Machine, atom: object, names: frozenset[str]) -> bool:
+    if not isinstance(atom, Lambda | Bound):
+        return False
+    written = effects_of(run, atom.function if isinstance(atom, Bound) else atom).written
+    return not names.isdisjoint(written.assigned | written.changed)
 
 
 def _round(rounds: _Rounds) -> bool:

@@ -22,6 +22,7 @@ from nodl.infer.cpp.reading.names import STANDARD_TYPES
 from nodl.infer.cpp.reading.type_names import NO_TYPE
 from nodl.infer.cpp.reading.writes import FILLS
 from nodl.infer.cpp.running.assignments import assign
+from nodl.infer.cpp.running.callbacks import run_meanwhile
 from nodl.infer.cpp.running.constructors import cast, construct, is_plain_type, made
 from nodl.infer.cpp.running.containers import CONTAINER_METHODS, container_call, is_standard
 from nodl.infer.cpp.running.contents import handed_over
@@ -59,6 +60,10 @@ _RUNS_OTHERS = re.compile(
 """Functions of rclcpp that run callbacks of a node (executors.hpp, timer.hpp, subscription.hpp, service.hpp)."""
 
 
+_WAITS = re.compile(r"(?:^|\W)(?:sleep\w*|wait\w*|ok|join)$")
+"""What a program does while callbacks run in a thread of their own."""
+
+
 @expression("call_expression")
 def call_expression(run: Machine, node: Node, frame: Frame) -> Value:
     """Calls a method on an object, something by its name, or else whatever the callee evaluates to."""
@@ -66,8 +71,14 @@ def call_expression(run: Machine, node: Node, frame: Frame) -> Value:
     if callee is None:
         return unknown("a call")
     site = CallSite(run, node, callee, frame)
-    if _RUNS_OTHERS.search(callee_name(callee)):
+    name = callee_name(callee)
+    if _RUNS_OTHERS.search(name):
         run.store.others_run()
+        run.spins_beside = run.spins_beside or bool(run.closures)
+        if run.spins_beside or not name.endswith("spin"):
+            run_meanwhile(run, frame)
+    elif run.spins_beside and _WAITS.search(name):
+        run_meanwhile(run, frame)
     if callee.type == "field_expression":
         return method_call(run, site)
     if callee.type in _NAMES:

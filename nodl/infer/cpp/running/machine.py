@@ -128,7 +128,8 @@ class Machine:
         self.left: object = None  # the last call that certainly threw, or ended the program
         self.steps = 0
         self.repeated = 0  # how many of the elements being made stand for several each
-        self.calls_back = False  # the program has come to its end, callbacks run
+        self.calls_back = False  # callbacks run: at the program's end, or where it spins and goes on
+        self.spins_beside = False  # a thread runs callbacks while the program goes on
         self.undecided = 0  # how many conditions that are not known decide whether this runs
         self.consulted: dict[str, object] = {}  # parameters whose value decided what is made
         self.from_default: dict[str, None] = {}  # those of them that no launch was asked for

@@ -199,11 +199,15 @@ def _calls_back(run: Machine, values: Sequence[Value], node: Node, frame: Frame)
     return unknown(f"the result of {text(node.child_by_field_name('function'))[:40]}()")
 
 
+_SPINS = re.compile(r"\bspin\w*")
+
+
 @library_class("std::thread", "std::jthread")
 def _thread(run: Machine, call: Call) -> None:
     """Run a thread beside what follows."""
     if call.values:
         run.store.others_run()
+        run.spins_beside = run.spins_beside or _SPINS.search(text(call.node)) is not None
         _calls_back(run, call.values, call.node, call.frame)
 
 

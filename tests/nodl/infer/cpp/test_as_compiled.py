@@ -184,3 +184,41 @@ def test_a_whole_number_is_divided_and_is_no_path(tmp_path: Path) -> None:
     listed = names(infer(tmp_path, in_class(body, PUB)))
     assert "hparam:id/2" not in listed
     assert "dir/x" in listed
+
+
+NODE = """#include <rclcpp/rclcpp.hpp>
+std::string shared = "before";
+int main(int argc, char ** argv) {
+  rclcpp::init(argc, argv);
+  auto n = std::make_shared<rclcpp::Node>("n");
+  rclcpp::executors::SingleThreadedExecutor executor;
+  executor.add_node(n);
+  std::string own = "before";
+  %s
+}
+"""
+LISTENS = """auto s = n->create_subscription<std_msgs::msg::String>("in", 1, [&own](std_msgs::msg::String::SharedPtr) {
+    own = "after"; shared = "after"; });"""
+THREAD = "std::thread t([&]() { executor.spin(); });"
+WAIT = "rclcpp::sleep_for(std::chrono::seconds(1));"
+SPINS = {
+    "once": f"{LISTENS} rclcpp::spin_some(n);",
+    "until somebody has come": f'{LISTENS} while (own == "before") {{ rclcpp::spin_some(n); }}',
+    "by an executor": f"{LISTENS} executor.spin_once();",
+    "in a thread": f"{LISTENS} {THREAD} {WAIT}",
+    "in a thread that is there before": f"{THREAD} {LISTENS} {WAIT}",
+}
+
+
+@pytest.mark.parametrize("spins", SPINS.values(), ids=SPINS)
+@pytest.mark.parametrize("name", ["own", "shared"])
+def test_what_callbacks_changed_is_seen_where_a_program_spins_and_goes_on(
+    spins: str, name: str, tmp_path: Path
+) -> None:
+    body = f"{spins} n->create_publisher<std_msgs::msg::String>({name}, 1); rclcpp::spin(n);"
+    assert {"in", "after"} <= set(names(infer(tmp_path, NODE % body)))
+
+
+def test_what_they_change_at_the_end_is_not(tmp_path: Path) -> None:
+    body = f"{LISTENS} n->create_publisher<std_msgs::msg::String>(own, 1); rclcpp::spin(n);"
+    assert set(names(infer(tmp_path, NODE % body))) == {"in", "before"}
