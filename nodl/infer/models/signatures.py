@@ -224,7 +224,7 @@ _MAKES_NOTHING = frozenset({
     "ros2_numpy", "tf_transformations", "sensor_msgs_py", "image_geometry", "cv_bridge", "rclpy_message_converter",
     "ament_index_python", "ament_copyright", "ament_flake8", "ament_pep257", "rosidl_runtime_py", "rosidl_parser",
     "tf2_geometry_msgs", "tf2_sensor_msgs", "tf2_py", "launch", "launch_ros", "rclpy", "rospkg", "ros2cli", "rosbags",
-    "diagnostic_updater", "message_filters", "interactive_markers",
+    "diagnostic_updater", "message_filters", "interactive_markers", "tf2_kdl", "PyKDL",
 })  # fmt: skip
 # Libraries that know nothing of ROS, under names that package.xml lists too.
 _NOT_OF_ROS = frozenset({

@@ -47,6 +47,7 @@ def test_what_a_ros_package_makes_that_cannot_be_read_is_a_gap(imports: str, bod
         ("import rosbag2_py", "rosbag2_py.SequentialReader()"),
         ("from ultralytics import YOLO", "YOLO('m.pt')"),
         ("import tf_transformations", "tf_transformations.euler_from_quaternion([0, 0, 0, 1])"),
+        ("import tf2_kdl", "tf2_kdl.PyKDL.Vector(1, 0, 0)"),
         ("from tf2_sensor_msgs.tf2_sensor_msgs import do_transform_cloud", "do_transform_cloud(None, None)"),
         ("from geometry_msgs.msg import Twist", "Twist()"),
     ],
