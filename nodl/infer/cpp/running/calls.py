@@ -252,7 +252,7 @@ def method_call(run: Machine, site: CallSite) -> Value:
     is_inner = name in GIVES_INNER and not site.given and any(isinstance(atom, Obj) for atom in receiver)
     if is_inner and not any(run.methods_of(atom, name) for atom in receiver):
         return receiver
-    if name == "reset" and _declared_pointer(run, subject, frame):
+    if name == "reset" and (_declared_pointer(run, subject, frame) or _is_pointer(run, site, receiver)):
         value = run.evaluate(site.given[0], frame) if site.given else BOTTOM
         assign(run, subject, value, frame)  # pointer.reset(new Foo(...))
         return BOTTOM
@@ -302,6 +302,13 @@ def _declared_pointer(run: Machine, node: Node, frame: Frame) -> bool:
     if node.parent is not None and "->" in text(node.parent)[len(text(node)) : len(text(node)) + 3]:
         return False
     return declared_type(run, node, frame)[1]
+
+
+def _is_pointer(run: Machine, site: CallSite, held: Value) -> bool:
+    """Return whether ``auto x`` is a pointer to what it holds: the objects have no ``reset()`` of their own."""
+    is_auto = declared_type(run, site.receiver, site.frame)[0].name == "auto"
+    objects = all(isinstance(atom, Obj) and not run.methods_of(atom, "reset") for atom in held)
+    return is_auto and bool(held) and objects and text(field_of(site.callee, "operator")) == "."
 
 
 def _on_atom(run: Machine, atom: object, name: str, site: CallSite) -> Value:

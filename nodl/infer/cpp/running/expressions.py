@@ -316,6 +316,8 @@ def binary(run: Machine, node: Node, frame: Frame) -> Value:
     right = run.evaluate(right_node, frame)
     own = by_operator(run, operator, left, [right], node, frame)
     if own is not None:
+        if operator == "<<" and has_text(left):  # it gives the stream that it wrote to
+            _write_stream(run, left_node, own, frame)
         return own
     if operator == ">>" and not (len(left) == 1 and isinstance(left[0], int)):
         if right_node is not None:
@@ -369,12 +371,17 @@ def _streamed(
     else:
         pieces = tuple(literal(f"{atom:g}")[0] if isinstance(atom, float) else atom for atom in right)
         found = concatenated(left, pieces) if right else left
+    _write_stream(run, target, found, frame)
+    return found
+
+
+def _write_stream(run: Machine, target: Node | None, written: Value, frame: Frame) -> None:
+    """Write to the stream at the beginning of ``s << a << b``."""
     inner = target
     while inner is not None and inner.type == "binary_expression":
         inner = field_of(inner, "left")
     if inner is not None and inner.type in ("identifier", "field_expression", "field_identifier"):
-        assign(run, inner, found, frame)
-    return found
+        assign(run, inner, written, frame)
 
 
 @expression("unary_expression")

@@ -153,6 +153,18 @@ KNOWN: dict[str, tuple[str, str, str, set[str]]] = {
         "t_ = create_wall_timer(1s, [this] { Eigen::MatrixXd m(rows_, 2); }); pub(\"b\");",
         "int rows_ = 3; rclcpp::TimerBase::SharedPtr t_;", "", {"b"},
     ),
+    "a pointer declared with auto shows another object": (
+        'auto p = std::make_unique<P>("a"); p.reset(new P("b")); pub(p->n);', "",
+        "struct P { std::string n; explicit P(std::string s) : n(s) {} };", {"b"},
+    ),
+    "an object declared with auto has a reset of its own": (
+        'auto p = P("a"); p.reset(); pub(p.n);', "",
+        'struct P { std::string n; explicit P(std::string s) : n(s) {} void reset() { n += "_reset"; } };', {"a_reset"},
+    ),
+    "an operator of the program writes to a stream": (
+        'C c; std::ostringstream s; s << "a_" << c << "_b"; pub(s.str());', "",
+        CONFIG + "std::ostream & operator<<(std::ostream & s, const C & c) { return s << c.t; }", {"a_plain_b"},
+    ),
     "a map goes by its keys": (
         'std::map<int, std::string> m{{3, "three"}, {1, "one"}}; std::string j;'
         "for (auto & e : m) j += e.second; pub(j);",
