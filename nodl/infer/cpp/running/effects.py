@@ -23,9 +23,10 @@ if TYPE_CHECKING:
 _BEYOND_VARIABLES = re.compile(
     r"\w*declare\w*|set_\w*parameter\w*|NodeOptions|arguments|init|thread|jthread|async|bind|spin\w*|"
     r"execute_\w+|handle_(?:message|request|response|loaned_message)|create_\w*timer|add_\w*callback\w*|\w+Listener|"
-    r"_?exit|quick_exit|_Exit|abort|terminate"
+    r"const_cast|_?exit|quick_exit|_Exit|abort|terminate"
 )
-"""Functions that do more than change variables: they declare parameters, keep closures, run callbacks or end it all."""
+"""Words of code that does more than change variables: it declares parameters, keeps closures, runs callbacks, ends it
+all or writes behind ``const``."""
 _PLAIN = re.compile(
     r"string|vector|double|float|bool|int|size_t|char|msg::|Msg|Eigen|Time|Duration|unsigned|long|Point|Pose"
 )

@@ -48,6 +48,12 @@ def test_a_name_that_the_call_may_change_is_never_taken_for_the_earlier_one(
     assert names(system) != ["a"] or gaps(system)
 
 
+def test_what_a_call_writes_behind_const_is_never_taken_for_the_earlier_one(tmp_path: Path) -> None:
+    force = 'void force(const std::string & s) { const_cast<std::string &>(s) = "b"; }'
+    system = infer(tmp_path, with_method(force, f"force(topic); {MAKES}"))
+    assert names(system) != ["a"] or gaps(system)
+
+
 def test_what_a_closure_writes_that_an_algorithm_runs_is_not_known_afterwards(tmp_path: Path) -> None:
     change = 'void change() { std::for_each(list.begin(), list.end(), [this](auto &) { topic = "b"; }); }'
     system = infer(tmp_path, with_method(change, f"change(); {MAKES}"))
