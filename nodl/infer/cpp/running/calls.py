@@ -60,6 +60,7 @@ _RUNS_OTHERS = re.compile(
 """Functions of rclcpp that run callbacks of a node (executors.hpp, timer.hpp, subscription.hpp, service.hpp)."""
 
 
+_SPINS = re.compile(r"(?:^|\W)spin\w*$")
 _WAITS = re.compile(r"(?:^|\W)(?:sleep\w*|wait\w*|ok|join)$")
 """What a program does while callbacks run in a thread of their own."""
 
@@ -74,6 +75,7 @@ def call_expression(run: Machine, node: Node, frame: Frame) -> Value:
     name = callee_name(callee)
     if _RUNS_OTHERS.search(name):
         run.store.others_run()
+    if _SPINS.search(name):
         run.spins_beside = run.spins_beside or bool(run.closures)
         if run.spins_beside or not name.endswith("spin"):
             run_meanwhile(run, frame)
