@@ -5,11 +5,12 @@ Run until nothing changes. A callback that makes no interface runs too when it m
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
 
 from nodl.infer.cpp.reading.declarations import Class
-from nodl.infer.cpp.running.effects import effects_of, looked_at
+from nodl.infer.cpp.running.effects import CallEffects, effects_of, looked_at
 from nodl.infer.cpp.running.invocation import HOOKS, call_lambda, invoke
 from nodl.infer.cpp.running.machine import NEXT, Frame, Machine
 from nodl.infer.cpp.running.memory import Reads, name_of
@@ -86,28 +87,34 @@ def run_meanwhile(run: Machine, frame: Frame) -> None:
     run.calls_back = True
     rounds = _Rounds(run, names_read=set(read))
     for number in range(PATIENCE):
-        mark, ran = run.store.mark(), False
-        for key, (atom, place) in list(run.callbacks.items()):
-            if _changes_one_of(run, atom, read):
-                ran |= _call(rounds, key, atom, place)
-        if not ran:
+        mark = run.store.mark()
+        if not _round(rounds, partial(_changes_one_of, run, read)):
             break
         _widen(run, mark, number == PATIENCE - 1)
     run.calls_back = False
 
 
-def _changes_one_of(run: Machine, atom: object, names: frozenset[str]) -> bool:
+def _changes_one_of(run: Machine, names: frozenset[str], atom: object) -> bool:
     if not isinstance(atom, Lambda | Bound):
         return False
-    written = effects_of(run, atom.function if isinstance(atom, Bound) else atom).written
+    written = _effects(run, atom).written
     return not names.isdisjoint(written.assigned | written.changed)
 
 
-def _round(rounds: _Rounds) -> bool:
-    """Run every callback once, without those that would do what they did before; return whether any ran."""
+def _effects(run: Machine, atom: Lambda | Bound) -> CallEffects:
+    return effects_of(run, atom.function if isinstance(atom, Bound) else atom)
+
+
+def _round(rounds: _Rounds, takes_part: Callable[[object], bool] = lambda atom: True) -> bool:
+    """Run each callback that ``takes_part`` once, without those that would do what they did before.
+
+    Returns:
+        Whether any ran.
+    """
     ran = False
     for key, (atom, frame) in list(rounds.run.callbacks.items()):
-        ran |= _call(rounds, key, atom, frame)
+        if takes_part(atom):
+            ran |= _call(rounds, key, atom, frame)
     return ran
 
 
@@ -148,7 +155,7 @@ def _matters(rounds: _Rounds, atom: object) -> bool:
     """Return whether it may make an interface or a node, give one away, or change what a callback has read."""
     if not isinstance(atom, Lambda | Bound):
         return False
-    effects = effects_of(rounds.run, atom.function if isinstance(atom, Bound) else atom)
+    effects = _effects(rounds.run, atom)
     written = effects.written
     return (
         _makes(rounds.run, atom)

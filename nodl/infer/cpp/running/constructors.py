@@ -98,9 +98,8 @@ def initial_value(run: Machine, value: Node, frame: Frame, reference: bool = Fal
         return found
     if any(isinstance(atom, Seq | Map) for atom in found):
         return elements_copied(run, seen_type(run, value, frame), found, value, frame)
-    cls = (
-        seen_class(run, value, frame) if text(value).startswith("*") else None
-    )  # behind a pointer lies an object
+    # Behind a pointer lies an object.
+    cls = seen_class(run, value, frame) if text(value).startswith("*") else None
     return copied(run, found, value, frame, cls)
 
 

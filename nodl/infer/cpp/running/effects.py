@@ -172,8 +172,6 @@ def _referred_to(function: Function) -> frozenset[str]:
 
 # --- what leading functions look at --------------------------------------------------------------------------------
 
-_MEMBER = re.compile(r"(?:\.|->)\s*([A-Za-z_]\w*)")
-
 
 def looked_at(run: Machine) -> frozenset[str]:
     """Return the members and globals that functions which lead to interfaces mention."""
@@ -212,23 +210,25 @@ def _not_local(function: Function) -> frozenset[str]:
     """Return the variables of others whose value a function may use: not its own, nor those that it only replaces."""
     own = {each.name for each in function.parameters}
     found: set[str] = set()
+    members: set[str] = set()
     waiting = [function.node]
     while waiting:
         each = waiting.pop()
         if each.type in ("declaration", "for_range_loop", "parameter_declaration"):
             own |= _declared(each)
-        if each.type in _NAMES:
+        if each.type == "field_identifier":
+            members.add(text(each))
+        elif each.type in _NAMES:
             found.add(text(each))
         callee = field_of(each, "function") if each.type == "call_expression" else None
         if callee is not None and _READS_ALONE.fullmatch(callee_name(callee)):
             continue
         replaced = _replaced(each)
         waiting += [field for field in each.named_children if replaced is None or field.id != replaced.id]
-    source = (function.node.text or b"").decode("utf-8", "replace")
-    return frozenset(found - own) | (found & frozenset(_MEMBER.findall(source)))
+    return frozenset((found - own) | members)
 
 
-_NAMES = ("identifier", "field_identifier", "type_identifier", "namespace_identifier")
+_NAMES = ("identifier", "type_identifier", "namespace_identifier")
 _READS_ALONE = re.compile(r"RCLCPP_\w+|RCUTILS_\w+|.*(?:\.|->)publish")
 
 
@@ -238,19 +238,13 @@ def _replaced(node: Node) -> Node | None:
         return node.named_children[0]
     if node.type == "assignment_expression" and text(field_of(node, "operator")) == "=":
         target = field_of(node, "left")
-    elif node.type == "expression_statement" and node.named_children:
-        callee = field_of(node.named_children[0], "function")
-        target = (
-            callee if callee is not None and text(field_of(callee, "field")) in ("clear", "reset") else None
-        )
-        return (
-            node.named_children[0]
-            if target is not None and _is_variable(field_of(target, "argument"))
-            else None
-        )
-    else:
-        return None
-    return target if _is_variable(target) else None
+        return target if _is_variable(target) else None
+    if node.type == "expression_statement" and node.named_children:
+        call = node.named_children[0]
+        callee = field_of(call, "function")
+        empties = callee is not None and text(field_of(callee, "field")) in ("clear", "reset")
+        return call if empties and _is_variable(field_of(callee, "argument")) else None
+    return None
 
 
 def _is_variable(target: Node | None) -> bool:

@@ -181,8 +181,7 @@ def _one_of_many(run: Machine, functions: Sequence[Function], node: Node, frame:
     changed = frozenset[str]().union(*(each.assigned | each.changed | each.seen for each in every))
     changed -= {p.name for each in functions for p in each.parameters if not p.written_back}
     name = functions[0].name
-    copies = {each.name for function in functions for each in function.parameters if not each.written_back}
-    if not looked_at(run).isdisjoint(changed - copies):
+    if not looked_at(run).isdisjoint(changed):
         run.gap(node, frame, f"which of {len(functions)} functions {name}() is called is not known")
     return unknown(f"the result of {name}()")
 
