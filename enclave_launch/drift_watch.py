@@ -56,7 +56,7 @@ class SettlingTimes(NamedTuple):
 
 
 class Change(NamedTuple):
-    """The findings that came and went. ``over``: what was reported and is no longer so."""
+    """Differences that are new, and ``over``: those that were reported before and have ended."""
 
     new: tuple[DriftFinding, ...] = ()
     over: tuple[DriftFinding, ...] = ()

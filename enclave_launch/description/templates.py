@@ -80,7 +80,7 @@ def _private(name: str) -> str:
 
 
 class _Signature:
-    """``inspect.signature`` of a class whose constructor comes from its declarations; made when it is read."""
+    """A descriptor that gives ``inspect.signature`` the declared arguments of a class."""
 
     def __get__(self, instance: object, owner: type[_Templates]) -> inspect.Signature:
         if owner.__init__ not in (TemplateAction.__init__, TemplateSubstitution.__init__):

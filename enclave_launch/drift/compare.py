@@ -34,18 +34,26 @@ _OR_PLAN_IT = "or plan it: in the launch file or its manifests; or accept it"
 
 
 class Security(NamedTuple):
-    """Of a secured system. ``enclaves``: first bytes of GUIDs → enclave of this keystore; ``authenticated``: the
-    observer is in an enclave, so that what it cannot see is not what it should be."""
+    """What is known of a secured system.
+
+    Attributes:
+        enclaves: First bytes of GUIDs → enclave of this keystore.
+        authenticated: The observer is in an enclave, so that what it cannot see is not what it should be.
+    """
 
     enclaves: Mapping[int, str] = MappingProxyType({})
     authenticated: bool = True
 
 
 class Circumstances(NamedTuple):
-    """What a comparison knows beside plan and graph. ``security`` ``None``: the system runs unsecured. ``accepted``:
-    names of nodes, with wildcards, that may run beside the plan. ``strangers``: pids on this machine that the
-    launch did not start; empty where nobody knows. ``forged``: lists of nodes that one participant published for
-    another."""
+    """What a comparison uses beside plan and graph.
+
+    Attributes:
+        security: ``None`` if the system runs unsecured.
+        accepted: Names of nodes, with wildcards, that may run beside the plan.
+        strangers: Process ids on this machine that the launch did not start; empty if that is not known.
+        forged: Lists of nodes that one participant published for another.
+    """
 
     security: Security | None = None
     accepted: tuple[str, ...] = ()

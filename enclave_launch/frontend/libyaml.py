@@ -1,7 +1,7 @@
 """PyYAML for the code of launch files, with its C loader and dumper where they do the same.
 
 Launch files and their helpers (nav2's ``RewrittenYaml`` above all) read and write whole parameter files with PyYAML's
-pure Python loader and dumper. A class that somebody taught something, a text that libyaml would read otherwise, and
+pure Python loader and dumper. A loader with constructors of its own, a text that libyaml would read otherwise, and
 every error go the way of PyYAML's own scanner, so that values and messages are those of upstream.
 """
 

@@ -191,7 +191,7 @@ def _cache() -> Path:
 
 
 def _is_ours(path: Path) -> bool:
-    """Return True if nobody else can have written it: every process of a launch loads it."""
+    """Return True if only this user can write the file: every process of a launch loads it."""
     try:
         status = path.stat()
     except OSError:

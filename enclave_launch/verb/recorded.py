@@ -131,7 +131,7 @@ DEVICES_STAY_REAL = "motors, sensors and device files are not isolated: what the
 
 
 class Isolation(str, Enum):
-    """What keeps a launch apart; the value is the text for a reader."""
+    """Ways to isolate a recorded launch; the value is the text for reports."""
 
     NAMESPACE = "network namespace"
     LOCAL = "discovery on this machine only, in a DDS domain of its own"
@@ -142,7 +142,7 @@ def isolate(wanted: str = "auto") -> Isolation:
     """Isolate this process from other robots and other nodes of this machine, and return what was done.
 
     A learning run is real and unsecured. A network namespace of its own keeps everything in but devices; if that is not
-    allowed, or nodes need the network, discovery stays on this machine, in a DDS domain that nobody else uses. Call it
+    allowed, or nodes need the network, discovery stays on this machine, in a DDS domain of its own. Call it
     before any thread or process is started.
     """
     if wanted == "none":

@@ -59,8 +59,10 @@ def names_twice(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
 
 
 def wildcards(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
-    """Yield permissions whose name is a pattern, except those that planning reported already, and those of names that
-    a program makes up at each start, which nobody could list."""
+    """Yield permissions whose name is a pattern.
+
+    Left out are those that planning reported already, and those of names that a program makes up at each start.
+    """
     explained = " ".join(each.text for each in plan.diagnostics if each.code == "pattern-accepted")
     for enclave, grants in sorted(plan.enclaves.items()):
         for grant in sorted(grants - plan.built_in(enclave)):
