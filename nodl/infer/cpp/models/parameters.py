@@ -55,7 +55,7 @@ def read(run: Machine, record: AllocatedNode, name: Value, default: Value = BOTT
             continue
         if default:
             record.declare(filled, tuple(_with_defaults(run, atom) for atom in default))
-        found += [Param(record, filled), *record.set_values.get(filled, BOTTOM)]
+        found += record.set_values.get(filled) or [Param(record, filled)]
     return tuple(dict.fromkeys(found))
 
 
@@ -116,7 +116,7 @@ def _has(run: Machine, call: Call) -> Value:
 
 @node_method("set_parameter", "set_parameters", "set_parameters_atomically")
 def _set(run: Machine, call: Call) -> Value:
-    """Add one more value that a parameter may have, since the program sets it itself."""
+    """Note that a parameter is not known any more, since the program sets it itself."""
     stack = list(call.values)
     while stack:
         for atom in stack.pop():
@@ -130,7 +130,7 @@ def _set(run: Machine, call: Call) -> Value:
                 if name is not None:
                     record = call.record
                     record.declare(name, BOTTOM)
-                    record.set_values[name] = join(record.set_values.get(name, BOTTOM), given[1])
+                    record.set_values[name] = unknown(f"parameter {name}, which the program sets")
     return unknown("the result of a parameter call")
 
 

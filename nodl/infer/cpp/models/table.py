@@ -56,6 +56,7 @@ class Makes(NamedTuple):
 
 TF = "tf2_msgs/msg/TFMessage"
 _LIFECYCLE = "lifecycle_msgs/srv"
+_DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
 
 ROWS: dict[str, tuple[Makes, ...]] = {
     # ros2/geometry2 humble d0dbd516, jazzy 646342c6, rolling 1b005c65: tf2_ros/include/tf2_ros/transform_broadcaster.h,
@@ -64,7 +65,7 @@ ROWS: dict[str, tuple[Makes, ...]] = {
     "tf2_ros::StaticTransformBroadcaster": (Makes(PUB, "/tf_static", TF),),
     "tf2_ros::BufferClient": (Makes(CALL, "{0}", "tf2_msgs/action/LookupTransform"),),
     # ros/diagnostics ros2 431926f: diagnostic_updater/include/diagnostic_updater/diagnostic_updater.hpp
-    "diagnostic_updater::Updater": (Makes(PUB, "/diagnostics", "diagnostic_msgs/msg/DiagnosticArray"),),
+    "diagnostic_updater::Updater": (Makes(PUB, "/diagnostics", _DIAGNOSTICS),),
     # ros/bond_core ros2 e6d0fc2: bondcpp/src/bond.cpp
     "bond::Bond": (Makes(PUB, "{0}", "bond/msg/Status"), Makes(SUB, "{0}", "bond/msg/Status")),
     # ros2/rclcpp humble 99f1d8d12, jazzy 985e320de, rolling a0a2a067d: rclcpp/parameter_event_handler.hpp
@@ -95,6 +96,16 @@ ROWS: dict[str, tuple[Makes, ...]] = {
         Makes(CLI, "{0}/change_state", f"{_LIFECYCLE}/ChangeState"),
         Makes(CLI, "{0}/get_state", f"{_LIFECYCLE}/GetState"),
     ),
+    # autowarefoundation/autoware_utils main a17a086: logger_level_configure.hpp, diagnostics_interface.hpp,
+    # processing_time_publisher.hpp, polling_subscriber.hpp
+    "autoware_utils_logging::LoggerLevelConfigure": (
+        Makes(SRV, "~/config_logger", "logging_demo/srv/ConfigLogger"),
+    ),
+    "autoware_utils_diagnostics::DiagnosticsInterface": (Makes(PUB, "/diagnostics", _DIAGNOSTICS),),
+    "autoware_utils_debug::ProcessingTimePublisher": (
+        Makes(PUB, "{0=~/debug/processing_time_ms}", "diagnostic_msgs/msg/DiagnosticStatus"),
+    ),
+    "autoware_utils_rclcpp::InterProcessPollingSubscriber": (Makes(SUB, "{0}", "T0"),),
 }
 NONE = (
     "tf2_ros::CreateTimerROS", "tf2_ros::MessageFilter",
@@ -117,9 +128,12 @@ NONE = (
         "DiagnosticStatusWrapper", "FunctionDiagnosticTask", "GenericFunctionDiagnosticTask", "CompositeDiagnosticTask",
         "DiagnosticTask",         "DiagnosticTaskVector")),
     "interactive_markers::MenuHandler", "nav2_util::NodeThread", "nav2::NodeThread", "nav2_util::ExecutionTimer",
+    # autowarefoundation/autoware_utils main a17a086: time_keeper.hpp; lanelet2, below namespace lanelet, knows no ROS
+    "autoware_utils_debug::TimeKeeper", "autoware_utils_debug::ScopedTimeTrack",
 )  # fmt: skip
 """Classes that were read and make no interface on the node that they may get."""
 ROWS.update(dict.fromkeys(NONE, ()))
+ROWS.update({re.sub(r"^autoware_utils_\w+::", "autoware_utils::", name): row for name, row in ROWS.items()})
 
 
 def _make(row: Sequence[Makes], run: Machine, call: Call) -> None:

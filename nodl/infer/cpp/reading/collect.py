@@ -128,12 +128,12 @@ class _Collector:
 
     def function(self, node: Node, scope: Scope, templates: list[str], cls: Class | None) -> None:
         made = self._function(node, scope, templates, cls)
-        if made is None:
+        if made is None or any(child.type == "delete_method_clause" for child in node.named_children):
             return
         made.body = next(
             (c for c in node.named_children if c.type in ("compound_statement", "try_statement")), None
         )
-        if made.body is None:  # = default, = delete, = 0
+        if made.body is None:  # = default, = 0
             self._declare(made, cls)
             return
         for child in (

@@ -385,7 +385,7 @@ def _unmodelled(run: Machine, kind: Type, node: Node, frame: Frame, deliberate: 
     ``deliberate``: it is made with arguments or with new, as structures of C are not.
     """
     why = unmodelled(run.names, kind.name, frame.file, deliberate)
-    if why:
+    if why and all(why != said for _, said in run.gaps):  # one place says it of a class
         run.gap(node, frame, why)
 
 
@@ -518,11 +518,11 @@ def _bases(
         if where is not None:
             run.handle(where, inner)
             values = [run.evaluate(each, inner) for each in children(where)]
-            if cls.virtual_base and values:
-                run.gap(where, inner, f"{cls.name} has a virtual base: who makes it is not followed")
         else:
             values = list(arguments) if cls.inherits_constructors else []
         base = run.class_of(kind, cls)
+        if cls.virtual_base and ((where is not None and values) or base in this.bindings):
+            run.gap(where or node, inner, f"{cls.name} has a virtual base: who makes it is not followed")
         if base is not None and base is not cls:
             construct_class(run, this, base, kind, values, where or node, inner)
         else:

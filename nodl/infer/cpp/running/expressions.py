@@ -13,7 +13,7 @@ from nodl.infer.cpp.running.assignments import as_declared, assign
 from nodl.infer.cpp.running.constructors import as_map, cast, construct, default_value, initial_value, made
 from nodl.infer.cpp.running.contents import copied, elements_copied, items_of
 from nodl.infer.cpp.running.invocation import by_operator, pointed_to
-from nodl.infer.cpp.running.launch_values import decided, settled, settled_text
+from nodl.infer.cpp.running.launch_values import decided, in_doubt, settled, settled_text
 from nodl.infer.cpp.running.machine import NEXT, Frame, Machine, expression
 from nodl.infer.cpp.running.references import as_referred_to
 from nodl.infer.cpp.running.static_types import class_of_member, current_object, seen_type
@@ -33,6 +33,7 @@ from nodl.infer.cpp.running.values import (
     concatenated,
     has_text,
     join,
+    join_in_doubt,
     literal,
     plain,
     unknown,
@@ -443,7 +444,8 @@ def method_pointer(run: Machine, node: Node, frame: Frame) -> Value | None:
 @expression("conditional_expression")
 def conditional(run: Machine, node: Node, frame: Frame) -> Value:
     """Evaluate ``a ? b : c``: the side that is chosen, the other one dead; both joined if that is not decided."""
-    known = decided(run, run.evaluate(field_of(node, "condition"), frame))
+    condition = run.evaluate(field_of(node, "condition"), frame)
+    known = decided(run, condition)
     sides = {True: field_of(node, "consequence"), False: field_of(node, "alternative")}
     if known is not None:
         other = sides[not known]
@@ -456,8 +458,9 @@ def conditional(run: Machine, node: Node, frame: Frame) -> Value:
         found.append(run.evaluate(which, frame))
         return NEXT
 
-    run.branches([lambda: side(sides[True]), lambda: side(sides[False])])
-    return join(*found)
+    doubt = in_doubt(condition)
+    run.branches([lambda: side(sides[True]), lambda: side(sides[False])], doubt=doubt)
+    return join_in_doubt(found, doubt) if doubt else join(*found)
 
 
 @expression("update_expression")
@@ -535,6 +538,8 @@ def element(run: Machine, atom: object, key: Value) -> Value:
         items, exact = items_of(run, atom)
         if exact and len(key) == 1 and isinstance(key[0], int) and 0 <= key[0] < len(items):
             return items[key[0]]
+        if not exact and (not key or (len(key) == 1 and isinstance(key[0], int))):
+            return join_in_doubt(items, "an element of a list whose order is not known")
         return join(*items) if items else unknown("an element of a list")
     if isinstance(atom, Unknown):
         return (atom,)

@@ -10,7 +10,6 @@ from functools import partial
 from nodl.infer.cpp.libraries import IN_PLACE_OF_SOURCE, Call
 from nodl.infer.cpp.reading.declarations import Function, FunctionParameter, parameters_of, type_text
 from nodl.infer.cpp.reading.type_names import Type
-from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.constructors import as_parameter, bind_parameters
 from nodl.infer.cpp.running.contents import copied, handed_over
@@ -19,11 +18,11 @@ from nodl.infer.cpp.running.left_out import leave_out
 from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
 from nodl.infer.cpp.running.memory import MEMORY_DEPTH, CallOutcome, Changes
 from nodl.infer.cpp.running.overloads import candidates, chosen
-from nodl.infer.cpp.running.static_types import declared_type, written_as
+from nodl.infer.cpp.running.static_types import declared_type, given_to, written_as
 from nodl.infer.cpp.running.unknown_calls import may_be_written as may_be_written
 from nodl.infer.cpp.running.unknown_calls import unknown_call
-from nodl.infer.cpp.running.values import Bound, Lambda, Obj, Value, join, unknown
-from nodl.infer.cpp.syntax import Node, children, field_of, template_arguments, text, unwrapped
+from nodl.infer.cpp.running.values import Bound, Lambda, Obj, Value, join, join_in_doubt, unknown
+from nodl.infer.cpp.syntax import Node, children, field_of, template_arguments, text, unwrapped, words_in
 
 
 @dataclass(eq=False)
@@ -167,7 +166,9 @@ def call_functions(
         return unknown_call(run, functions[0].name, values, node, [], frame)
     if len(fitting) > MAX_OVERLOADS and not any(map(run.makes_interfaces, fitting)):
         return _one_of_many(run, fitting, node, frame)
-    return _any_of(run, [partial(invoke, run, each, None, values, node, frame, types) for each in fitting])
+    return _any_of(
+        run, fitting, lambda each: invoke(run, each, None, values, node, frame, types), node, frame
+    )
 
 
 MAX_OVERLOADS = 3
@@ -177,12 +178,19 @@ def _one_of_many(run: Machine, functions: Sequence[Function], node: Node, frame:
     """Return an unknown for one of many overloads, nobody knows which; a gap if they change what matters."""
     run.handle(node, frame)
     run.called.update(functions)
-    every = [effects_of(run, each).written for each in functions]
-    changed = frozenset[str]().union(*(each.assigned | each.changed | each.seen for each in every))
-    changed -= {p.name for each in functions for p in each.parameters if not p.written_back}
-    name = functions[0].name
-    if not looked_at(run).isdisjoint(changed):
-        run.gap(node, frame, f"which of {len(functions)} functions {name}() is called is not known")
+    name, given = functions[0].name, given_to(node, frame)
+    changed: set[str] = set()
+    for each in functions:
+        written = effects_of(run, each).written
+        changed |= (written.assigned | written.changed | written.seen) - {p.name for p in each.parameters}
+        back = (at for at, p in zip(given, each.parameters, strict=False) if p.written_back)
+        changed.update(*map(words_in, back))
+    if not looked_at(run).isdisjoint(changed) or not all(
+        effects_of(run, each).only_variables for each in functions
+    ):
+        which = "specialisation of" if any(each.specialises for each in functions) else "function"
+        run.gap(node, frame, f"which {which} {name} is called is not known")
+    may_be_written(run, f"{name}()", [], given, frame)
     return unknown(f"the result of {name}()")
 
 
@@ -205,31 +213,33 @@ def _in_place(
 def _one_of_special(run: Machine, functions: Sequence[Function], node: Node, frame: Frame) -> Value | None:
     """Return an unknown for a template with explicit specialisations: which is meant is not followed.
 
-    ``None`` for any other, also behind a gap: where one of them changes something or may make interfaces.
+    ``None`` for any other, also behind a gap: where one of them may make interfaces.
     """
     if all(each.specialises is None for each in functions):
         return None
-    name = functions[0].name
-    if any(run.makes_interfaces(each) or writes_of(each.node) for each in functions):
-        run.gap(node, frame, f"which specialisation of {name} is called is not known")
+    if any(map(run.makes_interfaces, functions)):
+        run.gap(node, frame, f"which specialisation of {functions[0].name} is called is not known")
         return None
-    run.handle(node, frame)
-    run.called.update(functions)
-    return unknown(f"the result of a specialisation of {name}()")
+    return _one_of_many(run, functions, node, frame)
 
 
-def _any_of(run: Machine, calls: Sequence[Callable[[], Value]]) -> Value:
-    """Run one of several calls, nobody knows which."""
-    if len(calls) == 1:
-        return calls[0]()
+def _any_of(
+    run: Machine, functions: Sequence[Function], call: Callable[[Function], Value], node: Node, frame: Frame
+) -> Value:
+    """Call one of several overloads, nobody knows which."""
+    if len(functions) == 1:
+        return call(functions[0])
     found: list[Value] = []
+    doubt = f"which of {len(functions)} functions {functions[0].name}() is called is not known"
+    if any(map(run.makes_interfaces, functions)):
+        run.gap(node, frame, doubt)
 
-    def once(call: Callable[[], Value]) -> int:
-        found.append(call())
+    def once(function: Function) -> int:
+        found.append(call(function))
         return NEXT
 
-    run.branches([partial(once, call) for call in calls])
-    return join(*found)
+    run.branches([partial(once, each) for each in functions], doubt=doubt)
+    return join_in_doubt(found, doubt)
 
 
 def call_methods(
@@ -258,10 +268,13 @@ def call_methods(
         return _one_of_many(run, fitting, node, frame)
     if this_object is not None and not exactly and len(values) < len(fitting[0].parameters):
         _check_defaults(run, fitting[0], this_object, len(values), node, frame)
-    calls = [
-        partial(invoke, run, each, this_object, values, node, frame, types, bindings) for each in fitting
-    ]
-    return _any_of(run, calls)
+    return _any_of(
+        run,
+        fitting,
+        lambda each: invoke(run, each, this_object, values, node, frame, types, bindings),
+        node,
+        frame,
+    )
 
 
 def _check_defaults(

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from nodl.infer.cpp.findings import AllocatedNode
 from nodl.infer.cpp.running.machine import Machine
-from nodl.infer.cpp.running.values import Atom, NodeNamePart, Param, Text, Value, literal, plain, truth
+from nodl.infer.cpp.running.values import Atom, NodeNamePart, Obj, Param, Text, Value, literal, plain, truth
 from nodl.name_template import ParameterPart
 
 
@@ -34,6 +34,12 @@ def settled_text(run: Machine, atom: Atom) -> str | None:
 def decided(run: Machine, value: Value) -> bool | None:
     """Return whether ``value`` is certainly true or false in this run."""
     return truth(settled(run, value))
+
+
+def in_doubt(condition: Value) -> str:
+    """Return why it is not known which way a condition goes that no input decides; the empty text if one does."""
+    is_pointer = bool(condition) and all(isinstance(atom, Obj) for atom in condition)
+    return "whether a pointer is set decides" if is_pointer else ""
 
 
 def settled(run: Machine, value: Value) -> Value:

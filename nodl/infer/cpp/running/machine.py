@@ -188,10 +188,12 @@ class Machine:
             return NEXT
         return handler(self, node, frame)
 
-    def branches(self, alternatives: Sequence[Callable[[], int]], tested: bool = False) -> int:
+    def branches(
+        self, alternatives: Sequence[Callable[[], int]], tested: bool = False, doubt: str = ""
+    ) -> int:
         """Run each alternative from the present state; continue with any that goes on.
 
-        ``tested``: a condition of the program decides.
+        ``tested``: a condition of the program decides; ``doubt``: see ``AbstractStore.merge``.
         """
         mark = self.store.mark()
         outcome = 0
@@ -205,7 +207,7 @@ class Machine:
             self.store.undo(mark)
         self.undecided -= tested
         if going:
-            self.store.merge(going)
+            self.store.merge(going, doubt)
         self.left = None
         return outcome
 

@@ -16,6 +16,7 @@ from nodl.infer.cpp.running.values import (
     hold,
     holds_callable,
     join,
+    join_in_doubt,
 )
 
 MEMORY_DEPTH = 20
@@ -184,13 +185,17 @@ class AbstractStore:
                 if self._history is not None:
                     self._remember(cell, old)
 
-    def merge(self, alternatives: Sequence[Changes]) -> None:
-        """Continue with any of ``alternatives``, each made from the present state."""
+    def merge(self, alternatives: Sequence[Changes], doubt: str = "") -> None:
+        """Continue with any of ``alternatives``, each made from the present state.
+
+        ``doubt``: why it is not known which of them it is, where C++ decides it.
+        """
         for cell in dict.fromkeys(cell for changes in alternatives for cell in changes):
             present = self._cells.get(cell, BOTTOM)
             if any(cell not in changes for changes in alternatives):
                 self._read(cell, self._since.get(cell, -1))
-            self.set(cell, join(*(changes.get(cell, present) for changes in alternatives)))
+            values = [changes.get(cell, present) for changes in alternatives]
+            self.set(cell, join_in_doubt(values, doubt) if doubt else join(*values))
 
 
 def name_of(cell: Cell) -> str:

@@ -15,6 +15,7 @@ from nodl.infer.cpp.running.machine import NEXT, Frame, Machine, registered
 from nodl.infer.cpp.running.static_types import is_pointer
 from nodl.infer.cpp.running.values import (
     BOTTOM,
+    END,
     Atom,
     Bound,
     Group,
@@ -185,10 +186,14 @@ def _calls_back(run: Machine, values: Sequence[Value], node: Node, frame: Frame)
         return run.calls.call_values(run, callee, values[first:], node, frame)
     if text(node).startswith("std::async"):
         run.store.others_run()
-    elements = tuple(join(*items_of(run, atom)[0]) for atom in values[0]) if values else ()
+    items, exact = items_of(run, values[0][0]) if len(values[0] if values else ()) == 1 else ([], False)
+    every = exact and text(node).startswith("std::for_each(") and END in values[1]
     for atom in (atom for value in values for atom in value if isinstance(atom, Lambda)):
-        # Before what follows, or not.
-        run.branches([partial(_once, run, atom, elements, node, frame), lambda: NEXT])
+        for item in items if every else ():
+            _once(run, atom, [item], node, frame)
+        if not every:  # before what follows, or not
+            once = partial(_once, run, atom, [join(*items)] if items else [], node, frame)
+            run.branches([once, lambda: NEXT], doubt="what a closure that runs meanwhile writes")
     position = next(
         (at for at, value in enumerate(values) if any(isinstance(a, Lambda | Bound) for a in value)), 0
     )
@@ -216,7 +221,7 @@ _ALGORITHMS = ("std::for_each", "std::transform", "std::sort", "std::any_of", "s
 
 
 def _once(run: Machine, atom: Lambda, elements: Sequence[Value], node: Node, frame: Frame) -> int:
-    run.calls.call_values(run, (atom,), [join(*elements)] if elements else [], node, frame)
+    run.calls.call_values(run, (atom,), elements, node, frame)
     return NEXT
 
 
@@ -279,4 +284,6 @@ def called_now(run: Machine, values: Sequence[Value], node: Node, frame: Frame) 
 
     for atom in (atom for value in values for atom in value if isinstance(atom, Lambda)):
         if writes_of(atom.node):
-            run.branches([partial(once, atom), lambda: NEXT])
+            run.branches(
+                [partial(once, atom), lambda: NEXT], doubt="what a closure writes that may be called"
+            )

@@ -12,7 +12,7 @@ from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.constructors import declared_value, fields_of
 from nodl.infer.cpp.running.contents import copied, iterated
 from nodl.infer.cpp.running.effects import only_changes_variables
-from nodl.infer.cpp.running.launch_values import decided, settled
+from nodl.infer.cpp.running.launch_values import decided, in_doubt, settled
 from nodl.infer.cpp.running.machine import (
     BREAK,
     CONTINUE,
@@ -171,17 +171,19 @@ def if_statement(run: Machine, node: Node, frame: Frame) -> int:
     for child in children(condition):
         for inner in children(child) if child.type == "init_statement" else ():
             run.execute(inner, frame)
-    value = condition_value(run, condition, frame)
+    subject = condition_of(run, condition, frame)
+    value = decided(run, subject)
     then, other = field_of(node, "consequence"), field_of(node, "alternative")
     if value is None:
-        return run.branches([partial(run.execute, side, frame) for side in (then, other)], tested=True)
+        sides = [partial(run.execute, side, frame) for side in (then, other)]
+        return run.branches(sides, tested=True, doubt=in_doubt(subject))
     always = "always" if value else "never"
     run.kill(other if value else then, frame, f"the condition {text(condition)[:60]} is {always} true")
     return run.execute(then if value else other, frame)
 
 
-def condition_value(run: Machine, condition: Node | None, frame: Frame) -> bool | None:
-    """Runs a condition: certainly true or false, else ``None``, as for none, or one that declares."""
+def condition_of(run: Machine, condition: Node | None, frame: Frame) -> Value:
+    """Run a condition and return what is tested: of one that declares, its variable."""
     inner = (
         field_of(condition, "value")
         if condition is not None and condition.type == "condition_clause"
@@ -189,8 +191,9 @@ def condition_value(run: Machine, condition: Node | None, frame: Frame) -> bool 
     )
     if inner is not None and inner.type == "declaration":
         run.execute(inner, frame)
-        return None
-    return decided(run, run.evaluate(inner, frame))
+        named = [each for each in walk(field_of(inner, "declarator")) if each.type == "identifier"]
+        return (run.store.get((frame, text(named[0]))) or BOTTOM) if named else BOTTOM
+    return run.evaluate(inner, frame)
 
 
 @statement("preproc_if", "preproc_ifdef", "preproc_elif")
@@ -266,11 +269,13 @@ def try_statement(run: Machine, node: Node, frame: Frame) -> int:
     outcome, held = run.store.held_during(partial(run.execute, field_of(node, "body"), frame))
     catches = [child for child in children(node) if child.type == "catch_clause"]
     after: list[Callable[[], int]] = [lambda: outcome]
-    return run.branches([*after, *(partial(_caught, run, clause, held, frame) for clause in catches)])
+    doubt = "" if outcome & NEXT else "what is left where an exception was thrown"
+    caught = (partial(_caught, run, clause, held, doubt, frame) for clause in catches)
+    return run.branches([*after, *caught])
 
 
-def _caught(run: Machine, clause: Node, held: Changes, frame: Frame) -> int:
-    run.store.merge([{}, held])
+def _caught(run: Machine, clause: Node, held: Changes, doubt: str, frame: Frame) -> int:
+    run.store.merge([{}, held], doubt)
     for each in (n for n in walk(clause) if n.type == "parameter_declaration"):
         declared = field_of(each, "declarator")
         if declared is not None:
@@ -541,7 +546,7 @@ def _counted(run: Machine, node: Node, frame: Frame) -> int:
     returns, outer_path = 0, frame.path
     for index in range(MAX_UNROLLED):
         is_certain = condition is None or (index == 0 and node.type == "do_statement")
-        holds = is_certain or condition_value(run, condition, frame)
+        holds = is_certain or decided(run, condition_of(run, condition, frame))
         if holds is False:
             if index == 0:
                 run.kill(body, frame, "the condition of the loop is never true")
@@ -592,7 +597,7 @@ def _repeated(
             outcome = _iteration(run, body, frame, loop)
             if outcome & NEXT:
                 run.evaluate(update, frame)
-            condition_value(run, condition, frame)
+            condition_of(run, condition, frame)
             return outcome
 
         returns |= run.branches([once, lambda: NEXT]) & RETURN

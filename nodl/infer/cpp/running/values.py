@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -250,6 +250,17 @@ def join(*values: Value) -> Value:
         return found
     objects = tuple(atom for atom in found if isinstance(atom, Obj))[:MAX_ALTERNATIVES]
     return (*objects, Unknown("too many possible values"))
+
+
+def join_in_doubt(values: Sequence[Value], why: str) -> Value:
+    """Join alternatives of which C++ takes a certain one, not known which: texts and numbers that differ are open."""
+    common = set(values[0]).intersection(*values[1:]) if values else set()
+    return join(
+        *(
+            unknown(why) if isinstance(atom, Text | Param | int | float) and atom not in common else (atom,)
+            for atom in join(*values)
+        )
+    )
 
 
 def _one_container(atoms: Value) -> Value:

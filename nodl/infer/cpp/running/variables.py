@@ -7,7 +7,7 @@ from nodl.infer.cpp.running.constructors import default_value, made
 from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.static_types import current_object, static_by_name
 from nodl.infer.cpp.running.values import BOTTOM, NPOS, Bound, Const, Obj, Value, unknown
-from nodl.infer.cpp.syntax import Node, children
+from nodl.infer.cpp.syntax import Node, children, text
 
 
 def variable(run: Machine, name: str, frame: Frame) -> Value:
@@ -85,6 +85,8 @@ def constant(run: Machine, name: str, frame: Frame) -> Value | None:
     if static is not None:
         return static_member(run, *static)
     cell_owner = run.names.find_global(name, frame.scope, frame.file)
+    if cell_owner is not None and "thread_local" in text(cell_owner.node).partition("=")[0]:
+        return unknown(f"the value of {name}, which each thread has its own of")
     if cell_owner is not None:
         cell = (cell_owner, "")
         known = run.store.get(cell)
