@@ -11,7 +11,7 @@ from nodl.infer.cpp.running.arithmetic import added, as_type, computed
 from nodl.infer.cpp.running.constructors import in_braces
 from nodl.infer.cpp.running.contents import copied, elements_copied, overwrite
 from nodl.infer.cpp.running.machine import Frame, Machine, expression
-from nodl.infer.cpp.running.references import is_plain, through
+from nodl.infer.cpp.running.references import REFERRED_TO, is_plain, through
 from nodl.infer.cpp.running.static_types import (
     TEXTS,
     WHOLE_NUMBERS,
@@ -326,7 +326,11 @@ def _write_element(
 ) -> None:
     keys = [run.evaluate(child, frame) for child in children(indices)]
     found: list[Value] = []
-    for atom in run.evaluate(container, frame):
+    held = run.evaluate(container, frame)
+    refers = is_plain(held) or REFERRED_TO in held
+    if refers and is_plain(value) and points_to_plain(run, container, frame, _ANYTHING):
+        through(run, node, frame)  # p[0] = x is *p = x
+    for atom in held:
         if run.methods_of(atom, "operator[]"):
             through(run, node, frame)
         if isinstance(atom, Map) and keys:
@@ -339,6 +343,9 @@ def _write_element(
             found.append((atom,))
     if found:
         assign(run, container, join(*found), frame)
+
+
+_ANYTHING = re.compile("")
 
 
 def with_entry(atom: Map, key: Value, value: Value) -> Map:

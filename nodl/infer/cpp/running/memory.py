@@ -50,6 +50,7 @@ class AbstractStore:
         self._watched_from = 0
         self._history: Changes | None = None
         self._held: dict[Cell, Value | None] | None = None
+        self._shared: dict[Cell, Value] = {}  # variables that somebody unknown may write to at any time
         self.log = NoteLog()
 
     def get(self, cell: Cell) -> Value | None:
@@ -105,6 +106,8 @@ class AbstractStore:
         old = self._cells.get(cell, _ABSENT)
         if old is not value:
             value = bounded(value)
+            if cell in self._shared:
+                value = join(value, self._shared[cell])
             if old is _ABSENT and not _is_of_a_call(cell):
                 self._by_name.setdefault(name_of(cell), {})[cell] = None
             if any(map(holds_callable, value)):
@@ -116,6 +119,14 @@ class AbstractStore:
                 self._remember(cell, value)
             if self._held is not None:
                 self._hold(cell, None if old is _ABSENT else join(old, value))
+
+    def share(self, action: Callable[[], None], why: Value) -> None:
+        """Run what writes to a variable; whatever is written to it from then on, it may also be ``why``."""
+        mark = len(self._trail)
+        action()
+        for cell, _, _ in self._trail[mark:]:
+            self._shared[cell] = why
+            self.set(cell, join(self._cells.get(cell, BOTTOM), why))
 
     def named(self, name: str) -> list[Cell]:
         """Return the members, globals and static members of that name that were ever set."""

@@ -21,11 +21,12 @@ def is_plain(value: Value) -> bool:
     return any(isinstance(atom, Text | Seq | Map | Group | Param | int | float) for atom in value)
 
 
+REFERRED_TO = Unknown("what a reference or pointer stands for")
+
+
 def as_referred_to(value: Value) -> Value:
     """Return what a member or element that is a reference or pointer holds: objects; a plain value may change."""
-    return tuple(
-        Unknown("what a reference or pointer stands for") if is_plain((atom,)) else atom for atom in value
-    )
+    return tuple(REFERRED_TO if is_plain((atom,)) else atom for atom in value)
 
 
 def bind_reference(run: Machine, name: str, kind: str, initial: Node | None, frame: Frame) -> None:

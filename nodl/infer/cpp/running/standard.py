@@ -5,12 +5,14 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Sequence
 from functools import partial
+from itertools import chain
 
 from nodl.infer.cpp.libraries import Call, library_class
 from nodl.infer.cpp.reading.declarations import parameters_of
 from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.constructors import text_of
 from nodl.infer.cpp.running.contents import copied, items_of
+from nodl.infer.cpp.running.effects import effects_of
 from nodl.infer.cpp.running.machine import NEXT, Frame, Machine, registered
 from nodl.infer.cpp.running.static_types import is_pointer
 from nodl.infer.cpp.running.values import (
@@ -212,7 +214,10 @@ def _thread(run: Machine, call: Call) -> None:
     """Run a thread beside what follows."""
     if call.values:
         run.store.others_run()
-        run.spins_beside = run.spins_beside or _SPINS.search(text(call.node)) is not None
+        words = [
+            effects_of(run, each).words for v in call.values for each in v if isinstance(each, Lambda | Bound)
+        ]
+        run.spins_beside = run.spins_beside or any(map(_SPINS.search, (text(call.node), *chain(*words))))
         _calls_back(run, call.values, call.node, call.frame)
 
 

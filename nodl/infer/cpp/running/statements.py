@@ -9,6 +9,7 @@ from nodl.infer.cpp.libraries import is_harmless_class
 from nodl.infer.cpp.reading.collect import declared_names
 from nodl.infer.cpp.reading.declarations import type_text
 from nodl.infer.cpp.running.assignments import assign
+from nodl.infer.cpp.running.callbacks import run_meanwhile
 from nodl.infer.cpp.running.constructors import declared_value, fields_of
 from nodl.infer.cpp.running.contents import copied, iterated
 from nodl.infer.cpp.running.effects import only_changes_variables
@@ -36,7 +37,9 @@ from nodl.infer.cpp.running.values import (
     Text,
     Value,
     join,
+    join_in_doubt,
     may_name,
+    one_sequence,
     plain,
     unknown,
 )
@@ -434,8 +437,10 @@ def for_range_loop(run: Machine, node: Node, frame: Frame) -> int:
     right, body = field_of(node, "right"), field_of(node, "body")
     subject = run.evaluate(right, frame)
     items, exact = iterated(run, subject)
-    if seen_type(run, right, frame).last == "map":
+    container = seen_type(run, right, frame).last
+    if container == "map":
         items = _by_key(items)
+    exact = exact and (len(items) < 2 or not container.startswith("unordered"))
     declarator, written = field_of(node, "declarator"), type_text(node)
     parts = list(walk(declarator)) if declarator is not None else []
     names = [text(part) for part in parts if part.type == "identifier"]
@@ -484,27 +489,47 @@ def _hold_pointers(run: Machine, right: Node | None, frame: Frame) -> bool:
 
 
 def _over(run: Machine, body: Node | None, steps: list[Callable[[], None]], exact: bool, frame: Frame) -> int:
-    """Run the body once for each step; any number of times each unless ``exact``."""
+    """Run the body once for each step; in any order and number unless ``exact``."""
     if not steps and exact:
         run.kill(body, frame, "the loop runs over nothing")
         return NEXT
     loop = Loop(run.store.mark())
-    returns, outer_path = 0, frame.path
-    for index, step in enumerate(steps):
-        frame.path = (*outer_path, index)
+    returns, outer_path, outcome = 0, frame.path, NEXT
+    for turn in range(1 if exact else 2):
+        for index, step in enumerate(steps if outcome & NEXT else ()):
+            frame.path = (*outer_path, index)
 
-        def once(step: Callable[[], None] = step) -> int:
-            step()
-            return _iteration(run, body, frame, loop)
+            def once(step: Callable[[], None] = step) -> int:
+                step()
+                return _iteration(run, body, frame, loop)
 
-        outcome = once() if exact else run.branches([once, lambda: NEXT])
-        returns |= outcome & RETURN
-        if not outcome & NEXT:
+            outcome = once() if exact else run.branches([once, lambda: NEXT])
+            returns |= outcome & RETURN
+            if not outcome & NEXT:
+                break
+        if not exact and (not _forget_order(run, loop.start) or turn):
             break
-    else:
-        outcome = NEXT
     frame.path = outer_path
     return returns | _after(run, loop, outcome)
+
+
+def _forget_order(run: Machine, start: int) -> bool:
+    """Make what turns in an order that is not known have changed unknown, and lists have any order.
+
+    Returns:
+        Whether a text or number changed: another turn may find it otherwise.
+    """
+    before, found = run.store.before(start), False
+    for cell, value in run.store.changes(start).items():
+        changed = before[cell] != BOTTOM and set(before[cell]) != set(value)
+        if changed and any(isinstance(atom, Text | int | float) for atom in value):
+            run.store.set(
+                cell, join_in_doubt((before[cell], value), "a value that a loop in any order changes")
+            )
+            found = True
+        elif changed and any(isinstance(atom, Seq) for atom in value):
+            run.store.set(cell, one_sequence(value))
+    return found
 
 
 def _after(run: Machine, loop: Loop, outcome: int) -> int:
@@ -545,6 +570,8 @@ def _counted(run: Machine, node: Node, frame: Frame) -> int:
     loop = Loop(run.store.mark())
     returns, outer_path = 0, frame.path
     for index in range(MAX_UNROLLED):
+        if run.spins_beside:
+            run_meanwhile(run, frame)
         is_certain = condition is None or (index == 0 and node.type == "do_statement")
         holds = is_certain or decided(run, condition_of(run, condition, frame))
         if holds is False:
@@ -597,6 +624,8 @@ def _repeated(
             outcome = _iteration(run, body, frame, loop)
             if outcome & NEXT:
                 run.evaluate(update, frame)
+            if run.spins_beside:
+                run_meanwhile(run, frame)
             condition_of(run, condition, frame)
             return outcome
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from functools import partial
 
 from nodl.infer.cpp.ledger import CREATES
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES, is_harmless_class, is_harmless_function
@@ -117,8 +118,10 @@ def may_be_written(
             target = field_of(target, "argument")
         if target is None or target.type not in ("identifier", "field_expression"):
             continue
-        if is_plain_type(declared_type(run, target, frame)[0].name):
-            _changed(run, name, target, frame)
+        if is_plain_type(declared_type(run, target, frame)[0].name):  # and it may keep a reference
+            run.store.share(
+                partial(_changed, run, name, target, frame), unknown(f"what {name} may write later")
+            )
 
 
 def changed_by_standard(run: Machine, name: str, given: Sequence[Node], frame: Frame) -> None:
