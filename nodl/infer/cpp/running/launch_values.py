@@ -106,6 +106,8 @@ def _part_text(run: Machine, part: object) -> str | None:
         return None
     if run.start is not None:
         name, namespace = run.start.final_name(_static_name(part.record))
+        if namespace == "/" and _static_namespace(part.record) != "/":
+            namespace = None  # whether the launch says so, or nothing
     else:
         run.from_default[f"the {part.what} of node {_static_name(part.record)}"] = None
         name, namespace = _static_name(part.record), _static_namespace(part.record)

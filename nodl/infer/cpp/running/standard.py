@@ -214,10 +214,10 @@ def _thread(run: Machine, call: Call) -> None:
     """Run a thread beside what follows."""
     if call.values:
         run.store.others_run()
-        words = [
-            effects_of(run, each).words for v in call.values for each in v if isinstance(each, Lambda | Bound)
-        ]
-        run.spins_beside = run.spins_beside or any(map(_SPINS.search, (text(call.node), *chain(*words))))
+        kept = (a for value in call.values for a in value if isinstance(a, Lambda | Bound))
+        words = (effects_of(run, a.function if isinstance(a, Bound) else a).words for a in kept)
+        spins = any(map(_SPINS.search, (text(call.node), *chain.from_iterable(words))))
+        run.spins_beside = run.spins_beside or spins
         _calls_back(run, call.values, call.node, call.frame)
 
 
