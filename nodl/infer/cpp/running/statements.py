@@ -37,7 +37,6 @@ from nodl.infer.cpp.running.values import (
     Text,
     Value,
     join,
-    join_in_doubt,
     may_name,
     one_sequence,
     plain,
@@ -309,7 +308,8 @@ def declaration(run: Machine, node: Node, frame: Frame) -> int:
     for name, value, pointer, written in declared_names(node):
         if any(text(each).startswith(name) for each in functions):
             continue
-        kind = written + (("*" if _points(node) else "&") if pointer else "")
+        fixed = not pointer and any(text(each) in ("const", "constexpr") for each in children(node))
+        kind = ("const " if fixed else "") + written + (("*" if _points(node) else "&") if pointer else "")
         initial = partial(declared_value, run, node, written, value, pointer, frame)
         if _is_static(node):
             _static_local(run, node, name, kind, initial, frame)
@@ -521,11 +521,11 @@ def _forget_order(run: Machine, start: int) -> bool:
     """
     before, found = run.store.before(start), False
     for cell, value in run.store.changes(start).items():
+        both = (*before[cell], *value)
         changed = before[cell] != BOTTOM and set(before[cell]) != set(value)
-        if changed and any(isinstance(atom, Text | int | float) for atom in value):
-            run.store.set(
-                cell, join_in_doubt((before[cell], value), "a value that a loop in any order changes")
-            )
+        if changed and any(isinstance(atom, Text | int | float) for atom in both):
+            kept = tuple(atom for atom in both if not isinstance(atom, Text | int | float))
+            run.store.set(cell, join(kept, unknown("a value that a loop in any order changes")))
             found = True
         elif changed and any(isinstance(atom, Seq) for atom in value):
             run.store.set(cell, one_sequence(value))

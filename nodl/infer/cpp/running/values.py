@@ -254,11 +254,14 @@ def join(*values: Value) -> Value:
 
 def join_in_doubt(values: Sequence[Value], why: str) -> Value:
     """Join alternatives of which C++ takes a certain one, not known which: texts and numbers that differ are open."""
+    found = join(*values)
+    if any(isinstance(atom, Unknown) for atom in found):
+        return found
     common = set(values[0]).intersection(*values[1:]) if values else set()
     return join(
         *(
             unknown(why) if isinstance(atom, Text | Param | int | float) and atom not in common else (atom,)
-            for atom in join(*values)
+            for atom in found
         )
     )
 

@@ -153,3 +153,33 @@ def test_nodes_of_a_package_of_tests_that_nobody_makes_are_not_listed(tmp_path: 
     for name, made in (("demo_tests", set()), ("demo_nodes", {("publisher", "t")})):
         folder = package(tmp_path / name, {"include/demo.hpp": source})
         assert endpoints(infer_paths([folder])) == made
+
+
+AUTOWARE = {
+    "autoware_utils_logging::LoggerLevelConfigure l(this);": {("service_server", "~/config_logger")},
+    'autoware_utils_diagnostics::DiagnosticsInterface d(this, "x");': {("publisher", "/diagnostics")},
+    "autoware_utils::ProcessingTimePublisher p(this);": {("publisher", "~/debug/processing_time_ms")},
+    'autoware_utils_debug::ProcessingTimePublisher p(this, "~/ms");': {("publisher", "~/ms")},
+    'autoware_utils_rclcpp::InterProcessPollingSubscriber<nav_msgs::msg::Odometry> s(this, "odom");': {
+        ("subscription", "odom")
+    },
+    'autoware_utils_debug::TimeKeeper k; autoware_utils_debug::ScopedTimeTrack t("x", k);': set(),
+    "lanelet::ConstLanelets lanes(3);": set(),
+}
+
+
+@pytest.mark.parametrize(("body", "expected"), AUTOWARE.items())
+def test_of_autoware_utils(body: str, expected: set[tuple[str, str]], tmp_path: Path) -> None:
+    before = "#include <autoware_utils_debug/time_keeper.hpp>\n#include <lanelet2_core/Forward.h>\n"
+    system = infer(tmp_path, in_class(body, before=before))
+    assert (endpoints(system), gaps(system)) == (expected, [])
+
+
+def test_a_class_that_nobody_read_is_told_once_and_a_node_that_it_gets_each_time(tmp_path: Path) -> None:
+    made = "acme::Scope a(1);\nacme::Scope b(2);\nacme::Scope c(this);\nacme::Scope d(this);"
+    source = in_class(made, before="#include <acme/scope.hpp>\n")
+    told = gaps(
+        infer_paths([package(tmp_path / "demo", {"src/main.cpp": source}, depends=("rclcpp", "acme"))])
+    )
+    assert sum("it may be a node or make one" in each for each in told) == 1, told
+    assert sum("the node is handed to the constructor" in each for each in told) == 2

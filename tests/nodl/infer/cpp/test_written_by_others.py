@@ -1,0 +1,210 @@
+"""What is written through references, pointers, algorithms and unknown code, and what a copy keeps."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.nodl.infer.cpp.workspace import gaps, in_class, infer, names
+
+pytest.importorskip("tree_sitter_cpp", reason="the extra cpp is not installed")
+
+S = "std_msgs::msg::String"
+
+
+WRITTEN = {
+    "by an operator": ("b << 1;", 'B & operator<<(int) { t = "a"; return *this; }'),
+    "by a free operator": ("b + 1;", ""),
+    "by a sign before it": ("++b;", 'B & operator++() { t = "a"; return *this; }'),
+    "by a comparison": ("if (b == b) {}", 'bool operator==(const B &) { t = "a"; return true; }'),
+    "by an algorithm": ('std::for_each(v.begin(), v.end(), [](B & e) { e.t = "a"; }); b = v[0];', ""),
+    "by a swap": ('B c; c.t = "a"; std::swap(b, c);', ""),
+    "through a list of pointers": ('for (auto p : {&b}) { p->t = "a"; }', ""),
+    "through a wrapped reference": ('std::reference_wrapper<B> r = b; r.get().t = "a";', ""),
+}
+
+
+@pytest.mark.parametrize(("body", "members"), WRITTEN.values(), ids=WRITTEN)
+def test_what_is_written_in_a_way_of_its_own_is_seen(body: str, members: str, tmp_path: Path) -> None:
+    before = f'struct B {{ std::string t = "x"; {members} }};\n'
+    before += 'B & operator+(B & b, int) { b.t = "a"; return b; }\n'
+    use = f"std::vector<B> v(1); B b; {body} create_publisher<std_msgs::msg::String>(b.t, 1);"
+    assert "a" in names(infer(tmp_path, in_class(use, before=before)))
+
+
+EACH = {
+    "by a closure": 'std::for_each(v.begin(), v.end(), [](auto & s) { s = "b"; });',
+    "by a closure found by its arguments": 'for_each(v.begin(), v.end(), [](auto & s) { s = "b"; });',
+    "by a function": "std::for_each(v.begin(), v.end(), set);",
+    "by an object": "std::for_each(v.begin(), v.end(), Set{});",
+    "by a bound function": "std::for_each(v.begin(), v.end(), std::bind(set, std::placeholders::_1));",
+    "by somebody unknown": "std::for_each(v.begin(), v.end(), boost::trim);",
+    "between iterators": 'auto i = v.begin(); auto e = v.end(); std::fill(i, e, "b");',
+    "through a template": "range(v.begin(), v.end());",
+    "by a predicate": 'std::any_of(v.begin(), v.end(), [](auto & s) { s = "b"; return true; });',
+    "of what a method gives": "std::for_each(all().begin(), all().end(), set);",
+    "at a place": "set(v.at(0));",
+    "where an iterator stands": "set(*v.begin());",
+    "in what a closure captured": "std::count_if(w.begin(), w.end(), [&](int) { v = {}; return true; });",
+    "by a method of a container": "std::list<int> l; l.remove_if([&](int) { v = {}; return true; });",
+}
+
+
+ONLY_READ = {
+    "copies": 'std::for_each(v.begin(), v.end(), [](auto s) { s = "b"; });',
+    "constants": "std::for_each(v.begin(), v.end(), [](const auto & s) { look(s); });",
+}
+
+
+SETTERS = """
+void set(std::string & s) { s = "b"; }
+struct Set { void operator()(std::string & s) { s = "b"; } };
+template <typename I> void range(I b, I e) { std::for_each(b, e, [](auto & s) { s = "b"; }); }
+void look(const std::string &) {}
+"""
+
+
+def elements(folder: Path, body: str) -> tuple[list[str], list[str]]:
+    use = f"std::vector<int> w(1); {body} create_publisher<std_msgs::msg::String>(v[0], 1);"
+    members = 'std::vector<std::string> v{"a"}; std::vector<std::string> & all() { return v; }'
+    if body.startswith(("auto", "range")):
+        use = f'std::vector<std::string> v{{"a"}}; {use}'
+    system = infer(folder, in_class(use, members, before=SETTERS))
+    return names(system), gaps(system)
+
+
+@pytest.mark.parametrize("body", EACH.values(), ids=EACH)
+def test_elements_that_somebody_writes_are_not_what_they_were(body: str, tmp_path: Path) -> None:
+    made, told = elements(tmp_path, body)
+    assert told or any("?" in each for each in made) or "b" in made
+
+
+@pytest.mark.parametrize("body", ONLY_READ.values(), ids=ONLY_READ)
+def test_elements_that_an_algorithm_only_reads_stay(body: str, tmp_path: Path) -> None:
+    assert elements(tmp_path, body) == (["a"], [])
+
+
+BEHIND = {
+    "through a reference that a member of another object is": (
+        'h.r = "b";',
+        "struct H { std::string & r; }; H h{t};",
+        "what h.r refers to is written",
+    ),
+    "through a pointer that is a member": (
+        'p = &t; *p = "b";',
+        "std::string * p = nullptr;",
+        "what p refers to is written",
+    ),
+    "through a pointer into an array": (
+        'std::string * p = l; p[0] = "b"; t = l[0];',
+        'std::string l[1] = {"a"};',
+        "what p refers to is written",
+    ),
+    "through a pointer that another object has": (
+        'h.p = &t; *h.p = "b";',
+        "struct H { std::string * p; }; H h;",
+        "what h.p refers to is written",
+    ),
+    "by a method, through a pointer that is a member": (
+        'p = &t; p->append("b");',
+        "std::string * p = nullptr;",
+        "what p refers to is written",
+    ),
+    "by an exchange through a pointer that is a member": (
+        'p = &t; std::string other = "b"; std::swap(*p, other);',
+        "std::string * p = nullptr;",
+        "what p refers to is written",
+    ),
+    "from a stream, through a pointer that is a member": (
+        "p = &t; std::cin >> *p;",
+        "std::string * p = nullptr;",
+        "what p refers to is written",
+    ),
+}
+
+
+@pytest.mark.parametrize(("body", "members", "why"), BEHIND.values(), ids=BEHIND)
+def test_a_text_that_is_written_behind_its_variable_is_told(
+    body: str, members: str, why: str, tmp_path: Path
+) -> None:
+    source = in_class(f"{body} create_publisher<{S}>(t, 1);", f'std::string t = "a"; {members}')
+    assert [gap.partition(":")[0] for gap in gaps(infer(tmp_path, source))] == [why]
+
+
+def test_a_text_that_a_member_only_reads_through_a_pointer_stays_known(tmp_path: Path) -> None:
+    members = 'std::string t = "a"; const std::string * p = nullptr; size_t n = 0;'
+    found = infer(tmp_path, in_class(f"p = &t; n = p->size(); create_publisher<{S}>(t, 1);", members))
+    assert (names(found), gaps(found)) == (["a"], [])
+
+
+def test_a_number_that_unknown_code_gets_as_a_variable_may_be_another_one(tmp_path: Path) -> None:
+    body = f'int n = 0; acme::read(n); create_publisher<{S}>("t" + std::to_string(n), 1);'
+    assert names(infer(tmp_path, in_class(body))) == ["t0", "t?"]
+
+
+COPIED = {
+    "a list that a method gives": ('auto v = list(); v[0].t = "b";', "a"),
+    "an element of it": ('auto c = list()[0]; c.t = "b";', "a"),
+    "each of its elements": ('for (auto c : list()) { c.t = "b"; }', "a"),
+    "pointers that a method gives": ('for (auto p : pointers()) { p->t = "b"; }', "b"),
+    "what a pointer that a method gives points to": ("*one() = other_;", "b"),
+}
+
+
+@pytest.mark.parametrize(("body", "expected"), COPIED.values(), ids=COPIED)
+def test_what_a_call_gives_is_copied_if_it_is_no_pointer(body: str, expected: str, tmp_path: Path) -> None:
+    members = (
+        'std::vector<C> l_{C{}}; std::vector<C> & list() { return l_; } C other_{"b"}; C * one() { return &l_[0]; }'
+        "std::vector<C *> p_{&l_[0]}; std::vector<C *> & pointers() { return p_; }"
+    )
+    use = f"{body} create_publisher<{S}>(l_[0].t, 1);"
+    assert names(infer(tmp_path, in_class(use, members, before='struct C { std::string t = "a"; };\n'))) == [
+        expected
+    ]
+
+
+KEPT = {
+    "a number behind a member that is a pointer": (
+        "int n = 0; Flag f{&n}; f.mine[0] = 1;",
+        "std::to_string(n)",
+        "what f.mine[0] refers to is written",
+    ),
+    "an array of its own": ("int n[2] = {0, 0}; n[1] = 7;", "std::to_string(n[1])", ""),
+    "a text that an unknown class may keep": ('std::string t = "x"; acme::Keeper k(t); t = "a";', "t", ""),
+    "a constant that it may keep": ('const std::string t = "a"; acme::Keeper k(t);', "t", ""),
+}
+
+
+@pytest.mark.parametrize(
+    ("kept", "made"),
+    [
+        ("a number behind a member that is a pointer", ["0"]),
+        ("an array of its own", ["7"]),
+        ("a text that an unknown class may keep", ["?", "a"]),
+        ("a constant that it may keep", ["a"]),
+    ],
+)
+def test_what_somebody_may_write_later_is_told_or_open(kept: str, made: list[str], tmp_path: Path) -> None:
+    body, name, why = KEPT[kept]
+    before = "#include <acme/keeper.hpp>\nstruct Flag { int * mine; };\n"
+    system = infer(tmp_path, in_class(f"{body} create_publisher<{S}>({name}, 1);", before=before))
+    assert names(system) == made
+    assert not why or any(why in each for each in gaps(system))
+
+
+ORDERS = {
+    "the last of an unordered map": ("std::unordered_map", "last = k;", "last", ["?"]),
+    "the last of a map, which sorts its keys": ("std::map", "last = k;", "last", ["b"]),
+    "each of an unordered map": ("std::unordered_map", "pub(k);", '"c"', ["a", "b", "c"]),
+}
+
+
+@pytest.mark.parametrize(("container", "turn", "name", "made"), ORDERS.values(), ids=ORDERS)
+def test_the_order_of_an_unordered_container_is_not_known(
+    container: str, turn: str, name: str, made: list[str], tmp_path: Path
+) -> None:
+    entries = f'{container}<std::string, int> m{{{{"b", 1}}, {{"a", 2}}}}; std::string last = "x";'
+    body = f"{entries} for (auto & [k, v] : m) {{ {turn} }} create_publisher<{S}>({name}, 1);"
+    pub = f"void pub(const std::string & t) {{ create_publisher<{S}>(t, 1); }}"
+    assert names(infer(tmp_path, in_class(body, pub))) == made
