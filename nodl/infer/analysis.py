@@ -28,7 +28,7 @@ from nodl.infer.interpreter.run import Arguments, BudgetExceeded, Call, Called, 
 from nodl.infer.interpreter.statements import STATEMENTS
 from nodl.infer.models import foreign
 from nodl.infer.models.foreign import is_node_class
-from nodl.infer.net import unsettled_places, words_read
+from nodl.infer.net import changed_meanwhile, unsettled_places, words_read
 from nodl.infer.program import Program, ProgramTarget, SourceModule
 from nodl.infer.results import interfaces_of
 from nodl.infer.start import NO_LAUNCH, InferredProgram, LaunchKey, ProgramLaunch
@@ -104,8 +104,9 @@ CALLABLES: dict[type, Caller] = {
 }
 
 TABLES = Tables(
-    EXPRESSIONS, STATEMENTS, CALLABLES, ATTRIBUTES, foreign.keeps_off, foreign.lets_through, foreign.creates
-)
+    EXPRESSIONS, STATEMENTS, CALLABLES, ATTRIBUTES, foreign.keeps_off, foreign.lets_through, foreign.creates,
+    changed_meanwhile,
+)  # fmt: skip
 
 
 def new_run(program: Program, main: SourceModule) -> Run:

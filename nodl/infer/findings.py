@@ -94,6 +94,10 @@ class Findings:
         unknown = any(type(each.name) is Unknown for record in self.nodes for each in record.endpoints)
         return unknown or bool(self.gaps) or any(record.gaps for record in self.nodes)
 
+    def count(self) -> int:
+        """Return how many interfaces were found so far."""
+        return sum(len(record.endpoints) for record in self.nodes)
+
     def add_node(self, record: NodeRecord) -> NodeRecord:
         self.nodes.setdefault(record)
         return record

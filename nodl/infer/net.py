@@ -14,6 +14,7 @@ here. What it cannot see: a wrong value, and creation behind names that do not s
 from __future__ import annotations
 
 import ast
+import collections
 import functools
 import itertools
 import re
@@ -21,10 +22,11 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
+from nodl.infer.interpreter.calls import SPECIAL_FOLLOWED
 from nodl.infer.interpreter.imports import absolute_name
 from nodl.infer.interpreter.run import Run
 from nodl.infer.models import ros
-from nodl.infer.models.signatures import NODE_ENDPOINTS
+from nodl.infer.models.signatures import COMMON_CALLBACKS, NODE_CALLBACKS, NODE_ENDPOINTS
 from nodl.infer.program import Program, SourceModule
 from nodl.infer.values import FunctionEntry
 from nodl.node_interface import Gap
@@ -34,6 +36,9 @@ Function = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda
 _NAMED = (ast.FunctionDef, ast.AsyncFunctionDef)
 Import = ast.Import | ast.ImportFrom
 CREATING_NAMES = frozenset(NODE_ENDPOINTS) | ros.CREATING_NAMES
+_SCHEDULING = (
+    CREATING_NAMES | COMMON_CALLBACKS.keys() | NODE_CALLBACKS.keys()
+)  # call what they are given in a spin
 _CREATING_TEXT = re.compile("|".join(sorted(map(re.escape, CREATING_NAMES))))
 _ELSEWHERE = re.compile(r"rclpy|\b(?:importlib|__import__|eval|exec|runpy|pickle)\b")
 _LOST = "may be called from somewhere that the analysis did not follow, and would create interfaces"
@@ -106,11 +111,25 @@ class FunctionText:
         self.stored: set[str] = set()  # variables
         self.set: set[str] = set()  # attributes, which may be properties
         self.may_leave = False  # before what is read next
+        self.yields = False
+        self.scheduled: set[str] = set()  # what rclpy is handed, and calls while it spins
         self.imports: list[Import] = []
 
     @property
     def name(self) -> str:
         return "" if self.node is None else getattr(self.node, "name", "a lambda")
+
+    @property
+    def is_plain(self) -> bool:
+        """Return True for a named function without decorators."""
+        return isinstance(self.node, _NAMED) and not self.node.decorator_list
+
+    @property
+    def runs_at_any_time(self) -> bool:
+        """Return True for a generator, a coroutine and a special method that does not run where it is named."""
+        special = self.cls is not None and self.name.startswith("__") and self.name.endswith("__")
+        later = self.yields or isinstance(self.node, ast.AsyncFunctionDef)
+        return later or (special and self.name not in SPECIAL_FOLLOWED)
 
     @functools.cached_property
     def bare(self) -> frozenset[str]:
@@ -148,6 +167,31 @@ def _text_of(module: SourceModule) -> _Text:
 def words_read(module: SourceModule) -> dict[ast.AST | None, frozenset[str]]:
     """Return what each function of a module reads or calls, by the last names in its text."""
     return {scope.node: scope.bare | scope.dotted for scope in _text_of(module).scopes}
+
+
+@functools.lru_cache(maxsize=256)
+def changed_meanwhile(module: SourceModule) -> frozenset[str]:
+    """Return the attributes and globals that code which runs at any time sets, and other code too.
+
+    At any time run generators, coroutines, special methods and functions that are handed to anything but rclpy, with
+    all that these call by name.
+    """
+    scopes = _text_of(module).scopes
+    named: dict[str, list[FunctionText]] = {}
+    for scope in scopes:
+        named.setdefault(scope.name, []).append(scope)
+    scheduled = {name for scope in scopes for name in scope.scheduled}
+    handed = {name for scope in scopes for name in scope.attributes | scope.names} - scheduled
+    left = [scope for scope in scopes if scope.runs_at_any_time or (scope.is_plain and scope.name in handed)]
+    found = set(left)
+    while left:
+        for place in left.pop().calls:
+            more = [scope for scope in named.get(place.name, ()) if scope not in found]
+            found.update(more)
+            left += more
+    setting = collections.Counter(name for scope in scopes for name in scope.set)
+    setting.update(scopes[0].stored)
+    return frozenset(name for scope in found for name in scope.set if setting[name] > 1)
 
 
 class _Reader:
@@ -212,6 +256,8 @@ class _Reader:
         certain = not scope.may_leave and not any(isinstance(each, _CONDITIONAL) for each in around)
         scope.calls.append(CallPlace(node, name, around, certain))
         scope.may_leave = scope.may_leave or name in _ENDS
+        if name in _SCHEDULING:
+            scope.scheduled.update(_names_among(node))
         if name in ("isinstance", "issubclass"):
             self._each(node.args[:1], scope, around)
             return
@@ -219,6 +265,13 @@ class _Reader:
             self.visit(node.func.value if isinstance(node.func, ast.Attribute) else node.func, scope, around)
         self._each(node.args, scope, around)
         self._each(node.keywords, scope, around)
+
+    def yields(self, node: ast.Yield, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
+        scope.yields = True
+        self.inside(node, scope, around)
+
+    def global_names(self, node: ast.Global, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
+        scope.set.update(node.names)
 
     def outer_names(self, node: ast.Nonlocal, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
         for each in self.scopes:  # one of them is meant
@@ -274,6 +327,8 @@ _VISITORS: dict[type, Callable[[_Reader, Any, FunctionText, tuple[ast.AST, ...]]
     **dict.fromkeys((ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda), _Reader.function),
     ast.ClassDef: _Reader.class_body,
     **dict.fromkeys((ast.Import, ast.ImportFrom), _Reader.imports),
+    **dict.fromkeys((ast.Yield, ast.YieldFrom), _Reader.yields),
+    ast.Global: _Reader.global_names,
     ast.Nonlocal: _Reader.outer_names,
     ast.Assign: _Reader.assignment,
     ast.AugAssign: _Reader.addition,
@@ -307,6 +362,15 @@ def last_name(node: ast.AST) -> str:
     if isinstance(node, ast.Call):
         return last_name(node.func)
     return node.id if isinstance(node, ast.Name) else ""
+
+
+def _names_among(node: ast.Call) -> Iterator[str]:
+    """Return the last names of what a call is given, and of what a ``partial`` among it is."""
+    for each in (*node.args, *(keyword.value for keyword in node.keywords)):
+        if isinstance(each, (ast.Attribute, ast.Name)):
+            yield last_name(each)
+        elif isinstance(each, ast.Call) and last_name(each) == "partial":
+            yield from _names_among(each)
 
 
 # --- what the run made of it --------------------------------------------------------------------------------

@@ -29,6 +29,7 @@ from nodl.infer.values import (
     contains,
     join,
     mixed_with_unknown,
+    unsettled,
     widen,
 )
 
@@ -47,6 +48,9 @@ class ProgramState:
         # Stamps of the latest writes, the last one at the end: by name of a variable or field, and by ``id`` of the
         # cells of a container.
         self.changed: dict[str | int, int] = {}
+        self.changed_meanwhile: set[str] = (
+            set()
+        )  # names of variables that code which runs at any time sets, too
         self.base = sys.maxsize  # how many undecided branches surround a write that stays
         self.fresh: set[int] = (
             set()
@@ -57,6 +61,8 @@ class ProgramState:
 
     def write(self, cells: Cells, key: object, value: Value, local: bool = False) -> None:
         """Update strongly. ``local``: only the running function can see the cell (no new stamp)."""
+        if key in self.changed_meanwhile and type(cells) is not LocalCells:
+            value = unsettled(value)
         old = cells.get(key)
         if old is value or (old is not None and _same(old, value)):
             return

@@ -413,6 +413,16 @@ def sole(value: Value | None) -> object:
     return value[0] if value is not None and len(value) == 1 else ANY[0]
 
 
+def unsettled(value: Value) -> Value:
+    """Return ``value`` with unknown in place of its texts and numbers, and either truth in place of one."""
+    left = tuple(atom for atom in value if not isinstance(atom, (str, Text, int, float)))
+    if len(left) == len(value):
+        return value
+    truths = tuple(atom for atom in value if type(atom) is bool)
+    known = len(left) + len(truths) == len(value)
+    return join(join(left, (True, False) if truths else BOTTOM), BOTTOM if known else CHANGES_MEANWHILE)
+
+
 def mixed_with_unknown(value: Value) -> Value:
     """Return ``value``, with unknown beside it if there are several: nobody knows which is meant."""
     items = value[0] if value else None
@@ -423,7 +433,10 @@ def mixed_with_unknown(value: Value) -> Value:
     if not several:
         return value
     others = tuple(atom for atom in value if not isinstance(atom, (str, Text)))
-    return join(others, unknown("a variable that changes while other code runs"))
+    return join(others, CHANGES_MEANWHILE)
+
+
+CHANGES_MEANWHILE = unknown("a variable that changes while other code runs")
 
 
 def widen(old: Value, new: Value, texts_too: bool) -> Value:

@@ -308,7 +308,7 @@ def _fill_fields(run: Run, cls: ClassValue, instance: Instance, call: Call) -> N
         run.call(after, Arguments(), call.node, call.frame)
 
 
-_FOLLOWED = frozenset({
+SPECIAL_FOLLOWED = frozenset({  # special methods that run where the program says so
     "__init__", "__new__", "__call__", "__enter__", "__exit__", "__getattr__", "__post_init__", "__init_subclass__",
     "__name__", "__module__", "__doc__", "__slots__", "__class_getitem__", "__set_name__",
 })  # fmt: skip
@@ -322,7 +322,7 @@ def _expect_operators(run: Run, cls: ClassValue, instance: Instance) -> None:
                 isinstance(name, str)
                 and name.startswith("__")
                 and name.endswith("__")
-                and name not in _FOLLOWED
+                and name not in SPECIAL_FOLLOWED
             ):
                 run.register_callback(methods_in(value, instance, cls), None, run.state.mark())
 

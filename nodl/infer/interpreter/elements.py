@@ -264,6 +264,10 @@ def assign(run: Run, target: ast.expr, value: Value, frame: Frame) -> None:
     """Bind ``value`` to a name, field or element, or take it apart for a tuple or list of targets."""
     at_once = isinstance(target, ast.Tuple | ast.List)
     if not at_once and any(type(atom) is Sequence and atom.kind == LAZY for atom in value):
+        if value in run.making:
+            run.gap(
+                target, frame, "interfaces are made where this is iterated over later, which is not followed"
+            )
         value = _stored(run, value, target)
     if isinstance(target, ast.Name):
         run.assign_name(target.id, value, frame)

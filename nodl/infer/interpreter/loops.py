@@ -176,6 +176,12 @@ Emit = Callable[[], None]
 
 def comprehension(run: Run, node: ast.ListComp | ast.SetComp | ast.GeneratorExp, frame: Frame) -> Value:
     """Return a list (a set for a set comprehension), exact only where iterables and conditions are decided."""
+    if isinstance(node, ast.GeneratorExp):
+        return run.lazily(lambda: _comprehension(run, node, frame))
+    return _comprehension(run, node, frame)
+
+
+def _comprehension(run: Run, node: ast.ListComp | ast.SetComp | ast.GeneratorExp, frame: Frame) -> Value:
     lazy = isinstance(node, ast.GeneratorExp)
     run.state.depth += lazy
     inner = _inner_frame(run, frame)

@@ -139,6 +139,7 @@ class Tables(NamedTuple):
     keeps_off: Callable[[str], bool]  # whether a library leaves the program's classes and objects alone
     lets_through: Callable[[str], bool]  # whether exceptions pass the library's context managers
     creates: Callable[[object], bool]  # whether calling this function of a library makes an interface
+    changed_meanwhile: Callable[[SourceModule], frozenset[str]]  # variables of a file that change at any time
 
 
 class Run(Allocations):
@@ -190,6 +191,7 @@ class Run(Allocations):
         self.guards_at_end: tuple[Guard, ...] = ()  # of the latest block
         self.answers: dict[ast.expr, Value] = {}  # what the calls in tests gave the last time
         self.environment = ContentCells()  # variables that the program sets itself
+        self.making: set[Value] = set()  # iterators that make interfaces where they are asked for elements
         self.unrolled = 1  # turns of the unrolled loops around, multiplied
         self.awaited: set[ast.AST] = set()  # calls whose coroutine runs where it is called
         self.repeated = 0  # inside a loop or callback: one allocation may stand for many objects
@@ -273,6 +275,14 @@ class Run(Allocations):
     def library_object(self, call: Call, path: str, kind: str = "") -> Instance:
         """Return the object of the library class ``path`` that ``call`` makes; ``kind`` as in ``allocate``."""
         return self.allocate(call.node, kind or path, lambda: Instance(External(path)))
+
+    def lazily(self, make: Callable[[], Value]) -> Value:
+        """Return the iterator that ``make`` gives, which has run all that it will do where it is asked for elements."""
+        before = self.findings.count()
+        made = make()
+        if self.findings.count() > before:
+            self.making.add(made)
+        return made
 
     def attribute(self, owner: Value, name: str, node: ast.AST, frame: Frame) -> Value:
         readers = self.tables.attributes

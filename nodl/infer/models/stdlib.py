@@ -188,8 +188,12 @@ def _map(run: Run, call: Call) -> Value:
     """Call the function for any of the elements."""
     given = [_items(run, call, index).any_element() or ANY for index in range(1, len(call.args.positional))]
     arguments = Arguments(given, more=call.args.more)
-    element = run.call(call.args.at(0) or ANY, arguments, call.node, call.frame)
-    return run.sequence(call.node, LAZY, Items(None, element))
+
+    def made() -> Value:
+        element = run.call(call.args.at(0) or ANY, arguments, call.node, call.frame)
+        return run.sequence(call.node, LAZY, Items(None, element))
+
+    return run.lazily(made)
 
 
 def _filter(run: Run, call: Call) -> Value:

@@ -173,6 +173,17 @@ def test_the_way_that_a_launch_takes_says_the_same(title: str, tmp_path: Path) -
     assert launch.exact == command.exact
 
 
+@pytest.mark.parametrize(
+    "title",
+    [
+        "waiting: a thread sets what no other code does",
+        "waiting: map and a generator expression, asked at once",
+    ],
+)
+def test_what_does_not_change_meanwhile_is_exact(title: str, tmp_path: Path) -> None:
+    assert judge(PROGRAMS[title], tmp_path).exact
+
+
 def test_many_of_them_are_exact(tmp_path: Path) -> None:
     """131 of 346 when this was written; less would be a step back."""
     exact = 0
