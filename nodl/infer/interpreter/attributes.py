@@ -193,6 +193,8 @@ def _of_external(run: Run, atom: External, name: str, node: ast.AST, frame: Fram
     if atom.path.count(".") > MAX_DOTS:
         return unknown(f"an attribute of {atom.path}")  # ``x = x.next`` in a loop would go on without end
     path = f"{atom.path}.{name}"
+    if path == "sys.modules":
+        return run.variables_of(node, frame)
     module = run.modules.get(path)  # imported from a folder without __init__.py
     if module is not None:
         return (module,)

@@ -166,6 +166,10 @@ def _text_side(value: Value) -> list[TextAtom]:
 
 
 def _added_sequences(run: Run, node: ast.AST, left: Value, right: Value, sequences: list[Sequence]) -> Value:
+    if len(left) == len(right) == 1 and len(sequences) == 2:
+        first, second = (sequence.items.exact for sequence in sequences)
+        if first is not None and second is not None:
+            return run.sequence(node, sequences[0].kind, Items((*first, *second)))
     element = join_all(sequence.items.any_element() for sequence in sequences)
     if any(not isinstance(atom, Sequence) for atom in (*left, *right)):
         element = join(element, ANY)
