@@ -64,12 +64,13 @@ def run_callbacks(run: Machine) -> None:
         for key, (atom, frame) in list(run.callbacks.items()):
             if getattr(key[0], "name", "") == name:
                 _call(rounds, key, atom, frame, certainly=True)
+    run.store.as_others_find_it()
     for number in range(MAX_ROUNDS):
         _find_overrides(run)
-        run.store.as_others_find_it()
         mark = run.store.mark()
         if not _round(rounds):
             return
+        run.store.as_others_find_it()
         if number:
             _widen(run, mark, number >= PATIENCE)
     place = next(iter(run.callbacks.values()))[1].file.file

@@ -287,9 +287,12 @@ def one_map(atoms: Value) -> Value:
 
 
 def as_one_map(entries: Iterable[tuple[Value, Value]], is_open: bool) -> Map:
-    """Merge entries of equal keys to one value; too many keys become one that is not known."""
+    """Merge entries of equal keys, and those whose key is not known; too many keys become one that is not known."""
     found: dict[Value, Value] = {}
+    unknown_one: Value | None = None
     for key, value in entries:
+        if len(key) == 1 and isinstance(key[0], Unknown):
+            key = unknown_one = unknown_one or key
         found[key] = join(found[key], value) if key in found else value
     if len(found) > MAX_ITEMS:
         found = {unknown("one of many keys"): join(*found.values())}
