@@ -89,9 +89,21 @@ class Text(NamedTuple):
 
 
 class Unknown(NamedTuple):
-    """Something that is not known; ``why``, such as ``the result of f()``, is what gaps say of it."""
+    """Something that is not known; ``why``, such as ``the result of f()``, is what gaps say of it.
+
+    All are equal: whatever the reason, the same can be said of what is done with it.
+    """
 
     why: str
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Unknown)
+
+    def __ne__(self, other: object) -> bool:
+        return not isinstance(other, Unknown)
+
+    def __hash__(self) -> int:
+        return hash(Unknown)
 
 
 class Const(NamedTuple):
