@@ -160,7 +160,7 @@ def _origin(name: Name, observations: Sequence[Observation]) -> NameOrigin:
         and not any(_contradicts(name, source, each) for each in observations)
     ]
     followed = [source for source in left if any(_follows(name, source, each) for each in observations)]
-    if followed:
+    if followed and common:
         return NameOrigin(followed[0], proven=True, candidates=tuple(followed[1:]))
     if common and len(left) == 1 and any(_is_telling(left[0], each) for each in seen_in):
         return NameOrigin(left[0])

@@ -206,6 +206,16 @@ def test_words_of_a_command_line_count_by_their_place() -> None:
     assert arguments_as_inputs(["in", "--rate", "5", "out"]) == {"<1>": "in", "--rate": "5"}
 
 
+def test_a_name_from_another_parameter_in_each_run_is_undecided_though_one_of_them_is_followed() -> None:
+    runs = [
+        seen({"p": "front"}, "front"),
+        seen({"p": "front", "q_topic": "rear"}, "front", "rear"),
+        seen({"p": "rear"}, "rear"),
+    ]
+    assert origins_of(runs)[name("rear")] == NameOrigin(candidates=(Source("q_topic"), Source("p")))
+    assert origins_of(runs[::2])[name("rear")] == NameOrigin(Source("p"), proven=True), "without the second run"
+
+
 texts = st.sampled_from(["a", "b", "c", "d"])
 inputs = st.dictionaries(st.sampled_from(["p", "q_topic", "r.s.topic"]), texts, max_size=3)
 observations = st.lists(
