@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import yaml
@@ -19,10 +20,13 @@ _MERGE_TAG = "tag:yaml.org,2002:merge"
 _SCALAR_TAGS = frozenset(f"tag:yaml.org,2002:{name}" for name in ("str", "int", "float", "bool", "null"))
 
 
-class YamlScalar(NamedTuple):
-    """A scalar with its place. ``value`` is a ``str``, ``int``, ``float``, ``bool`` or ``None``."""
+Scalar = str | int | float | bool | None
 
-    value: str | int | float | bool | None
+
+class YamlScalar(NamedTuple):
+    """A scalar with its place."""
+
+    value: Scalar
     source: SourceRef
 
 
@@ -40,8 +44,45 @@ class YamlMap(NamedTuple):
     keys: dict[str, SourceRef]
     source: SourceRef
 
+    def scalar(self, key: str) -> Scalar:
+        """Return the value under ``key``, None if there is none or it is a mapping or list."""
+        found = self.items.get(key)
+        return found.value if isinstance(found, YamlScalar) else None
+
+    def text(self, key: str) -> str:
+        """Return the text under ``key``, empty if there is none."""
+        found = self.scalar(key)
+        return found if isinstance(found, str) else ""
+
+    def mapping(self, key: str) -> YamlMap:
+        """Return the mapping under ``key``, an empty one if there is none."""
+        found = self.items.get(key)
+        return found if isinstance(found, YamlMap) else YamlMap({}, {}, self.source)
+
+    def listed(self, key: str) -> tuple[YamlValue, ...]:
+        """Return the elements of the list under ``key``, none if there is none."""
+        found = self.items.get(key)
+        return found.items if isinstance(found, YamlList) else ()
+
+    def mappings(self, key: str) -> Iterator[YamlMap]:
+        """Yield the elements of the list under ``key`` that are mappings."""
+        return (each for each in self.listed(key) if isinstance(each, YamlMap))
+
+    def texts(self, key: str) -> tuple[str, ...]:
+        """Return the scalars in the list under ``key`` as text."""
+        return tuple(str(each.value) for each in self.listed(key) if isinstance(each, YamlScalar))
+
 
 YamlValue = YamlScalar | YamlList | YamlMap
+
+
+def plain(value: YamlValue) -> object:
+    """Return the value without its places."""
+    if isinstance(value, YamlScalar):
+        return value.value
+    if isinstance(value, YamlList):
+        return [plain(item) for item in value.items]
+    return {name: plain(item) for name, item in value.items.items()}
 
 
 def parse_yaml(text: bytes, file: str, *, last_counts: bool = False) -> YamlValue:

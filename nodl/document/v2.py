@@ -26,7 +26,7 @@ from nodl.name_template import NameTemplate
 from nodl.names import InvalidNameError, validate_namespace, validate_node_name, validate_written_name
 from nodl.node_interface import ClientLibrary, Endpoint, EndpointKind, ManifestNode, NodeInterface
 from nodl.source_ref import SourceRef
-from nodl.yaml_text import YamlList, YamlMap, YamlScalar, parse_yaml
+from nodl.yaml_text import YamlMap, parse_yaml
 
 VERSION = 2
 ANY_TYPE = "of any type"
@@ -55,48 +55,37 @@ def parse_root(
         depends=dependence_of(root),
         runs=learnt.runs,
         incomplete=learnt.incomplete,
-        parameters_complete=_fields(root).get("all_parameters") is True,
+        parameters_complete=section_of(root).scalar("all_parameters") is True,
     )
     included = tuple(document.file for document in documents[1:])
-    explicit = not {"executable", "plugin"}.isdisjoint(_fields(root))
+    explicit = not {"executable", "plugin"}.isdisjoint(section_of(root).items)
     return ManifestNode(interface, VERSION, parameters, explicit, included)
 
 
-def _fields(root: YamlMap) -> dict[str, str | int | float | bool | None]:
-    ours = section_of(root)
-    given = ours.items if ours else {}
-    return {key: value.value for key, value in given.items() if isinstance(value, YamlScalar)}
-
-
 def _identified(root: YamlMap, file: str, package: str | None, name: str) -> NodeInterface:
-    fields = _fields(root)
-    executable, plugin = _text(fields, "executable"), _text(fields, "plugin")
+    section = section_of(root)
+    executable, plugin = section.text("executable") or None, section.text("plugin") or None
     if executable is None and plugin is None:
         executable, plugin = (None, name) if "::" in name else (name, None)
-    node, namespace = _text(fields, "node"), _text(fields, "namespace")
+    node, namespace = section.text("node"), section.text("namespace")
     try:
-        if node is not None:
+        if node:
             validate_node_name(node)
-        if namespace is not None:
+        if namespace:
             validate_namespace(namespace)
     except InvalidNameError as error:
-        raise InvalidElementError.at((section_of(root) or root).source, str(error)) from None
+        raise InvalidElementError.at(section.source, str(error)) from None
     return NodeInterface(
-        package=_text(fields, "package") or package,
+        package=section.text("package") or package,
         executable=executable,
         plugin=plugin,
         name=node or _node_name_from(name),
-        namespace=namespace,
+        namespace=namespace or None,
         endpoints=(),
         source=SourceRef(file, 1),
-        library=ClientLibrary(_text(fields, "library") or "unknown"),
-        lifecycle=fields.get("lifecycle") is True,
+        library=ClientLibrary(section.text("library") or "unknown"),
+        lifecycle=section.scalar("lifecycle") is True,
     )
-
-
-def _text(fields: dict[str, str | int | float | bool | None], key: str) -> str | None:
-    value = fields.get(key)
-    return value if isinstance(value, str) and value else None
 
 
 def _node_name_from(name: str) -> str | None:
@@ -112,9 +101,8 @@ def _endpoints(
 ) -> Iterator[Endpoint]:
     for category, kind in CATEGORIES.items():
         seen: dict[str, SourceRef] = {}
-        for entry in _entries(documents, category):
-            name, source = _field(entry, "name")
-            type_name, _ = _field(entry, "type")
+        for entry in (each for document in documents for each in document.root.mappings(category)):
+            name, source, type_name = entry.text("name"), entry.items["name"].source, entry.text("type")
             try:
                 validate_written_name(name)
             except InvalidNameError as error:
@@ -139,35 +127,20 @@ def _endpoints(
             )
 
 
-def _entries(documents: Sequence[Included], category: str) -> Iterator[YamlMap]:
-    for document in documents:
-        listed = document.root.items.get(category)
-        for entry in listed.items if isinstance(listed, YamlList) else ():
-            if isinstance(entry, YamlMap):
-                yield entry
-
-
 _UNDECIDED = ("SYSTEM_DEFAULT", "BEST_AVAILABLE")
 """Values of QoS policies that are only known when the node runs."""
 
 
 def _qos(entry: YamlMap) -> Iterator[tuple[str, str | int]]:
-    given = entry.items.get("qos")
-    for name, value in given.items.items() if isinstance(given, YamlMap) else ():
-        fixed = value.value if isinstance(value, YamlScalar) else None
+    given = entry.mapping("qos")
+    for name in given.items:
+        fixed = given.scalar(name)
         if isinstance(fixed, (str, int)) and fixed not in _UNDECIDED:
             yield name, fixed
 
 
-def _field(entry: YamlMap, key: str) -> tuple[str, SourceRef]:
-    value = entry.items[key]
-    return (str(value.value) if isinstance(value, YamlScalar) else ""), value.source
-
-
 def _is_placeholder(entry: YamlMap, type_name: str) -> bool:
-    description = entry.items.get("description")
-    said = description.value if isinstance(description, YamlScalar) else ""
-    return said == ANY_TYPE or type_name.startswith("unknown/")
+    return entry.text("description") == ANY_TYPE or type_name.startswith("unknown/")
 
 
 def _full_type(type_name: str, kind: EndpointKind) -> str:
@@ -180,16 +153,12 @@ def _parameters(documents: Sequence[Included]) -> dict[str, str]:
     found: dict[str, str] = {}
     first: dict[str, SourceRef] = {}
     for document in documents:
-        section = document.root.items.get("parameters")
-        if not isinstance(section, YamlMap):
-            continue
-        for name, definition in section.items.items():
-            source = section.keys[name]
+        section = document.root.mapping("parameters")
+        for name, source in section.keys.items():
             if name in found:
                 raise InvalidNoDLDocumentError.at(
                     source, f"parameter '{name}' is declared twice, first at {first[name]}"
                 )
-            kind = definition.items["type"] if isinstance(definition, YamlMap) else definition
-            found[name] = str(kind.value) if isinstance(kind, YamlScalar) else ""
+            found[name] = section.mapping(name).text("type")
             first[name] = source
     return found

@@ -15,7 +15,7 @@ from nodl.document.v2_schema import check_document
 from nodl.errors import IncludeError
 from nodl.names import shown
 from nodl.source_ref import SourceRef
-from nodl.yaml_text import MAX_BYTES, YamlList, YamlMap, YamlScalar, parse_yaml
+from nodl.yaml_text import MAX_BYTES, YamlMap, parse_yaml
 
 RESOURCE_TYPE = "nodl"  # of v2 documents in the ament index
 MAX_DEPTH = 32
@@ -44,11 +44,8 @@ class _Walk:
         self._visited = visited  # resolved file -> the chain of references that led there
 
     def of(self, root: YamlMap, origin: Path, chain: tuple[str, ...]) -> Iterator[Included]:
-        listed = root.items.get("include")
-        for entry in listed.items if isinstance(listed, YamlList) else ():
-            reference = entry.items["ref"] if isinstance(entry, YamlMap) else entry
-            if isinstance(reference, YamlScalar):
-                yield from self._one(str(reference.value), reference.source, origin, chain)
+        for entry in root.mappings("include"):
+            yield from self._one(entry.text("ref"), entry.items["ref"].source, origin, chain)
 
     def _one(self, ref: str, source: SourceRef, origin: Path, chain: tuple[str, ...]) -> Iterator[Included]:
         path = self._resolve(ref, source, origin)

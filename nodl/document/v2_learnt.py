@@ -31,12 +31,11 @@ from nodl.errors import InvalidElementError
 from nodl.name_template import PARAMETER_REFERENCE, NameTemplate, ParameterPart, Part
 from nodl.names import InvalidNameError, validate_name
 from nodl.node_interface import Endpoint, EndpointKind
-from nodl.yaml_text import YamlList, YamlMap, YamlScalar, YamlValue
+from nodl.source_ref import SourceRef
+from nodl.yaml_text import YamlMap
 
 ONE_RUN = "one run"
 """``proof`` of a name that had its parameter's value in the only run that gave it one."""
-
-_Fields = dict[str, "str | int | float | bool | None"]
 
 
 class LearntName(NamedTuple):
@@ -58,69 +57,53 @@ class LearntFrom(NamedTuple):
 
 def learnt_from(root: YamlMap) -> LearntFrom:
     """Return what the document says of the runs that taught it; nothing, if a person wrote it."""
-    section = _section(root)
-    runs = section.get("runs")
-    return LearntFrom(len(runs.items) if isinstance(runs, YamlList) else 0, _texts(section.get("incomplete")))
+    section = section_of(root)
+    return LearntFrom(len(section.listed("runs")), section.texts("incomplete"))
 
 
 def learnt_names(root: YamlMap) -> dict[tuple[str, str], LearntName]:
     """Return what was learnt, by list (``publishers``) and name of the entry; raises ``InvalidElementError``."""
-    rows = _section(root).get("endpoints")
-    found: dict[tuple[str, str], LearntName] = {}
-    for row in rows.items if isinstance(rows, YamlList) else ():
-        if isinstance(row, YamlMap):
-            fields = _scalars(row)
-            found[str(fields["in"]), str(fields["name"])] = LearntName(
-                _template(fields, row),
-                fields.get("introspection") is True,
-                _note(row),
-                tuple(_readings(fields, row)),
-            )
-    return found
+    return {
+        (row.text("in"), row.text("name")): LearntName(
+            _template(row, row.source),
+            row.scalar("introspection") is True,
+            _note(row),
+            tuple(_readings(row)),
+        )
+        for row in section_of(root).mappings("endpoints")
+    }
 
 
 def _note(row: YamlMap) -> str:
-    runs, undecided = _texts(row.items.get("runs")), _texts(row.items.get("undecided"))
-    proof = row.items.get("proof")
+    runs, undecided = row.texts("runs"), row.texts("undecided")
     texts = [f"recorded in {counted(len(runs), 'run')}"] if runs else []
     if undecided:
-        parameter = row.items.get("parameter")
-        first = f"comes from {parameter.value}" if isinstance(parameter, YamlScalar) else "is fixed"
+        first = f"comes from {row.text('parameter')}" if "parameter" in row.items else "is fixed"
         texts.append(f"undecided whether it {first} or comes from {' or '.join(undecided)}")
-    if isinstance(proof, YamlScalar):
-        source_is_known = proof.value != ONE_RUN
-        texts.append(str(proof.value) if source_is_known else "from the parameter as far as one run shows")
+    if "proof" in row.items:
+        proof = row.text("proof")
+        texts.append("from the parameter as far as one run shows" if proof == ONE_RUN else proof)
     return "; ".join(texts)
-
-
-def _texts(value: YamlValue | None) -> tuple[str, ...]:
-    items = value.items if isinstance(value, YamlList) else ()
-    return tuple(str(item.value) for item in items if isinstance(item, YamlScalar))
 
 
 def logger_services(root: YamlMap) -> Iterator[Endpoint]:
     """Yield the services of a node that was made with ``enable_logger_service`` (rclcpp node_logging.cpp)."""
-    given = _section(root).get("logger_services")
-    if isinstance(given, YamlScalar) and given.value is True:
+    section = section_of(root)
+    if section.scalar("logger_services") is True:
+        source = section.items["logger_services"].source
         for name, type_name in LOGGER_SERVICES.items():
             template = NameTemplate.literal(f"~/{name}")
-            yield Endpoint(EndpointKind.SERVICE_SERVER, template, type_name, given.source)
+            yield Endpoint(EndpointKind.SERVICE_SERVER, template, type_name, source)
 
 
-def _section(root: YamlMap) -> dict[str, YamlValue]:
-    section = section_of(root)
-    return section.items if section else {}
-
-
-def _template(fields: _Fields, row: YamlMap) -> NameTemplate:
-    parameter, default = fields.get("parameter"), fields.get("default")
-    if parameter:
-        item = "each" if fields.get("each") is True else None
-        given = str(default) if default is not None else None
-        part = ParameterPart(str(parameter), given, item)
-        prefix, suffix = str(fields.get("prefix") or ""), str(fields.get("suffix") or "")
-        return NameTemplate((*filter(None, (prefix,)), part, *_with_parameters(suffix)))
-    return _fixed(str(fields.get("written") or fields["name"]), row)
+def _template(row: YamlMap, place: SourceRef) -> NameTemplate:
+    parameter = row.text("parameter")
+    if not parameter:
+        return _fixed(row.text("written") or row.text("name"), place)
+    item = "each" if row.scalar("each") is True else None
+    default = row.text("default") if "default" in row.items else None
+    part = ParameterPart(parameter, default, item)
+    return NameTemplate((*filter(None, (row.text("prefix"),)), part, *_with_parameters(row.text("suffix"))))
 
 
 def _with_parameters(text: str) -> Iterator[Part]:
@@ -132,27 +115,18 @@ def _with_parameters(text: str) -> Iterator[Part]:
     yield from filter(None, (text[place:],))
 
 
-def _readings(fields: _Fields, row: YamlMap) -> Iterator[NameTemplate]:
+def _readings(row: YamlMap) -> Iterator[NameTemplate]:
     """Yield what else the recorded name may be: fixed, or the value of one of several parameters."""
-    if fields.get("parameter") and fields.get("proof") == ONE_RUN:
-        yield _fixed(str(fields.get("written") or fields["name"]), row)
-        for name in _texts(row.items.get("seen")):
-            yield _fixed(name, row)
-    for name in _texts(row.items.get("readings")):
-        yield _fixed(name, row)
-    candidates = row.items.get("candidates")
-    for each in candidates.items if isinstance(candidates, YamlList) else ():
-        if isinstance(each, YamlMap):
-            yield _template(_scalars(each), row)
+    fixed = row.texts("readings")
+    if row.text("parameter") and row.text("proof") == ONE_RUN:
+        fixed = (row.text("written") or row.text("name"), *row.texts("seen"), *fixed)
+    yield from (_fixed(name, row.source) for name in fixed)
+    yield from (_template(each, row.source) for each in row.mappings("candidates"))
 
 
-def _scalars(row: YamlMap) -> _Fields:
-    return {key: value.value for key, value in row.items.items() if isinstance(value, YamlScalar)}
-
-
-def _fixed(name: str, row: YamlMap) -> NameTemplate:
+def _fixed(name: str, place: SourceRef) -> NameTemplate:
     try:
         validate_name(name)
     except InvalidNameError as error:
-        raise InvalidElementError.at(row.source, str(error)) from None
+        raise InvalidElementError.at(place, str(error)) from None
     return NameTemplate.literal(name)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from typing import Any
 
 from nodl.builtin_interfaces import DISTROS
 from nodl.dependence import (
@@ -18,7 +18,7 @@ from nodl.dependence import (
 )
 from nodl.document.checks import Checker, anything, boolean, either, list_of, map_of, one_of, text_of
 from nodl.node_interface import EndpointKind
-from nodl.yaml_text import YamlList, YamlMap, YamlScalar, YamlValue
+from nodl.yaml_text import YamlMap, YamlScalar, YamlValue, plain
 
 IDENTITY_KEY = "enclave_launch"
 
@@ -145,113 +145,69 @@ _DEPENDENT = frozenset(
 )
 
 
-def section_of(root: YamlMap) -> YamlMap | None:
-    """Return our section of a checked document."""
-    codegen = root.items.get("codegen")
-    ours = codegen.items.get(IDENTITY_KEY) if isinstance(codegen, YamlMap) else None
-    return ours if isinstance(ours, YamlMap) else None
+def section_of(root: YamlMap) -> YamlMap:
+    """Return our section of a checked document, empty if it has none."""
+    return root.mapping("codegen").mapping(IDENTITY_KEY)
 
 
 def dependence_of(root: YamlMap) -> Dependence | None:
     """Return what varies, None if nothing does. ``root`` is a checked document."""
     section = section_of(root)
-    if section is None or _DEPENDENT.isdisjoint(section.items):
+    if _DEPENDENT.isdisjoint(section.items):
         return None
-    given: Mapping[str, object] = plain(section)  # type: ignore[assignment]
+    names = section.mapping("names")
+    rows = {
+        field: tuple(_row(kind, each) for each in section.mappings(field)) for field, kind in _ROWS.items()
+    }
     return Dependence(
-        variations=_variations(given.get("names") or {}),
-        nodes=tuple(
-            FurtherNode(
-                each["document"], each["node"], each.get("namespace", ""), _when(each), _true(each, "renamed")
-            )
-            for each in _maps(given, "nodes")
-        ),
-        plugins=tuple(_plugins(each) for each in _maps(given, "plugins")),
-        transports=tuple(
-            Transport(e["side"], e["base"], e.get("parameter", ""), _when(e), e.get("each", ""))
-            for e in _maps(given, "transports")
-        ),
-        configurations=tuple(
-            Configuration(each["kind"], each.get("file", ""), each.get("document", ""), _when(each))
-            for each in _maps(given, "configurations")
-        ),
-        gaps=tuple(StatedGap(e["why"], e.get("each", ""), _when(e)) for e in _maps(given, "gaps")),
+        variations={
+            (CATEGORIES[category], name): _row(Variation, names.mapping(category).mapping(name))
+            for category in names.items
+            for name in names.mapping(category).items
+        },
         defaults=_defaults(root),
-        options=_options(given.get("options") or {}),
-        node_name=str(given.get("node_name") or ""),
-        random_name=given.get("random_name") is True,
-        own_node=given.get("own_node") is True,
-        tf_listener=_tf_listener(given.get("tf_listener")),
+        options={name: section.mapping("options").texts(name) for name in section.mapping("options").items},
+        node_name=section.text("node_name"),
+        random_name=section.scalar("random_name") is True,
+        own_node=section.scalar("own_node") is True,
+        tf_listener=_tf_listener(section),
+        **rows,
     )
 
 
-def plain(value: YamlValue) -> object:
-    """Return the value without its places."""
-    if isinstance(value, YamlScalar):
-        return value.value
-    if isinstance(value, YamlList):
-        return [plain(item) for item in value.items]
-    return {name: plain(item) for name, item in value.items.items()}
+_ROWS: dict[str, Any] = {
+    "nodes": FurtherNode,
+    "plugins": PluginList,
+    "transports": Transport,
+    "configurations": Configuration,
+    "gaps": StatedGap,
+}
+"""The lists of our section, and of ``Dependence``: their rows have the fields of these."""
+_FIELD_OF = {"class": "plugin_class"}
 
 
-def _tf_listener(given: object) -> When | None:
-    if isinstance(given, dict):
-        return _when(given)
-    return When() if given is True else None
+def _row(kind: Any, row: YamlMap) -> Any:
+    """Return ``row`` as a ``kind``, with its condition as ``when``; what is left out or empty has its default."""
+    given = {
+        _FIELD_OF.get(key, key): plain(value) for key, value in row.items.items() if key not in _CONDITION
+    }
+    fields = {name: value or kind._field_defaults.get(name, value) for name, value in given.items()}
+    listed = {name: tuple(value) for name, value in fields.items() if isinstance(value, list)}
+    return kind(**{**fields, **listed}, when=_when(row))
 
 
-def _maps(given: Mapping[str, object], key: str) -> list[dict[str, str]]:
-    return given.get(key) or []  # type: ignore[return-value]
+def _tf_listener(section: YamlMap) -> When | None:
+    is_made = "tf_listener" in section.items and section.scalar("tf_listener") is not False
+    return _when(section.mapping("tf_listener")) if is_made else None
 
 
-def _options(options: object) -> dict[str, tuple[str, ...]]:
-    assert isinstance(options, dict)
-    return {name: tuple(spellings) for name, spellings in options.items()}
-
-
-def _variations(names: object) -> dict[tuple[EndpointKind, str], Variation]:
-    found: dict[tuple[EndpointKind, str], Variation] = {}
-    assert isinstance(names, dict)
-    for category, entries in names.items():
-        for name, each in entries.items():
-            variation = Variation(each.get("name", ""), each.get("each", ""), _when(each))
-            found[CATEGORIES[category], name] = variation
-    return found
-
-
-def _plugins(each: Mapping[str, object]) -> PluginList:
-    types = each.get("types") or {}
-    assert isinstance(types, dict)
-    return PluginList(
-        parameter=str(each["parameter"]),
-        default=_names(each, "default"),
-        type=str(each.get("type") or PluginList("").type),
-        types=types,
-        when=_when(each),
-        spawned=_true(each, "spawned"),
-        plugin_class=str(each.get("class") or ""),
-        always=_names(each, "always"),
-        without=str(each.get("without") or ""),
-    )
-
-
-def _true(each: Mapping[str, object], key: str) -> bool:
-    return each.get(key) is True
-
-
-def _names(each: Mapping[str, object], key: str) -> tuple[str, ...]:
-    listed = each.get(key) or ()
-    assert isinstance(listed, (list, tuple))
-    return tuple(listed)
-
-
-def _when(each: Mapping[str, object]) -> When:
-    given = each.get("when") or []
-    groups: list[dict[str, object]] = given if isinstance(given, list) else [given]  # type: ignore[list-item]
+def _when(row: YamlMap) -> When:
+    given = row.items.get("when")
+    groups = [given] if isinstance(given, YamlMap) else row.mappings("when")
     return When(
-        tuple(tuple(_test(name, demand) for name, demand in group.items()) for group in groups),
-        str(each.get("since") or ""),
-        str(each.get("until") or ""),
+        tuple(tuple(_test(name, plain(demand)) for name, demand in group.items.items()) for group in groups),
+        row.text("since"),
+        row.text("until"),
     )
 
 
@@ -271,11 +227,7 @@ def _values(value: object) -> tuple[str, ...]:
 
 
 def _defaults(root: YamlMap) -> dict[str, object]:
-    section = root.items.get("parameters")
-    entries = section.items if isinstance(section, YamlMap) else {}
-    found = {
-        name: plain(definition.items["default_value"])
-        for name, definition in entries.items()
-        if isinstance(definition, YamlMap) and "default_value" in definition.items
-    }
+    parameters = root.mapping("parameters")
+    given = {name: parameters.mapping(name).items.get("default_value") for name in parameters.items}
+    found = {name: plain(value) for name, value in given.items() if value is not None}
     return {name: value for name, value in found.items() if value is not None}

@@ -7,8 +7,9 @@ from typing import Any, NamedTuple
 
 from nodl.document import read_root
 from nodl.document.v2 import parse_root
-from nodl.document.v2_section import plain, section_of
+from nodl.document.v2_section import section_of
 from nodl.node_interface import NodeInterface
+from nodl.yaml_text import plain
 
 SUFFIX = ".nodl.yaml"
 
@@ -58,23 +59,23 @@ def read_library_document(folder: str, file: str) -> LibraryDocument:
     package, _, name = stem.partition("/")
     root = read_root(path)
     section = section_of(root)
-    given = plain(section) if section else {}
-    assert isinstance(given, dict)
-    classes = tuple(given.get("classes") or ())
-    given_evidence = (given.get("evidence") or {}).items()
+    classes, transport = section.texts("classes"), section.text("transport")
     evidence: dict[str, Any] = {
-        key: tuple(value) if isinstance(value, list) else value for key, value in given_evidence
+        key: tuple(value) if isinstance(value, list) else value
+        for key, value in ((key, plain(each)) for key, each in section.mapping("evidence").items.items())
     }
     node = parse_root(root, path, package=package, name=name).interface
-    programs = () if classes or given.get("transport") else (node.executable, node.plugin)
+    programs = () if classes or transport else (node.executable, node.plugin)
     return LibraryDocument(
         interface=node,
         stem=stem,
         file=path,
-        programs=(*(each for each in programs if each), *(given.get("also") or ())),
+        programs=(*(each for each in programs if each), *section.texts("also")),
         classes=classes,
-        versions=given.get("versions") or {},
+        versions={
+            distro: section.mapping("versions").text(distro) for distro in section.mapping("versions").items
+        },
         evidence=Evidence(**evidence),
-        transport=given.get("transport") or "",
-        recorded=bool(given.get("runs")) or evidence.get("how") == "recorded",
+        transport=transport,
+        recorded=bool(section.listed("runs")) or evidence.get("how") == "recorded",
     )

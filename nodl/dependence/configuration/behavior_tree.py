@@ -172,5 +172,4 @@ def _of_node(element: XmlElement, place: SourceRef, situation: Situation) -> Ite
 
 
 def _named(kind: EndpointKind, name: str, type_name: str, tag: str, place: SourceRef) -> Endpoint | Gap:
-    made = endpoint_named(kind, name, type_name, place, f"{tag} of the behavior tree")
-    return made if isinstance(made, Endpoint) else Gap(place, f"{tag}: {made}")
+    return endpoint_named(kind, name, type_name, place, f"{tag} of the behavior tree", about=f"{tag}: ")

@@ -125,8 +125,7 @@ def _needs_imu(written: _Written) -> bool:
 
 
 def _endpoint(kind: EndpointKind, name: str, type_name: str, key: str, written: _Written) -> Endpoint | Gap:
-    made = endpoint_named(kind, name, type_name, written.place, f"{key} of the configuration in Lua")
-    return made if isinstance(made, Endpoint) else Gap(written.place, str(made))
+    return endpoint_named(kind, name, type_name, written.place, f"{key} of the configuration in Lua")
 
 
 def _not_said(key: str, value: str | None) -> str:

@@ -45,11 +45,14 @@ def collected(parts: Iterable[Endpoint | Gap]) -> Configured:
 
 
 def endpoint_named(
-    kind: EndpointKind, name: str, type_name: str, place: SourceRef, note: str
-) -> Endpoint | InvalidNameError:
-    """Return the endpoint that a tool makes under the ``name`` in its file, or why there can be none of that name."""
+    kind: EndpointKind, name: str, type_name: str, place: SourceRef, note: str, about: str = ""
+) -> Endpoint | Gap:
+    """Return the endpoint that a tool makes under the ``name`` in its file, or why there can be none of that name.
+
+    ``about``: what the gap begins with.
+    """
     try:
         validate_written_name(name)
     except InvalidNameError as error:
-        return error
+        return Gap(place, f"{about}{error}")
     return Endpoint(kind, NameTemplate.literal(name), type_name, place, note=note)

@@ -70,6 +70,4 @@ def _word(word: str, place: SourceRef) -> Iterator[Endpoint | Gap]:
 def _endpoints(
     kinds: Iterable[EndpointKind], name: str, type_name: str, place: SourceRef, note: str
 ) -> Iterator[Endpoint | Gap]:
-    for kind in kinds:
-        made = endpoint_named(kind, name, type_name, place, note)
-        yield made if isinstance(made, Endpoint) else Gap(place, str(made))
+    return (endpoint_named(kind, name, type_name, place, note) for kind in kinds)

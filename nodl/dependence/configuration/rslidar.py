@@ -6,13 +6,12 @@ yaml_reader.hpp. What is not set, or null, has its default; ``yes`` and ``on`` a
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import NamedTuple
 
 from nodl.dependence.configuration.configured import Configured, collected, endpoint_named
 from nodl.names import shown
 from nodl.node_interface import Endpoint, EndpointKind, Gap
-from nodl.yaml_text import YamlList, YamlMap, YamlScalar, YamlValue
+from nodl.yaml_text import YamlList, YamlMap, YamlValue
 
 _PACKET = "rslidar_msg/msg/RslidarPacket"
 _TRUE, _FALSE = ("true", "yes", "on", "y"), ("false", "no", "off", "n")
@@ -52,7 +51,8 @@ _SENT = {
 
 def of_sensors(root: YamlValue) -> Configured:
     """Return what the file says of all lidars; a gap where the program itself would end."""
-    common, lidars = _entry(root, "common"), _entry(root, "lidar")
+    given = root.items if isinstance(root, YamlMap) else {}
+    common, lidars = given.get("common"), given.get("lidar")
     if not isinstance(common, YamlMap) or not isinstance(lidars, YamlList):
         why = "a configuration of rslidar_sdk has a mapping 'common' and a list 'lidar'"
         return Configured(gaps=(Gap(root.source, why),))
@@ -65,24 +65,17 @@ def of_sensors(root: YamlValue) -> Configured:
         if written not in (*_TRUE, *_FALSE):
             return Configured(gaps=(Gap(common.source, f"{switch} is neither true nor false"),))
         made += [sent] if written in _TRUE else []
-    found = collected(part for lidar in lidars.items for each in made for part in _endpoint(lidar, each))
+    found = collected(_endpoint(lidar, each) for lidar in lidars.items for each in made)
     return found._replace(
         nodes=tuple(f"{each.node}_{at}" for each in made for at in range(len(lidars.items)))
     )
 
 
-def _endpoint(lidar: YamlValue, made: _Made) -> Iterator[Endpoint | Gap]:
-    topics = _entry(lidar, "ros")
-    name = _text(topics, made.key, made.default)
-    endpoint = endpoint_named(made.kind, name, made.type_name, lidar.source, made.key)
-    yield endpoint if isinstance(endpoint, Endpoint) else Gap(lidar.source, str(endpoint))
+def _endpoint(lidar: YamlValue, made: _Made) -> Endpoint | Gap:
+    name = _text(lidar.mapping("ros"), made.key, made.default) if isinstance(lidar, YamlMap) else made.default
+    return endpoint_named(made.kind, name, made.type_name, lidar.source, made.key)
 
 
-def _entry(value: YamlValue | None, key: str) -> YamlValue | None:
-    return value.items.get(key) if isinstance(value, YamlMap) else None
-
-
-def _text(value: YamlValue | None, key: str, default: str) -> str:
-    entry = _entry(value, key)
-    given = entry.value if isinstance(entry, YamlScalar) else None
+def _text(value: YamlMap, key: str, default: str) -> str:
+    given = value.scalar(key)
     return default if given is None else str(given)

@@ -15,7 +15,7 @@ from nodl.dependence.configuration.configured import Configured, ConfiguredPlugi
 from nodl.names import shown
 from nodl.node_interface import Endpoint, EndpointKind, Gap
 from nodl.source_ref import SourceRef
-from nodl.yaml_text import YamlList, YamlMap, YamlScalar, YamlValue
+from nodl.yaml_text import YamlMap, YamlScalar, YamlValue
 
 _SUBSCRIBE, _PUBLISH = EndpointKind.SUBSCRIPTION, EndpointKind.PUBLISHER
 
@@ -74,13 +74,14 @@ def default(place: SourceRef) -> Configured:
 def of_file(root: YamlValue, distro: str) -> Configured:
     """Return what rviz2 needs for the configuration ``root``."""
     reading = _Reading(distro)
-    manager = _get(root, "Visualization Manager")
-    for display in _listed(manager, "Displays"):
-        reading.display(display)
-    for tool in _listed(manager, "Tools"):
-        reading.tool(tool)
-    for panel in _listed(root, "Panels"):
-        reading.panel(panel)
+    if isinstance(root, YamlMap):
+        manager = root.mapping("Visualization Manager")
+        for display in manager.mappings("Displays"):
+            reading.display(display)
+        for tool in manager.mappings("Tools"):
+            reading.tool(tool)
+        for panel in root.mappings("Panels"):
+            reading.panel(panel)
     endpoints = tuple(dict.fromkeys(reading.endpoints))
     return Configured(endpoints, tuple(reading.gaps), plugins=tuple(reading.plugins))
 
@@ -93,10 +94,10 @@ class _Reading:
     plugins: list[ConfiguredPlugin] = field(default_factory=list)
 
     def display(self, display: YamlMap) -> None:
-        kind = _text(display, "Class")
+        kind = display.text("Class")
         short = kind.removeprefix(_DEFAULT)
         if kind == "rviz_common/Group":
-            for inner in _listed(display, "Displays"):
+            for inner in display.mappings("Displays"):
                 self.display(inner)
         elif short == kind or (
             short not in _DISPLAYS and short not in _SPECIAL and short not in _SILENT_DISPLAYS
@@ -110,7 +111,7 @@ class _Reading:
                 _MORE[short](self, display)
 
     def tool(self, tool: YamlMap) -> None:
-        kind = _text(tool, "Class")
+        kind = tool.text("Class")
         short = kind.removeprefix(_DEFAULT)
         if short in _TOOLS and short != kind:
             default, type_name = _TOOLS[short]
@@ -120,12 +121,12 @@ class _Reading:
             self._of_another_package(tool, "tool", kind)
 
     def panel(self, panel: YamlMap) -> None:
-        kind = _text(panel, "Class")
+        kind = panel.text("Class")
         if not kind.startswith("rviz_common/"):
             self._of_another_package(panel, "panel", kind)
 
     def robot_model(self, display: YamlMap) -> None:
-        if _text(display, "Description Source") != "File":
+        if display.text("Description Source") != "File":
             name, place = _topic(display, "Description Topic")
             self._topic(_SUBSCRIBE, name, place, "std_msgs/msg/String", "display of a robot model")
 
@@ -166,7 +167,7 @@ class _Reading:
         self._topic(_SUBSCRIBE, name and f"{name}_array", place, type_name, "display of markers")
 
     def effort(self, display: YamlMap) -> None:
-        name = _text(display, "Robot Description") or "robot_description"
+        name = display.text("Robot Description") or "robot_description"
         self._topic(_SUBSCRIBE, name, display.source, "std_msgs/msg/String", "display of efforts")
 
     def _camera_info(self, image: str, place: SourceRef) -> None:
@@ -182,7 +183,7 @@ class _Reading:
         if isinstance(made, Endpoint):
             self.endpoints.append(made)
         else:
-            self.gaps.append(Gap(place, str(made)))
+            self.gaps.append(made)
 
     def _of_another_package(self, item: YamlMap, what: str, kind: str) -> None:
         if not kind.startswith(_OF_ROS_1):
@@ -198,15 +199,6 @@ _SPECIAL = {
 _MORE = {"Camera": _Reading.camera, "Effort": _Reading.effort, "Map": _Reading.map, "Marker": _Reading.marker}
 
 
-def _get(value: YamlValue | None, key: str) -> YamlValue | None:
-    return value.items.get(key) if isinstance(value, YamlMap) else None
-
-
-def _text(value: YamlMap, key: str) -> str:
-    found = _get(value, key)
-    return found.value if isinstance(found, YamlScalar) and isinstance(found.value, str) else ""
-
-
 def _properties(item: YamlMap, prefix: str) -> Iterator[tuple[str, object]]:
     """Yield each property and those below it, ``Planned_Path.Trajectory_Topic``; a topic by its ``Value``."""
     for key, value in item.items.items():
@@ -215,20 +207,13 @@ def _properties(item: YamlMap, prefix: str) -> Iterator[tuple[str, object]]:
             yield name, value.value
         elif isinstance(value, YamlMap):
             if "Value" in value.items:
-                yield name, _text(value, "Value")
+                yield name, value.text("Value")
             yield from _properties(value, f"{name}.")
 
 
 def _topic(display: YamlMap, key: str) -> tuple[str, SourceRef]:
     """Return the name in a topic property: a mapping with ``Value`` (and QoS), or in older files the name itself."""
-    found = _get(display, key)
+    found = display.items.get(key)
     if isinstance(found, YamlMap):
-        return _text(found, "Value"), found.source
-    return _text(display, key), display.source
-
-
-def _listed(value: YamlValue | None, key: str) -> Iterator[YamlMap]:
-    found = _get(value, key)
-    for item in found.items if isinstance(found, YamlList) else ():
-        if isinstance(item, YamlMap):
-            yield item
+        return found.text("Value"), found.source
+    return display.text(key), display.source
