@@ -19,7 +19,7 @@ class RefusedXml(ValueError):
 
 
 class XmlElement:
-    """One element. Iterating gives the child elements; comments and instructions are not kept.
+    """One element. Iterating gives the child elements; comments and instructions are left out.
 
     ``text`` is the first of its own that is not blank, where the reader keeps text.
     """

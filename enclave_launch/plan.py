@@ -82,7 +82,7 @@ class Missing(NamedTuple):
 InterfaceLookup = Callable[
     ["ResolvedProcess | ResolvedComponent", "ResolvedProcess | None"], "Found | Missing"
 ]
-"""Asked with what launch starts and, for a component, its container where that is known."""
+"""Called with what launch starts and, for a component, its container where that is known."""
 
 
 class PlannedProcess(NamedTuple):

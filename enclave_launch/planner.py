@@ -45,7 +45,7 @@ def make_plan(evaluation: Evaluation, inputs: PlanInputs) -> LaunchPlan:
         distro=evaluation.distro,
         options=options.policy,
         # Enclaves of which no node is known: of executables to which the launch file gives one, and of processes
-        # without a manifest, which must not be missing from what a person looks at.
+        # without a manifest, which must not be missing from what is shown.
         also=tuple(item.enclave.path for item in processes if item.enclave and not item.nodes),
     )
     return LaunchPlan(

@@ -181,7 +181,7 @@ class PlanProvider:
         return self._grant(planned, process.environment)
 
     def _find(self, process: ResolvedProcess) -> PlannedProcess | None:
-        # Equal ones may have enclaves of their own; names tell them apart unless events reordered them.
+        # Equal ones may have enclaves of their own; names distinguish them unless events reordered them.
         key = identity(process)
         return self._by_name.get((process.process_name, key)) or self._by_identity.get(key)
 

@@ -98,7 +98,7 @@ class LaunchContext:
         self.includes: tuple[str, ...] = ()
         self.open_files: tuple[OpenFile, ...] = ()
         self.unfolded = 0  # entities visited and copied in the walk in progress
-        self.simulated_time = False  # asked for by set_use_sim_time, for launch's own clock
+        self.simulated_time = False  # requested by set_use_sim_time, for launch's own clock
         self._timer_handler_installed = False
 
     @property

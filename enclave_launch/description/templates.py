@@ -29,7 +29,7 @@ _REQUIRED: Any = object()
 
 
 class Template(NamedTuple):
-    """One declaration. ``read`` makes what is kept of what the constructor is given; ``None`` as default is kept.
+    """One declaration. ``read`` makes what is stored from what the constructor is given; ``None`` as default is stored.
     ``attribute``: its name in XML and YAML, ``None`` for the same, empty where they have none."""
 
     attribute: str | None
@@ -68,7 +68,7 @@ def template(
     return Template(attribute, default, keyword_only, read, data_type)
 
 
-def kept(default: Any = _REQUIRED, *, keyword_only: bool = True) -> Any:
+def stored(default: Any = _REQUIRED, *, keyword_only: bool = True) -> Any:
     """Declare an argument of the constructor alone, which keeps it as it is."""
     return Template("", default, keyword_only, lambda value: value, None)
 

@@ -34,7 +34,7 @@ class LaunchFile:
         if parse not in self._parsed:
             try:
                 self._parsed[parse] = (parse(self.text), None)
-            except Exception as error:  # kept as a value and raised below, whatever it is
+            except Exception as error:  # cached as a value and raised below, whatever it is
                 self._parsed[parse] = (None, error)
         tree, failure = self._parsed[parse]
         if failure is not None:

@@ -2,7 +2,7 @@
 
 The process environment is the state itself, as upstream: Python launch files, their helpers and the commands
 they run must see what ``set_env`` did. A snapshot for each of thousands of processes would be slow to decode,
-so the last one is kept for as long as nothing changed.
+so the last one is cached while nothing changes.
 """
 
 from __future__ import annotations

@@ -143,7 +143,7 @@ class VirtualLoop:
         self._now = 0.0
         self._timers: list[tuple[float, int, VirtualTimer]] = []
         self._count = 0
-        self.used = 0  # how often anything was asked of it: what a live loop would have done
+        self.used = 0  # how often it was called: what a live loop would have done
 
     def time(self) -> float:
         return self._now

@@ -110,7 +110,7 @@ class RecordedResults:
         return value
 
     def keep(self, *objects: object) -> tuple[int, ...]:
-        """Return the ids of the objects, as part of a key; the objects are kept alive, so that ids stay unique."""
+        """Return the ids of the objects, as part of a key; the objects are held, so that ids stay unique."""
         self._kept_alive.extend(objects)
         return tuple(map(id, objects))
 

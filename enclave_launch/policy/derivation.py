@@ -145,7 +145,7 @@ class _Collection(NamedTuple):
 
 
 def _size_warnings(enclaves: Iterable[EnclavePolicy]) -> list[Diagnostic]:
-    # Only those with many rules are looked at: the others need not load the code that knows DDS.
+    # Only those with many rules are estimated: the others need not load the code that knows DDS.
     large = [enclave for enclave in enclaves if sum(len(p.rules) for p in enclave.profiles) > _MANY_RULES]
     if not large:
         return []

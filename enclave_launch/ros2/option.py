@@ -43,7 +43,7 @@ class EnclaveOption(OptionExtension):  # type: ignore[misc]  # untyped without R
                 action.dest = SECURE
         if names_keystore(sys.argv[1:]):
             group.add_argument("--secure", dest=SECURE, metavar="KEYSTORE", default=argparse.SUPPRESS)
-        # What ros2launch_security reads: not asked for.
+        # What ros2launch_security reads: not requested.
         parser.set_defaults(**{SECURE: False, "secure": None, "create_keystore": True})
 
     def prelaunch(self, launch_description: Any, args: argparse.Namespace) -> tuple[Any, ...]:

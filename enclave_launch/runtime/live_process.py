@@ -193,7 +193,7 @@ def _line_renderer(action: ExecuteLocal) -> Callable[[str], str] | None:
 
 
 DEFAULT_FORMAT = "[{this.process_description.final_name}] {line}"
-LONGEST_LINE = 1 << 20  # bytes kept waiting for a line end
+LONGEST_LINE = 1 << 20  # bytes that wait for a line end
 
 
 class LineBuffer:

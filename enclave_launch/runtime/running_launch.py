@@ -38,7 +38,7 @@ from nodl.node_interface import EndpointKind
 
 REMEMBERED_EVENTS = 10_000
 REMEMBERED_OUTPUT = 8 << 20  # bytes of output among them
-TAIL = 64 << 10  # bytes of output kept for each process
+TAIL = 64 << 10  # bytes of output that each process has in memory
 
 State = Literal["waiting", "running", "ended"]
 
@@ -215,7 +215,7 @@ class RunningLaunch:
         status, error = None, None
         try:
             status = asyncio.run(main(self._observe, self._hold))
-        except BaseException as raised:  # to be raised where somebody waits
+        except BaseException as raised:  # to be raised in the thread that waits
             error = raised
         with self._changed:
             self._exit_status, self._error = status, error

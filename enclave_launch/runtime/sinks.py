@@ -197,5 +197,5 @@ def _write_all(descriptor: int, data: bytes) -> None:
     while view:
         try:
             view = view[os.write(descriptor, view) :]
-        except BlockingIOError:  # somebody else made our standard output non-blocking
+        except BlockingIOError:  # another program made our standard output non-blocking
             select.select([], [descriptor], [], 1.0)

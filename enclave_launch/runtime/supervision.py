@@ -99,7 +99,7 @@ class SupervisedProcess:
         self._child: Child | None = None
         self._ending = asyncio.Event()
         self._timers: list[asyncio.TimerHandle] = []
-        self._owed: tuple[Patience, bool] | None = None  # an end asked for before there was a child
+        self._owed: tuple[Patience, bool] | None = None  # an end requested before there was a child
 
     @property
     def child(self) -> Child | None:

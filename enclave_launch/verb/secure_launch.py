@@ -68,7 +68,7 @@ def _main(line: CommandLine, parser: CommandParser) -> int:
         with ament_prefixes(options.prefix):
             return _show_file(target, options)
     keystore = _keystore(options)
-    if options.dry_run or options.explain or options.dump_params:  # only looked at
+    if options.dry_run or options.explain or options.dump_params:  # only shown
         with stdout_is_for_the_plan():
             plan = planned(target, options, keystore)
         return show_plan(plan, options, keystore)

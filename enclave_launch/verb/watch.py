@@ -1,4 +1,4 @@
-"""``secure-launch --watch``: a launch, and beside it a look at whether what runs is what was planned."""
+"""``secure-launch --watch``: a launch, compared with its plan while it runs."""
 
 from __future__ import annotations
 

@@ -127,7 +127,7 @@ class _PolicyReader:
             raise PolicyError(f"{group.where}: <profiles> needs at least one <profile>")
 
     def _profile(self, path: str, profile: Profile, written: PolicyElement, rules: Rules) -> None:
-        self._check_name("~/x", profile, written.where)  # looks at ns and node
+        self._check_name("~/x", profile, written.where)  # checks ns and node
         for group in self._reader.children(written):
             tag = str(group.element.tag)
             if tag not in _GROUPS:

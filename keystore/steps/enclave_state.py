@@ -179,7 +179,7 @@ def _identity(enclave: _Enclave) -> _Found:
         safe_files.read_if_there(enclave.view.root, layout.request(enclave.name)) if key is None else None
     )
     if request is not None:
-        # The key is on its host; ``private/`` holds the request that somebody accepted, so it may be certified again.
+        # The key is on its host; ``private/`` holds the request that was accepted, so it may be certified again.
         public = request_key(request, f"the request of {enclave.name}").spki
         matches = facts is not None and facts.public_key == public
         problem = _certificate_problem(enclave, facts, matches) if cert is not None else "no certificate"

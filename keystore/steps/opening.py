@@ -99,7 +99,7 @@ def take_over(opened: Store) -> None:
     """
     view = KeystoreView(opened.root)
     register = _authorities(view)
-    with suppress(KeystoreError):  # signed by somebody else: the next governance is recorded
+    with suppress(KeystoreError):  # signed by another CA: the next governance is recorded
         register = replace(register, governance=trusted_document(view, layout.GOVERNANCE))
     register = register.with_certificates(_issued(view))
     register = register.with_documents(_documents(view, register))

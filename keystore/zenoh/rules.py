@@ -47,7 +47,7 @@ class _Row(NamedTuple):
 
 _TABLE = (
     # ``reply``: the history of a transient local publisher comes back on the key of its messages. Its heartbeats, by
-    # which a subscription finds out that it missed the last message, are sent only where somebody subscribes to them.
+    # which a subscription finds out that it missed the last message, are sent only to a subscriber of them.
     _Row("publish", Use.PUBLISH, "ingress", ("put", "reply")),
     _Row("learn of subscriptions", Use.PUBLISH, "egress", ("declare_subscriber",)),
     _Row("offer history", Use.PUBLISH, "ingress", ("put", "declare_queryable", "liveliness_token"), cache),

@@ -15,7 +15,7 @@ from typing import NamedTuple
 from nodl.endpoint_kind import EndpointKind
 
 CONTROLLER = "controller"
-"""The name in sources of a controller of ros2_control, until somebody loads it."""
+"""The name in sources of a controller of ros2_control, until it is loaded."""
 
 HOST = "host"
 """The name in sources of the node that loads a plugin and hands itself to it."""

@@ -16,7 +16,7 @@ from nodl.errors import NoDLError
 from nodl.graph.json_form import graph_document
 from nodl.graph.observing import SOURCES, Where, in_own_process, observer
 
-_BETWEEN = 1.0  # seconds between two lines at least; looks come oftener
+_BETWEEN = 1.0  # seconds between two lines at least; polls are more frequent
 _INTERVAL = 0.2
 
 

@@ -1,4 +1,4 @@
-"""One run that was observed: the graph, and how its nodes were started. Kept as JSON, so that runs can be merged."""
+"""One run that was observed: the graph, and how its nodes were started. Saved as JSON, so that runs can be merged."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ from nodl.graph.cyclone import CycloneObserver, ObserverError
 from nodl.graph.model import Graph
 from nodl.graph.rclpy_graph import RclpyObserver
 
-INTERVAL = 0.1  # seconds between two looks: clients that call once and leave are there for about that long
+INTERVAL = 0.1  # seconds between two polls: clients that call once and leave are there for about that long
 SOURCES = ("auto", "cyclonedds", "rclpy")  # all but the first are packages
 _MOST_CRASHES = 10
 _AFTER_CRASH = 1.0  # seconds: the nodes whose start made DDS crash are then known to each other

@@ -1,7 +1,7 @@
 """Asks rclpy for the graph, where that is installed: through the middleware that the nodes themselves use. Acts.
 
-rclpy gives names and types by node; quality of service and identifiers of topics only, so participants are told apart
-by the identifiers of what their nodes publish. It does not know processes. Source: rclpy ``node.py``,
+rclpy gives names and types by node; quality of service and identifiers of topics only, so participants are
+distinguished by the identifiers of what their nodes publish. It does not know processes. Source: rclpy ``node.py``,
 ``action/graph.py``.
 """
 

@@ -32,7 +32,7 @@ OBSERVED = "observed"
 class LearntEndpoint(NamedTuple):
     """One name of a node. ``written`` where the manifest cannot hold it as a plain name; ``moved``: rules of the
     program itself made it of what the source writes, so that it is held as the final name; ``spellings``: what else the
-    source may write, as far as the runs can tell; ``readings``: what it may mean, all of which hold; ``seen``: further
+    source may write, as far as the runs show; ``readings``: what it may mean, all of which hold; ``seen``: further
     names from the same parameter."""
 
     kind: EndpointKind

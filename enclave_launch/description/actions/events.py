@@ -10,7 +10,7 @@ from enclave_launch.description.events.event import Event, ProcessExited
 from enclave_launch.description.events.event import Shutdown as ShutdownEvent
 from enclave_launch.description.logging import get_logger
 from enclave_launch.description.markup.expose import expose_action
-from enclave_launch.description.templates import TemplateAction, kept
+from enclave_launch.description.templates import TemplateAction, stored
 
 if TYPE_CHECKING:
     from enclave_launch.description.events.handlers import BaseEventHandler
@@ -21,14 +21,14 @@ if TYPE_CHECKING:
 class EmitEvent(TemplateAction):
     """Queue an event; it is handled after all that is being visited now."""
 
-    event: Event = kept()
+    event: Event = stored()
 
     def execute(self, context: LaunchContext) -> None:
         context.emit_event_sync(self.event)
 
 
 class _OfHandler(TemplateAction):
-    event_handler: BaseEventHandler = kept(keyword_only=False)
+    event_handler: BaseEventHandler = stored(keyword_only=False)
 
 
 class RegisterEventHandler(_OfHandler):

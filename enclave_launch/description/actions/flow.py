@@ -24,7 +24,7 @@ from enclave_launch.description.markup.entity import Entity
 from enclave_launch.description.markup.expose import expose_action
 from enclave_launch.description.substitution import SomeSubstitutionsType, perform_substitutions
 from enclave_launch.description.substitutions.variables import local_name
-from enclave_launch.description.templates import TemplateAction, kept, template
+from enclave_launch.description.templates import TemplateAction, stored, template
 from enclave_launch.host.user_code import called_for_entities
 from enclave_launch.ros_rules.distro import Feature
 
@@ -174,7 +174,7 @@ class ForEach(TemplateAction):
     SEPARATOR = ";"
 
     input_values = template(attribute="values")
-    function: Body = kept()
+    function: Body = stored()
 
     @classmethod
     def parse(cls, entity: Entity, parser: Parser) -> tuple[type[Action], dict[str, Any]]:
@@ -206,8 +206,8 @@ class ForLoop(TemplateAction):
     """
 
     length = template(attribute="len")
-    function: Body = kept()
-    name: str | None = kept(default=None)
+    function: Body = stored()
+    name: str | None = stored(default=None)
 
     @classmethod
     def parse(cls, entity: Entity, parser: Parser) -> tuple[type[Action], dict[str, Any]]:

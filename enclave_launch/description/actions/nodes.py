@@ -309,7 +309,9 @@ def _parse_named_parameter(param: Entity, parser: Parser) -> tuple[tuple[Substit
 
 
 def __getattr__(name: str) -> Any:
-    if name == "NodeActionExtension":  # upstream's place for it; kept apart so that it loads only when asked
+    if (
+        name == "NodeActionExtension"
+    ):  # upstream's place for it; in a module of its own, which loads only when requested
         return NodeActionExtension
     raise AttributeError(f"module 'launch_ros.actions.node' has no attribute {name!r}")
 

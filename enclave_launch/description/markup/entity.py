@@ -98,7 +98,7 @@ class Parser(Protocol):
     def escape_characters(self, value: str) -> str: ...
 
 
-# Types that front ends can be asked for (API of ``launch.frontend.type_utils``).
+# Types that can be requested of front ends (API of ``launch.frontend.type_utils``).
 
 _SCALARS = {"str": str, "bool": bool, "float": float, "int": int}
 

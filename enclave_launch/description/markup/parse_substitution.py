@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 MAX_SHARED_LENGTH = 1024  # characters; longer texts are whole files, parsed once anyway
-_shared_for: Release | None = None  # the release whose registered names the kept results used
+_shared_for: Release | None = None  # the release whose registered names the cached results used
 
 
 def replace_escaped_characters(data: str) -> str:

@@ -40,7 +40,7 @@ PREDICATE = "https://in-toto.io/attestation/test-result/v0.1"
 
 class Examined(NamedTuple):
     """The subject of the evidence. ``keys``, ``defaults`` and ``components`` are ``None`` where nothing was given to
-    look at; ``document``: the dry run's JSON; ``rules``: every code that the checks can give, with its meaning."""
+    examine; ``document``: the dry run's JSON; ``rules``: every code that the checks can give, with its meaning."""
 
     document: Mapping[str, Any]
     plan: DryRun

@@ -106,7 +106,7 @@ def _read_or_observed(
 def _observed(
     options: argparse.Namespace, where: Where, findings: Findings
 ) -> tuple[Graph, list[DriftFinding]]:
-    """Look where the environment says; if the plan is out of sight there, once more on the loopback interface."""
+    """Observe where the environment says; if the plan is out of sight there, once more on the loopback interface."""
     with observer(where, os.environ) as up:
         graph, found = _settled(options, up, findings)
     if _in_sight(found) or any(os.environ.get(name) for name in RANGE_VARIABLES):

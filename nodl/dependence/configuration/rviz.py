@@ -178,7 +178,7 @@ class _Reading:
 
     def _topic(self, kind: EndpointKind, name: str, place: SourceRef, type_name: str, why: str) -> None:
         if not name:
-            return  # rviz asks for nothing until somebody chooses a topic
+            return  # rviz subscribes nothing until the user chooses a topic
         made = endpoint_named(kind, name, type_name, place, why)
         if isinstance(made, Endpoint):
             self.endpoints.append(made)

@@ -213,7 +213,9 @@ def test_a_name_from_another_parameter_in_each_run_is_undecided_though_one_of_th
         seen({"p": "rear"}, "rear"),
     ]
     assert origins_of(runs)[name("rear")] == NameOrigin(candidates=(Source("q_topic"), Source("p")))
-    assert origins_of(runs[::2])[name("rear")] == NameOrigin(Source("p"), proven=True), "without the second run"
+    assert origins_of(runs[::2])[name("rear")] == NameOrigin(Source("p"), proven=True), (
+        "without the second run"
+    )
 
 
 texts = st.sampled_from(["a", "b", "c", "d"])
