@@ -9,8 +9,6 @@ from typing import Any
 import pytest
 
 from enclave_launch.evaluation.evaluate import (
-    EvaluationError,
-    evaluate,
     evaluation_surroundings,
     top_description,
 )
@@ -34,28 +32,6 @@ def folder(files: Callable[..., Path], monkeypatch: pytest.MonkeyPatch) -> Path:
     )
     monkeypatch.setenv("D", str(folder))
     return folder
-
-
-@pytest.mark.parametrize(
-    ("name", "missing"),
-    [
-        ("needs", True),
-        ("gives", False),
-        ("hidden", True),
-        ("conditional", False),
-    ],
-)
-def test_required_arguments(folder: Path, name: str, missing: bool) -> None:
-    if not missing:
-        evaluate(folder / f"{name}.launch.xml")
-        return
-    with pytest.raises(EvaluationError, match="missing required argument 'req'"):
-        evaluate(folder / f"{name}.launch.xml")
-
-
-def test_an_argument_behind_a_reset_is_missed_and_fails_later(folder: Path) -> None:
-    with pytest.raises(EvaluationError, match='Required launch argument "req" was not provided'):
-        evaluate(folder / "behind_reset.launch.xml")
 
 
 @pytest.mark.parametrize("name", ["needs", "gives", "hidden", "conditional", "behind_reset", "pair"])

@@ -46,11 +46,6 @@ def test_snapshots_are_shared_only_while_nothing_changes(monkeypatch: pytest.Mon
     assert environment.changes() == {"ENCLAVE_LAUNCH_TEST": "1"}
 
 
-def test_popping_an_empty_stack() -> None:
-    with pytest.raises(RuntimeError, match="environment stack unexpectedly empty"):
-        Environment().pop()
-
-
 def handler() -> EventHandler:
     return EventHandler(matcher=lambda event: True)
 

@@ -9,32 +9,6 @@ import pytest
 from enclave_launch.evaluation.evaluate import EvaluationError
 
 
-def test_timers_come_after_the_visit_by_due_time(launch_py: Any, started: Any) -> None:
-    found = launch_py("""
-        entities = [
-            TimerAction(period=0.3, actions=[EP(cmd=["t1"])]),
-            TimerAction(period=0.1, actions=[EP(cmd=["t2"]), TimerAction(period=0.1, actions=[EP(cmd=["t2n"])])]),
-            TimerAction(period=0.1, actions=[EP(cmd=["t3"])]),
-            EP(cmd=["main"]),
-        ]
-    """)
-    assert started(found) == [
-        ("main", None),
-        ("t2", "timer 0.1"),
-        ("t3", "timer 0.1"),
-        ("t2n", "timer 0.1, then timer 0.1"),
-        ("t1", "timer 0.3"),
-    ]
-
-
-def test_timer_bodies_find_the_state_of_the_end_of_the_visit(launch_xml: Any, started: Any) -> None:
-    found = launch_xml("""
-        <group><let name="g" value="inside"/><timer period="1"><executable cmd="late $(var g gone)"/></timer></group>
-        <let name="g" value="end"/>
-    """)
-    assert started(found) == [("late end", "timer 1")]
-
-
 def test_newer_releases_keep_the_state_of_the_timers_position(launch_xml: Any, started: Any) -> None:
     found = launch_xml(
         '<let name="g" value="there"/><timer period="1"><executable cmd="late $(var g)"/></timer>'
@@ -145,11 +119,6 @@ def test_on_exit_of_a_process_and_shutdown_handlers_behind_it(launch_py: Any, st
     assert started(found) == [("a", None), ("b", None), ("last", "OnProcessExit a-1, then OnShutdown")]
 
 
-def test_nothing_starts_on_an_idle_shutdown(launch_py: Any, started: Any) -> None:
-    found = launch_py('entities = [RegisterEventHandler(OnShutdown(on_shutdown=[EP(cmd=["x"])]))]')
-    assert started(found) == []
-
-
 def test_an_explicit_shutdown_cancels_timers_and_what_would_come_later(launch_py: Any, started: Any) -> None:
     found = launch_py("""
         a = EP(cmd=["a"])
@@ -187,17 +156,6 @@ def test_what_a_callback_computes_is_not_foreseeable(launch_py: Any, started: An
     (unforeseen,) = found.unforeseeable
     assert "p-1" in unforeseen.what
     assert unforeseen.location.file.endswith("main.launch.py")
-
-
-def test_the_callback_of_a_certain_event_is_called(launch_py: Any, started: Any) -> None:
-    found = launch_py("""
-        log = LogInfo(msg="done")
-        entities = [
-            RegisterEventHandler(OnExecutionComplete(target_action=log, on_completion=lambda e, c: EP(cmd=["next"]))),
-            log,
-        ]
-    """)
-    assert started(found) == [("next", "OnExecutionComplete LogInfo")]
 
 
 def test_a_handler_that_would_fail_is_a_warning_not_the_end(launch_py: Any, started: Any) -> None:

@@ -14,7 +14,7 @@ from enclave_launch.description.markup.parse_substitution import (
     parse_substitution,
     replace_escaped_characters,
 )
-from enclave_launch.description.substitution import Substitution, TextSubstitution, perform_substitutions
+from enclave_launch.description.substitution import Substitution, TextSubstitution
 from enclave_launch.description.substitutions.paths import ThisLaunchFileDir
 from enclave_launch.description.substitutions.variables import EnvironmentVariable, LaunchConfiguration
 from enclave_launch.frontend.substitution_grammar import UnexpectedCharacters, VisitError
@@ -42,12 +42,6 @@ def parse_shout(data: Iterable[Any]) -> tuple[type[Shout], dict[str, Any]]:
     return Shout, {"text": "".join(part.text for part in argument)}
 
 
-def performed(text: str, **configurations: str) -> str:
-    context = LaunchContext()
-    context.launch_configurations.update(configurations)
-    return perform_substitutions(context, parse_substitution(text))
-
-
 def test_the_empty_text_is_one_text_substitution() -> None:
     (part,) = parse_substitution("")
     assert isinstance(part, TextSubstitution) and part.text == ""
@@ -63,30 +57,6 @@ def test_arguments_are_templates() -> None:
     assert isinstance(part, EnvironmentVariable)
     assert [type(item) for item in part.name] == [TextSubstitution, LaunchConfiguration]
     assert part.default_value == []
-
-
-PERFORMED = {
-    "nested defaults and quoting (E72)": (
-        "1 $(var nope $(var nope2 deep)) 2 $(var nope 'a b $(var sp)') 3 [$(var nope '')] "
-        '4 $(var nope "it\'s") 5 $(var nope a,b=c) 6 $(var nope \\(x\\))',
-        "1 deep 2 a b a b 3 [] 4 it's 5 a,b=c 6 (x)",
-    ),
-    "escapes in plain text (E73)": (
-        r"1 $x 2 $$(var x) 3 \$(var x) 4 \\$(var x) 5 a\b 6 a\\b 7 'q' 8 it's",
-        r"1 $x 2 $X 3 $(var x) 4 \$(var x) 5 ab 6 a\b 7 'q' 8 it's",
-    ),
-    "quotes inside quotes (E74)": (
-        """1 $(eval "'$(var nope z)' == 'z'") 2 $(eval '\\'$(var nope z)\\' == \\'z\\'') """
-        """3 $(var nope '$(var nope2 "q")')""",
-        '1 True 2 True 3 "q"',
-    ),
-    "computed name": ("$(var $(var y))", "X"),
-}
-
-
-@pytest.mark.parametrize(("text", "result"), PERFORMED.values(), ids=PERFORMED.keys())
-def test_performed(text: str, result: str) -> None:
-    assert performed(text, x="X", sp="a b", y="x") == result
 
 
 REFUSED = {

@@ -41,21 +41,6 @@ def test_calls_of_the_launcher(launched: Evaluate) -> None:
     ]
 
 
-@pytest.mark.parametrize(
-    ("handler", "words"),
-    [
-        ("OnProcessExit(on_exit=lambda event, context: [ExecuteProcess(cmd=['x'])])", "OnProcessExit p-1"),
-        ("OnProcessIO(on_stdout=lambda event: [ExecuteProcess(cmd=['x'])])", "OnProcessIO p-1"),
-    ],
-)
-def test_what_a_callback_computes_is_reported(launched: Evaluate, handler: str, words: str) -> None:
-    result = launched(in_python(f"ExecuteProcess(cmd=['p']), RegisterEventHandler({handler})"), syntax="py")
-    assert [process.cmd for process in result.processes] == [("p",)]
-    (gap,) = result.unforeseeable
-    assert words in gap.what
-    assert gap.location.file.endswith("main.launch.py")
-
-
 def test_a_sequence_of_transitions_is_followed_and_leaves_no_gap(launched: Evaluate) -> None:
     text = in_python("""
         LifecycleNode(package="pk", executable="e", name="n", namespace=""),
