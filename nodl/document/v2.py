@@ -18,7 +18,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 from nodl.document.v2_include import Included, follow_includes
-from nodl.document.v2_learnt import LearntName, learnt_from, learnt_names, logger_services
+from nodl.document.v2_learnt import LearntName, learnt_names, logger_services
 from nodl.document.v2_schema import check_document
 from nodl.document.v2_section import CATEGORIES, dependence_of, section_of
 from nodl.errors import InvalidElementError, InvalidNoDLDocumentError
@@ -47,18 +47,17 @@ def parse_root(
 ) -> ManifestNode:
     """Parse as ``parse_v2`` a document that was read and checked."""
     documents = (Included(file, root), *follow_includes(root, file, prefixes))
-    own, learnt = _identified(root, file, package, name), learnt_from(root)
-    parameters = _parameters(documents)
-    interface = own._replace(
+    section, parameters = section_of(root), _parameters(documents)
+    interface = _identified(root, file, package, name)._replace(
         endpoints=(*_endpoints(documents, learnt_names(root)), *logger_services(root)),
         parameters=tuple(parameters),
         depends=dependence_of(root),
-        runs=learnt.runs,
-        incomplete=learnt.incomplete,
-        parameters_complete=section_of(root).scalar("all_parameters") is True,
+        runs=len(section.listed("runs")),
+        incomplete=section.texts("incomplete"),
+        parameters_complete=section.scalar("all_parameters") is True,
     )
     included = tuple(document.file for document in documents[1:])
-    explicit = not {"executable", "plugin"}.isdisjoint(section_of(root).items)
+    explicit = not {"executable", "plugin"}.isdisjoint(section.items)
     return ManifestNode(interface, VERSION, parameters, explicit, included)
 
 

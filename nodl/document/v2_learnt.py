@@ -48,19 +48,6 @@ class LearntName(NamedTuple):
     readings: tuple[NameTemplate, ...] = ()
 
 
-class LearntFrom(NamedTuple):
-    """The runs behind a learnt manifest. ``runs``: how many; ``incomplete``: why they may not have shown everything."""
-
-    runs: int = 0
-    incomplete: tuple[str, ...] = ()
-
-
-def learnt_from(root: YamlMap) -> LearntFrom:
-    """Return what the document says of the runs that taught it; nothing, if a person wrote it."""
-    section = section_of(root)
-    return LearntFrom(len(section.listed("runs")), section.texts("incomplete"))
-
-
 def learnt_names(root: YamlMap) -> dict[tuple[str, str], LearntName]:
     """Return what was learnt, by list (``publishers``) and name of the entry; raises ``InvalidElementError``."""
     return {

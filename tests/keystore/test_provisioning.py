@@ -108,14 +108,6 @@ def test_modes_do_not_depend_on_the_umask(tmp_path: Path, umask: int) -> None:
         assert mode(root / directory) == 0o755
 
 
-def test_a_second_run_touches_nothing(tmp_path: Path) -> None:
-    root = filled(tmp_path / "ks", ARTICLE)
-    before = snapshot(root)
-    report = provision(root, [policy(name) for name in ARTICLE], options=options())
-    assert not report.changed
-    assert snapshot(root) == before
-
-
 def test_an_unchanged_keystore_can_be_read_only(tmp_path: Path) -> None:
     """The warm path takes no lock and writes nothing, so a launch works from a read-only volume."""
     root = filled(tmp_path / "ks", ["/a"])
@@ -268,19 +260,6 @@ def test_a_new_domain_extends_the_governance(tmp_path: Path) -> None:
     assert report.created == ("governance signed for domains 42",)
     assert b"<id>0</id><id>42</id>" in (root / "enclaves/governance.xml").read_bytes()
     assert codes(root) == set()
-
-
-def test_creating_can_be_forbidden(tmp_path: Path) -> None:
-    with pytest.raises(NotAKeystoreError, match="is not a complete keystore"):
-        provision(tmp_path / "ks", [policy("/a")], options=options(create=False))
-    assert not (tmp_path / "ks").exists()
-
-
-def test_a_directory_with_other_things_is_left_alone(tmp_path: Path) -> None:
-    (tmp_path / "thesis.tex").write_text("years of work")
-    with pytest.raises(NotAKeystoreError):
-        provision(tmp_path, [policy("/a")], options=options())
-    assert list(tmp_path.iterdir()) == [tmp_path / "thesis.tex"]
 
 
 @pytest.mark.parametrize("name", ["/../escape", "/a/../../b", "relative", "/a/", ""])
