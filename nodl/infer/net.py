@@ -133,12 +133,12 @@ class FunctionText:
 
     @functools.cached_property
     def bare(self) -> frozenset[str]:
-        """What the function reads or calls by a name alone."""
+        """Return what the function reads or calls by a name alone."""
         return frozenset({*self.names, *(place.name for place in self.calls if place.is_bare)})
 
     @functools.cached_property
     def dotted(self) -> frozenset[str]:
-        """What it reads or calls of something, by last names, and what a text may name."""
+        """Return what it reads or calls of something, by last names, and what a text may name."""
         return frozenset({*self.attributes, *(place.name for place in self.calls if not place.is_bare)})
 
 

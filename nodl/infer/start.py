@@ -70,7 +70,7 @@ class InferredProgram(NamedTuple):
 
     @property
     def open_places(self) -> int:
-        """How much is not known: gaps, and names that are not known in full."""
+        """Count what is not known: gaps, and names that are not known in full."""
         gaps = sum(len(node.gaps) for node in self.interfaces)
         names = (each.name for node in self.interfaces for each in node.endpoints)
         return gaps + sum(any(isinstance(part, UnknownPart) for part in name.parts) for name in names)

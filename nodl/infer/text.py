@@ -35,7 +35,7 @@ class Guard(NamedTuple):
 
     @property
     def piece(self) -> Input:
-        """The piece of a text that is empty where the condition holds; elsewhere there is no such text."""
+        """Return the piece of a text that is empty where the condition holds; elsewhere there is no such text."""
         return self.asked._replace(edits=(*self.asked.edits, (self.edit, self.given)))
 
 

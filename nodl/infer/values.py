@@ -162,7 +162,7 @@ class Sequence(HeapObject):
 
     @property
     def items(self) -> Items:
-        """The contents; others may have changed what they were handed."""
+        """Return the contents; others may have changed what they were handed."""
         HeapObject.looked_into.add(id(self.cells))
         items = self.cells[ITEMS][0]
         assert isinstance(items, Items)

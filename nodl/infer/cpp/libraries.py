@@ -26,19 +26,19 @@ class Call:
 
     @property
     def this(self) -> Obj:
-        """The object that is made, or whose method is called."""
+        """Return the object that is made, or whose method is called."""
         assert self.receiver is not None
         return self.receiver
 
     @property
     def record(self) -> AllocatedNode:
-        """The node whose method is called."""
+        """Return the node whose method is called."""
         assert self.this.node is not None
         return self.this.node
 
     @property
     def interface(self) -> str:
-        """The interface type that is the first template argument; empty without one."""
+        """Return the interface type that is the first template argument; empty without one."""
         return ros_type(self.types[0]) if self.types else ""
 
     def key(self, what: str) -> tuple[object, ...]:

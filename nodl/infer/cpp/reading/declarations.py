@@ -34,7 +34,7 @@ class FunctionParameter:
 
     @property
     def written_back(self) -> bool:
-        """Whether what a function writes to the parameter shows in its caller."""
+        """Return True if what a function writes to the parameter shows in its caller."""
         marked = self.type.rstrip().endswith(("&", "*"))
         return marked and "const" not in self.type.split() and bool(self.name)
 
@@ -61,7 +61,7 @@ class Function:
 
     @property
     def words(self) -> frozenset[str]:
-        """Every identifier in it but for its own name, and for scopes: whoever it may call is among them."""
+        """Return every identifier in it but for its own name, and for scopes: whoever it may call is among them."""
         if self._words is None:
             named = field_of(function_declarator(self.node), "declarator")
             source, start = self.node.text or b"", self.node.start_byte
@@ -73,7 +73,7 @@ class Function:
 
     @property
     def only_computes(self) -> bool:
-        """A number or condition from values that it cannot change, in more than a few lines."""
+        """Return True if it computes a number or condition from values that it cannot change, in many lines."""
         declarator = function_declarator(self.node)
         if declarator is None or self.body is None or self.body.end_byte - self.body.start_byte < 300:
             return False

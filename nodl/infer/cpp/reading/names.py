@@ -143,7 +143,7 @@ class Names:
 
     @cached_property
     def pointers_to_plain(self) -> dict[str, set[str]]:
-        """The names of members that are pointers or references to texts, numbers or containers, with their classes."""
+        """Return the members that are pointers or references to texts, numbers or containers, with their classes."""
         found: dict[str, set[str]] = {}
         for cls in (each for listed in self.classes.values() for each in listed):
             for field in cls.fields.values():

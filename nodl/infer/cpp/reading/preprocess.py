@@ -69,7 +69,7 @@ class Preprocessed:
 
     @cached_property
     def called(self) -> frozenset[str]:
-        """Every word in front of a parenthesis: a macro of who includes the file may be among them."""
+        """Return every word in front of a parenthesis: a macro of who includes the file may be among them."""
         return frozenset(_CALLED.findall(self.text))
 
 

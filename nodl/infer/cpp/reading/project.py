@@ -122,7 +122,7 @@ class Workspace:
 
     @cached_property
     def plugin_classes(self) -> dict[str, list[tuple[PluginClass, SourcePackage]]]:
-        """By lookup name and by class."""
+        """Return the plugins by lookup name and by class."""
         found: dict[str, list[tuple[PluginClass, SourcePackage]]] = {}
         for package in self.packages.values():
             for each in package.plugins:

@@ -50,7 +50,7 @@ class CallEffects:
 
     @cached_property
     def size(self) -> int:
-        """How many bytes of source it is."""
+        """Return the bytes of its source, with everything that it may call."""
         return sum(each.node.end_byte - each.node.start_byte for each in self.functions)
 
     @cached_property
@@ -60,7 +60,7 @@ class CallEffects:
 
     @cached_property
     def leaving(self) -> Leaving:
-        """How it leaves the program, with everything that it may call."""
+        """Return how it leaves the program, with everything that it may call."""
         every = [_leaving(self._run, each) for each in self.functions]
         if isinstance(self._of, Lambda):
             outer = self._of.frame.function
@@ -73,7 +73,7 @@ class CallEffects:
 
     @cached_property
     def only_variables(self) -> bool:
-        """Whether all that it does is to change variables."""
+        """Return True if all that it does is to change variables."""
         modelled = {name.rpartition("::")[2] for name in LIBRARY_CLASSES} - _PLAIN_VALUES
         modelled -= self._run.names.classes.keys()
         return (
@@ -84,7 +84,7 @@ class CallEffects:
 
     @cached_property
     def written(self) -> VariableWrites:
-        """What it does to variables, arguments of the program's own functions as these take them."""
+        """Return what it does to variables, arguments of the program's own functions as these take them."""
         run, parts = self._run, [written_in(each) for each in self.functions]
         if isinstance(self._of, Lambda):
             parts.append(written_by(self._of.node))

@@ -38,7 +38,7 @@ class CallSite:
 
     @property
     def receiver(self) -> Node:
-        """What stands before the name of a method."""
+        """Return what stands before the name of a method."""
         return field_of(self.callee, "argument") or self.callee
 
     @property
@@ -55,7 +55,7 @@ class CallSite:
 
     @property
     def types(self) -> list[Type]:
-        """The template arguments that are written out."""
+        """Return the template arguments that are written out."""
         return [self.run.type_of(text(each), self.frame) for each in template_arguments(self.callee)]
 
     def call(self, receiver: Obj | None = None) -> Call:

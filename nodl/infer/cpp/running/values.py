@@ -130,7 +130,7 @@ class Param(NamedTuple):
 
     @property
     def default(self) -> Value:
-        """What the program declares, at any time."""
+        """Return what the program declares, at any time."""
         return self.known or self.record.default(self.name)
 
 
