@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from nodl.infer.cpp.running.machine import Machine
 
 _BEYOND_VARIABLES = re.compile(
-    r"\w*declare\w*|set_\w*parameter\w*|NodeOptions|arguments|init|thread|jthread|async|bind|spin\w*|"
+    r"\w*declare\w*|set_\w*parameter\w*|NodeOptions|arguments|thread|jthread|async|bind|spin\w*|"
     r"execute_\w+|handle_(?:message|request|response|loaned_message)|create_\w*timer|add_\w*callback\w*|\w+Listener|"
     r"const_cast|_?exit|quick_exit|_Exit|abort|terminate"
 )
@@ -79,7 +79,15 @@ class CallEffects:
         return (
             self.words.isdisjoint(modelled)
             and not any(map(_BEYOND_VARIABLES.fullmatch, self.words))
+            and not self._may_init_ros
             and not any(self.leaving)
+        )
+
+    @property
+    def _may_init_ros(self) -> bool:
+        """Whether ``init`` may be rclcpp's: it is, unless the program has a function of this name."""
+        return "init" in self.words and (
+            "rclcpp" in self.words or "init" not in self._run.names.functions_by_name
         )
 
     @cached_property
@@ -118,9 +126,8 @@ def effects_of(run: Machine, of: Function | Lambda) -> CallEffects:
 def only_changes_variables(run: Machine, words: Iterable[str]) -> bool:
     """Return whether code with these words makes no interface and does nothing but change variables."""
     found = Reach(run).from_words(words)
-    return not any(
-        map(_BEYOND_VARIABLES.fullmatch, {*words, *(word for each in found for word in each.words)})
-    )
+    every = {*words, *(word for each in found for word in each.words)}
+    return not any(map(_BEYOND_VARIABLES.fullmatch, every)) and "init" not in every
 
 
 def written_in(function: Function) -> VariableWrites:

@@ -90,11 +90,17 @@ def _made(node: Node) -> tuple[str, Node | None]:
     if node.type == "declaration" and any(
         each.type == "identifier" for each in node.children_by_field_name("declarator")
     ):
-        return text(field_of(node, "type")), None
+        return _type_of(node), None
     given = field_of(node, "value") if node.type == "init_declarator" else None
     if given is not None and node.parent is not None and given.type in ("argument_list", "initializer_list"):
-        return text(field_of(node.parent, "type")), given
+        return _type_of(node.parent), given
     return "", None
+
+
+def _type_of(declaration: Node) -> str:
+    """Return the type that a declaration names; behind ``#endif`` the parser takes ``else`` for one."""
+    written = text(field_of(declaration, "type"))
+    return "" if written == "else" else written
 
 
 def _last(callee: Node | None) -> str:

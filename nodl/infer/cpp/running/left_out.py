@@ -55,7 +55,7 @@ def leave_out(run: Machine, function: Function, values: Sequence[Value], node: N
     ):
         return False
     effects = effects_of(run, function)
-    if effects.size < LEAST_SIZE or not effects.only_variables or not _is_unused(function, node):
+    if effects.size < LEAST_SIZE or not effects.only_variables or not _is_unused(run, function, node):
         return False
     if not run.store.callable_names.isdisjoint(effects.words):
         return False
@@ -82,12 +82,15 @@ def _never_returns(function: Function) -> bool:
     return bool(statements) and statements[-1].type == "throw_statement"
 
 
-def _is_unused(function: Function, call: Node) -> bool:
-    """Return whether nobody looks at what the call gives, or it is a number or condition."""
+def _is_unused(run: Machine, function: Function, call: Node) -> bool:
+    """Return whether nobody looks at what the call gives, or it is a number, a condition or of an enumeration."""
     is_statement = call.type != "call_expression" or (
         call.parent is not None and call.parent.type == "expression_statement"
     )
-    return is_statement or _NUMBERS.fullmatch(type_text(function.node)) is not None
+    if is_statement or _NUMBERS.fullmatch(type_text(function.node)):
+        return True
+    kind = run.names.resolve(type_text(function.node), function.scope, function.file)
+    return not kind.pointer and (_NUMBERS.fullmatch(kind.name) is not None or kind.last in run.names.enums)
 
 
 def _changes(run: Machine, effects: CallEffects) -> dict[Cell, Value] | None:

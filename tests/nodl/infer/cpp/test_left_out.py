@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from nodl.infer.cpp.reading.declarations import Function
+from nodl.infer.cpp.running import left_out
+from nodl.infer.cpp.running.machine import Machine
 from tests.nodl.infer.cpp.workspace import gaps, in_class, infer, names
 
 pytest.importorskip("tree_sitter_cpp", reason="the extra cpp is not installed")
@@ -22,6 +26,19 @@ def every_size(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def with_method(method: str, body: str) -> str:
     return in_class(body, f"{MEMBERS} {method}")
+
+
+def calls_left_out(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """Return the list that the names of functions whose calls are left out are added to."""
+    names: list[str] = []
+
+    def leave_out(run: Machine, function: Function, *rest: Any) -> bool:
+        is_left_out = left_out.leave_out(run, function, *rest)
+        names.extend([function.name] if is_left_out else [])
+        return is_left_out
+
+    monkeypatch.setattr("nodl.infer.cpp.running.invocation.leave_out", leave_out)
+    return names
 
 
 def test_a_name_stays_exact_behind_a_call_that_does_not_change_it(tmp_path: Path) -> None:
@@ -103,3 +120,38 @@ def test_one_that_it_gives_to_a_function_of_the_program_is_none(tmp_path: Path) 
     tick = "void tick() { attach(shared_from_this()); }"
     system = infer(tmp_path, in_class(LATER, f"{MEMBERS} {tick}", before=before))
     assert gaps(system) == []
+
+
+def test_a_call_that_changes_nothing_of_a_name_is_left_out_beside_a_split_if_and_an_own_init(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Behind ``#endif`` the parser takes ``else`` for a type; ``init`` is this class's own, not rclcpp's."""
+    left = calls_left_out(monkeypatch)
+    methods = """
+    void init(bool twice) { sum = twice ? 2 : 1; }
+    void compute() {
+      init(true);
+    #ifndef SLOW
+      if (sum > 1) { sum = 3; }
+    #endif
+      else if (sum > 0) { sum = 2; }
+    #ifndef SLOW
+      else { sum = sum + 1; }
+    #endif
+    }
+    """
+    system = infer(tmp_path, with_method(methods, f"compute(); {MAKES}"))
+    assert (names(system), gaps(system), left) == (["a"], [], ["compute"])
+
+
+@pytest.mark.parametrize(
+    ("result", "is_left_out"), [("status_t", True), ("Mode", True), ("int", True), ("Text", False)]
+)
+def test_a_call_is_left_out_where_its_result_is_a_number_by_whatever_name(
+    result: str, is_left_out: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    left = calls_left_out(monkeypatch)
+    types = "typedef uint32_t status_t; enum Mode { SLOW, FAST }; using Text = std::string;"
+    method = f"{types} {result} compute() {{ sum = 1; return {result}(); }}"
+    system = infer(tmp_path, with_method(method, f"auto found = compute(); {MAKES}"))
+    assert (names(system), gaps(system), left) == (["a"], [], ["compute"] if is_left_out else [])
