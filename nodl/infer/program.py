@@ -23,7 +23,7 @@ from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
 from enclave_common.files import read_bytes
-from nodl.infer.cpp.cache.folder import digest, digest_of
+from nodl.infer.answers.folder import digest, digest_of
 
 _PRIVATE = re.compile(r"__(?!\w*__\b)\w")  # or the middle of a name, which does no harm
 _ASCII = b"\\x41\\u0041+AEE-"

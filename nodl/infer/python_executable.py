@@ -14,7 +14,7 @@ import re
 from collections.abc import Iterator, Sequence
 
 from enclave_common.files import read_text
-from nodl.infer.cache import CachedAnswer
+from nodl.infer.answers.python import CachedAnswer
 from nodl.infer.program import Program, ProgramTarget
 from nodl.infer.start import NO_LAUNCH, InferredProgram, LaunchedNode, LaunchKey, ProgramLaunch, Start
 from nodl.node_interface import Gap, NodeInterface

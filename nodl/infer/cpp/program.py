@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from enclave_common.files import read_bytes
-from nodl.infer.cpp.cache.folder import digest_of, digest_of_content
+from nodl.infer.answers.folder import digest_of, digest_of_content
 from nodl.infer.cpp.entry import CppSupportMissing, Entry, failure
 from nodl.infer.cpp.findings import AllocatedNode
 from nodl.infer.cpp.ledger import CREATES, SiteAnswer, account, leads_to_interfaces

@@ -11,8 +11,8 @@ from functools import partial
 from typing import TypeAlias
 
 from enclave_common.files import text_or_nothing
-from nodl.infer.cpp.cache.answers import Answers, Made
-from nodl.infer.cpp.cache.folder import digest_of
+from nodl.infer.answers.cpp import Answers, Made
+from nodl.infer.answers.folder import digest_of
 from nodl.infer.cpp.entry import CppSupportMissing, Entry, Solved, failure
 from nodl.infer.cpp.parallel import each_in_parallel
 from nodl.infer.cpp.program import Sources, run_program

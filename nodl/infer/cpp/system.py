@@ -12,7 +12,7 @@ from pathlib import Path
 
 from enclave_common.files import text_or_nothing
 from nodl.dependence import COMPONENT, HOST
-from nodl.infer.cpp.cache.answers import Answers, Made, WatchedStart
+from nodl.infer.answers.cpp import Answers, Made, WatchedStart
 from nodl.infer.cpp.entry import Answer, CppSupportMissing, Entry, Solved, failure
 from nodl.infer.cpp.libraries import NODE_BASES
 from nodl.infer.cpp.models.controllers import CONTROLLERS

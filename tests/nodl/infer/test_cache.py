@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from nodl.infer import analysis, infer_executable
-from nodl.infer.cache import own_sources
+from nodl.infer.answers.python import own_sources
 from nodl.infer.program import Program, ProgramTarget
 
 PROGRAM = """\

@@ -13,8 +13,8 @@ from tests.nodl.infer.cpp.workspace import HEAD, names, package, write
 
 pytest.importorskip("tree_sitter_cpp", reason="the extra cpp is not installed")
 
-from nodl.infer.cpp.cache.codec import decoded, encoded
-from nodl.infer.cpp.cache.folder import CacheFolder
+from nodl.infer.answers.codec import decoded, encoded
+from nodl.infer.answers.folder import CacheFolder
 
 NODE = (
     HEAD

@@ -11,7 +11,7 @@ from enum import Enum
 from typing import Any
 
 from nodl.dependence import Dependence, Test, Variation, When
-from nodl.infer.cpp.cache.folder import CacheFolder
+from nodl.infer.answers.folder import CacheFolder
 from nodl.infer.cpp.entry import Entry, FixedMapping, Solved
 from nodl.infer.start import InferredProgram, LaunchKey
 from nodl.name_template import NameTemplate, ParameterPart, UnknownPart

@@ -10,8 +10,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from nodl.infer.cpp.cache.codec import keep_variant, variants
-from nodl.infer.cpp.cache.folder import CacheFolder, digest, digest_of
+from nodl.infer.answers.codec import keep_variant, variants
+from nodl.infer.answers.folder import CacheFolder, digest, digest_of
 from nodl.infer.cpp.reading.project import Workspace
 from nodl.infer.start import Start
 
@@ -114,7 +114,7 @@ _BUILD_NAMES = frozenset({"CMakeLists.txt", "compile_commands.json", "CMakeCache
 @lru_cache(maxsize=1)
 def analyser() -> str:
     """Return a digest of our own code, whatever it is installed as, and of the parser."""
-    root = Path(__file__).parents[3]
+    root = Path(__file__).parents[2]
     own = [(str(path.relative_to(root)), digest_of(str(path))) for path in sorted(root.rglob("*.py"))]
     return digest(own, [_version(name) for name in ("tree-sitter", "tree-sitter-cpp")])
 

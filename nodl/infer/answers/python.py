@@ -11,8 +11,8 @@ from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from nodl.infer.cpp.cache.codec import keep_variant, variants
-from nodl.infer.cpp.cache.folder import CacheFolder, digest, digest_of
+from nodl.infer.answers.codec import keep_variant, variants
+from nodl.infer.answers.folder import CacheFolder, digest, digest_of
 
 if TYPE_CHECKING:
     from nodl.infer.program import Program
@@ -22,14 +22,14 @@ VARIANTS = 4
 
 
 _OWN_SOURCES = (
-    "*.py", "dependence/*.py", "document/*.py", "infer/*.py", "infer/interpreter/*.py", "infer/models/*.py",
-    "infer/cpp/*.py", "infer/cpp/cache/*.py",
+    "*.py", "dependence/*.py", "document/*.py", "infer/*.py", "infer/answers/*.py", "infer/interpreter/*.py",
+    "infer/models/*.py", "infer/cpp/*.py",
 )  # fmt: skip
 
 
 def own_sources() -> list[Path]:
     """Return the files of our own code that answers depend on."""
-    root = Path(__file__).parents[1]
+    root = Path(__file__).parents[2]
     return sorted(path for pattern in _OWN_SOURCES for path in root.glob(pattern))
 
 

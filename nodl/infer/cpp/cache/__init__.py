@@ -1,5 +1,0 @@
-"""Answers of earlier runs by what they were made from: our own code, build files, the content of each source.
-
-``fingerprint`` says what an answer depends on; ``codec`` writes answers as JSON; ``folder`` keeps them where nobody
-else may write; ``answers`` asks and keeps.
-"""
