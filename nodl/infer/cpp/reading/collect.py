@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 from nodl.infer.cpp.reading.declarations import (
@@ -26,7 +26,7 @@ from nodl.infer.cpp.reading.preprocess import Preprocessed
 from nodl.infer.cpp.reading.type_names import split_type
 from nodl.infer.cpp.syntax import Node, children, field_of, line_of, parse, parse_expression, text, walk
 
-_STRUCTURES = ("class_specifier", "struct_specifier", "union_specifier")
+STRUCTURES = ("class_specifier", "struct_specifier", "union_specifier")
 _USING = re.compile(r"\busing\s+namespace\s+([\w:]+)\s*;")
 
 
@@ -62,7 +62,7 @@ class _Collector:
                 *(part.strip() for part in name.removeprefix("inline").split("::") if part.strip()),
             )
             self.collect(_required(child, "body"), inner, [])
-        elif kind in _STRUCTURES:
+        elif kind in STRUCTURES:
             self.class_(child, scope, templates)
         elif kind == "function_definition":
             self.function(child, scope, templates, cls)
@@ -145,6 +145,8 @@ class _Collector:
                     _initialiser(item) for item in children(child) if item.type == "field_initializer"
                 ]
         self.index.all_functions.append(made)
+        for each in _local_classes(made.body):
+            self.class_(each, local_scope(made, each), [])
         if cls is not None:
             cls.methods.setdefault(made.name, []).append(made)
         else:
@@ -190,7 +192,7 @@ class _Collector:
 
     def declaration(self, node: Node, scope: Scope, templates: list[str], cls: Class | None) -> None:
         kind = field_of(node, "type")
-        if kind is not None and kind.type in _STRUCTURES:
+        if kind is not None and kind.type in STRUCTURES:
             self.class_(kind, scope, templates)
         elif kind is not None and kind.type == "enum_specifier":
             self.enum(kind, scope)
@@ -244,7 +246,7 @@ class _Collector:
         if node.type == "type_definition":
             names = [child for child in node.named_children if child.type == "type_identifier"]
             kind = field_of(node, "type")
-            if kind is not None and kind.type in _STRUCTURES and field_of(kind, "body") is not None:
+            if kind is not None and kind.type in STRUCTURES and field_of(kind, "body") is not None:
                 own = "" if field_of(kind, "name") is not None or not names else text(names[-1])
                 self.class_(kind, scope, [], own)
                 if own:
@@ -260,6 +262,22 @@ class _Collector:
         inner = children(node)
         if len(inner) >= 2:
             self.index.aliases["::".join((*scope, text(inner[0])))] = (text(inner[-1]), scope)
+
+
+def _local_classes(body: Node) -> Iterator[Node]:
+    """Yield the classes with a name that are defined inside a function, without those inside of them."""
+    waiting = [body]
+    while waiting:
+        each = waiting.pop()
+        if each.type not in STRUCTURES:
+            waiting += each.named_children
+        elif field_of(each, "name") is not None and field_of(each, "body") is not None:
+            yield each
+
+
+def local_scope(function: Function, node: Node) -> Scope:
+    """Return the scope of a function's own class: no other class of this name has it."""
+    return (*function.scope, f"{function.name}()@{node.start_byte}")
 
 
 def _specialised(name: str, templates: list[str]) -> tuple[str, ...] | None:

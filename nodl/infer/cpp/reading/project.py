@@ -158,13 +158,17 @@ def _defined(words: Sequence[str]) -> dict[str, str]:
 
 
 def find_packages(roots: Iterable[str]) -> dict[str, SourcePackage]:
-    """Find every package below ``roots``; folders that colcon would ignore are left out."""
+    """Find every package below ``roots``; links are followed, and folders ignored, as colcon does."""
     found: dict[str, SourcePackage] = {}
     for root in roots:
-        for folder, folders, names in os.walk(root):
-            if "COLCON_IGNORE" in names or "AMENT_IGNORE" in names:
+        seen: set[str] = set()
+        for folder, folders, names in os.walk(root, followlinks=True):
+            real = os.path.realpath(folder)
+            if real in seen or "COLCON_IGNORE" in names or "AMENT_IGNORE" in names:
                 folders[:] = []
-            elif "package.xml" in names:
+                continue
+            seen.add(real)
+            if "package.xml" in names:
                 folders[:] = []
                 package = read_source_package(folder)
                 found.setdefault(package.name, package)
