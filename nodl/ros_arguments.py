@@ -5,7 +5,7 @@ They stand between ``--ros-args`` and ``--`` (or the end); elsewhere ``a:=b`` is
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from enclave_common.shell_words import split_words
@@ -115,3 +115,19 @@ def _parameter_rule(text: str) -> ParameterRule:
     target, _, value = text.partition(":=")
     node, colon, name = target.rpartition(":")
     return ParameterRule(name, value, node if colon else None)
+
+
+def split_options(
+    words: Iterable[str], with_value: Container[str]
+) -> tuple[list[tuple[str, str]], list[str]]:
+    """Return each option of ``with_value`` with its value (``--a 1``, ``--a=1``), in their order, and all other words."""
+    options: list[tuple[str, str]] = []
+    others: list[str] = []
+    rest = iter(words)
+    for word in rest:
+        option, equals, value = word.partition("=")
+        if option in with_value:
+            options.append((option, value if equals else next(rest, "")))
+        else:
+            others.append(word)
+    return options, others

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
-from typing import NamedTuple
 
 from enclave_common.shell_words import split_words
 from enclave_launch.errors import UsageError
@@ -23,7 +22,7 @@ from nodl.dependence import Launched, Situation, Spawned
 from nodl.dependence.apply import applied, own_name
 from nodl.library import SHIPPED, Hit, Library, LibraryDocuments
 from nodl.node_interface import Certainty, NodeInterface
-from nodl.ros_arguments import ParameterFileArgument, parse_ros_arguments
+from nodl.ros_arguments import ParameterFileArgument, parse_ros_arguments, split_options
 
 _FURTHER = 32
 
@@ -36,22 +35,6 @@ def _filled(interface: NodeInterface, parameters: Mapping[str, object]) -> NodeI
         for name in endpoint.name.fill_each(parameters)
     )
     return interface._replace(endpoints=tuple(dict.fromkeys(endpoints)))
-
-
-class _Documents(NamedTuple):
-    """The documents of a library, and what sources say of plugins that have none."""
-
-    library: LibraryDocuments
-    of_source: Callable[[str, str], NodeInterface | None]
-
-    def of_class(self, plugin_class: str, instance: str = "") -> NodeInterface | None:
-        return self.library.of_class(plugin_class) or self.of_source(plugin_class, instance)
-
-    def named(self, name: str) -> NodeInterface | None:
-        return self.library.named(name)
-
-    def transports(self) -> tuple[tuple[str, str, NodeInterface], ...]:
-        return self.library.transports()
 
 
 class LibraryAccess:
@@ -144,8 +127,7 @@ class LibraryAccess:
             made.extend(filled[1:])
             return filled[0] if filled else None
 
-        documents = _Documents(LibraryDocuments(self._library, self._distro), of_source)
-        done = applied(named, situation, documents)
+        done = applied(named, situation, LibraryDocuments(self._library, self._distro, of_source))
         yield done.interface
         yield from made
         for further in done.further if depth < _FURTHER else ():
@@ -208,7 +190,8 @@ def _robot_description(evaluation: Evaluation) -> str:
 
 
 def _spawned(process: ResolvedProcess) -> Iterator[Spawned]:
-    options, names = _options(own_words(process))
+    options, others = split_options(own_words(process), _TAKE_A_VALUE)
+    names = [word for word in others if not word.startswith("-")]
     namespace = (process.namespace or "/").rstrip("/")
     if not namespace.startswith("/"):
         namespace = ""
@@ -228,20 +211,6 @@ def _spawned(process: ResolvedProcess) -> Iterator[Spawned]:
             parameters=parameters,
             rules=rules,
         )
-
-
-def _options(words: Sequence[str]) -> tuple[list[tuple[str, str]], list[str]]:
-    """Return pairs of option and value in their order, and the words that belong to none."""
-    options: list[tuple[str, str]] = []
-    names: list[str] = []
-    rest = iter(words)
-    for word in rest:
-        option, equals, value = word.partition("=")
-        if option in _TAKE_A_VALUE:
-            options.append((option, value if equals else next(rest, "")))
-        elif not word.startswith("-"):
-            names.append(word)
-    return options, names
 
 
 def _values(options: Sequence[tuple[str, str]], spellings: Sequence[str]) -> list[str]:

@@ -21,6 +21,7 @@ from typing import NamedTuple
 from nodl.builtin_interfaces import DISTROS
 from nodl.dependence import Situation, Test, When
 from nodl.name_template import NameTemplate, Part, UnknownPart
+from nodl.ros_arguments import split_options
 
 _REFERENCE = re.compile(r"\$\(([a-z_]+)(?: ([^()]*))?\)")
 _ARGUMENTS = "arguments "
@@ -227,16 +228,9 @@ def _command_line(
 ) -> tuple[dict[str, str], list[str]]:
     """Return the declared options (the first value of each), and the words that belong to none."""
     by_spelling = {spelling: name for name, spellings in options.items() for spelling in spellings}
-    values: dict[str, str] = {}
-    arguments: list[str] = []
-    rest = iter(words)
-    for word in rest:
-        spelling, equals, value = word.partition("=")
-        if spelling in by_spelling:
-            values.setdefault(by_spelling[spelling], value if equals else next(rest, ""))
-        elif not word.startswith("-") or _is_number(word):
-            arguments.append(word)
-    return values, arguments
+    given, others = split_options(words, by_spelling)
+    values = {by_spelling[spelling]: value for spelling, value in reversed(given)}
+    return values, [word for word in others if not word.startswith("-") or _is_number(word)]
 
 
 def _is_number(word: str) -> bool:

@@ -119,14 +119,18 @@ class Library:
 
 
 class LibraryDocuments(NamedTuple):
-    """What documents refer to in a library, as ``nodl.dependence.apply`` asks for it."""
+    """What documents refer to in a library, as ``nodl.dependence.apply`` requests it. ``of_source``: what sources say
+    of a plugin, by its class and instance, that no document describes."""
 
     library: Library
     distro: str = ""
+    of_source: Callable[[str, str], NodeInterface | None] | None = None
 
     def of_class(self, plugin_class: str, instance: str = "") -> NodeInterface | None:
-        """Return the description of a plugin by its class, the same for each ``instance``."""
+        """Return the description of a plugin by its class, of a document the same for each ``instance``."""
         hit = self.library.of_class(plugin_class, distro=self.distro)
+        if hit is None and self.of_source is not None:
+            return self.of_source(plugin_class, instance)
         return hit.document.interface if hit else None
 
     def named(self, name: str) -> NodeInterface | None:
