@@ -120,7 +120,7 @@ def _parameter_rule(text: str) -> ParameterRule:
 def split_options(
     words: Iterable[str], with_value: Container[str]
 ) -> tuple[list[tuple[str, str]], list[str]]:
-    """Return each option of ``with_value`` with its value (``--a 1``, ``--a=1``), in their order, and all other words."""
+    """Return each option of ``with_value`` with its value (``--a 1``, ``--a=1``), in order, and all other words."""
     options: list[tuple[str, str]] = []
     others: list[str] = []
     rest = iter(words)

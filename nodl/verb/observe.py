@@ -16,11 +16,11 @@ import os
 import socket
 import subprocess
 import sys
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
-from xml.sax.saxutils import escape, quoteattr
+from xml.etree import ElementTree
 
 from enclave_common.command_line import FLAG, PATH, TEXT, TIME, Option, one_of
 from enclave_common.environment import domain_id
@@ -213,8 +213,6 @@ def _nothing_seen(runs: Sequence[Observed]) -> str:
     )
 
 
-Names = Mapping[EndpointKind, Iterable[str]]
-
 # group, child, attribute, kind: in the order of the schema
 _GROUPS = (
     ("topics", "topic", "publish", EndpointKind.PUBLISHER),
@@ -224,7 +222,6 @@ _GROUPS = (
     ("actions", "action", "execute", EndpointKind.ACTION_SERVER),
     ("actions", "action", "call", EndpointKind.ACTION_CLIENT),
 )
-Enclaves = dict[str, dict[str, dict[EndpointKind, set[str]]]]
 
 
 def observed_policy(graphs: Iterable[Graph]) -> str:
@@ -233,15 +230,22 @@ def observed_policy(graphs: Iterable[Graph]) -> str:
     Hidden nodes and half open interfaces are left out. All nodes of a participant share an enclave: the one that it
     announces, else one named after its first node.
     """
-    enclaves: Enclaves = {}
-    for graph in graphs:
-        for process in graph.processes:
-            nodes = [node for node in process.nodes if not _hidden(node)]
-            if nodes:
-                profiles = enclaves.setdefault(_enclave(process, nodes), {})
-                for node in nodes:
-                    _add(profiles.setdefault(node.fqn, {}), node)
-    return _policy_text({path: _profiles(found) for path, found in sorted(enclaves.items())})
+    enclaves: dict[str, dict[str, set[tuple[EndpointKind, str]]]] = {}
+    for process in (process for graph in graphs for process in graph.processes):
+        nodes = [node for node in process.nodes if not node.fqn.rpartition("/")[2].startswith("_")]
+        for node in nodes:
+            names = enclaves.setdefault(_enclave(process, nodes), {}).setdefault(node.fqn, set())
+            names.update((each.kind, each.name) for each in node.interfaces if each.complete)
+    policy = ElementTree.Element("policy", version="0.2.0")
+    listed = ElementTree.SubElement(policy, "enclaves")
+    for path, found in sorted(enclaves.items()):
+        enclave = ElementTree.SubElement(listed, "enclave", path=path)
+        profiles = ElementTree.SubElement(enclave, "profiles")
+        for fqn, names in sorted(found.items()):
+            _add_profile(profiles, *split_fqn(fqn), names)
+    ElementTree.indent(policy)
+    text = ElementTree.tostring(policy, encoding="unicode", short_empty_elements=False)
+    return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'
 
 
 def _enclave(process: GraphProcess, nodes: list[GraphNode]) -> str:
@@ -249,39 +253,13 @@ def _enclave(process: GraphProcess, nodes: list[GraphNode]) -> str:
     return announced if announced not in ("", "/") else min(node.fqn for node in nodes)
 
 
-def _hidden(node: GraphNode) -> bool:
-    return node.fqn.rpartition("/")[2].startswith("_")
-
-
-def _add(names: dict[EndpointKind, set[str]], node: GraphNode) -> None:
-    for interface in node.interfaces:
-        if interface.complete:
-            names.setdefault(interface.kind, set()).add(interface.name)
-
-
-def _profiles(found: dict[str, dict[EndpointKind, set[str]]]) -> list[str]:
-    lines: list[str] = []
-    for fqn, names in sorted(found.items()):
-        namespace, name = split_fqn(fqn)
-        kinds: Names = names
-        lines += _profile_lines(namespace, name, kinds)
-    return lines
-
-
-def _policy_text(enclaves: Mapping[str, Iterable[str]]) -> str:
-    lines = ['<?xml version="1.0" encoding="UTF-8"?>', '<policy version="0.2.0">', "  <enclaves>"]
-    for path, profiles in enclaves.items():
-        lines += [f"    <enclave path={quoteattr(path)}>", "      <profiles>", *profiles]
-        lines += ["      </profiles>", "    </enclave>"]
-    return "\n".join([*lines, "  </enclaves>", "</policy>", ""])
-
-
-def _profile_lines(namespace: str, node: str, names: Names) -> list[str]:
-    lines = [f"        <profile ns={quoteattr(namespace)} node={quoteattr(node)}>"]
+def _add_profile(
+    profiles: ElementTree.Element, namespace: str, name: str, names: Iterable[tuple[EndpointKind, str]]
+) -> None:
+    profile = ElementTree.SubElement(profiles, "profile", ns=namespace, node=name)
     for group, child, attribute, kind in _GROUPS:
-        of_kind = sorted(set(names.get(kind, ())))
+        of_kind = sorted(each for its_kind, each in names if its_kind is kind)
         if of_kind:
-            lines.append(f'          <{group} {attribute}="ALLOW">')
-            lines += [f"            <{child}>{escape(name)}</{child}>" for name in of_kind]
-            lines.append(f"          </{group}>")
-    return [*lines, "        </profile>"]
+            listed = ElementTree.SubElement(profile, group, {attribute: "ALLOW"})
+            for each in of_kind:
+                ElementTree.SubElement(listed, child).text = each
