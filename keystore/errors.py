@@ -17,6 +17,8 @@ enter a message. Errors of the operating system, cryptography, lxml and yaml are
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from os import PathLike
 
 from enclave_common.terminal import quoted
@@ -84,6 +86,15 @@ class StorageError(KeystoreError):
         place = f" {printable(str(error.filename))}" if error.filename else ""
         reason = error.strerror or error
         return cls(f"{doing}{place}: {reason}; no file was left half-written: fix this and run it again")
+
+
+@contextmanager
+def storage_errors(doing: str) -> Iterator[None]:
+    """Translate each ``OSError`` to a ``StorageError``; ``doing`` as of ``StorageError.of``."""
+    try:
+        yield
+    except OSError as error:
+        raise StorageError.of(error, doing) from None
 
 
 def printable(text: str | PathLike[str]) -> str:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 from enclave_common.files import read_bytes
 from keystore.disk.store import Content, Link
-from keystore.errors import DamagedKeystoreError, StorageError, printable
+from keystore.errors import DamagedKeystoreError, printable, storage_errors
 
 MAX_ARCHIVE = 256_000_000
 """Bytes; some 20 000 enclaves."""
@@ -43,10 +43,8 @@ def archive_bytes(files: Mapping[str, Content | Link], *, compressed: bool = Fal
 
 def read_bundle(bundle: Path) -> dict[str, bytes]:
     """Return what ``read_archive`` returns, from a file. Raises StorageError, too."""
-    try:
+    with storage_errors("reading the bundle"):
         content = read_bytes(bundle, MAX_ARCHIVE)
-    except OSError as error:
-        raise StorageError.of(error, "reading the bundle") from None
     return read_archive(content, printable(bundle))
 
 

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from keystore.disk import layout, safe_files
 from keystore.disk.store import Content
-from keystore.errors import StorageError
+from keystore.errors import storage_errors
 from keystore.formats.enclave_name import from_flat_name
 
 
@@ -46,10 +46,8 @@ def container_owner(root: Path) -> ContainerUser | None:
 def give_to(root: Path, owner: ContainerUser) -> None:
     """Give the keys among the copies to ``owner``. Raises StorageError if this user may not."""
     for key in root.glob(f"{layout.CONTAINERS}/*/{layout.KEY}"):
-        try:
+        with storage_errors(f"giving keys to {owner.uid}:{owner.gid}"):
             os.chown(key, owner.uid, owner.gid, follow_symlinks=False)
-        except OSError as error:
-            raise StorageError.of(error, f"giving keys to {owner.uid}:{owner.gid}") from None
 
 
 def differing_copies(root: Path) -> Iterator[tuple[str, str]]:

@@ -18,7 +18,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from keystore.disk import layout
-from keystore.errors import KeystoreBusyError, StorageError, UnsafeKeystoreError, printable
+from keystore.errors import KeystoreBusyError, StorageError, UnsafeKeystoreError, printable, storage_errors
 from keystore.formats.validity import iso, utc_now
 
 DEFAULT_TIMEOUT = 30.0
@@ -41,10 +41,8 @@ def exclusive(root: Path, timeout: float = DEFAULT_TIMEOUT) -> Iterator[None]:
 def _locked(root: Path, timeout: float, deadline: float) -> int | None:
     """Return the locked descriptor; None if the file was removed or replaced meanwhile, so that others lock it."""
     path = root / layout.LOCK
-    try:
+    with storage_errors("locking the keystore"):
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
-    except OSError as error:
-        raise StorageError.of(error, "locking the keystore") from None
     try:
         _refuse_strange(path, os.fstat(descriptor))
         _wait(descriptor, root, timeout, deadline)

@@ -27,7 +27,7 @@ from pathlib import Path
 from keystore.disk import layout, lock, safe_files
 from keystore.disk.register_file import read_register
 from keystore.disk.view import KeystoreView
-from keystore.errors import StorageError
+from keystore.errors import StorageError, storage_errors
 from keystore.formats.register import Register, register_json
 
 PUBLIC_MODE, PRIVATE_MODE = 0o644, 0o600
@@ -112,14 +112,12 @@ class Store:
 
     def set_mode(self, relative: str, mode: int) -> None:
         """Repair the mode of an existing file or directory, never through a link."""
-        try:
+        with storage_errors("changing the mode of"):
             descriptor = os.open(self.root / relative, os.O_RDONLY | os.O_NOFOLLOW | os.O_CLOEXEC)
             try:
                 os.fchmod(descriptor, mode)
             finally:
                 os.close(descriptor)
-        except OSError as error:
-            raise StorageError.of(error, "changing the mode of") from None
 
     def remove(self, relative: str) -> None:
         """Remove a file or link if it is there."""
@@ -252,11 +250,9 @@ def opened(root: Path, *, timeout: float = lock.DEFAULT_TIMEOUT, durable: bool =
     Raises KeystoreBusyError, UnsafeKeystoreError (its directory or the one above is open to others) or StorageError.
     ``durable`` False skips every fsync: for tests and for keystores that can be thrown away.
     """
-    try:
+    with storage_errors("opening the keystore"):
         safe_files.refuse_unsafe_parent(root)
         safe_files.refuse_unsafe_directory(root)
-    except OSError as error:
-        raise StorageError.of(error, "opening the keystore") from None
     with lock.exclusive(root, timeout):
         store = Store(root, durable)
         _clear_staging(root)
@@ -286,13 +282,11 @@ def _directory_mode(relative: str) -> int:
 
 def _clear_staging(root: Path) -> None:
     staging = root / layout.STAGING
-    try:
+    with storage_errors("clearing what an interrupted run left in"):
         if os.path.islink(staging):
             os.unlink(staging)
         elif staging.exists():
             shutil.rmtree(staging)
-    except OSError as error:
-        raise StorageError.of(error, "clearing what an interrupted run left in") from None
 
 
 def _try_link(target: str, place: str) -> bool:

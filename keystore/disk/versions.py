@@ -20,7 +20,7 @@ from pathlib import Path
 from keystore.disk import layout, lock, safe_files
 from keystore.disk.archive import parents
 from keystore.disk.store import Content, Link, create_root
-from keystore.errors import NotAKeystoreError, StorageError, printable
+from keystore.errors import NotAKeystoreError, printable, storage_errors
 
 PENDING = "pending"
 _STAGING = ".staging"
@@ -62,10 +62,8 @@ class Versions:
     def stage(self, entries: Mapping[str, Content | Link]) -> Path:
         """Write a version aside and return its place, for ``switch``. Raises StorageError."""
         staging = self.folder / _STAGING
-        try:
+        with storage_errors("writing the bundle's files"):
             write_tree(staging, entries)
-        except OSError as error:
-            raise StorageError.of(error, "writing the bundle's files") from None
         return staging
 
     def switch(self, number: int) -> None:
@@ -74,7 +72,7 @@ class Versions:
         Beside a version with this number, which is being restored, the new one is ``NUMBER.1`` and so on.
         """
         link = self.folder / f"{_STAGING}.link"
-        try:
+        with storage_errors("putting the bundle in force"):
             _sync_tree(self.folder / _STAGING)
             name, repeat = str(number), 0
             while os.path.lexists(self.folder / name):
@@ -86,8 +84,6 @@ class Versions:
             os.rename(link, self.root)
             _sync(self.root.parent)
             self._clear()
-        except OSError as error:
-            raise StorageError.of(error, "putting the bundle in force") from None
 
     def discard(self) -> None:
         """Delete what was staged."""

@@ -22,6 +22,7 @@ from keystore.errors import (
     SigningUnavailableError,
     StorageError,
     printable,
+    storage_errors,
 )
 from keystore.formats.certificate import CertificateFacts, read_certificate, read_certificates
 from keystore.formats.enclave_name import validate_enclave_name
@@ -187,10 +188,8 @@ class KeystoreView:
     def enclaves(self) -> list[str]:
         """Return the names of all enclaves (directories with a key or a certificate), sorted; follows no links."""
         found: list[str] = []
-        try:
+        with storage_errors("reading the keystore"):
             _collect(self.root / layout.ENCLAVES, "", found)
-        except OSError as error:
-            raise StorageError.of(error, "reading the keystore") from None
         return sorted(found)
 
 

@@ -15,7 +15,7 @@ from keystore.disk.archive import archive_bytes
 from keystore.disk.store import Content, Link
 from keystore.disk.versions import write_new, write_tree, written_aside
 from keystore.disk.view import KeystoreView, keystore_at
-from keystore.errors import DamagedKeystoreError, InvalidInputError, StorageError, printable
+from keystore.errors import DamagedKeystoreError, InvalidInputError, printable, storage_errors
 from keystore.formats.validity import utc_now
 from keystore.verification import Finding, Severity, verify
 
@@ -55,10 +55,8 @@ def export(
         raise InvalidInputError(f"{printable(target)} exists already; choose a new name or remove it")
     if Path(os.path.realpath(target)).is_relative_to(view.root):
         raise InvalidInputError(f"{printable(target)} lies in the keystore; choose another place")
-    try:
+    with storage_errors("writing the bundle"):
         _write(target, files)
-    except OSError as error:
-        raise StorageError.of(error, "writing the bundle") from None
     return tuple(names)
 
 

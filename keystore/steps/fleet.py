@@ -20,7 +20,7 @@ from keystore.disk.register_file import read_register
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.signed_documents import own_permissions_cas
 from keystore.disk.view import KeystoreView, keystore_at
-from keystore.errors import InvalidInputError, KeystoreError, StorageError, printable
+from keystore.errors import InvalidInputError, KeystoreError, printable, storage_errors
 from keystore.formats.bundle import Manifest, parse_manifest
 from keystore.formats.certificate import CertificateFacts
 from keystore.formats.register import Register
@@ -112,10 +112,8 @@ def _sources(places: Iterable[Path | str]) -> Iterator[Path]:
         if place.is_file() or (place / layout.BUNDLE).is_file():
             yield place
             continue
-        try:
+        with storage_errors("looking for bundles in"):
             entries = sorted(os.scandir(place), key=lambda entry: entry.name)
-        except OSError as error:
-            raise StorageError.of(error, "looking for bundles in") from None
         for entry in entries:
             if entry.name.endswith(SUFFIX) or os.path.isfile(f"{entry.path}/{layout.BUNDLE}"):
                 yield Path(entry.path)

@@ -18,7 +18,7 @@ from keystore.disk.register_file import read_register
 from keystore.disk.store import Content, Store
 from keystore.disk.versions import write_new, written_aside
 from keystore.disk.view import KeystoreView, keystore_at
-from keystore.errors import InvalidInputError, StorageError, printable
+from keystore.errors import InvalidInputError, printable, storage_errors
 from keystore.formats.bundle import BundledEnclave, Manifest, manifest_json, parse_manifest, pin
 from keystore.formats.certificate import read_certificate
 from keystore.formats.hosts import Hosts, refuse_host_name
@@ -210,12 +210,10 @@ def _write(output: Path, host: str, content: bytes, root: Path) -> Path:
     target = output / f"{host}{SUFFIX}"
     if Path(os.path.realpath(output)).is_relative_to(root):
         raise InvalidInputError(f"{printable(output)} lies in the keystore; choose another place")
-    try:
+    with storage_errors("writing the bundle"):
         output.mkdir(parents=True, exist_ok=True)
         with written_aside(target) as aside:
             write_new(aside, content, store.PRIVATE_MODE)
-    except OSError as error:
-        raise StorageError.of(error, "writing the bundle") from None
     return target
 
 

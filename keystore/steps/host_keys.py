@@ -28,6 +28,7 @@ from keystore.errors import (
     StorageError,
     UnsafeKeystoreError,
     printable,
+    storage_errors,
 )
 from keystore.formats.bundle import BundledEnclave
 from keystore.formats.certificate import read_certificate
@@ -99,13 +100,11 @@ def _request(pending: Path, enclave: str, options: RequestOptions) -> Request:
         pem = new_request(common_name(enclave), signer)
         aside = pending / f".{place.name}"
         shutil.rmtree(aside, ignore_errors=True)
-        try:
+        with storage_errors("writing the request"):
             os.mkdir(aside, 0o700)
             write_new(aside / key.name, key.data, store.PRIVATE_MODE)
             write_new(aside / layout.REQUEST, pem, store.PUBLIC_MODE)
             os.rename(aside, place)
-        except OSError as error:
-            raise StorageError.of(error, "writing the request") from None
     pem = safe_files.read(place, layout.REQUEST)
     return Request(enclave, fingerprint(request_key(pem, f"the request of {enclave}").spki), pem)
 

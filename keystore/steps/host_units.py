@@ -7,7 +7,6 @@ import shutil
 import subprocess
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import NamedTuple
@@ -15,7 +14,7 @@ from typing import NamedTuple
 from enclave_common.terminal import printable as printable_line
 from keystore.disk.units import Unit, in_restart_order, parse_unit
 from keystore.disk.versions import write_new, written_aside
-from keystore.errors import InvalidInputError, StorageError, printable
+from keystore.errors import InvalidInputError, StorageError, printable, storage_errors
 from keystore.formats.bundle import Manifest
 
 UNITS = Path("/etc/systemd/system")
@@ -113,7 +112,7 @@ def install(folder: Path, options: UnitOptions | None = None) -> Installed:
     if removed:
         _systemctl("stop", *removed)
     parameters = chosen.parameters / target.removesuffix(".target") / "parameters"
-    with _storage("installing units"):
+    with storage_errors("installing units"):
         stale = _install_parameters(folder / "parameters", parameters)
         for name in changed:
             _replace(chosen.units / name, brought[name])
@@ -133,7 +132,7 @@ def uninstall(name: str, options: UnitOptions | None = None) -> Installed:
         raise InvalidInputError(f"no target {printable(target)} of ours is installed in {chosen.units}")
     _systemctl("disable", target)
     _systemctl("stop", *names)
-    with _storage("removing units"):
+    with storage_errors("removing units"):
         for one in names:
             (chosen.units / one).unlink()
         shutil.rmtree(chosen.parameters / target.removesuffix(".target") / "parameters", ignore_errors=True)
@@ -203,20 +202,12 @@ def differences(units: Iterable[Unit], manifest: Manifest) -> Iterator[str]:
             yield f"no unit of this host runs enclave {enclave}"
 
 
-@contextmanager
-def _storage(doing: str) -> Iterator[None]:
-    try:
-        yield
-    except OSError as error:
-        raise StorageError.of(error, doing) from None
-
-
 def _target_names(unit: Unit) -> tuple[str, str]:
     return unit.target, unit.target.removesuffix(".target")
 
 
 def _generated(folder: Path) -> Iterator[tuple[Unit, str]]:
-    with _storage("looking for units in"):
+    with storage_errors("looking for units in"):
         for path in sorted(folder.iterdir()):
             if path.suffix in _SUFFIXES and path.is_file() and not path.is_symlink():
                 text = path.read_text(encoding="utf-8", errors="replace")
@@ -288,10 +279,8 @@ def _described(name: str, state: dict[str, str]) -> str:
 def _systemctl(
     *words: str, may_fail: bool = False, timeout: float | None = None
 ) -> subprocess.CompletedProcess[str]:
-    try:
+    with storage_errors("running systemctl"):
         done = subprocess.run(["systemctl", *words], capture_output=True, text=True, timeout=timeout)
-    except OSError as error:
-        raise StorageError.of(error, "running systemctl") from None
     if done.returncode != 0 and not may_fail:
         raise StorageError(f"systemctl {' '.join(words)} failed: {printable_line(done.stderr.strip())}")
     return done

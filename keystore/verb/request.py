@@ -12,7 +12,7 @@ from pathlib import Path
 
 from enclave_common.command_line import PATH, TEXT
 from enclave_common.files import write_bytes
-from keystore.errors import StorageError
+from keystore.errors import storage_errors
 from keystore.steps.host_keys import RequestOptions, request, requests_text
 from keystore.verb import common
 
@@ -41,7 +41,5 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _write(output: Path, text: bytes) -> None:
-    try:
+    with storage_errors("writing the requests"):
         write_bytes(output, text)
-    except OSError as error:
-        raise StorageError.of(error, "writing the requests") from None

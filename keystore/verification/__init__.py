@@ -13,7 +13,7 @@ from keystore.disk import layout
 from keystore.disk.crl_file import revoked_serials
 from keystore.disk.deployed import find_differences
 from keystore.disk.view import KeystoreView, keystore_at
-from keystore.errors import KeystoreError, NotInstalledError, StorageError
+from keystore.errors import KeystoreError, NotInstalledError, storage_errors
 from keystore.formats.governance import Governance
 from keystore.formats.validity import utc_now
 from keystore.signing.ca_access import CaAccess
@@ -57,10 +57,8 @@ def verify(
     """Check everything; raises NotAKeystoreError only when there is nothing to check."""
     view = keystore_at(keystore)
     order = list(Severity)
-    try:
+    with storage_errors("checking the keystore"):
         found = list(_findings(view, access or CaAccess(), now or utc_now(), required or Requirements()))
-    except OSError as error:
-        raise StorageError.of(error, "checking the keystore") from None
     found.sort(key=lambda finding: (order.index(finding.severity), finding.place, finding.code))
     return VerifyReport(view.root, len(view.enclaves()), tuple(found))
 
