@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import os
 import re
-import signal
 import time
 from collections.abc import Awaitable, Callable, Mapping
 from pathlib import Path
@@ -85,15 +84,6 @@ def lived(
     return asyncio.run(main()), story
 
 
-def test_a_clean_end() -> None:
-    outcome, story = lived("true")
-    assert outcome == ProcessEnd(0, requested_to_end=False)
-    assert story.lines == [
-        ("INFO", "process started with pid [PID]"),
-        ("INFO", "process has finished cleanly [pid PID]"),
-    ]
-
-
 def test_a_bad_end() -> None:
     outcome, story = lived("exit 7")
     assert outcome == ProcessEnd(7, requested_to_end=False)
@@ -114,26 +104,6 @@ def test_a_program_that_cannot_be_started() -> None:
 
     assert asyncio.run(main()) == ProcessEnd(None, requested_to_end=False)
     assert story.lines == [("ERROR", "cannot start process: No such file or directory: '/no/such/program'")]
-
-
-def test_respawn_until_the_retries_are_used_up() -> None:
-    outcome, story = lived("exit 1", LifeRules(respawn=True, max_retries=2))
-    assert story.exits == [1, 1, 1]
-    assert len(set(story.pids)) == 3
-    assert outcome == ProcessEnd(1, requested_to_end=False)
-
-
-def test_respawn_under_kill_9_until_requested_to_end() -> None:
-    async def steps(process: SupervisedProcess, story: Story) -> None:
-        for count in range(1, 6):
-            await story.until(lambda count=count: len(story.pids) == count)  # type: ignore[misc]
-            os.kill(story.pids[-1], signal.SIGKILL)
-        await story.until(lambda: len(story.pids) == 6)
-        process.end(QUICK)
-
-    outcome, story = lived("exec sleep 60", LifeRules(respawn=True), steps)
-    assert story.exits == [-9] * 5 + [-2]
-    assert outcome.requested_to_end
 
 
 def test_the_delay_before_a_respawn_is_kept_and_cut_short_by_the_end() -> None:
