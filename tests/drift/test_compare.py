@@ -306,18 +306,14 @@ def test_what_the_observer_cannot_see_is_neither_missing_nor_as_planned() -> Non
     assert Kind.MISSING_NODE not in {each.kind for each in findings}
 
 
-def test_an_observer_without_an_enclave_cannot_tell_about_a_secured_system() -> None:
+@pytest.mark.parametrize(("authenticated", "remedy"), [(False, "--enclave"), (True, "not trusted")])
+def test_an_observer_without_an_enclave_that_is_trusted_cannot_tell_about_a_secured_system(
+    authenticated: bool, remedy: str
+) -> None:
     made = Made()
     made.participant(1, prefix=f"{HASH:012x}")
-    (finding,) = found(TALKER, made.graph(), security=SECURITY._replace(authenticated=False))
-    assert finding.kind is Kind.OUT_OF_SIGHT and "--enclave" in finding.remedy
-
-
-def test_an_observer_that_is_not_trusted_cannot_tell() -> None:
-    made = Made()
-    made.participant(1, prefix=f"{HASH:012x}")
-    (finding,) = found(TALKER, made.graph(), security=SECURITY)
-    assert finding.kind is Kind.OUT_OF_SIGHT and "not trusted" in finding.remedy
+    (finding,) = found(TALKER, made.graph(), security=SECURITY._replace(authenticated=authenticated))
+    assert finding.kind is Kind.OUT_OF_SIGHT and remedy in finding.remedy
 
 
 def test_a_planned_node_in_a_process_that_the_launch_did_not_start_is_found() -> None:

@@ -165,25 +165,24 @@ def test_a_closed_output_is_no_traceback(command: str) -> None:
     assert (ran.returncode, ran.stderr) == (0, "")
 
 
-@pytest.mark.parametrize("module", ["argparse", "yaml"])
-def test_ctrl_c_during_the_imports_of_an_installed_command_is_one_line(tmp_path: Path, module: str) -> None:
+_SECURE_NODL = "from enclave_common.entry import secure_nodl; raise SystemExit(secure_nodl())"
+
+
+@pytest.mark.parametrize(
+    ("command", "module", "words"),
+    [
+        ("secure-nodl", "argparse", ["-c", _SECURE_NODL]),
+        ("secure-nodl", "yaml", ["-c", _SECURE_NODL]),
+        ("secure-launch", "yaml", ["-m", "enclave_launch", "--help"]),
+    ],
+)
+def test_ctrl_c_during_the_imports_is_one_line(
+    command: str, module: str, words: list[str], tmp_path: Path
+) -> None:
     (tmp_path / f"{module}.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGINT)\n")
     path = os.pathsep.join([str(tmp_path), str(Path(__file__).parents[2])])
+    environment = {**os.environ, "PYTHONPATH": path}
     ran = subprocess.run(
-        [sys.executable, "-c", "from enclave_common.entry import secure_nodl; raise SystemExit(secure_nodl())"],
-        env={**os.environ, "PYTHONPATH": path}, capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert (ran.returncode, ran.stderr) == (130, "secure-nodl: interrupted\n")
-
-
-def test_ctrl_c_during_the_imports_is_one_line(tmp_path: Path) -> None:
-    (tmp_path / "yaml.py").write_text("import os, signal\nos.kill(os.getpid(), signal.SIGINT)\n")
-    path = os.pathsep.join([str(tmp_path), str(Path(__file__).parents[2])])
-    ran = subprocess.run(
-        [sys.executable, "-m", "enclave_launch", "--help"],
-        env={**os.environ, "PYTHONPATH": path},
-        capture_output=True,
-        text=True,
-        check=False,
+        [sys.executable, *words], env=environment, capture_output=True, text=True, check=False
     )
-    assert (ran.returncode, ran.stderr) == (130, "secure-launch: interrupted\n")
+    assert (ran.returncode, ran.stderr) == (130, f"{command}: interrupted\n")
