@@ -157,3 +157,27 @@ def _enclave(row: list[Any]) -> BundledEnclave:
     return BundledEnclave(
         validate_enclave_name(name), int(serial, 16), str(key), str(document), *dates, bool(has_key)
     )
+
+
+_HANDOVER = "enclave-launch handover"
+
+
+def handover_json(authorities: Mapping[Role, tuple[str, ...]]) -> bytes:
+    """Return what a permissions CA signs before it is replaced, for each later bundle: the CAs to trust then, by the
+    SHA-256 of their certificates."""
+    named = {role.value: list(authorities[role]) for role in Role}
+    return (
+        json.dumps({"type": _HANDOVER, "version": 1, "authorities": named}, indent=1, sort_keys=True).encode()
+        + b"\n"
+    )
+
+
+def parse_handover(text: bytes, place: str) -> dict[Role, frozenset[str]]:
+    """Return the CAs that a handover names, by role. Raises DamagedKeystoreError."""
+    try:
+        content: Any = json.loads(text)
+        if content["type"] == _HANDOVER and content["version"] == 1:
+            return {role: frozenset(map(str, content["authorities"][role.value])) for role in Role}
+    except (ValueError, KeyError, TypeError, RecursionError):
+        pass
+    raise DamagedKeystoreError(f"{place} does not name the CAs that follow")

@@ -35,10 +35,9 @@ from keystore.errors import (
     UnsafeKeystoreError,
     printable,
 )
-from keystore.formats.bundle import BundledEnclave, Manifest, parse_manifest, pins_of
+from keystore.formats.bundle import BundledEnclave, Manifest, parse_handover, parse_manifest, pins_of
 from keystore.formats.certificate import read_certificates
 from keystore.formats.governance import parse_governance
-from keystore.formats.handover import parse_handover
 from keystore.formats.role import Role
 from keystore.formats.validity import utc_now
 from keystore.signing import smime

@@ -25,8 +25,8 @@ from keystore.disk.signed_documents import governance_stands
 from keystore.disk.store import Content, Store, refresh_copies
 from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import DamagedKeystoreError, InvalidInputError
+from keystore.formats.bundle import handover_json
 from keystore.formats.certificate import read_certificate
-from keystore.formats.handover import handover_json
 from keystore.formats.register import AuthorityState
 from keystore.formats.role import Role
 from keystore.formats.tool_needs import is_tool_enclave
