@@ -82,7 +82,15 @@ def _default(value: Value) -> Value:
     return BOTTOM if typed else value
 
 
-@node_method("get_parameter", "get_parameter_or", "get_parameter_value")
+@node_method("get_parameter_or")
+def _get_or(run: Machine, call: Call) -> Value:
+    """Model both forms: (name, alternative) gives the value, (name, variable, alternative) writes it."""
+    if len(call.values) == 2:
+        return read(run, call.record, call.value(0), call.value(1))
+    return _get(run, call)
+
+
+@node_method("get_parameter", "get_parameter_value")
 def _get(run: Machine, call: Call) -> Value:
     found = read(run, call.record, call.value(0), call.value(2))
     if len(call.values) < 2:

@@ -96,10 +96,18 @@ def run_meanwhile(run: Machine, frame: Frame) -> None:
 
 
 def _changes_one_of(run: Machine, names: frozenset[str], atom: object) -> bool:
-    if not isinstance(atom, Lambda | Bound):
-        return False
-    written = _effects(run, atom).written
-    return not names.isdisjoint(written.assigned | written.changed)
+    written = (_effects(run, each).written for each in _with_held(run, atom))
+    return any(not names.isdisjoint(each.assigned | each.changed) for each in written)
+
+
+def _with_held(run: Machine, atom: object) -> list[Lambda | Bound]:
+    """Return a callback and the functions in variables that it mentions, and those that these mention."""
+    found = [atom] if isinstance(atom, Lambda | Bound) else []
+    for each in found:
+        for name in sorted(run.store.callable_names & _effects(run, each).words):
+            held = (value for cell in run.store.named(name) for value in run.store.get(cell) or BOTTOM)
+            found += [other for other in held if isinstance(other, Lambda | Bound) and other not in found]
+    return found
 
 
 def _effects(run: Machine, atom: Lambda | Bound) -> CallEffects:
@@ -154,16 +162,17 @@ def _run(run: Machine, atom: object, frame: Frame) -> None:
 
 def _matters(rounds: _Rounds, atom: object) -> bool:
     """Return whether it may make an interface or a node, give one away, or change what a callback has read."""
-    if not isinstance(atom, Lambda | Bound):
-        return False
-    effects = _effects(rounds.run, atom)
-    written = effects.written
-    return (
-        _makes(rounds.run, atom)
-        or effects.leaving.gives_node
-        or effects.leaving.makes_node
-        or not rounds.names_read.isdisjoint(written.assigned | written.changed | written.seen)
-    )
+    for each in _with_held(rounds.run, atom):
+        effects = _effects(rounds.run, each)
+        written = effects.written
+        if (
+            _makes(rounds.run, each)
+            or effects.leaving.gives_node
+            or effects.leaving.makes_node
+            or not rounds.names_read.isdisjoint(written.assigned | written.changed | written.seen)
+        ):
+            return True
+    return False
 
 
 def _makes(run: Machine, atom: object) -> bool:

@@ -8,7 +8,6 @@ to is not known.
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
 
 from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.machine import Frame, Machine
@@ -68,18 +67,6 @@ def _is_fixed(target: Node) -> bool:
         inner = field_of(target, "argument")
         return inner is not None and (inner.type == "this" or _is_fixed(inner))
     return target.type in ("identifier", "qualified_identifier")
-
-
-def elements_written(
-    run: Machine, body: Node | None, names: Sequence[str], subject: Value, frame: Frame
-) -> bool:
-    """Return whether a loop over ``subject`` writes to the plain elements, or letters, that ``names`` stand for."""
-    held: list[object] = [atom for atom in subject if isinstance(atom, Text | Param)]
-    held += [atom for name in names for atom in run.store.get((frame, name)) or BOTTOM]
-    held += [inner for atom in held if isinstance(atom, Group) for item in atom.items[1:] for inner in item]
-    if not any(isinstance(atom, Text | Param | int | float) for atom in held):
-        return False
-    return body is not None and not writes_of(body).isdisjoint(names)
 
 
 def through(run: Machine, what: Node, frame: Frame) -> None:

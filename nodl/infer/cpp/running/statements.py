@@ -9,6 +9,7 @@ from nodl.infer.cpp.libraries import is_harmless_class
 from nodl.infer.cpp.reading.collect import STRUCTURES, declared_names, local_scope
 from nodl.infer.cpp.reading.declarations import type_text
 from nodl.infer.cpp.reading.type_names import Type
+from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.callbacks import run_meanwhile
 from nodl.infer.cpp.running.constructors import declared_value, fields_of
@@ -27,16 +28,18 @@ from nodl.infer.cpp.running.machine import (
     statement,
 )
 from nodl.infer.cpp.running.memory import Changes
-from nodl.infer.cpp.running.references import bind_reference, elements_written, is_plain
+from nodl.infer.cpp.running.references import bind_reference, is_plain
 from nodl.infer.cpp.running.static_types import element_type, seen_type
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     Const,
     Group,
+    Map,
     Obj,
     Seq,
     Text,
     Value,
+    has_text,
     join,
     may_name,
     one_sequence,
@@ -470,14 +473,13 @@ def for_range_loop(run: Machine, node: Node, frame: Frame) -> int:
             own = copied(run, item, node, frame, cls) if by_value else item
             run.local(frame, names[0], own, written)
 
-    outcome = _over(run, body, [partial(bind, item) for item in items], exact, frame)
     is_reference = "&" in text(declarator) and "const" not in text(node).split(":")[0]
-    if (
-        is_reference
-        and right is not None
-        and right.type in _VARIABLES
-        and elements_written(run, body, names, subject, frame)
-    ):
+    may_write = is_reference and body is not None and not writes_of(body).isdisjoint(names)
+    held: Changes | None = {} if may_write else None
+    outcome = _over(run, body, [partial(bind, item) for item in items], exact, frame, held)
+    written = join(*(held.get((frame, name)) or BOTTOM for name in names)) if held else BOTTOM
+    is_plain_one = is_plain(written) or (written != BOTTOM and has_text(subject))  # a letter is not known
+    if right is not None and right.type in _VARIABLES and is_plain_one:
         assign(run, right, unknown("what a loop writes to the elements"), frame)
     return outcome
 
@@ -503,48 +505,64 @@ def _hold_pointers(run: Machine, right: Node | None, frame: Frame) -> bool:
     return element_type(seen_type(run, right, frame)).pointer
 
 
-def _over(run: Machine, body: Node | None, steps: list[Callable[[], None]], exact: bool, frame: Frame) -> int:
-    """Run the body once for each step; in any order and number unless ``exact``."""
+def _over(
+    run: Machine,
+    body: Node | None,
+    steps: list[Callable[[], None]],
+    exact: bool,
+    frame: Frame,
+    held: Changes | None,
+) -> int:
+    """Run the body once for each step; in any order and number unless ``exact``.
+
+    ``held`` gets what variables hold meanwhile that were there before a turn of the body.
+    """
     if not steps and exact:
         run.kill(body, frame, "the loop runs over nothing")
         return NEXT
     loop = Loop(run.store.mark())
     returns, outer_path, outcome = 0, frame.path, NEXT
-    for turn in range(1 if exact else 2):
+    for again in range(1 if exact else 2):
         for index, step in enumerate(steps if outcome & NEXT else ()):
             frame.path = (*outer_path, index)
 
             def once(step: Callable[[], None] = step) -> int:
                 step()
-                return _iteration(run, body, frame, loop)
+                turn = partial(_iteration, run, body, frame, loop)
+                if held is None:
+                    return turn()
+                outcome, found = run.store.held_during(turn)
+                held.update(found)
+                return outcome
 
             outcome = once() if exact else run.branches([once, lambda: NEXT])
             returns |= outcome & RETURN
             if not outcome & NEXT:
                 break
-        if not exact and (not _forget_order(run, loop.start) or turn):
+        if not exact and (not _forget_order(run, body, loop.start) or again):
             break
     frame.path = outer_path
     return returns | _after(run, loop, outcome)
 
 
-def _forget_order(run: Machine, start: int) -> bool:
+def _forget_order(run: Machine, body: Node | None, start: int) -> bool:
     """Make what turns in an order that is not known have changed unknown, and lists have any order.
 
     Returns:
-        Whether a text or number changed: another turn may find it otherwise.
+        Whether another turn may make something else of it.
     """
-    before, found = run.store.before(start), False
+    before, found, kept = run.store.before(start), False, body is not None and run.subtree_matters(body)
     for cell, value in run.store.changes(start).items():
         both = (*before[cell], *value)
         changed = before[cell] != BOTTOM and set(before[cell]) != set(value)
         if changed and any(isinstance(atom, Text | int | float) for atom in both):
-            kept = tuple(atom for atom in both if not isinstance(atom, Text | int | float))
-            run.store.set(cell, join(kept, unknown("a value that a loop in any order changes")))
+            rest = tuple(atom for atom in both if not isinstance(atom, Text | int | float))
+            run.store.set(cell, join(rest, unknown("a value that a loop in any order changes")))
             found = True
-        elif changed and any(isinstance(atom, Seq) for atom in value):
+        elif changed and any(isinstance(atom, Seq | Map | Group) for atom in value):
             run.store.set(cell, one_sequence(value))
-    return found
+            kept = True
+    return found and kept
 
 
 def _after(run: Machine, loop: Loop, outcome: int) -> int:

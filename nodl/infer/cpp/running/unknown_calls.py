@@ -10,10 +10,10 @@ from nodl.infer.cpp.ledger import CREATES
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES, is_harmless_class, is_harmless_function
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.constructors import is_plain_type
-from nodl.infer.cpp.running.contents import handed_over, nodes_in
+from nodl.infer.cpp.running.contents import handed_over, iterated, nodes_in
 from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.references import is_plain, through
-from nodl.infer.cpp.running.standard import INTO_FIRST, called_now
+from nodl.infer.cpp.running.standard import INTO_FIRST, called_now, may_write
 from nodl.infer.cpp.running.static_types import declared_type, element_type, given_to, seen_type
 from nodl.infer.cpp.running.values import (
     BOTTOM,
@@ -175,7 +175,11 @@ def _changed(run: Machine, name: str, target: Node, frame: Frame) -> None:
         return
     before = run.evaluate(target, frame)
     if is_plain(before):
-        if _is_iterator(run, target, frame) or element_type(seen_type(run, target, frame)).pointer:
+        pointers = element_type(seen_type(run, target, frame)).pointer
+        objects = all(isinstance(atom, Obj) for item in iterated(run, before)[0] for atom in item)
+        if pointers and objects and not may_write(name):
+            return  # what they point to was written, where the closure ran
+        if pointers or _is_iterator(run, target, frame):
             through(run, target, frame)
         assign(run, target, join(*(_after(atom, name) for atom in before)), frame)
 
