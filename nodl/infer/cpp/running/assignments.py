@@ -212,7 +212,8 @@ def _through_pointer(run: Machine, pointer: Node, value: Value, frame: Frame) ->
     kind, owner = declared_type(run, pointer, frame)[0], frame.owner_of(text(pointer))
     before = run.evaluate(pointer, frame)
     shared = "shared_ptr" in owner.types.get(text(pointer), "") if owner is not None else False
-    if any(run.methods_of(atom, "operator*") for atom in before) or (shared and is_plain(value)):
+    by_operator = any(run.methods_of(atom, "operator*") for atom in before)
+    if by_operator or REFERRED_TO in before or (shared and is_plain(value)):
         through(run, pointer, frame)
     if points_to_plain(run, pointer, frame, TEXTS) or (
         is_plain(value) and points_to_plain(run, pointer, frame, WHOLE_NUMBERS)
@@ -226,13 +227,13 @@ def _through_pointer(run: Machine, pointer: Node, value: Value, frame: Frame) ->
         and is_pointer(run, pointer, frame)
     ):
         through(run, pointer, frame)  # a member
-    if owner is None or kind.pointer or text(pointer) in owner.aliases:
+    if owner is None or text(pointer) in owner.aliases:
         return
     if owner.function is not None and any(p.name == text(pointer) for p in owner.function.parameters):
         return
     if is_plain(before) and is_plain(value) and set(before) != set(value):
         through(run, pointer, frame)
-    elif not all(isinstance(atom, Obj) for atom in (*before, *value)):
+    elif not kind.pointer and not all(isinstance(atom, Obj) for atom in (*before, *value)):
         _element_written(run, pointer, frame)
 
 

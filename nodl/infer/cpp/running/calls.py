@@ -28,7 +28,7 @@ from nodl.infer.cpp.running.containers import CONTAINER_METHODS, container_call,
 from nodl.infer.cpp.running.contents import handed_over
 from nodl.infer.cpp.running.invocation import CallSite, call_functions, call_values, pointed_to
 from nodl.infer.cpp.running.machine import Frame, Machine, expression
-from nodl.infer.cpp.running.references import is_plain, through
+from nodl.infer.cpp.running.references import REFERRED_TO, is_plain, through
 from nodl.infer.cpp.running.standard import CASTS, STANDARD, as_algorithm, may_write, writes_elements
 from nodl.infer.cpp.running.static_types import (
     GIVES_INNER,
@@ -270,7 +270,7 @@ def method_call(run: Machine, site: CallSite) -> Value:
             found_at = (frame.file.file, site.node.start_byte)
             run.unset[found_at] = (run.place(site.node, frame), text(subject)[:40], name)
         return BOTTOM
-    if name in FILLS and points_to_plain(run, subject, frame, TEXTS):
+    if name in FILLS and (REFERRED_TO in receiver or points_to_plain(run, subject, frame, TEXTS)):
         through(run, subject, frame)
     found: list[Value] = []
     before = run.store.mark()

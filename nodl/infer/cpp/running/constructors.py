@@ -16,6 +16,7 @@ from nodl.infer.cpp.reading.type_names import NO_TYPE, Type
 from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.arithmetic import as_type
 from nodl.infer.cpp.running.contents import copied, elements_copied, handed_over, items_of, takes_another
+from nodl.infer.cpp.running.effects import written_in
 from nodl.infer.cpp.running.foreign import unmodelled
 from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
 from nodl.infer.cpp.running.overloads import candidates
@@ -390,14 +391,18 @@ def _unmodelled(run: Machine, kind: Type, node: Node, frame: Frame, deliberate: 
 
 
 def _check_operators(run: Machine, cls: Class, node: Node, frame: Frame) -> None:
-    """Add a gap for an operator that changes something and whose calls are not followed: conversions, ``,``, and
-    comparisons, from which C++20 derives others."""
+    """Add a gap for what changes something and runs where nobody calls it: conversions, ``,``, comparisons, from which
+    C++20 derives others; destructors, where they write to what a member refers or points to."""
     ancestry = run.names.ancestry(cls)
+    behind = {name for each in ancestry for name, field in each.fields.items() if field.pointer}
     kept = {name for each in ancestry for name in each.fields} | run.names.globals.keys()
     listed = [
         (name, f) for each in ancestry for name, found in run.names.methods[each].items() for f in found
     ]
     for name, method in listed:
+        written = written_in(method) if name.startswith("~") else None
+        if written is not None and not behind.isdisjoint(written.assigned | written.changed):
+            run.gap(node, frame, f"{name} changes what others have: when it runs is not followed")
         if _NOT_FOLLOWED.fullmatch(name) and (run.makes_interfaces(method) or writes_of(method.node) & kept):
             why = f"{name} of {cls.name} changes something: where it runs is not followed"
             run.gap(node, frame, why)

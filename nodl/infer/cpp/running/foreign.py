@@ -66,10 +66,12 @@ class Leaving(NamedTuple):
 def leaving(names: Names, function: Function, part: Node | None = None) -> Leaving:
     """Return how a function, or a part of it, leaves the program."""
     is_node = _may_be_node(names, function)
+    around = names.classes.get(function.owner.rpartition("::")[2], ())
+    templates = {*function.templates, *(each for cls in around for each in cls.templates)}
     gives_node = makes_unknown = makes_node = False
     for each in walk(part if part is not None else function.node):
         written, given = _made(each)
-        if written and written not in function.templates:
+        if written and written not in templates:
             outside, unknown = _class_of(names, written, function, given is not None)
             makes_unknown = makes_unknown or unknown
             makes_node = makes_node or (written.rpartition("::")[2] in _NODES and given is not None)

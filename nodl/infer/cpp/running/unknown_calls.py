@@ -177,7 +177,7 @@ def _changed(run: Machine, name: str, target: Node, frame: Frame) -> None:
     if is_plain(before):
         pointers = element_type(seen_type(run, target, frame)).pointer
         objects = all(isinstance(atom, Obj) for item in iterated(run, before)[0] for atom in item)
-        if pointers and objects and not may_write(name):
+        if pointers and objects and name.startswith("std::") and not may_write(name):
             return  # what they point to was written, where the closure ran
         if pointers or _is_iterator(run, target, frame):
             through(run, target, frame)
