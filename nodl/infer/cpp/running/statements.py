@@ -199,7 +199,8 @@ def condition_of(run: Machine, condition: Node | None, frame: Frame) -> Value:
     )
     if inner is not None and inner.type == "declaration":
         run.execute(inner, frame)
-        named = [each for each in walk(field_of(inner, "declarator")) if each.type == "identifier"]
+        declared = field_of(inner, "declarator") or inner
+        named = [each for each in walk(declared) if each.type == "identifier"]
         return (run.store.get((frame, text(named[0]))) or BOTTOM) if named else BOTTOM
     return run.evaluate(inner, frame)
 
@@ -477,8 +478,8 @@ def for_range_loop(run: Machine, node: Node, frame: Frame) -> int:
     may_write = is_reference and body is not None and not writes_of(body).isdisjoint(names)
     held: Changes | None = {} if may_write else None
     outcome = _over(run, body, [partial(bind, item) for item in items], exact, frame, held)
-    written = join(*(held.get((frame, name)) or BOTTOM for name in names)) if held else BOTTOM
-    is_plain_one = is_plain(written) or (written != BOTTOM and has_text(subject))  # a letter is not known
+    left = join(*(held.get((frame, name)) or BOTTOM for name in names)) if held else BOTTOM
+    is_plain_one = is_plain(left) or (left != BOTTOM and has_text(subject))  # a letter is not known
     if right is not None and right.type in _VARIABLES and is_plain_one:
         assign(run, right, unknown("what a loop writes to the elements"), frame)
     return outcome
