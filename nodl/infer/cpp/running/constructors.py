@@ -16,7 +16,6 @@ from nodl.infer.cpp.reading.type_names import NO_TYPE, Type
 from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.arithmetic import as_type
 from nodl.infer.cpp.running.contents import copied, elements_copied, handed_over, items_of, takes_another
-from nodl.infer.cpp.running.effects import written_in
 from nodl.infer.cpp.running.foreign import unmodelled
 from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
 from nodl.infer.cpp.running.overloads import candidates
@@ -38,7 +37,7 @@ from nodl.infer.cpp.running.values import (
     open_sequence,
     unknown,
 )
-from nodl.infer.cpp.syntax import Node, callee_name, children, field_of, text
+from nodl.infer.cpp.syntax import Node, callee_name, children, field_of, text, walk, words_in
 
 SEQUENCES = frozenset({
     "std::vector", "std::array", "std::list", "std::deque", "std::set", "std::unordered_set", "std::initializer_list",
@@ -394,18 +393,33 @@ def _check_operators(run: Machine, cls: Class, node: Node, frame: Frame) -> None
     """Add a gap for what changes something and runs where nobody calls it: conversions, ``,``, comparisons, from which
     C++20 derives others; destructors, where they write to what a member refers or points to."""
     ancestry = run.names.ancestry(cls)
-    behind = {name for each in ancestry for name, field in each.fields.items() if field.pointer}
     kept = {name for each in ancestry for name in each.fields} | run.names.globals.keys()
     listed = [
         (name, f) for each in ancestry for name, found in run.names.methods[each].items() for f in found
     ]
     for name, method in listed:
-        written = written_in(method) if name.startswith("~") else None
-        if written is not None and not behind.isdisjoint(written.assigned | written.changed):
+        if name.startswith("~") and _writes_elsewhere(ancestry, method):
             run.gap(node, frame, f"{name} changes what others have: when it runs is not followed")
         if _NOT_FOLLOWED.fullmatch(name) and (run.makes_interfaces(method) or writes_of(method.node) & kept):
             why = f"{name} of {cls.name} changes something: where it runs is not followed"
             run.gap(node, frame, why)
+
+
+_WRITES = {"assignment_expression": "left", "update_expression": "argument"}
+
+
+def _writes_elsewhere(ancestry: Sequence[Class], method: Function) -> bool:
+    """Return whether a method writes to what a member of its object refers or points to."""
+    fields = [field for each in ancestry for field in each.fields.values() if field.pointer]
+    references = {each.name for each in fields if "&" in text(each.node)}
+    pointers = {each.name for each in fields} - references
+    for each in walk(method.node):
+        target = field_of(each, _WRITES[each.type]) if each.type in _WRITES else None
+        words = words_in(target) if target is not None else frozenset()
+        behind = words & pointers and text(target).removeprefix("this->") not in pointers
+        if words & references or behind:
+            return True
+    return False
 
 
 _NOT_FOLLOWED = re.compile(r"operator (?!new|delete)\w.*|operator(?:,|&&|\|\||==|<=>)")

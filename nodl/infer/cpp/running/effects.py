@@ -76,9 +76,10 @@ class CallEffects:
         """Return True if all that it does is to change variables."""
         modelled = {name.rpartition("::")[2] for name in LIBRARY_CLASSES} - _PLAIN_VALUES
         modelled -= self._run.names.classes.keys()
+        own = {each for each in self._run.names.functions_by_name if each.startswith("add_")}
         return (
             self.words.isdisjoint(modelled)
-            and not any(map(_BEYOND_VARIABLES.fullmatch, self.words))
+            and not any(map(_BEYOND_VARIABLES.fullmatch, self.words - own))
             and not self._may_init_ros
             and not any(self.leaving)
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -226,20 +227,32 @@ def _one_of_special(run: Machine, functions: Sequence[Function], node: Node, fra
 def _any_of(
     run: Machine, functions: Sequence[Function], call: Callable[[Function], Value], node: Node, frame: Frame
 ) -> Value:
-    """Call one of several overloads, nobody knows which."""
+    """Call one of several overloads, nobody knows which; a gap if they do not make the same."""
     if len(functions) == 1:
         return call(functions[0])
     found: list[Value] = []
+    made: list[Counter[object]] = []
     doubt = f"which of {len(functions)} functions {functions[0].name}() is called is not known"
-    if any(map(run.makes_interfaces, functions)):
-        run.gap(node, frame, doubt)
 
     def once(function: Function) -> int:
+        before = _count(run)
         found.append(call(function))
+        made.append(_count(run) - before)
         return NEXT
 
     run.branches([partial(once, each) for each in functions], doubt=doubt)
+    if any(each.keys() != made[0].keys() for each in made):
+        run.gap(node, frame, doubt)
     return join_in_doubt(found, doubt)
+
+
+def _count(run: Machine) -> Counter[object]:
+    """Count how often each interface was made so far, and the nodes."""
+    made = Counter[object](run.nodes.values())
+    for record in run.nodes.values():
+        for each, times in record.endpoints.items():
+            made[record, each.kind, each.name, each.type] += len(times)
+    return made
 
 
 def call_methods(
