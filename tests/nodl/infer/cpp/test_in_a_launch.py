@@ -250,3 +250,26 @@ def test_a_parameter_decides_what_a_launch_makes(tmp_path: Path) -> None:
             "/spare",
             "/beside",
         }
+
+
+IN_A_NAMESPACE = HEAD + (
+    'class Arm : public rclcpp::Node { public: Arm() : Node("n", "arm") {'
+    'create_publisher<std_msgs::msg::Bool>(std::string(get_namespace()) + "/own", 1);'
+    'if (std::string(get_namespace()) == "/arm") { create_publisher<std_msgs::msg::Bool>("/in_arm", 1); } } };\n'
+    "int main(int argc, char ** argv) { rclcpp::init(argc, argv); rclcpp::spin(std::make_shared<Arm>()); }\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("namespace", "made", "not_made"),
+    [("", ("/arm/own", "/in_arm"), "/own"), ('namespace="left"', ("/left/own",), "/in_arm")],
+    ids=["of the code", "of the launch"],
+)
+def test_a_node_says_the_namespace_that_the_launch_or_else_the_code_gives(
+    namespace: str, made: tuple[str, ...], not_made: str, tmp_path: Path
+) -> None:
+    package(tmp_path / "src/demo", {"src/arm.cpp": IN_A_NAMESPACE}, "add_executable(filter_node src/arm.cpp)")
+    install(tmp_path)
+    planned = plan(tmp_path, f'<launch><node pkg="demo" exec="filter_node" {namespace}/></launch>')
+    assert all(may(planned, name) for name in made)
+    assert not may(planned, not_made)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.nodl.infer.cpp.workspace import HEAD, in_class, infer, names
+from tests.nodl.infer.cpp.workspace import HEAD, gaps, in_class, infer, names
 
 pytest.importorskip("tree_sitter_cpp", reason="the extra cpp is not installed")
 
@@ -121,3 +121,11 @@ class App : public rclcpp::Node {{ public: App() : Node("n") {{
 int main(int argc, char ** argv) {{ rclcpp::init(argc, argv); std::make_shared<App>()->go(); }}
 """
     assert set(made) <= set(names(infer(tmp_path, source)))
+
+
+def test_a_callback_runs_that_calls_a_function_kept_in_a_variable(tmp_path: Path) -> None:
+    driver = "struct Driver { std::function<void()> made; void poll() { made(); } };\n"
+    made = f'd_.made = [this] {{ create_publisher<{S}>("late", 1); }};'
+    use = f"{made} t_ = create_wall_timer(1s, [this] {{ d_.poll(); }});"
+    system = infer(tmp_path, in_class(use, "Driver d_; rclcpp::TimerBase::SharedPtr t_;", driver))
+    assert (names(system), gaps(system)) == (["late"], [])

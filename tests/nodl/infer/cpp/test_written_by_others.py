@@ -208,3 +208,36 @@ def test_the_order_of_an_unordered_container_is_not_known(
     body = f"{entries} for (auto & [k, v] : m) {{ {turn} }} create_publisher<{S}>({name}, 1);"
     pub = f"void pub(const std::string & t) {{ create_publisher<{S}>(t, 1); }}"
     assert names(infer(tmp_path, in_class(body, pub))) == made
+
+
+LOOPS = {
+    "that gives them to its own code": ("look(t);", ["a", "b"]),
+    "that gives them to a class of its own": ("kept_.push_back(std::make_shared<Keep>(t));", ["a", "b"]),
+    "that writes to them": ('t += "_x";', ["?"]),
+    "that writes to them and ends": ('if (t == given) { t = "c"; break; }', ["?"]),
+}
+
+
+@pytest.mark.parametrize(("turn", "made"), LOOPS.values(), ids=LOOPS)
+def test_a_loop_writes_to_its_elements_where_it_does(turn: str, made: list[str], tmp_path: Path) -> None:
+    before = "struct Keep { std::string t; explicit Keep(const std::string & s) : t(s) {} };\n"
+    before += "void look(const std::string &) {}\n"
+    members = 'std::vector<std::string> all_{"a", "b"}; std::vector<std::shared_ptr<Keep>> kept_;'
+    body = f'auto given = std::string(getenv("X")); for (auto & t : all_) {{ {turn} }}'
+    use = f"{body} for (const auto & t : all_) {{ create_publisher<{S}>(t, 1); }}"
+    assert names(infer(tmp_path, in_class(use, members, before))) == made
+
+
+DESTROYED = {
+    "writes to what it refers to": ("s += 1;", ["~G changes what others have: when it runs is not followed"]),
+    "sets its own pointer": ("p = nullptr;", []),
+    "writes to its own member": ("own = 1;", []),
+}
+
+
+@pytest.mark.parametrize(("body", "told"), DESTROYED.values(), ids=DESTROYED)
+def test_a_destructor_that_changes_what_others_have_is_told(
+    body: str, told: list[str], tmp_path: Path
+) -> None:
+    before = f"struct G {{ int & s; int * p = nullptr; int own = 0; ~G() {{ {body} }} }};\n"
+    assert gaps(infer(tmp_path, in_class("int n = 0; { G g{n}; }", before=before))) == told
