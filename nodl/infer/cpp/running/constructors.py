@@ -177,10 +177,16 @@ def _sequence(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame
     """Make a list: in braces its elements; in parentheses a copy, a part of another one, or so many equal elements."""
     inner = kind.arguments[0] if kind.arguments else NO_TYPE
     cls = run.held_class(inner, frame)
+    if kind.name == "std::array" and [each.type for each in given] == ["initializer_list"]:
+        within = children(given[0])  # the braces of the array that std::array holds
+        if cls is None or any(each.type == "initializer_list" for each in within):
+            given = within
     items = [
         made(run, each, inner, children(each), frame)
-        if cls is not None and each.type == "initializer_list"
+        if (cls is not None or inner.name in SEQUENCES) and each.type == "initializer_list"
         else run.evaluate(each, frame)
+        if inner.pointer and (inner.name == "char" or each.type.endswith("literal"))
+        else as_referred_to(run.evaluate(each, frame))
         if inner.pointer
         else copied(run, run.evaluate(each, frame), each, frame, cls)
         for each in given

@@ -28,7 +28,7 @@ from nodl.infer.cpp.running.machine import (
     statement,
 )
 from nodl.infer.cpp.running.memory import Changes
-from nodl.infer.cpp.running.references import bind_reference, is_plain
+from nodl.infer.cpp.running.references import REFERRED_TO, bind_reference, is_plain, through
 from nodl.infer.cpp.running.static_types import element_type, seen_type
 from nodl.infer.cpp.running.values import (
     BOTTOM,
@@ -479,6 +479,8 @@ def for_range_loop(run: Machine, node: Node, frame: Frame) -> int:
     held: Changes | None = {} if may_write else None
     outcome = _over(run, body, [partial(bind, item) for item in items], exact, frame, held)
     left = join(*(held.get((frame, name)) or BOTTOM for name in names)) if held else BOTTOM
+    if left and right is not None and any(REFERRED_TO in item for item in items):
+        through(run, right, frame)
     is_plain_one = is_plain(left) or (left != BOTTOM and has_text(subject))  # a letter is not known
     if right is not None and right.type in _VARIABLES and is_plain_one:
         assign(run, right, unknown("what a loop writes to the elements"), frame)

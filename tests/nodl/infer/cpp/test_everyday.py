@@ -609,3 +609,20 @@ def test_a_loader_in_a_template_loads_the_plugins_that_the_program_names(tmp_pat
     cmake = "add_library(p src/speaker.cpp)\npluginlib_export_plugin_description_file(p plugins.xml)"
     package(tmp_path / "p", files, cmake)
     assert endpoints(infer_paths([tmp_path])) == {("publisher", "a")}
+
+
+BRACES = {
+    "of structures": ('std::array<E, 2> all{{{"a", 1}, {"b", 2}}};', "e.t", ["a", "b"]),
+    "of texts": ('std::array<std::string, 2> all{{"a", "b"}};', "e", ["a", "b"]),
+    "of texts, the inner ones left out": ('std::array<std::string, 2> all{"a", "b"};', "e", ["a", "b"]),
+    "of one structure": ('std::array<E, 1> all{E{"a", 1}};', "e.t", ["a"]),
+}
+
+
+@pytest.mark.parametrize(("made", "name", "expected"), BRACES.values(), ids=BRACES)
+def test_the_inner_braces_of_an_array_hold_its_elements(
+    made: str, name: str, expected: list[str], tmp_path: Path
+) -> None:
+    use = f"{made} for (const auto & e : all) {{ create_publisher<std_msgs::msg::String>({name}, 1); }}"
+    before = "struct E { std::string t; int n; };\n"
+    assert names(infer(tmp_path, in_class(use, before=before))) == expected

@@ -228,6 +228,23 @@ def test_a_loop_writes_to_its_elements_where_it_does(turn: str, made: list[str],
     assert names(infer(tmp_path, in_class(use, members, before))) == made
 
 
+THROUGH_A_LIST = {
+    "of pointers": 'std::vector<std::string *> v{&t}; for (auto p : v) { *p += "_x"; }',
+    "of pointers, by a method": 'std::vector<std::string *> v{&t}; for (auto p : v) { p->append("_x"); }',
+    "of references": 'std::vector<std::reference_wrapper<std::string>> v{t}; for (std::string & r : v) { r += "_x"; }',
+}
+
+
+@pytest.mark.parametrize("body", THROUGH_A_LIST.values(), ids=THROUGH_A_LIST)
+def test_what_is_written_through_a_list_of_pointers_is_told(body: str, tmp_path: Path) -> None:
+    use = f'std::string t = "a"; {body} create_publisher<{S}>(t, 1);'
+    assert any("refers to is written" in each for each in gaps(infer(tmp_path, in_class(use))))
+    only_read = (
+        use.replace("*p += ", "look(*p) + ").replace("append", "compare").replace("r += ", "look(r) + ")
+    )
+    assert gaps(infer(tmp_path / "read", in_class(only_read))) == []
+
+
 DESTROYED = {
     "writes to what it refers to": ("s += 1;", ["~G changes what others have: when it runs is not followed"]),
     "sets its own pointer": ("p = nullptr;", []),
