@@ -1,4 +1,4 @@
-"""Interfaces from source, where no manifest tells them: abstract interpretation of ROS 2 nodes.
+"""Interfaces from source, where no manifest has them: abstract interpretation of ROS 2 nodes.
 
 Nothing of an analysed program is executed. ``infer_paths`` looks at files and folders, ``infer_executable``
 at what launch starts as ``lib/<package>/<executable>``. What could not be found out is returned as gaps.

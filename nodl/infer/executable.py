@@ -44,7 +44,7 @@ def infer_executable(
     """Return the nodes that ``executable`` of an installed package creates; gaps are attached to them.
 
     Compiled programs and components are read from ``sources``; all under what launch gives them (``start_of``).
-    ``compiled_only``: programs in Python, which are read anew each time, are left alone.
+    ``compiled_only``: programs in Python, which are read again each time, are left alone.
     """
     if executable is None:
         return _compiled(package, None, plugin, sources, start_of, f"component {plugin} is compiled code")

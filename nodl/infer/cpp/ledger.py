@@ -268,7 +268,7 @@ class Reach:
         self.used: set[str] = set()
         self.reached: set[Function] = set()
         self.waiting: list[Function] = []
-        self.idle: dict[str, list[Function]] = {}  # class -> methods that wait for somebody to speak of it
+        self.idle: dict[str, list[Function]] = {}  # class -> methods that wait for code that mentions it
         self.used |= run.used_classes()
         self.followed = False  # whether functions that ran count with what was not followed in them alone
 
@@ -342,7 +342,7 @@ class Reach:
                     self.waiting.append(method)
 
     def _field(self, field: Field) -> None:
-        """Follow a member: an object is made with its class, a pointer only points to what somebody else made."""
+        """Follow a member: an object is made with its class, a pointer only points to an object made elsewhere."""
         words = _WORD.findall(field.type)
         if not field.pointer and not _POINTER.search(field.type):
             self._mention(words)

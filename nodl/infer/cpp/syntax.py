@@ -57,7 +57,7 @@ def field_of(node: Node | None, name: str) -> Node | None:
 
 def text(node: Node | None) -> str:
     """Return what the source says; the empty text for no node."""
-    found = node.text if node is not None else None  # cut out of the source anew each time
+    found = node.text if node is not None else None  # cut out of the source again each time
     return found.decode("utf-8", "replace") if found is not None else ""
 
 

@@ -85,7 +85,7 @@ def _variables(run: Run, obj: Instance, node: ast.AST, frame: Frame) -> Value:
 
 @functools.lru_cache(maxsize=64)
 def _read_in_place(tree: ast.AST) -> frozenset[ast.AST]:
-    """Return the dictionaries of variables that are copied or asked where they are named: ``dict(x.__dict__)``."""
+    """Return the dictionaries of variables that are copied or read where they are named: ``dict(x.__dict__)``."""
     found: set[ast.AST] = set()
     for call in ast.walk(tree):
         if isinstance(call, ast.Call):

@@ -269,7 +269,7 @@ def _merge(orders: list[list[object]], bases: list[object]) -> list[object]:
 
 
 def methods_in(held: Value, receiver: object, cls: ClassValue) -> Value:
-    """Return the functions among what a class holds under one name, bound as somebody who calls them gets them."""
+    """Return the functions among what a class holds under one name, bound as a caller gets them."""
     bound: list[object] = []
     for atom in held:
         if isinstance(atom, FunctionValue):

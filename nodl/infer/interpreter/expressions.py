@@ -105,7 +105,7 @@ def binary_operation(
 
 def _has_own(value: Value) -> bool:
     """Return True if ``value`` may be an object of one of the program's classes."""
-    for atom in value:  # noqa: SIM110 - asked at every operator; a generator takes three times as long
+    for atom in value:  # noqa: SIM110 - evaluated at every operator; a generator takes three times as long
         if type(atom) is Instance and type(atom.cls) is ClassValue:
             return True
     return False

@@ -468,7 +468,7 @@ def update(run: Machine, node: Node, frame: Frame) -> Value:
     """Evaluate ``++x`` or ``x--``; an ``x`` that was not one known integer becomes unknown."""
     argument = field_of(node, "argument")
     before = run.evaluate(argument, frame)
-    of_postfix = [] if text(node).startswith(("++", "--")) else [(0,)]  # which it takes to be told apart
+    of_postfix = [] if text(node).startswith(("++", "--")) else [(0,)]  # which it takes to be distinguished
     own = by_operator(run, "++" if "++" in text(node) else "--", before, of_postfix, node, frame)
     if own is not None:
         return own

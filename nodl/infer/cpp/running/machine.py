@@ -132,7 +132,7 @@ class Machine:
         self.spins_beside = False  # a thread runs callbacks while the program goes on
         self.undecided = 0  # how many conditions that are not known decide whether this runs
         self.consulted: dict[str, object] = {}  # parameters whose value decided what is made
-        self.from_default: dict[str, None] = {}  # those of them that no launch was asked for
+        self.from_default: dict[str, None] = {}  # those of them that were decided without a launch
         self.unset: dict[tuple[str, int], tuple[SourceRef, str, str]] = {}  # calls on pointers to nothing
         self._used: set[str] = set()
         self._known: set[Class] = set()
@@ -293,7 +293,7 @@ class Machine:
         self.gaps.setdefault((source, why))
 
     def handle(self, node: Node, frame: Frame) -> None:
-        """Record that this place has its result: an interface, a gap, or somebody who was followed."""
+        """Record that this place has its result: an interface, a gap, or a function that was followed."""
         self.handled.setdefault(frame.file.file, set()).add(node.start_byte)
 
     def resolve(self, node: Node, frame: Frame) -> None:
@@ -328,7 +328,7 @@ class Machine:
             record.endpoints.setdefault(found, []).append(conditions)
 
     def later(self, values: Iterable[Value], frame: Frame) -> None:
-        """Keep closures for later that somebody outside keeps: they may be called at any time."""
+        """Store closures that code outside of the program holds: they may be called at any time."""
         atoms = [*chain.from_iterable(values)]
         for atom in atoms:
             if isinstance(atom, Lambda):
@@ -391,7 +391,7 @@ class Loop:
 
 @dataclass(eq=False)
 class Frame:
-    """A call that runs. ``path`` tells apart what is made at one place through different calls."""
+    """A call that runs. ``path`` distinguishes what is made at one place through different calls."""
 
     file: FileIndex
     scope: Scope

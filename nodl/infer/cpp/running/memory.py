@@ -29,7 +29,7 @@ _LOOKED_AT_IN_A_STEP = 64
 
 
 class Reads(NamedTuple):
-    """What somebody read: cells with the values that they had before, and notes."""
+    """What some code read: cells with the values that they had before, and notes."""
 
     cells: Changes
     noted: Noted
@@ -39,7 +39,7 @@ class AbstractStore:
     """What every cell holds now; writes can be undone and joined, reads watched."""
 
     def __init__(self, spend: Callable[[int], None] = lambda steps: None) -> None:
-        """``spend`` is told the steps that long looks at the trail count for; what it raises ends the run."""
+        """``spend`` gets the steps that long searches of the trail count for; what it raises ends the run."""
         self._spend = spend
         self._cells: dict[Cell, Value] = {}
         self._by_name: dict[str, dict[Cell, None]] = {}
@@ -50,7 +50,7 @@ class AbstractStore:
         self._watched_from = 0
         self._history: Changes | None = None
         self._held: dict[Cell, Value | None] | None = None
-        self._shared: dict[Cell, Value] = {}  # variables that somebody unknown may write to at any time
+        self._shared: dict[Cell, Value] = {}  # variables that unknown code may write to at any time
         self.log = NoteLog()
 
     def get(self, cell: Cell) -> Value | None:

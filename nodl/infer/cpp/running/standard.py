@@ -127,7 +127,7 @@ def _pair(run: Machine, values: Sequence[Value], node: Node, frame: Frame) -> Va
 
 
 def _by_value(run: Machine, values: Sequence[Value], call: Node, frame: Frame) -> list[Value]:
-    """Return the arguments as somebody keeps them who copies objects; not those behind pointers and ``std::tie``."""
+    """Return the arguments as a callee stores them that copies objects; not those behind pointers and ``std::tie``."""
     given = children(field_of(call, "arguments"))
     if len(given) != len(values) or _TIES.search(text(field_of(call, "function"))):
         return list(values)

@@ -17,7 +17,7 @@ from nodl.infer.cpp.syntax import Node, callee_name, children, field_of, templat
 
 
 def check_hidden(run: Machine, cls: Class, node: Node, frame: Frame) -> None:
-    """Add a gap if ``cls`` has two plain members, or operators that matter, of one name: they are not told apart."""
+    """Add a gap if ``cls`` has two plain members, or operators that matter, of one name: they are not distinguished."""
     ancestry = run.names.ancestry(cls)
     for name in hidden(run.names, cls):
         plain = any(_PLAIN.search(each.fields[name].type) for each in ancestry if name in each.fields)
