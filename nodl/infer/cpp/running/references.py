@@ -11,7 +11,7 @@ import re
 
 from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.machine import Frame, Machine
-from nodl.infer.cpp.running.values import BOTTOM, Group, Map, Param, Seq, Text, Unknown, Value
+from nodl.infer.cpp.running.values import BOTTOM, Group, Map, Param, ReferredTo, Seq, Text, Unknown, Value
 from nodl.infer.cpp.syntax import Node, children, field_of, text, unwrapped
 
 
@@ -20,7 +20,7 @@ def is_plain(value: Value) -> bool:
     return any(isinstance(atom, Text | Seq | Map | Group | Param | int | float) for atom in value)
 
 
-REFERRED_TO = Unknown("what a reference or pointer stands for")
+REFERRED_TO = ReferredTo("what a reference or pointer stands for")
 
 
 def as_referred_to(value: Value) -> Value:

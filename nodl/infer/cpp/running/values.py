@@ -106,6 +106,19 @@ class Unknown(NamedTuple):
         return hash(Unknown)
 
 
+class ReferredTo(Unknown):
+    """What a reference or pointer to a plain value stands for: who writes to it writes to a variable of somebody."""
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, ReferredTo)
+
+    def __ne__(self, other: object) -> bool:
+        return not isinstance(other, ReferredTo)
+
+    def __hash__(self) -> int:
+        return hash(ReferredTo)
+
+
 class Const(NamedTuple):
     """An enumerator, by its qualified name."""
 
@@ -249,7 +262,7 @@ def join(*values: Value) -> Value:
     unknown_one: Unknown | None = None  # of several things that are not known
     for value in values:
         for atom in value:
-            if isinstance(atom, Unknown):
+            if type(atom) is Unknown:
                 unknown_one = unknown_one or atom
                 atom = unknown_one
             every[atom] = None
@@ -317,7 +330,7 @@ def open_sequence(items: Iterable[Value]) -> Seq:
     found: dict[Value, None] = {}
     unknown_one: Value | None = None
     for item in items:
-        if len(item) == 1 and isinstance(item[0], Unknown):
+        if len(item) == 1 and type(item[0]) is Unknown:
             unknown_one = unknown_one or item
         else:
             found.setdefault(item)
