@@ -11,7 +11,13 @@ from dataclasses import replace
 from functools import partial
 
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES, Call, is_harmless_class
-from nodl.infer.cpp.reading.declarations import Class, Field, Function, FunctionParameter
+from nodl.infer.cpp.reading.declarations import (
+    Class,
+    Field,
+    Function,
+    FunctionParameter,
+    function_declarator,
+)
 from nodl.infer.cpp.reading.type_names import NO_TYPE, Type
 from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.arithmetic import as_type
@@ -399,13 +405,15 @@ def _check_operators(run: Machine, cls: Class, node: Node, frame: Frame) -> None
     """Add a gap for what changes something and runs where nobody calls it: conversions, ``,``, comparisons, from which
     C++20 derives others; destructors, where they write to what a member refers or points to."""
     ancestry = run.names.ancestry(cls)
-    kept = {name for each in ancestry for name in each.fields} | run.names.globals.keys()
+    fields = {name: member for each in ancestry for name, member in each.fields.items()}
+    behind_const = {name for name, each in fields.items() if each.pointer or "mutable" in text(each.node)}
     listed = [
         (name, f) for each in ancestry for name, found in run.names.methods[each].items() for f in found
     ]
     for name, method in listed:
         if name.startswith("~") and _writes_elsewhere(ancestry, method):
             run.gap(node, frame, f"{name} changes what others have: when it runs is not followed")
+        kept = (behind_const if _only_reads(method) else fields.keys()) | run.names.globals.keys()
         if _NOT_FOLLOWED.fullmatch(name) and (run.makes_interfaces(method) or writes_of(method.node) & kept):
             why = f"{name} of {cls.name} changes something: where it runs is not followed"
             run.gap(node, frame, why)
@@ -426,6 +434,17 @@ def _writes_elsewhere(ancestry: Sequence[Class], method: Function) -> bool:
         if words & references or behind:
             return True
     return False
+
+
+def _only_reads(method: Function) -> bool:
+    """Return whether a method is ``const``, and what it takes, too: it hands its members on to be read."""
+    declarator = function_declarator(method.node)
+    qualifiers = declarator.named_children if declarator is not None else []
+    return (
+        any(each.type == "type_qualifier" and text(each) == "const" for each in qualifiers)
+        and "const_cast" not in method.words
+        and not any(each.written_back for each in method.parameters)
+    )
 
 
 _NOT_FOLLOWED = re.compile(r"operator (?!new|delete)\w.*|operator(?:,|&&|\|\||==|<=>)")

@@ -70,6 +70,27 @@ def test_an_operator_whose_calls_are_not_followed_is_told_if_it_makes_something(
     assert why in gaps(infer(tmp_path, in_class("P p{this};", before=before)))
 
 
+CONSTANT = "bool operator==(const C & other) const"
+
+
+@pytest.mark.parametrize(
+    ("field", "head", "is_told"),
+    [
+        ("char code[8];", CONSTANT, False),
+        ("std::string code;", CONSTANT, False),
+        ("char * code;", CONSTANT, True),  # what it points to may change
+        ("mutable char code[8];", CONSTANT, True),
+        ("char code[8];", "bool operator==(const C & other)", True),
+        ("char code[8];", "bool operator==(C & other) const", True),
+    ],
+)
+def test_a_comparison_that_is_const_hands_its_members_on_to_be_read(
+    field: str, head: str, is_told: bool, tmp_path: Path
+) -> None:
+    before = f"struct C {{ {field} {head} {{ return same_text(code, other.code); }} }};\n"
+    assert bool(gaps(infer(tmp_path, in_class("C c;", before=before)))) is is_told
+
+
 def test_a_literal_of_the_program_is_told_if_it_makes_something(tmp_path: Path) -> None:
     before = f"""rclcpp::Node * the_node;
 int operator""_topic(const char * s, size_t) {{ the_node->create_publisher<{S}>(s, 1); return 1; }}
