@@ -116,13 +116,16 @@ class _Collector:
         prefix = "::".join((*scope, *([name] if name else [])))
         self.index.enums.add(name)
         listed = [child for child in children(body) if child.type == "enumerator"]
-        if not _all_differ([text(field_of(each, "value")) for each in listed]):
+        numbers = [text(field_of(each, "value")) for each in listed]
+        if not _all_differ(numbers):
             return
-        for child in listed:
+        for at, child in enumerate(listed):
+            number = int(numbers[at]) if any(numbers[1:]) else int(numbers[0] or 0) + at
             constant = text(field_of(child, "name"))
             full = f"{prefix}::{constant}" if prefix else constant
             for key in (constant, f"{name}::{constant}", full):
                 self.index.enumerators.setdefault(key, full)
+            self.index.numbered.setdefault((name, number), []).append(full)
 
     # --- functions --------------------------------------------------------------------------------------
 
