@@ -65,6 +65,7 @@ that a program calls a thousand times."""
 _HARMLESS_CLASSES = re.compile(
     r"sensor_msgs::PointCloud2\w+"
     r"|(?:std|Eigen|cv|boost|pcl|YAML|nlohmann|fmt|spdlog|tinyxml2|urdf|KDL|angles|grid_map|urcl|gtsam|ouster|dai|rs2|sl|asio|"
+    r"gazebo::(?:transport|event|common|physics|sensors|rendering)|"
     r"websocketpp|gz|ignition|sdf|octomap|octomath|fcl|ceres|g2o|Sophus|torch|nvinfer1|zmq|google|absl|casadi|pinocchio|ompl|"
     r"mavconn|mavlink|zbar|open3d|tbb|Magick|xt|Ogre|libcamera|GeographicLib|proj|osqp|autoware_utils_(?:geometry|math|system|uuid|pcl)|lanelet|"
     r"cartographer|mcap|tl|gsl|CLI|toml|rtabmap|bosdyn|lcm)::.*"

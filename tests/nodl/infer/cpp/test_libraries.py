@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from nodl.infer import infer_paths
-from tests.nodl.infer.cpp.workspace import HEAD, endpoints, gaps, in_class, infer, package
+from tests.nodl.infer.cpp.workspace import HEAD, endpoints, gaps, in_class, infer, names, package
 
 pytest.importorskip("tree_sitter_cpp", reason="the extra cpp is not installed")
 
@@ -183,3 +183,23 @@ def test_a_class_that_nobody_read_is_told_once_and_a_node_that_it_gets_each_time
     )
     assert sum("it may be a node or make one" in each for each in told) == 1, told
     assert sum("the node is handed to the constructor" in each for each in told) == 2
+
+
+@pytest.mark.parametrize("library", ["gz", "gazebo"])
+def test_nodes_of_gazebo_make_no_interfaces_of_ros_and_their_callbacks_run(
+    library: str, tmp_path: Path
+) -> None:
+    members = f"""
+    {library}::transport::NodePtr gazebo{{new {library}::transport::Node()}};
+    void on(int) {{ create_publisher<std_msgs::msg::String>("made_by_callback", 1); }}
+    """
+    body = 'gazebo->Init(); gazebo->Subscribe("~/contacts", &Demo::on, this);'
+    system = infer(tmp_path, in_class(body, members))
+    assert (names(system), gaps(system)) == (["made_by_callback"], [])
+
+
+def test_what_else_bears_gazebos_name_may_make_interfaces(tmp_path: Path) -> None:
+    system = infer(tmp_path, in_class("auto helper = std::make_shared<gazebo::Helper>(this);"))
+    assert "the node is handed to the constructor of gazebo::Helper, which may make interfaces on it" in gaps(
+        system
+    )
