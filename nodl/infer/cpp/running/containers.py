@@ -222,8 +222,10 @@ def _sequence_call(run: Machine, atom: Seq | Group, name: str, site: CallSite) -
         return element(run, atom, first)
     if name in ("end", "cend", "rend"):
         return (END,)
-    if name in ("begin", "cbegin", "rbegin", "data"):
+    if name in ("begin", "cbegin", "data"):
         return (atom,)
+    if name == "rbegin":
+        return (atom._replace(items=items[::-1]),)
     if name == "value_or":  # an optional that holds nothing reads as an empty list
         return first if exact and not items else (atom,)
     if name == "size":

@@ -188,8 +188,9 @@ def _calls_back(run: Machine, values: Sequence[Value], node: Node, frame: Frame)
         return run.calls.call_values(run, callee, values[first:], node, frame)
     if text(node).startswith("std::async"):
         run.store.others_run()
-    items, exact = items_of(run, values[0][0]) if len(values[0] if values else ()) == 1 else ([], False)
-    every = exact and text(node).startswith("std::for_each(") and END in values[1]
+    whole = len(values) > 1 and len(values[0]) == 1 and END in values[1]  # else a part of a list, or none
+    items, exact = items_of(run, values[0][0]) if whole else ([], False)
+    every = exact and text(node).startswith("std::for_each(")
     for atom in (atom for value in values for atom in value if isinstance(atom, Lambda)):
         for item in items if every else ():
             _once(run, atom, [item], node, frame)

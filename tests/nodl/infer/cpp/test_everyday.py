@@ -646,3 +646,17 @@ def test_a_number_that_is_cast_to_an_enumeration_is_its_enumerator(
     cases = "".join(f'case M::{each}: {PUB}("{each}", 1); break;' for each in "AB")
     use = f'switch (static_cast<M>(1)) {{ {cases} default: {PUB}("else", 1); }}'
     assert names(infer(tmp_path, in_class(use, before=f"{declared}\n"))) == made
+
+
+RANGES = {
+    "turned round in a list": ("std::vector<std::string> r(v.rbegin(), v.rend()); s = r[0];", ["b"]),
+    "turned round in a loop": ("std::for_each(v.rbegin(), v.rend(), [&](auto & t) { s += t; });", ["xba"]),
+    "whole": ("std::for_each(v.begin(), v.end(), [&](auto & t) { s += t; });", ["xab"]),
+    "a part": ("std::for_each(v.begin(), v.end() - 1, [&](auto & t) { s = t; });", ["?", "x"]),
+}
+
+
+@pytest.mark.parametrize(("body", "made"), RANGES.values(), ids=RANGES)
+def test_a_range_is_taken_in_its_order(body: str, made: list[str], tmp_path: Path) -> None:
+    start = 'std::vector<std::string> v{"a", "b"}; std::string s = "x";'
+    assert names(infer(tmp_path, in_class(f"{start} {body} {PUB}(s, 1);"))) == made
