@@ -13,6 +13,7 @@ from typing import Any
 from nodl.dependence import Dependence, Test, Variation, When
 from nodl.infer.answers.folder import CacheFolder
 from nodl.infer.cpp.entry import Entry, FixedMapping, Solved
+from nodl.infer.cpp.reading.built import Definitions
 from nodl.infer.start import InferredProgram, LaunchKey
 from nodl.name_template import NameTemplate, ParameterPart, UnknownPart
 from nodl.node_interface import Certainty, ClientLibrary, Endpoint, EndpointKind, Gap, NodeInterface
@@ -21,8 +22,8 @@ from nodl.source_ref import SourceRef
 _RECORDS: dict[str, Callable[..., Any]] = {
     each.__name__: each
     for each in (
-        Dependence, Endpoint, Entry, Gap, InferredProgram, LaunchKey, NameTemplate, NodeInterface, ParameterPart,
-        Solved, SourceRef, Test, UnknownPart, Variation, When,
+        Definitions, Dependence, Endpoint, Entry, Gap, InferredProgram, LaunchKey, NameTemplate, NodeInterface,
+        ParameterPart, Solved, SourceRef, Test, UnknownPart, Variation, When,
     )
 }  # fmt: skip
 _ENUMERATIONS: dict[str, type[Enum]] = {

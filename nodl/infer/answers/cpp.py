@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 from nodl.infer.answers.codec import keep_variant, variants
 from nodl.infer.answers.folder import CacheFolder, digest, digest_of
+from nodl.infer.cpp.reading.built import build_files
 from nodl.infer.cpp.reading.project import Workspace
 from nodl.infer.start import Start
 
@@ -153,5 +154,5 @@ def _is_build_file(path: str) -> bool:
 
 def _left_by_builds(workspace: Workspace) -> Iterator[str]:
     for folder in workspace.build_folders:
-        for name in ("compile_commands.json", "*/compile_commands.json", "*/CMakeCache.txt"):
-            yield from map(str, sorted(Path(folder).glob(name)))
+        read = *build_files(folder), *Path(folder).glob("*/CMakeCache.txt")
+        yield from map(str, sorted({*read, *(each.with_name("DependInfo.cmake") for each in read)}))

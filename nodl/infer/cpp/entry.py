@@ -6,6 +6,7 @@ import os
 import traceback
 from typing import Any, NamedTuple
 
+from nodl.infer.cpp.reading.built import UNBUILT, Definitions
 from nodl.node_interface import Gap, NodeInterface
 
 
@@ -16,8 +17,7 @@ class Entry(NamedTuple):
     files: tuple[str, ...]
     cls: str = ""
     main: bool = True
-    symbols: tuple[tuple[str, str], ...] = ()
-    complete: bool = False
+    definitions: Definitions = UNBUILT
     place: str = ""  # the package's folder, for what has no file
     instance: str = ""
 

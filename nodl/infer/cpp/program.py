@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from enclave_common.files import read_bytes
@@ -14,6 +14,7 @@ from nodl.infer.cpp.findings import AllocatedNode
 from nodl.infer.cpp.ledger import CREATES, SiteAnswer, account, leads_to_interfaces
 from nodl.infer.cpp.models.loaded import host_of, load
 from nodl.infer.cpp.models.nodes import ARGUMENT
+from nodl.infer.cpp.reading.built import Definitions, joined
 from nodl.infer.cpp.reading.cmake import Target
 from nodl.infer.cpp.reading.collect import index_file
 from nodl.infer.cpp.reading.declarations import Class, FileIndex, Function, FunctionParameter, Global
@@ -21,7 +22,7 @@ from nodl.infer.cpp.reading.known_headers import KNOWN_HEADERS
 from nodl.infer.cpp.reading.names import Names
 from nodl.infer.cpp.reading.parameter_library import listener_of
 from nodl.infer.cpp.reading.preprocess import Preprocessed, preprocess
-from nodl.infer.cpp.reading.project import SourcePackage, Workspace, sources_of
+from nodl.infer.cpp.reading.project import SourcePackage, Workspace, sources_of, targets_of
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running import calls, expressions, invocation, statements  # noqa: F401 (how each runs)
 from nodl.infer.cpp.running.callbacks import run_callbacks
@@ -59,13 +60,14 @@ class Sources:
 
     def __init__(self, workspace: Workspace):
         self.workspace = workspace
-        self._preprocessed: dict[tuple[str, str], Preprocessed | None] = {}
-        self._indexed: dict[tuple[str, str], FileIndex] = {}
+        self._preprocessed: dict[tuple[str, Definitions], Preprocessed | None] = {}
+        self._elsewhere: dict[tuple[str, Definitions], Definitions] = {}  # in another package, by its name
+        self._indexed: dict[tuple[str, Definitions], FileIndex] = {}
         self.unreadable: dict[str, str] = {}
         self.digests: dict[str, str] = {}  # SHA-256 of what was read
 
-    def preprocessed(self, file: str, symbols: Mapping[str, str], complete: bool) -> Preprocessed | None:
-        key = (file, repr(sorted(symbols.items())) + str(complete))
+    def preprocessed(self, file: str, definitions: Definitions) -> Preprocessed | None:
+        key = (file, definitions)
         if key not in self._preprocessed:
             self._preprocessed[key] = None  # a file that includes itself
             source = self._read(file)
@@ -77,9 +79,9 @@ class Sources:
                     found = self.workspace.header(name, file, quoted)
                     if found is None or self._is_modelled(name, found, file):
                         return None
-                    return self.preprocessed(found, symbols, complete)
+                    return self.preprocessed(found, definitions)
 
-                self._preprocessed[key] = preprocess(file, source, symbols, complete, include)
+                self._preprocessed[key] = preprocess(file, source, self._of(file, definitions), include)
         return self._preprocessed[key]
 
     def _is_modelled(self, name: str, found: str, file: str) -> bool:
@@ -112,11 +114,23 @@ class Sources:
             self.unreadable[file] = f"this file cannot be read: {error.strerror}"
             return None
 
-    def index(self, file: str, symbols: Mapping[str, str], complete: bool) -> FileIndex | None:
-        key = (file, repr(sorted(symbols.items())) + str(complete))
+    def _of(self, file: str, definitions: Definitions) -> Definitions:
+        """Return what a file is compiled with: as part of a program with ``definitions``, or of its own package."""
+        package = self.workspace.package_of(file)
+        if package is None or package.name == definitions.package:
+            return definitions
+        key = (package.name, definitions)
+        if key not in self._elsewhere:
+            libraries = [t for t in package.build.targets.values() if t.sources and not t.executable]
+            own = [self.workspace.definitions(package, libraries)] if libraries else []
+            self._elsewhere[key] = joined([definitions, *own])
+        return self._elsewhere[key]
+
+    def index(self, file: str, definitions: Definitions) -> FileIndex | None:
+        key = (file, definitions)
         if key not in self._indexed:
             try:
-                source = self.preprocessed(file, symbols, complete)
+                source = self.preprocessed(file, definitions)
                 if source is None:
                     return None
                 self._indexed[key] = index_file(source)
@@ -127,7 +141,7 @@ class Sources:
                 return None
         return self._indexed[key]
 
-    def closure(self, files: Iterable[str], symbols: Mapping[str, str], complete: bool) -> list[FileIndex]:
+    def closure(self, files: Iterable[str], definitions: Definitions) -> list[FileIndex]:
         """Return ``files``, what they include, and the library sources of other packages that define what they
         include.
         """
@@ -139,7 +153,7 @@ class Sources:
             file = waiting.pop(0)
             if file in found:
                 continue
-            index = self.index(file, symbols, complete)
+            index = self.index(file, definitions)
             if index is None:
                 continue
             found[file] = index
@@ -172,11 +186,10 @@ def library_sources(package: SourcePackage) -> list[str]:
 
 def run_program(sources: Sources, entry: Entry, start: Start | None) -> ProgramFindings:
     """Run everything that the program may make; raises ``CppSupportMissing``."""
-    symbols = dict(entry.symbols)
-    files = sources.closure(entry.files, symbols, entry.complete)
+    files = sources.closure(entry.files, entry.definitions)
     missing = [name for name in _possible_plugins(sources, files) if name not in {i.file for i in files}]
     if missing:
-        files = sources.closure([*entry.files, *missing], symbols, entry.complete)
+        files = sources.closure([*entry.files, *missing], entry.definitions)
     names = Names(files)
     names.plugins = {key: found[0][0].type for key, found in sources.workspace.plugin_classes.items()}
     names.depends = frozenset().union(
@@ -357,8 +370,10 @@ def registered_components(index: FileIndex) -> list[str]:
 
 def target_entry(target: Target, package: SourcePackage, workspace: Workspace) -> Entry:
     """Return the program of an executable target."""
-    files = sources_of(target, package.build)
-    commands = workspace.compile_commands
-    known = next((commands[os.path.realpath(f)] for f in files if os.path.realpath(f) in commands), None)
-    symbols = known if known is not None else target.definitions
-    return Entry(tuple(files), symbols=tuple(sorted(symbols.items())), complete=known is not None)
+    files = sources_of(targets_of(target, package.build))
+    return Entry(tuple(files), definitions=definitions_of(target, package, workspace))
+
+
+def definitions_of(target: Target, package: SourcePackage, workspace: Workspace) -> Definitions:
+    """Return what a program is compiled with: the target, and the libraries of its package that it links."""
+    return workspace.definitions(package, targets_of(target, package.build))

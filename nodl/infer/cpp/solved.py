@@ -146,18 +146,18 @@ def _main_beside(executable: Entry, component: Entry) -> str | None:
     """Return the one source that the executable has beside those of the component; ``None`` if that is not all."""
     own = [file for file in executable.files if file not in component.files]
     rest = tuple(file for file in executable.files if file in component.files)
-    alike = (executable.symbols, executable.complete) == (component.symbols, component.complete)
+    alike = executable.definitions == component.definitions
     return own[0] if alike and executable.main and rest == component.files and len(own) == 1 else None
 
 
 def only_makes(executable: Entry, component: Entry, sources: Sources) -> bool:
     """Return whether ``executable`` makes ``component``, as a container would, and nothing else."""
-    file, symbols = _main_beside(executable, component), dict(component.symbols)
-    index = sources.index(file, symbols, component.complete) if file is not None else None
+    file = _main_beside(executable, component)
+    index = sources.index(file, component.definitions) if file is not None else None
     made = _made(index) if index is not None else None
     if index is None or made is None or made["component"] != component.cls:
         return False
-    reached = sources.closure(component.files, symbols, component.complete)
+    reached = sources.closure(component.files, component.definitions)
     takes = _options_alone(component.cls, reached)
     default = text(takes.default) if takes is not None else ""
     called_alike = takes is not None and (made["given"] or "".join(default.split()) in _DEFAULTS)

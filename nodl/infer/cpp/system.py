@@ -16,16 +16,16 @@ from nodl.infer.answers.cpp import Answers, Made, WatchedStart
 from nodl.infer.cpp.entry import Answer, CppSupportMissing, Entry, Solved, failure
 from nodl.infer.cpp.libraries import NODE_BASES
 from nodl.infer.cpp.models.controllers import CONTROLLERS
-from nodl.infer.cpp.program import Sources, registered_components, target_entry
+from nodl.infer.cpp.program import Sources, definitions_of, registered_components, target_entry
+from nodl.infer.cpp.reading.built import UNBUILT
 from nodl.infer.cpp.reading.names import Names
-from nodl.infer.cpp.reading.project import SourcePackage, Workspace, find_packages
+from nodl.infer.cpp.reading.project import SOURCES, SourcePackage, Workspace, find_packages
 from nodl.infer.cpp.solved import solve, solve_all
 from nodl.infer.cpp.syntax import check_support
 from nodl.infer.start import LaunchKey, Start
 from nodl.node_interface import Gap, NodeInterface
 from nodl.source_ref import SourceRef
 
-_SOURCES = (".cpp", ".cc", ".cxx", ".c++", ".C")
 _TESTS = frozenset({"test", "tests", "testing", "benchmark", "examples", "example", "mock"})
 
 
@@ -160,7 +160,7 @@ def components(package: SourcePackage, sources: Sources) -> dict[str, LaunchKey]
     }
     for target in package.build.targets.values():
         for file in target.sources:
-            index = sources.index(file, dict(target.definitions), False)
+            index = sources.index(file, definitions_of(target, package, sources.workspace))
             for name in registered_components(index) if index is not None else ():
                 if name not in found:
                     found[name] = LaunchKey(package.name, None, name)
@@ -176,7 +176,8 @@ def _component_entry(name: str, package: SourcePackage, workspace: Workspace, so
                 t
                 for t in build.targets.values()
                 for f in t.sources
-                if (i := sources.index(f, dict(t.definitions), False)) and name in registered_components(i)
+                if (i := sources.index(f, definitions_of(t, package, workspace)))
+                and name in registered_components(i)
             ),
             None,
         )
@@ -184,14 +185,14 @@ def _component_entry(name: str, package: SourcePackage, workspace: Workspace, so
         files = [
             f
             for f in _all_sources(package)
-            if (i := sources.index(f, {}, False)) and name in registered_components(i)
+            if (i := sources.index(f, UNBUILT)) and name in registered_components(i)
         ]
         return Entry(tuple(files), cls=name, main=False, place=package.folder)
     return target_entry(target, package, workspace)._replace(cls=name, main=False)
 
 
 def _all_sources(package: SourcePackage) -> list[str]:
-    return [str(path) for path in sorted(Path(package.folder).rglob("*")) if path.suffix in _SOURCES]
+    return [str(path) for path in sorted(Path(package.folder).rglob("*")) if path.suffix in SOURCES]
 
 
 def _left_over(
@@ -206,7 +207,7 @@ def _left_over(
         by_folder.setdefault(package.name if package else "", []).append(file)
     for name, listed in by_folder.items():
         package_name = name or None
-        indexed = {file: sources.index(file, {}, False) for file in listed}
+        indexed = {file: sources.index(file, UNBUILT) for file in listed}
         for file, index in indexed.items():
             if index is not None and "main" in index.functions:
                 others = [f for f in listed if "main" not in getattr(indexed[f], "functions", {})]
@@ -223,7 +224,7 @@ def _unmade(
     workspace: Workspace, sources: Sources, files: Sequence[str], made: set[str]
 ) -> Iterable[tuple[LaunchKey, Entry]]:
     indexes = [
-        i for f in files if not _is_test(f, workspace) and (i := sources.index(f, {}, False)) is not None
+        i for f in files if not _is_test(f, workspace) and (i := sources.index(f, UNBUILT)) is not None
     ]
     names = Names(indexes)
     parents = {
@@ -251,7 +252,7 @@ def _unmade(
 
 
 def _with_first(file: str, files: Sequence[str]) -> tuple[str, ...]:
-    return (file, *(each for each in files if each != file and each.endswith(_SOURCES)))
+    return (file, *(each for each in files if each != file and each.endswith(SOURCES)))
 
 
 def _is_test(file: str, workspace: Workspace) -> bool:

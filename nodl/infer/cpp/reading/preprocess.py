@@ -14,6 +14,8 @@ from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple
 
+from nodl.infer.cpp.reading.built import Definitions
+
 # Name as written, in quotes -> the file, None if not in reach.
 Include = Callable[[str, bool], "Preprocessed | None"]
 
@@ -73,11 +75,9 @@ class Preprocessed:
         return frozenset(_CALLED.findall(self.text))
 
 
-def preprocess(
-    file: str, source: str, symbols: Mapping[str, str], complete: bool, include: Include
-) -> Preprocessed:
-    """Preprocess. ``symbols``: what the build defines; ``complete``: nothing else is defined on the command line."""
-    return _Pass(file, symbols, complete, include).run(source)
+def preprocess(file: str, source: str, definitions: Definitions, include: Include) -> Preprocessed:
+    """Preprocess a file that is compiled with ``definitions``."""
+    return _Pass(file, definitions, include).run(source)
 
 
 @dataclass
@@ -92,11 +92,13 @@ class _Conditional:
 
 
 class _Pass:
-    def __init__(self, file: str, symbols: Mapping[str, str], complete: bool, include: Include):
+    def __init__(self, file: str, definitions: Definitions, include: Include):
         self.result = Preprocessed(file)
-        self.macros = {name: Macro(None, value) for name, value in {**_STANDARD, **symbols}.items()}
+        symbols = {**_STANDARD, **dict(definitions.symbols)}
+        self.macros = {name: Macro(None, value) for name, value in symbols.items()}
+        self.macros |= {name: Macro(None, "", uncertain=True) for name in definitions.open}
         self.bodies: dict[str, str] = {}  # by name: all that it was ever defined as in this file
-        self.complete = complete
+        self.complete = definitions.complete
         self.include = include
         self.stack: list[_Conditional] = []
         self.pending: list[str] = []

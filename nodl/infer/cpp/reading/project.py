@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from html import unescape
-from pathlib import Path
 
-from enclave_common.files import read_text, text_or_nothing
-from enclave_common.shell_words import split_words
+from enclave_common.files import text_or_nothing
+from nodl.infer.cpp.reading.built import Compiled, Definitions, compiled_sources, joined
 from nodl.infer.cpp.reading.cmake import Build, Target, read_build
 
 _TAG = re.compile(r"<(?:\w*depend|exec_depend|build_depend)(?:\s[^<>]*)?>\s*([\w\-.]+)\s*</")
@@ -20,6 +18,7 @@ _NAME = re.compile(r"<name>\s*([^<\s]+)\s*</name>")
 _EXPORT = re.compile(r'<(\w+)\s+plugin\s*=\s*"([^"]+)"')
 _CLASS = re.compile(r"<class\b((?:\s+[\w:]+\s*=\s*(?:\"[^\"]*\"|'[^']*'))+)\s*/?>")
 _ATTRIBUTE = re.compile(r"([\w:]+)\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
+SOURCES = (".cpp", ".cc", ".cxx", ".c++", ".C")
 _SKIPPED = frozenset({"build", "install", "log", "node_modules", "venv", "site-packages", "__pycache__"})
 
 
@@ -131,30 +130,23 @@ class Workspace:
         return found
 
     @cached_property
-    def compile_commands(self) -> dict[str, dict[str, str]]:
-        """Definitions of each compiled file, where a build left ``compile_commands.json``."""
-        found: dict[str, dict[str, str]] = {}
-        for folder in self.build_folders:
-            for path in (
-                Path(folder, "compile_commands.json"),
-                *sorted(Path(folder).glob("*/compile_commands.json")),
-            ):
-                try:
-                    entries = json.loads(read_text(path))
-                except (OSError, ValueError, RecursionError):
-                    continue
-                for entry in entries if isinstance(entries, list) else []:
-                    if not isinstance(entry, dict):
-                        continue
-                    words = entry.get("arguments") or split_words(str(entry.get("command", "")))
-                    file = os.path.normpath(os.path.join(entry.get("directory", ""), entry.get("file", "")))
-                    found[os.path.realpath(file)] = _defined(words)
-        return found
+    def _compiled(self) -> Compiled:
+        return compiled_sources(self.build_folders)
 
-
-def _defined(words: Sequence[str]) -> dict[str, str]:
-    given = [word[2:] for word in words if word.startswith("-D")]
-    return {name: value or "1" for name, _, value in (word.partition("=") for word in given)}
+    def definitions(self, package: SourcePackage, targets: Sequence[Target]) -> Definitions:
+        """Return what sources of one program are compiled with: as they were built, else as CMake's files say."""
+        found: list[Definitions] = []
+        is_known = True
+        for target in targets:
+            for file in (each for each in target.sources if each.endswith(SOURCES)):
+                by_target = self._compiled.get(os.path.realpath(file), {})
+                is_known = is_known and bool(by_target)
+                for each in [by_target[target.name]] if target.name in by_target else by_target.values():
+                    symbols = tuple(sorted(each.items())) if each is not None else ()
+                    found.append(Definitions(symbols, each is not None, package=package.name))
+        if not found:
+            return joined(each.definitions(package.name) for each in targets)
+        return joined(found)._replace(complete=is_known and all(each.complete for each in found))
 
 
 def find_packages(roots: Iterable[str]) -> dict[str, SourcePackage]:
@@ -197,9 +189,9 @@ def plugin_classes(file: str) -> list[PluginClass]:
     return found
 
 
-def sources_of(target: Target, build: Build) -> list[str]:
-    """Return the target's own sources and those of the libraries of its package that it links."""
-    order, waiting = [target.name], [target]
+def targets_of(target: Target, build: Build) -> list[Target]:
+    """Return the target and the libraries of its package that it links."""
+    found, waiting = {target.name: target}, [target]
     while waiting:
         current = waiting.pop()
         names = list(current.links)
@@ -207,7 +199,12 @@ def sources_of(target: Target, build: Build) -> list[str]:
             names += [t.name for t in build.targets.values() if not t.executable]
         for name in names:
             linked = build.targets.get(name.rpartition("::")[2])
-            if linked is not None and linked.name not in order:
-                order.append(linked.name)
+            if linked is not None and linked.name not in found:
+                found[linked.name] = linked
                 waiting.append(linked)
-    return list(dict.fromkeys(file for name in order for file in build.targets[name].sources))
+    return list(found.values())
+
+
+def sources_of(targets: Iterable[Target]) -> list[str]:
+    """Return what targets are built from, each file once."""
+    return list(dict.fromkeys(file for target in targets for file in target.sources))
