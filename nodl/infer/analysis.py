@@ -173,7 +173,7 @@ def _unnamed_cells(run: Run) -> set[str | int]:
     return {id(run.environment), *(id(node.cells) for node in run.findings.nodes)}
 
 
-_READ_UNNAMED = frozenset({"getattr", "vars", "globals", "locals", "__dict__"})
+_READ_UNNAMED = frozenset({"getattr", "setattr", "vars", "globals", "locals", "__dict__"})
 
 
 def _call_back(run: Run, callback: object, arity: int | None, widen_texts: bool) -> None:

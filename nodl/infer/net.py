@@ -22,7 +22,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from nodl.infer.interpreter.calls import SPECIAL_FOLLOWED
+from nodl.infer.interpreter.calls import SPECIAL_FOLLOWED, has_yield
 from nodl.infer.interpreter.imports import absolute_name
 from nodl.infer.interpreter.run import Run
 from nodl.infer.models import ros
@@ -111,25 +111,12 @@ class FunctionText:
         self.stored: set[str] = set()  # variables
         self.set: set[str] = set()  # attributes, which may be properties
         self.may_leave = False  # before what is read next
-        self.yields = False
         self.scheduled: set[str] = set()  # what rclpy is handed, and calls while it spins
         self.imports: list[Import] = []
 
     @property
     def name(self) -> str:
         return "" if self.node is None else getattr(self.node, "name", "a lambda")
-
-    @property
-    def is_plain(self) -> bool:
-        """Return True for a named function without decorators."""
-        return isinstance(self.node, _NAMED) and not self.node.decorator_list
-
-    @property
-    def runs_at_any_time(self) -> bool:
-        """Return True for a generator, a coroutine and a special method that does not run where it is named."""
-        special = self.cls is not None and self.name.startswith("__") and self.name.endswith("__")
-        later = self.yields or isinstance(self.node, ast.AsyncFunctionDef)
-        return later or (special and self.name not in SPECIAL_FOLLOWED)
 
     @functools.cached_property
     def bare(self) -> frozenset[str]:
@@ -180,9 +167,12 @@ def changed_meanwhile(module: SourceModule) -> frozenset[str]:
     named: dict[str, list[FunctionText]] = {}
     for scope in scopes:
         named.setdefault(scope.name, []).append(scope)
-    scheduled = {name for scope in scopes for name in scope.scheduled}
-    handed = {name for scope in scopes for name in scope.attributes | scope.names} - scheduled
-    left = [scope for scope in scopes if scope.runs_at_any_time or (scope.is_plain and scope.name in handed)]
+    handed = {name for scope in scopes for name in scope.attributes | scope.names}
+    handed -= {name for scope in scopes for name in scope.scheduled}
+    handed -= {
+        scope.name for scope in scopes if getattr(scope.node, "decorator_list", ())
+    }  # properties, for one
+    left = [each for each in scopes if each.name in handed or _runs_at_any_time(each, module)]
     found = set(left)
     while left:
         for place in left.pop().calls:
@@ -192,6 +182,13 @@ def changed_meanwhile(module: SourceModule) -> frozenset[str]:
     setting = collections.Counter(name for scope in scopes for name in scope.set)
     setting.update(scopes[0].stored)
     return frozenset(name for scope in found for name in scope.set if setting[name] > 1)
+
+
+def _runs_at_any_time(scope: FunctionText, module: SourceModule) -> bool:
+    """Return True for a generator, a coroutine and a special method that does not run where it is named."""
+    special = scope.cls is not None and scope.name.startswith("__") and scope.name.endswith("__")
+    later = isinstance(scope.node, ast.AsyncFunctionDef) or (module.has_yield and has_yield(scope.node))
+    return later or (special and scope.name not in SPECIAL_FOLLOWED)
 
 
 class _Reader:
@@ -266,10 +263,6 @@ class _Reader:
         self._each(node.args, scope, around)
         self._each(node.keywords, scope, around)
 
-    def yields(self, node: ast.Yield, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
-        scope.yields = True
-        self.inside(node, scope, around)
-
     def global_names(self, node: ast.Global, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
         scope.set.update(node.names)
 
@@ -327,7 +320,6 @@ _VISITORS: dict[type, Callable[[_Reader, Any, FunctionText, tuple[ast.AST, ...]]
     **dict.fromkeys((ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda), _Reader.function),
     ast.ClassDef: _Reader.class_body,
     **dict.fromkeys((ast.Import, ast.ImportFrom), _Reader.imports),
-    **dict.fromkeys((ast.Yield, ast.YieldFrom), _Reader.yields),
     ast.Global: _Reader.global_names,
     ast.Nonlocal: _Reader.outer_names,
     ast.Assign: _Reader.assignment,

@@ -16,13 +16,17 @@ from typing import Any, TypeVar
 
 from nodl.infer.values import (
     ABSENT,
+    ANY,
     BOTTOM,
     ITEMS,
+    OTHER,
+    OTHER_KEYS,
     Cells,
     ContentCells,
     FieldCells,
     HeapObject,
     Items,
+    Key,
     LocalCells,
     Sequence,
     Value,
@@ -252,6 +256,14 @@ class ProgramState:
                 stable = False
             self.write(cells, key, joined)
         return stable
+
+    def unsettle(self, mark: int) -> None:
+        """Forget the texts, numbers and truths that cells got since ``mark``; containers may hold anything else."""
+        for cells, key, value in self.written(mark).values():
+            self.write(cells, key, unsettled(value))
+            if isinstance(key, Key):
+                self.write(cells, OTHER, join(cells.get(OTHER, BOTTOM), ANY))
+                self.write(cells, OTHER_KEYS, join(cells.get(OTHER_KEYS, BOTTOM), ANY))
 
     def written(self, mark: int) -> Written:
         """Return each cell written since ``mark`` as it is now."""

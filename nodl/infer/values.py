@@ -415,6 +415,8 @@ def sole(value: Value | None) -> object:
 
 def unsettled(value: Value) -> Value:
     """Return ``value`` with unknown in place of its texts and numbers, and either truth in place of one."""
+    if value and isinstance(value[0], Items):
+        return (Items(None, join(value[0].any_element(), CHANGES_MEANWHILE)),)
     left = tuple(atom for atom in value if not isinstance(atom, (str, Text, int, float)))
     if len(left) == len(value):
         return value
@@ -436,6 +438,7 @@ def mixed_with_unknown(value: Value) -> Value:
     return join(others, CHANGES_MEANWHILE)
 
 
+MODULES = unknown("a module out of sys.modules")
 CHANGES_MEANWHILE = unknown("a variable that changes while other code runs")
 
 

@@ -14,6 +14,7 @@ from nodl.infer.values import (
     ABSENT,
     ANY,
     BOTTOM,
+    MODULES,
     RESULT,
     BoundMethod,
     ClassMethod,
@@ -34,7 +35,6 @@ from nodl.infer.values import (
     Value,
     external,
     join,
-    join_all,
     present,
     unknown,
 )
@@ -194,7 +194,7 @@ def _of_external(run: Run, atom: External, name: str, node: ast.AST, frame: Fram
         return unknown(f"an attribute of {atom.path}")  # ``x = x.next`` in a loop would go on without end
     path = f"{atom.path}.{name}"
     if path == "sys.modules":
-        return run.variables_of(node, frame)
+        return MODULES
     module = run.modules.get(path)  # imported from a folder without __init__.py
     if module is not None:
         return (module,)
@@ -220,10 +220,6 @@ def _of_super(run: Run, proxy: SuperProxy, name: str, node: ast.AST, frame: Fram
             if found is not None:
                 return found
         return (ForeignMethod("builtins.object", receiver, name),)
-    for base in rest:
-        if isinstance(base, ClassValue) and name in base.cells:
-            held = base.cells[name]
-            return join_all(_bound_class_method(a, cls) if isinstance(a, ClassMethod) else (a,) for a in held)
     if name in ("__new__", "__init_subclass__"):
         return external(f"builtins.object.{name}")
     return unknown(f"{name} of a base class that is not analysed")

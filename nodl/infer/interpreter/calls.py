@@ -16,7 +16,6 @@ from nodl.infer.interpreter.define import (
     new_instance,
     program_classes,
 )
-from nodl.infer.interpreter.loops import fixpoint
 from nodl.infer.interpreter.run import MAX_DEPTH, Arguments, Call, Run
 from nodl.infer.models import foreign
 from nodl.infer.text import constant_text
@@ -43,7 +42,6 @@ from nodl.infer.values import (
     join,
     sole,
     unknown,
-    widen,
 )
 
 MISSING = unknown("an argument that the caller does not give")
@@ -52,18 +50,27 @@ LATER = unknown("what a generator gives later")
 
 
 def call_function(run: Run, function: FunctionValue, call: Call) -> Value:
-    """Return what a call gives: nothing if no path comes back, unknown (and a gap) if calls nest too deep."""
+    """Return what a call gives: nothing if no path comes back, unknown (and a gap) if calls nest too deep.
+
+    A call of a function that is running is not followed: what it gives, and what it changes, is unknown.
+    """
     node = function.node
     if len(run.stack) >= MAX_DEPTH:
         run.gap(call.node, call.frame, "calls are nested too deep to be followed")
         return unknown("the result of a deeply nested call")
     cells = bind(run, function, call)
     run.called.setdefault(node)
+    if node in run.stack:  # what it would make is a gap: the call counts as not understood
+        run.recursive.add(node)
+        return unknown("the result of a function that is calling itself")
     run.understood.add(call.node)
-    if node in run.recursions or node in run.stack[run.since_recursion :]:
-        return _recursive(run, function, cells, call)
-    mark = run.state.mark()
+    mark, born = run.state.mark(), len(run.born)
     result = _run_body(run, function, cells, call)
+    if node in run.recursive:  # nobody knows what the inner calls changed
+        run.recursive.discard(node)
+        run.state.unsettle(mark)
+        for made in run.born[born:]:
+            made.summary = True
     if is_generator(function) or _runs_later(run, function, call):  # its body may go on at any time
         later = Partial((function,), tuple(call.args.positional), tuple(call.args.keywords.items()))
         run.register_callback((later,), 0, mark)
@@ -84,11 +91,12 @@ def _runs_later(run: Run, function: FunctionValue, call: Call) -> bool:
 
 def is_generator(function: FunctionValue) -> bool:
     """Return True if a function's own body has a ``yield``."""
-    return function.module.source.has_yield and _is_generator(function.node)
+    return function.module.source.has_yield and has_yield(function.node)
 
 
 @functools.lru_cache(maxsize=8192)
-def _is_generator(node: ast.AST) -> bool:
+def has_yield(node: ast.AST | None) -> bool:
+    """Return True if the own body of a function has a ``yield``."""
     left = [node.body] if isinstance(node, ast.Lambda) else list(getattr(node, "body", []))
     while left:
         part = left.pop()
@@ -97,45 +105,6 @@ def _is_generator(node: ast.AST) -> bool:
         if not isinstance(part, (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda, ast.ClassDef)):
             left.extend(ast.iter_child_nodes(part))
     return False
-
-
-class Recursion:
-    """What the calls of a function by itself give to it, joined, and what comes back."""
-
-    def __init__(self, parameters: LocalCells) -> None:
-        self.parameters = dict(parameters)
-        self.result: Value = BOTTOM
-        self.grew = True
-
-
-def _recursive(run: Run, function: FunctionValue, cells: LocalCells, call: Call) -> Value:
-    """Follow a call inside of a call of the same function: all of them are one, run until nothing new comes."""
-    outer = run.recursions.get(function.node)
-    if outer is not None:
-        for name, value in cells.items():
-            joined = widen(outer.parameters.get(name, BOTTOM), value, True)
-            outer.grew = outer.grew or joined is not outer.parameters.get(name, BOTTOM)
-            outer.parameters[name] = joined
-        result_so_far: Value = outer.result
-        return result_so_far  # nothing yet: this path ends in a call that has not come back so far
-    recursion = run.recursions[function.node] = Recursion(cells)
-    mark = run.state.mark()
-    before, run.since_recursion = run.since_recursion, len(run.stack)
-
-    def turn() -> bool:
-        recursion.grew = False
-        inner = LocalCells()
-        inner.update(recursion.parameters)
-        result = join(recursion.result, _run_body(run, function, inner, call))
-        recursion.grew = recursion.grew or result is not recursion.result
-        recursion.result = result
-        return True
-
-    fixpoint(run, call.frame, turn, lambda: not recursion.grew)
-    run.since_recursion = before
-    del run.recursions[function.node]
-    run.state.join_seen(mark, mixed=True)
-    return recursion.result
 
 
 def _run_body(run: Run, function: FunctionValue, cells: LocalCells, call: Call) -> Value:

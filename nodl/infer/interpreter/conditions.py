@@ -508,10 +508,6 @@ def _compare_atoms(op: ast.cmpop, left: object, right: object) -> bool | None:
     if isinstance(op, (ast.In, ast.NotIn)):
         found = _is_among(left, right)
         return None if found is None else found is isinstance(op, ast.In)
-    if isinstance(left, Sequence) and isinstance(right, Sequence):
-        first, second = _constants_in(left), _constants_in(right)
-        known = first is not None and second is not None and not isinstance(op, (ast.Is, ast.IsNot))
-        return _compare_constants(op, first, second) if known else None
     if isinstance(left, CONSTANTS) and isinstance(right, CONSTANTS):
         return _compare_constants(op, left, right)
     if not isinstance(op, (ast.Is, ast.IsNot, ast.Eq, ast.NotEq)):
@@ -543,18 +539,6 @@ def _is_among(constant: object, container: object) -> bool | None:
         held, certain = container.held(constant)
         return True if certain else None if held or container.summary else False
     return None
-
-
-_PLAIN: dict[str, type] = {"tuple": tuple, "list": list}
-
-
-def _constants_in(sequence: Sequence) -> object:
-    """Return a tuple or list of constants; None if it is not known as one."""
-    exact = sequence.items.exact
-    if exact is None or any(len(each) != 1 or not isinstance(each[0], CONSTANTS) for each in exact):
-        return None
-    make = _PLAIN.get(sequence.kind)
-    return None if make is None else make(each[0] for each in exact)
 
 
 _NEVER_NONE = (Instance, FunctionValue, ClassValue, ModuleValue, Sequence, Dictionary)

@@ -17,6 +17,7 @@ from nodl.infer.values import (
     BOTTOM,
     ITEMS,
     LAZY,
+    MODULES,
     OTHER,
     OTHER_KEYS,
     RESULT,
@@ -264,10 +265,6 @@ def assign(run: Run, target: ast.expr, value: Value, frame: Frame) -> None:
     """Bind ``value`` to a name, field or element, or take it apart for a tuple or list of targets."""
     at_once = isinstance(target, ast.Tuple | ast.List)
     if not at_once and any(type(atom) is Sequence and atom.kind == LAZY for atom in value):
-        if value in run.making:
-            run.gap(
-                target, frame, "interfaces are made where this is iterated over later, which is not followed"
-            )
         value = _stored(run, value, target)
     if isinstance(target, ast.Name):
         run.assign_name(target.id, value, frame)
@@ -304,6 +301,8 @@ def store_attribute(run: Run, owners: Value, name: str, value: Value, node: ast.
             run.state.store(owner, name, join(kept, value))
         else:
             run.escape_value(value)  # whoever holds it may call it
+            if owner is MODULES[0]:
+                run.gap(node, frame, "a variable of a module out of sys.modules is set")
             if isinstance(owner, External):
                 _patched(run, owner, name, node, frame)
 

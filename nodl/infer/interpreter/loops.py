@@ -143,10 +143,8 @@ def _while(run: Run, node: ast.While, frame: Frame) -> _Turns:
     return _Turns(broken or not endless, not endless, _breaks(node))
 
 
-def fixpoint(
-    run: Run, frame: Frame, turn: Callable[[], bool], settled: Callable[[], bool] = lambda: True
-) -> None:
-    """Run ``turn`` as something that happens any number of times, until it changes nothing and all is ``settled``."""
+def fixpoint(run: Run, frame: Frame, turn: Callable[[], bool]) -> None:
+    """Run ``turn`` as something that happens any number of times, until it changes nothing."""
     run.repeated += 1
     run.state.depth += 1
     run.state.forks += 1
@@ -159,7 +157,7 @@ def fixpoint(
             jumped = True
             frame.unsettled = ""
             run.state.join_seen(mark, mixed=True)
-        if run.state.join_head(mark, count >= WIDEN_TEXTS_FROM) and settled():
+        if run.state.join_head(mark, count >= WIDEN_TEXTS_FROM):
             break
     else:
         frame_source = frame.function.node if frame.function else frame.module.source.tree
@@ -176,12 +174,6 @@ Emit = Callable[[], None]
 
 def comprehension(run: Run, node: ast.ListComp | ast.SetComp | ast.GeneratorExp, frame: Frame) -> Value:
     """Return a list (a set for a set comprehension), exact only where iterables and conditions are decided."""
-    if isinstance(node, ast.GeneratorExp):
-        return run.lazily(lambda: _comprehension(run, node, frame))
-    return _comprehension(run, node, frame)
-
-
-def _comprehension(run: Run, node: ast.ListComp | ast.SetComp | ast.GeneratorExp, frame: Frame) -> Value:
     lazy = isinstance(node, ast.GeneratorExp)
     run.state.depth += lazy
     inner = _inner_frame(run, frame)

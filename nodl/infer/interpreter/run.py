@@ -181,8 +181,7 @@ class Run(Allocations):
         self.classes: dict[ast.AST, ClassValue] = {}
         self.functions: dict[tuple[object, ...], FunctionValue] = {}
         self.members: dict[tuple[ClassValue, str], Instance] = {}  # of enumerations
-        self.recursions: dict[ast.AST, Any] = {}  # functions that are calling themselves
-        self.since_recursion = 0  # how many calls surround the innermost of these
+        self.recursive: set[ast.AST] = set()  # functions that called themselves in the running call
         self.options = OptionDefaults()
         self.launch = NO_LAUNCH  # with its values inputs do not stay open
         self.asks_launch = False  # the value of a parameter decides more than conditions on names can say
@@ -191,7 +190,6 @@ class Run(Allocations):
         self.guards_at_end: tuple[Guard, ...] = ()  # of the latest block
         self.answers: dict[ast.expr, Value] = {}  # what the calls in tests gave the last time
         self.environment = ContentCells()  # variables that the program sets itself
-        self.making: set[Value] = set()  # iterators that make interfaces where they are asked for elements
         self.unrolled = 1  # turns of the unrolled loops around, multiplied
         self.awaited: set[ast.AST] = set()  # calls whose coroutine runs where it is called
         self.repeated = 0  # inside a loop or callback: one allocation may stand for many objects
@@ -200,7 +198,6 @@ class Run(Allocations):
         self.gave_up = False
         self.called_back: dict[tuple[object, int | None], Called] = {}
         self.running: set[FunctionValue] = set()  # functions that ran since the latest callback began
-        self.without_value = 0  # inside bodies whose handlers catch a parameter that has no value
 
     # --- syntax -----------------------------------------------------------------------------------------
 
@@ -275,14 +272,6 @@ class Run(Allocations):
     def library_object(self, call: Call, path: str, kind: str = "") -> Instance:
         """Return the object of the library class ``path`` that ``call`` makes; ``kind`` as in ``allocate``."""
         return self.allocate(call.node, kind or path, lambda: Instance(External(path)))
-
-    def lazily(self, make: Callable[[], Value]) -> Value:
-        """Return the iterator that ``make`` gives, which has run all that it will do where it is asked for elements."""
-        before = self.findings.count()
-        made = make()
-        if self.findings.count() > before:
-            self.making.add(made)
-        return made
 
     def attribute(self, owner: Value, name: str, node: ast.AST, frame: Frame) -> Value:
         readers = self.tables.attributes

@@ -139,10 +139,6 @@ def _set_defaults(run: Run, parser: Instance, call: Call) -> Value:
     return NONE
 
 
-def _argument_group(run: Run, parser: Instance, call: Call) -> Value:
-    return (parser,)
-
-
 def _parse_args(run: Run, parser: Instance, call: Call) -> Value:
     namespace = run.library_object(call, NAMESPACE)
     run.state.store(namespace, "parser", (parser,))
@@ -184,9 +180,9 @@ def namespace_attribute(run: Run, namespace: Instance, name: str) -> Value:
 METHODS: dict[tuple[str, str], Callable[[Run, Instance, Call], Value]] = {
     (PARSER, "add_argument"): _add_argument,
     (PARSER, "set_defaults"): _set_defaults,
-    (PARSER, "add_argument_group"): _argument_group,
+    (PARSER, "add_argument_group"): lambda run, parser, call: (parser,),
     (PARSER, "add_subparsers"): _add_subparsers,
-    (PARSER, "add_mutually_exclusive_group"): _argument_group,
+    (PARSER, "add_mutually_exclusive_group"): lambda run, parser, call: (parser,),
     (PARSER, "parse_args"): _parse_args,
     (PARSER, "parse_known_args"): _parse_known_args,
     (PARSER, "parse_intermixed_args"): _parse_args,

@@ -8,12 +8,12 @@ from functools import partial
 from typing import Any
 
 from nodl.infer.interpreter.conditions import is_instance, truth
-from nodl.infer.interpreter.define import expect_methods, linearized, new_instance, program_classes
+from nodl.infer.interpreter.define import expect_methods, new_instance, program_classes
 from nodl.infer.interpreter.elements import copy_dictionary, elements, store_attribute
 from nodl.infer.interpreter.formatting import as_texts, is_whole_number, text_value
 from nodl.infer.interpreter.imports import import_module
 from nodl.infer.interpreter.run import Arguments, Call, Model, Run
-from nodl.infer.models import data_files, options
+from nodl.infer.models import data_files, options, ros
 from nodl.infer.start import NO_LAUNCH
 from nodl.infer.text import Input, Text, concatenations, constant_text, input_of, make_text, may_be, with_edit
 from nodl.infer.values import (
@@ -37,7 +37,6 @@ from nodl.infer.values import (
     Key,
     ModuleValue,
     Partial,
-    PropertyValue,
     Sequence,
     Value,
     boolean,
@@ -188,26 +187,8 @@ def _map(run: Run, call: Call) -> Value:
     """Call the function for any of the elements."""
     given = [_items(run, call, index).any_element() or ANY for index in range(1, len(call.args.positional))]
     arguments = Arguments(given, more=call.args.more)
-
-    def made() -> Value:
-        element = run.call(call.args.at(0) or ANY, arguments, call.node, call.frame)
-        return run.sequence(call.node, LAZY, Items(None, element))
-
-    return run.lazily(made)
-
-
-def _filter(run: Run, call: Call) -> Value:
-    """Return any of the elements; the function is called for each."""
-    element = _items(run, call, 1).any_element()
-    call_each(run, call.args.at(0) or NONE, element, call)
+    element = run.call(call.args.at(0) or ANY, arguments, call.node, call.frame)
     return run.sequence(call.node, LAZY, Items(None, element))
-
-
-def _extreme(run: Run, call: Call) -> Value:
-    """Model ``min``, ``max``: one of the elements, nobody knows which."""
-    found = chosen(run, call)
-    call_each(run, call.args.keywords.get("key", NONE), found, call)
-    return join(found, ANY)
 
 
 def _dict(run: Run, call: Call) -> Value:
@@ -261,7 +242,7 @@ def _getattr(run: Run, call: Call) -> Value:
 
 
 def _setattr(run: Run, call: Call) -> Value:
-    """Set one of the named attributes; one whose name is not known is a gap, unless a library holds the object."""
+    """Set one of the named attributes; one that may be another one is a gap, unless a library holds the object."""
     owner, names = call.args.at(0) or ANY, call.args.at(1) or ANY
     value = call.args.at(2) or ANY
     known = constant_strings(names)
@@ -272,42 +253,25 @@ def _setattr(run: Run, call: Call) -> Value:
     if len(known) < len(names):
         run.escape_value(value)
         for atom in owner:
-            if isinstance(atom, Instance) and _only_holds(run, atom) and _set_any(run, atom, names, value):
-                continue
-            if isinstance(atom, HeapObject):
+            if isinstance(atom, HeapObject) and not _is_new(atom, names):
                 run.gap(call.node, call.frame, "an attribute whose name is made at run time is set")
     return NONE
 
 
-def _only_holds(run: Run, obj: Instance) -> bool:
-    """Return True for an object of the program alone, that is no node and has no ``__setattr__``."""
-    if not isinstance(obj.cls, ClassValue) or obj in run.findings.node_of:
+def _is_new(obj: HeapObject, names: Value) -> bool:
+    """Return True if no attribute or method of an object of the program can have one of these names."""
+    if not isinstance(obj, Instance) or not isinstance(obj.cls, ClassValue):
         return False
+    held = {
+        *obj.cells,
+        *(name for base in program_classes(obj.cls) for name in base.cells),
+        *ros.NODE_METHODS,
+    }
+    unknown_ones = [atom for atom in names if not isinstance(atom, str)]
+    known = [name for name in held if isinstance(name, str)]
     return all(
-        "__setattr__" not in base.cells
-        if isinstance(base, ClassValue)
-        else isinstance(base, External) and base.path == "builtins.object"
-        for base in linearized(obj.cls)
+        isinstance(atom, Text) and not any(may_be(atom, name) for name in known) for atom in unknown_ones
     )
-
-
-def _set_any(run: Run, obj: Instance, names: Value, value: Value) -> bool:
-    """Let each attribute of ``obj``, and what its class has, be ``value``, whose name may be one of ``names``.
-
-    Returns False if it may be a property, whose setter decides.
-    """
-    assert isinstance(obj.cls, ClassValue)
-    patterns = [atom for atom in names if isinstance(atom, Text)]
-    unknown_names = any(not isinstance(atom, str | Text) for atom in names)
-    of_class = {name: held for base in program_classes(obj.cls) for name, held in base.cells.items()}
-    plain = True
-    for name in dict.fromkeys((*obj.cells, *of_class)):
-        if not isinstance(name, str) or name.startswith(("[", "__")):
-            continue
-        if unknown_names or any(may_be(pattern, name) for pattern in patterns):
-            run.state.store(obj, name, join(obj.cells.get(name, ABSENT), value))
-            plain = plain and not any(isinstance(each, PropertyValue) for each in of_class.get(name, ()))
-    return plain
 
 
 def _type(run: Run, call: Call) -> Value:
@@ -378,10 +342,8 @@ _BUILT_IN: dict[str, Callable[[Run, Call], Value]] = {
         "enumerate": _enumerate,
         "zip": _zip,
         "map": _map,
-        "filter": _filter,
         "dict": _dict,
         "next": chosen,
-        **dict.fromkeys(("min", "max"), _extreme),
         "getattr": _getattr,
         "setattr": _setattr,
         "type": _type,
@@ -479,11 +441,6 @@ def _lock(run: Run, call: Call) -> Value:
     return LOCKS
 
 
-def _timer(run: Run, call: Call) -> Value:
-    _register_with(run, call.args.at(1, "function") or NONE, call.args.at(2, "args"), None, call)
-    return ANY
-
-
 def _thread_init(run: Run, thread: Instance, call: Call) -> Value:
     _thread(run, call)
     return NONE
@@ -526,7 +483,6 @@ FUNCTIONS: dict[str, Model] = {
     "functools.partial": _partial,
     **{f"threading.{name}": _lock for name in ("Lock", "RLock", "Condition", "Semaphore", "Event")},
     "threading.Thread": _thread,
-    "threading.Timer": _timer,
     "multiprocessing.Process": _thread,
     "collections.OrderedDict": _BUILT_IN["builtins.dict"],
     "collections.deque": _BUILT_IN["builtins.list"],

@@ -105,21 +105,11 @@ CASES: dict[str, tuple[str, list[str]]] = {
     "closure": ("x = 'a'\ndef f():\n    return x + '/b'\nself.P(f())", ["a/b"]),
     "nonlocal": ("x = 'a'\ndef f():\n    nonlocal x\n    x = 'b'\nf()\nself.P(x)", ["b"]),
     "default argument": ("def f(y='a'):\n    return y\nself.P(f())\nself.P(f('b'))", ["a", "b"]),
-    "recursion": ("def f(n):\n    return 'a' if n == 0 else f(n - 1)\nself.P(f(3))", ["a"]),
+    "recursion": ("def f(n):\n    return 'a' if n == 0 else f(n - 1)\nself.P(f(3))", ["?"]),
     "generator": ("def f():\n    yield 'a'\n    yield 'b'\nfor x in f():\n    self.P(x)", ["?", "a", "b"]),
     "getattr": ("self.a = 'x'\nself.P(getattr(self, 'a'))", ["x"]),
-    "setattr by a name known in part": (
-        "class S:\n    a_error = 'a'\n    topic = 'b'\n    def run(self): return 'c'\n"
-        "    @property\n    def drops(self): return 'd'\ns = S()\n"
-        "setattr(s, sys.argv[1] + '_error', 'x')\nself.P(s.a_error); self.P(s.topic + s.run())",
-        ["a", "bc", "x"],
-    ),
     "a class without bases by type()": (
         "s = type('S', (object,), {'topic': 'a'})()\nself.P('b')\nself.P(s.topic)", ["?", "b"]
-    ),
-    "setattr by any name": (
-        "class S:\n    def __init__(self): self.topic = 'b'\ns = S()\nsetattr(s, sys.argv[1], 'x')\nself.P(s.topic)",
-        ["b", "x"],
     ),
     "a copy of __dict__": (
         "class S:\n    def __init__(self): self.topic = 'b'\ns = S()\nd = dict(s.__dict__)\n"
