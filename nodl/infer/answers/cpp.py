@@ -16,8 +16,9 @@ from nodl.infer.cpp.reading.built import build_files
 from nodl.infer.cpp.reading.project import Workspace
 from nodl.infer.start import Start
 
-VARIANTS = 8
-"""Answers to one question, under different launches or after different edits, of which the newest are kept."""
+VARIANTS = 32
+"""Answers to one question, under different launches (each robot of a fleet has one) or after different edits, of which
+the newest are kept."""
 
 Asked = tuple[str, str, str]  # what, of which node, and what the launch said
 

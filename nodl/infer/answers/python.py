@@ -17,8 +17,8 @@ from nodl.infer.answers.folder import CacheFolder, digest, digest_of
 if TYPE_CHECKING:
     from nodl.infer.program import Program
 
-VARIANTS = 4
-"""Number of answers cached for one question, after different edits; the newest stay."""
+VARIANTS = 32
+"""Number of answers cached for one question, under different launches or after different edits; the newest stay."""
 
 
 _OWN_SOURCES = (

@@ -13,7 +13,8 @@ from tests.nodl.infer.cpp.workspace import HEAD, names, package, write
 
 pytest.importorskip("tree_sitter_cpp", reason="the extra cpp is not installed")
 
-from nodl.infer.answers.codec import decoded, encoded
+from nodl.infer.answers import cpp, python
+from nodl.infer.answers.codec import decoded, encoded, keep_variant, variants
 from nodl.infer.answers.folder import CacheFolder
 
 NODE = (
@@ -62,6 +63,15 @@ def test_an_edit_of_the_source_counts(workspace: Path) -> None:
     asked(workspace)
     write(workspace / "demo" / "src" / "main.cpp", NODE.replace("TOPIC", '"edited"'))
     assert names(asked(workspace)) == ["edited"]
+
+
+@pytest.mark.parametrize("kept", [cpp.VARIANTS, python.VARIANTS])
+def test_each_robot_of_a_fleet_has_its_answer_in_the_next_run(kept: int, own_cache: Path) -> None:
+    """They start one program each under its own parameters; were fewer kept, each run would lose them all in turn."""
+    folder = CacheFolder()
+    for robot in range(20):
+        keep_variant(folder, "program", (f"robot_{robot}",), kept)
+    assert {name for (name,) in variants(folder, "program")} == {f"robot_{robot}" for robot in range(20)}
 
 
 def test_a_header_that_appears_before_the_one_that_was_found_counts(workspace: Path) -> None:
