@@ -103,10 +103,17 @@ def _changes_one_of(run: Machine, names: frozenset[str], atom: object) -> bool:
 def _with_held(run: Machine, atom: object) -> list[Lambda | Bound]:
     """Return a callback and the functions in variables that it mentions, and those that these mention."""
     found = [atom] if isinstance(atom, Lambda | Bound) else []
+    code: set[object] = set()  # that is in ``found``
+    names: set[str] = set()  # of variables that were looked into
     for each in found:
-        for name in sorted(run.store.callable_names & _effects(run, each).words):
-            held = (value for cell in run.store.named(name) for value in run.store.get(cell) or BOTTOM)
-            found += [other for other in held if isinstance(other, Lambda | Bound) and other not in found]
+        mentioned = (run.store.callable_names & _effects(run, each).words) - names
+        names |= mentioned
+        for cell in (cell for name in sorted(mentioned) for cell in run.store.named(name)):
+            for other in run.store.get(cell) or BOTTOM:
+                key = other.node.id if isinstance(other, Lambda) else getattr(other, "function", None)
+                if isinstance(other, Lambda | Bound) and key not in code:
+                    code.add(key)
+                    found.append(other)
     return found
 
 
