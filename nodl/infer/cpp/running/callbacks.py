@@ -5,7 +5,7 @@ Run until nothing changes. A callback that makes no interface runs too when it m
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import partial
 
@@ -100,21 +100,22 @@ def _changes_one_of(run: Machine, names: frozenset[str], atom: object) -> bool:
     return any(not names.isdisjoint(each.assigned | each.changed) for each in written)
 
 
-def _with_held(run: Machine, atom: object) -> list[Lambda | Bound]:
-    """Return a callback and the functions in variables that it mentions, and those that these mention."""
-    found = [atom] if isinstance(atom, Lambda | Bound) else []
-    code: set[object] = set()  # that is in ``found``
+def _with_held(run: Machine, atom: object) -> Iterator[Lambda | Bound]:
+    """Yield a callback, then the functions in variables that it mentions, and those that these mention."""
+    waiting = [atom] if isinstance(atom, Lambda | Bound) else []
+    code: set[object] = set()  # of what was found
     names: set[str] = set()  # of variables that were looked into
-    for each in found:
-        mentioned = (run.store.callable_names & _effects(run, each).words) - names
+    while waiting:
+        each = waiting.pop()
+        yield each
+        mentioned = (run.store.callables.keys() & _effects(run, each).words) - names
         names |= mentioned
-        for cell in (cell for name in sorted(mentioned) for cell in run.store.named(name)):
+        for cell in (cell for name in sorted(mentioned) for cell in list(run.store.callables[name])):
             for other in run.store.get(cell) or BOTTOM:
                 key = other.node.id if isinstance(other, Lambda) else getattr(other, "function", None)
                 if isinstance(other, Lambda | Bound) and key not in code:
                     code.add(key)
-                    found.append(other)
-    return found
+                    waiting.append(other)
 
 
 def _effects(run: Machine, atom: Lambda | Bound) -> CallEffects:

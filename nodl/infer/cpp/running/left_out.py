@@ -57,7 +57,7 @@ def leave_out(run: Machine, function: Function, values: Sequence[Value], node: N
     effects = effects_of(run, function)
     if effects.size < LEAST_SIZE or not effects.only_variables or not _is_unused(run, function, node):
         return False
-    if not run.store.callable_names.isdisjoint(effects.words):
+    if not run.store.callables.keys().isdisjoint(effects.words):
         return False
     if any(
         holds_callable(atom) or (isinstance(atom, Obj) and atom.node is not None)

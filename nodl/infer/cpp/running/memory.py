@@ -43,7 +43,8 @@ class AbstractStore:
         self._spend = spend
         self._cells: dict[Cell, Value] = {}
         self._by_name: dict[str, dict[Cell, None]] = {}
-        self.callable_names: set[str] = set()  # of variables that ever held a function or closure
+        # Variables that ever held a function or closure, by their names.
+        self.callables: dict[str, dict[Cell, None]] = {}
         self._trail: list[tuple[Cell, Value, int]] = []  # what was there before, and since when
         self._since: dict[Cell, int] = {}  # the place in the trail where a cell was written last
         self._reads: set[Cell] | None = None
@@ -111,7 +112,7 @@ class AbstractStore:
             if old is _ABSENT and not _is_of_a_call(cell):
                 self._by_name.setdefault(name_of(cell), {})[cell] = None
             if any(map(holds_callable, value)):
-                self.callable_names.add(name_of(cell))
+                self.callables.setdefault(name_of(cell), {})[cell] = None
             self._trail.append((cell, old, self._since.get(cell, -1)))
             self._since[cell] = len(self._trail) - 1
             self._cells[cell] = value
