@@ -245,8 +245,11 @@ def _delete(run: Run, node: ast.Delete, frame: Frame) -> bool:
 def run_try(run: Run, node: Any, frame: Frame) -> bool:
     """Run each handler after any part of the body; it sees every value written on the way, as ``finally`` does."""
     mark, returned = run.state.mark(), frame.returned
+    without_value = any(map(_catches_no_value, node.handlers))
     run.state.depth += 1
+    run.without_value += without_value
     passes = run.execute(node.body, frame)
+    run.without_value -= without_value
     run.state.depth -= 1
     if node.handlers:
         passes = _perhaps_handled(run, node, passes, mark, frame)
@@ -281,6 +284,16 @@ def _perhaps_handled(run: Run, node: Any, passes: bool, mark: int, frame: Frame)
         frame.early = True
     handled = [partial(handle, handler) for handler in node.handlers]
     return run.state.branches([*handled, lambda: passes and run.execute(node.orelse, frame)])
+
+
+def _catches_no_value(handler: ast.ExceptHandler) -> bool:
+    """Return True if a parameter that was declared without a value, and got none, ends in ``handler``."""
+    kinds = handler.type.elts if isinstance(handler.type, ast.Tuple) else [handler.type]
+    return any(kind is None or ast.unparse(kind).rpartition(".")[2] in _NO_VALUE for kind in kinds)
+
+
+_NO_VALUE = frozenset({"ParameterUninitializedException", "ParameterException", "Exception", "BaseException"})
+"""What rclpy's ``get_parameter`` raises then, and what it is derived from (rclpy/exceptions.py)."""
 
 
 def run_with(run: Run, node: ast.With | ast.AsyncWith, frame: Frame) -> bool:

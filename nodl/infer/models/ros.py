@@ -424,7 +424,8 @@ def _inputs(run: Run, record: NodeRecord, names: list[str], call: Call) -> Value
             others = [
                 only_if(unset, each) for each in declared if isinstance(each, Text) and is_of_inputs(each)
             ]
-            text = with_edit(asked, "only if set", ()) if others else make_text((asked,))
+            only_set = others or (run.without_value and not declared)
+            text = with_edit(asked, "only if set", ()) if only_set else make_text((asked,))
             result = join(result, (text, *others))
     return result
 
