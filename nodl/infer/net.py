@@ -36,9 +36,8 @@ Function = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda
 _NAMED = (ast.FunctionDef, ast.AsyncFunctionDef)
 Import = ast.Import | ast.ImportFrom
 CREATING_NAMES = frozenset(NODE_ENDPOINTS) | ros.CREATING_NAMES
-_SCHEDULING = (
-    CREATING_NAMES | COMMON_CALLBACKS.keys() | NODE_CALLBACKS.keys()
-)  # call what they are given in a spin
+_SCHEDULING = CREATING_NAMES | COMMON_CALLBACKS.keys() | NODE_CALLBACKS.keys()
+"""Calls whose functions rclpy runs while it spins."""
 _CREATING_TEXT = re.compile("|".join(sorted(map(re.escape, CREATING_NAMES))))
 _ELSEWHERE = re.compile(r"rclpy|\b(?:importlib|__import__|eval|exec|runpy|pickle)\b")
 _LOST = "may be called from somewhere that the analysis did not follow, and would create interfaces"
@@ -171,7 +170,7 @@ def changed_meanwhile(module: SourceModule) -> frozenset[str]:
     handed -= {name for scope in scopes for name in scope.scheduled}
     handed -= {
         scope.name for scope in scopes if getattr(scope.node, "decorator_list", ())
-    }  # properties, for one
+    }  # such as properties
     left = [each for each in scopes if each.name in handed or _runs_at_any_time(each, module)]
     found = set(left)
     while left:

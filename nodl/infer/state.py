@@ -52,9 +52,8 @@ class ProgramState:
         # Stamps of the latest writes, the last one at the end: by name of a variable or field, and by ``id`` of the
         # cells of a container.
         self.changed: dict[str | int, int] = {}
-        self.changed_meanwhile: set[str] = (
-            set()
-        )  # names of variables that code which runs at any time sets, too
+        # Names of variables that code which runs at any time sets, too.
+        self.changed_meanwhile: set[str] = set()
         self.base = sys.maxsize  # how many undecided branches surround a write that stays
         self.fresh: set[int] = (
             set()

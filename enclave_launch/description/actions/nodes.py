@@ -309,9 +309,8 @@ def _parse_named_parameter(param: Entity, parser: Parser) -> tuple[tuple[Substit
 
 
 def __getattr__(name: str) -> Any:
-    if (
-        name == "NodeActionExtension"
-    ):  # upstream's place for it; in a module of its own, which loads only when requested
+    # Upstream's place for it; here it has a module of its own, which loads only when requested.
+    if name == "NodeActionExtension":
         return NodeActionExtension
     raise AttributeError(f"module 'launch_ros.actions.node' has no attribute {name!r}")
 

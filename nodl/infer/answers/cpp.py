@@ -155,5 +155,4 @@ def _is_build_file(path: str) -> bool:
 
 def _left_by_builds(workspace: Workspace) -> Iterator[str]:
     for folder in workspace.build_folders:
-        read = *build_files(folder), *Path(folder).glob("*/CMakeCache.txt")
-        yield from map(str, sorted({*read, *(each.with_name("DependInfo.cmake") for each in read)}))
+        yield from map(str, sorted((*build_files(folder), *Path(folder).glob("*/CMakeCache.txt"))))

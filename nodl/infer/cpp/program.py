@@ -121,7 +121,7 @@ class Sources:
             return definitions
         key = (package.name, definitions)
         if key not in self._elsewhere:
-            libraries = [t for t in package.build.targets.values() if t.sources and not t.executable]
+            libraries = [each for each in package.build.libraries if each.sources]
             own = [self.workspace.definitions(package, libraries)] if libraries else []
             self._elsewhere[key] = joined([definitions, *own])
         return self._elsewhere[key]
@@ -177,8 +177,7 @@ _MODELLED_IF_INSTALLED = frozenset({"nav2_core", "nav2_costmap_2d", "nav2_ros_co
 
 def library_sources(package: SourcePackage) -> list[str]:
     """Return what the libraries of a package are built from."""
-    libraries = [t for t in package.build.targets.values() if not t.executable]
-    return list(dict.fromkeys(file for target in libraries for file in target.sources))
+    return sources_of(package.build.libraries)
 
 
 # --- running ----------------------------------------------------------------------------------------------------

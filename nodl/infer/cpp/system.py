@@ -18,8 +18,9 @@ from nodl.infer.cpp.libraries import NODE_BASES
 from nodl.infer.cpp.models.controllers import CONTROLLERS
 from nodl.infer.cpp.program import Sources, definitions_of, registered_components, target_entry
 from nodl.infer.cpp.reading.built import UNBUILT
+from nodl.infer.cpp.reading.cmake import SOURCES
 from nodl.infer.cpp.reading.names import Names
-from nodl.infer.cpp.reading.project import SOURCES, SourcePackage, Workspace, find_packages
+from nodl.infer.cpp.reading.project import SourcePackage, Workspace, find_packages
 from nodl.infer.cpp.solved import solve, solve_all
 from nodl.infer.cpp.syntax import check_support
 from nodl.infer.start import LaunchKey, Start
@@ -346,7 +347,7 @@ def _plugin_entry(name: str, package: SourcePackage, workspace: Workspace) -> En
     With all sources of the package if CMake's files do not say what the library is made of.
     """
     last = name.rpartition("::")[2]
-    libraries = [each for each in package.build.targets.values() if not each.executable]
+    libraries = package.build.libraries
     target = next((each for each in libraries if any(_exports(file, last) for file in each.sources)), None)
     if target is None:
         sources = _all_sources(package)

@@ -9,7 +9,8 @@ from __future__ import annotations
 import json
 import os
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import NamedTuple, TypeAlias
 
@@ -24,9 +25,6 @@ _NINJA_SOURCE = re.compile(
     r"^build (\S+\.o): CXX_COMPILER\S* ((?:[^\s$]|\$.)+).*\n((?:  .*\n)*)", re.MULTILINE
 )
 _NINJA_FLAGS = re.compile(r"^  (?:DEFINES|FLAGS) = (.*)$", re.MULTILINE)
-
-Compiled: TypeAlias = "dict[str, dict[str, Mapping[str, str] | None]]"
-"""Real path of a source -> target -> what it is compiled with; ``None`` if that is not all on the command line."""
 
 
 class Definitions(NamedTuple):
@@ -57,15 +55,18 @@ def joined(several: Iterable[Definitions]) -> Definitions:
 
 UNBUILT = Definitions()
 
+Compiled: TypeAlias = "dict[str, dict[str, Definitions]]"
+"""Real path of a source -> target -> what it is compiled with."""
 
-def defined_on(words: Sequence[str]) -> dict[str, str] | None:
-    """Return what a command line of a compiler defines; ``None`` if it has the compiler read more of it from files."""
+
+def defined_on(words: Sequence[str]) -> Definitions:
+    """Return what a command line of a compiler defines: not all, if it has the compiler read more of it from files."""
     found: dict[str, str] = {}
     waiting = list(words)
     while waiting:
         word = waiting.pop(0)
         if word.startswith(("-include", "-imacros", "@")):
-            return None
+            return UNBUILT
         if word == "-D" and waiting:
             word += waiting.pop(0)
         if word.startswith("-D"):
@@ -73,19 +74,15 @@ def defined_on(words: Sequence[str]) -> dict[str, str] | None:
             found[name] = value if given else "1"
         elif word.startswith("-U"):
             found.pop(word[2:], None)
-    return found
+    return Definitions(tuple(sorted(found.items())), complete=True)
 
 
 def compiled_sources(build_folders: Iterable[str]) -> Compiled:
     """Return what each source is compiled with below the folders that hold a build, or one for each package."""
     found: Compiled = {}
-    for source, target, words in (each for folder in build_folders for each in _compilations(folder)):
-        try:
-            words = split_words(words) if isinstance(words, str) else words
-        except ValueError:
-            words = None
-        definitions = defined_on(words) if words is not None else None
-        found.setdefault(os.path.realpath(source), {})[target] = definitions
+    for path in (each for folder in build_folders for each in build_files(folder)):
+        for source, target, command in _READERS[path.name](path):
+            found.setdefault(os.path.realpath(source), {})[target] = _definitions(command)
     return found
 
 
@@ -95,24 +92,27 @@ def build_files(folder: str) -> Iterator[Path]:
         commands = each / "compile_commands.json"
         if commands.is_file():
             yield commands
-        else:
-            yield from each.glob("build.ninja")
-            yield from sorted(each.glob("CMakeFiles/*.dir/flags.make"))
-            yield from sorted(each.glob("*/CMakeFiles/*.dir/flags.make"))
+            continue
+        yield from each.glob("build.ninja")
+        below = (each.glob(f"{at}CMakeFiles/*.dir/flags.make") for at in ("", "*/"))
+        for flags in sorted(chain.from_iterable(below)):
+            yield flags
+            yield flags.with_name(_SOURCES_OF_FLAGS)
 
 
-Compilation: TypeAlias = "tuple[str, str, str | list[str] | None]"
-"""A source, the target that it is compiled for, and the compiler's command line; ``None`` if it is not known."""
+_SOURCES_OF_FLAGS = "DependInfo.cmake"
+Command: TypeAlias = "str | list[str] | None"
+"""The compiler's command line, as one text or in words; ``None`` if it is not known."""
+Compilation: TypeAlias = "tuple[str, str, Command]"
+"""A source, the target that it is compiled for, and how."""
 
 
-def _compilations(folder: str) -> Iterator[Compilation]:
-    for path in build_files(folder):
-        if path.name == "compile_commands.json":
-            yield from _of_commands(path)
-        elif path.name == "build.ninja":
-            yield from _of_ninja(path)
-        else:
-            yield from _of_make(path)
+def _definitions(command: Command) -> Definitions:
+    try:
+        words = split_words(command) if isinstance(command, str) else command
+    except ValueError:
+        words = None
+    return defined_on(words) if words is not None else UNBUILT
 
 
 def _of_commands(path: Path) -> Iterator[Compilation]:
@@ -132,7 +132,7 @@ def _of_make(path: Path) -> Iterator[Compilation]:
     content = text_or_nothing(path)
     flags = " ".join(_MAKE_FLAGS.findall(content)).replace("$$", "$").replace("\\#", "#")
     custom = set(_MAKE_CUSTOM.findall(content))
-    for source, made in _MAKE_SOURCE.findall(text_or_nothing(path.with_name("DependInfo.cmake"))):
+    for source, made in _MAKE_SOURCE.findall(text_or_nothing(path.with_name(_SOURCES_OF_FLAGS))):
         yield source, path.parent.name.removesuffix(".dir"), None if made in custom else flags
 
 
@@ -146,3 +146,11 @@ def _of_ninja(path: Path) -> Iterator[Compilation]:
 def _unescaped(text: str) -> str:
     """Return a value of Ninja as it is meant ([Ninja manual, lexical syntax])."""
     return re.sub(r"\$([$ :])", r"\1", text)
+
+
+_READERS: dict[str, Callable[[Path], Iterable[Compilation]]] = {
+    "compile_commands.json": _of_commands,
+    "build.ninja": _of_ninja,
+    "flags.make": _of_make,
+    _SOURCES_OF_FLAGS: lambda path: (),  # read with the flags
+}

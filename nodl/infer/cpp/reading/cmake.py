@@ -17,7 +17,9 @@ from pathlib import Path
 from enclave_common.files import read_text
 from nodl.infer.cpp.reading.built import Definitions
 
-_SOURCE_SUFFIXES = (".cpp", ".cc", ".cxx", ".c++", ".C", ".cu")
+SOURCES = (".cpp", ".cc", ".cxx", ".c++", ".C")
+"""The suffixes of files that a C++ compiler gets."""
+_SOURCE_SUFFIXES = (*SOURCES, ".cu")
 _EXECUTABLES = frozenset({
     "add_executable", "ament_auto_add_executable", "rclcpp_add_executable", "qt5_add_executable", "qt6_add_executable",
     "qt_add_executable",
@@ -63,9 +65,12 @@ class Build:
     plugin_files: list[str] = field(default_factory=list)
     includes: list[str] = field(default_factory=list)
     renamed: dict[str, str] = field(default_factory=dict)  # target -> OUTPUT_NAME
-    parameter_files: dict[str, str] = field(
-        default_factory=dict
-    )  # header of generate_parameter_library -> YAML
+    # Header of generate_parameter_library -> YAML.
+    parameter_files: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def libraries(self) -> list[Target]:
+        return [each for each in self.targets.values() if not each.executable]
 
 
 def read_build(folder: str | None) -> Build:

@@ -11,14 +11,13 @@ from html import unescape
 
 from enclave_common.files import text_or_nothing
 from nodl.infer.cpp.reading.built import Compiled, Definitions, compiled_sources, joined
-from nodl.infer.cpp.reading.cmake import Build, Target, read_build
+from nodl.infer.cpp.reading.cmake import SOURCES, Build, Target, read_build
 
 _TAG = re.compile(r"<(?:\w*depend|exec_depend|build_depend)(?:\s[^<>]*)?>\s*([\w\-.]+)\s*</")
 _NAME = re.compile(r"<name>\s*([^<\s]+)\s*</name>")
 _EXPORT = re.compile(r'<(\w+)\s+plugin\s*=\s*"([^"]+)"')
 _CLASS = re.compile(r"<class\b((?:\s+[\w:]+\s*=\s*(?:\"[^\"]*\"|'[^']*'))+)\s*/?>")
 _ATTRIBUTE = re.compile(r"([\w:]+)\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
-SOURCES = (".cpp", ".cc", ".cxx", ".c++", ".C")
 _SKIPPED = frozenset({"build", "install", "log", "node_modules", "venv", "site-packages", "__pycache__"})
 
 
@@ -141,12 +140,11 @@ class Workspace:
             for file in (each for each in target.sources if each.endswith(SOURCES)):
                 by_target = self._compiled.get(os.path.realpath(file), {})
                 is_known = is_known and bool(by_target)
-                for each in [by_target[target.name]] if target.name in by_target else by_target.values():
-                    symbols = tuple(sorted(each.items())) if each is not None else ()
-                    found.append(Definitions(symbols, each is not None, package=package.name))
+                found += [by_target[target.name]] if target.name in by_target else by_target.values()
         if not found:
             return joined(each.definitions(package.name) for each in targets)
-        return joined(found)._replace(complete=is_known and all(each.complete for each in found))
+        as_built = joined(found)
+        return as_built._replace(complete=as_built.complete and is_known, package=package.name)
 
 
 def find_packages(roots: Iterable[str]) -> dict[str, SourcePackage]:
@@ -196,7 +194,7 @@ def targets_of(target: Target, build: Build) -> list[Target]:
         current = waiting.pop()
         names = list(current.links)
         if current.automatic:
-            names += [t.name for t in build.targets.values() if not t.executable]
+            names += [each.name for each in build.libraries]
         for name in names:
             linked = build.targets.get(name.rpartition("::")[2])
             if linked is not None and linked.name not in found:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 from functools import partial
 
 from nodl.infer.cpp.reading.declarations import Class
-from nodl.infer.cpp.running.effects import CallEffects, effects_of, looked_at
+from nodl.infer.cpp.running.effects import effects_of, looked_at
 from nodl.infer.cpp.running.invocation import HOOKS, call_lambda, invoke
 from nodl.infer.cpp.running.machine import NEXT, Frame, Machine
 from nodl.infer.cpp.running.memory import Reads, name_of
@@ -96,7 +96,7 @@ def run_meanwhile(run: Machine, frame: Frame) -> None:
 
 
 def _changes_one_of(run: Machine, names: frozenset[str], atom: object) -> bool:
-    written = (_effects(run, each).written for each in _with_held(run, atom))
+    written = (effects_of(run, each).written for each in _with_held(run, atom))
     return any(not names.isdisjoint(each.assigned | each.changed) for each in written)
 
 
@@ -108,7 +108,7 @@ def _with_held(run: Machine, atom: object) -> Iterator[Lambda | Bound]:
     while waiting:
         each = waiting.pop()
         yield each
-        mentioned = (run.store.callables.keys() & _effects(run, each).words) - names
+        mentioned = (run.store.callables.keys() & effects_of(run, each).words) - names
         names |= mentioned
         for cell in (cell for name in sorted(mentioned) for cell in list(run.store.callables[name])):
             for other in run.store.get(cell) or BOTTOM:
@@ -116,10 +116,6 @@ def _with_held(run: Machine, atom: object) -> Iterator[Lambda | Bound]:
                 if isinstance(other, Lambda | Bound) and key not in code:
                     code.add(key)
                     waiting.append(other)
-
-
-def _effects(run: Machine, atom: Lambda | Bound) -> CallEffects:
-    return effects_of(run, atom.function if isinstance(atom, Bound) else atom)
 
 
 def _round(rounds: _Rounds, takes_part: Callable[[object], bool] = lambda atom: True) -> bool:
@@ -171,7 +167,7 @@ def _run(run: Machine, atom: object, frame: Frame) -> None:
 def _matters(rounds: _Rounds, atom: object) -> bool:
     """Return whether it may make an interface or a node, give one away, or change what a callback has read."""
     for each in _with_held(rounds.run, atom):
-        effects = _effects(rounds.run, each)
+        effects = effects_of(rounds.run, each)
         written = effects.written
         if (
             _makes(rounds.run, each)

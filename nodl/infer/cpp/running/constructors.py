@@ -409,8 +409,11 @@ def _unmodelled(run: Machine, kind: Type, node: Node, frame: Frame, deliberate: 
 
 
 def _check_operators(run: Machine, cls: Class, node: Node, frame: Frame) -> None:
-    """Add a gap for what changes something and runs where nobody calls it: conversions, ``,``, comparisons, from which
-    C++20 derives others; destructors, where they write to what a member refers or points to."""
+    """Add a gap for functions that change something and that are called implicitly.
+
+    Conversions, ``,``, comparisons, from which C++20 derives others, and destructors that write to what a member
+    refers or points to.
+    """
     ancestry = run.names.ancestry(cls)
     fields = {name: member for each in ancestry for name, member in each.fields.items()}
     behind_const = {name for name, each in fields.items() if each.pointer or "mutable" in text(each.node)}

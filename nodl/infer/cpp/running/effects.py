@@ -14,7 +14,7 @@ from nodl.infer.cpp.reading.names import Names
 from nodl.infer.cpp.reading.writes import VariableWrites, written_by
 from nodl.infer.cpp.running.foreign import Leaving, leaving
 from nodl.infer.cpp.running.memory import Cell
-from nodl.infer.cpp.running.values import Lambda
+from nodl.infer.cpp.running.values import Bound, Lambda
 from nodl.infer.cpp.syntax import Node, callee_name, field_of, text, walk, words_in
 
 if TYPE_CHECKING:
@@ -86,7 +86,7 @@ class CallEffects:
 
     @property
     def _may_init_ros(self) -> bool:
-        """Whether ``init`` may be rclcpp's: it is, unless the program has a function of this name."""
+        """Return True if ``init`` may be rclcpp's: unless the program has a function of this name."""
         return "init" in self.words and (
             "rclcpp" in self.words or "init" not in self._run.names.functions_by_name
         )
@@ -116,8 +116,9 @@ class CallEffects:
         return VariableWrites(frozenset(assigned), frozenset(changed), frozenset(seen), (), lasting)
 
 
-def effects_of(run: Machine, of: Function | Lambda) -> CallEffects:
+def effects_of(run: Machine, of: Function | Lambda | Bound) -> CallEffects:
     """Return what ``of`` may do with the classes that are used so far."""
+    of = of.function if isinstance(of, Bound) else of
     key = (of if isinstance(of, Function) else of.node.id, len(run.used_classes()))
     if key not in run.effects:
         run.effects[key] = CallEffects(run, of)

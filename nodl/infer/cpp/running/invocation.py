@@ -156,27 +156,14 @@ def call_functions(
     types: Sequence[Type],
 ) -> Value:
     """Return what the overloads that fit best may return; ``unknown_call`` decides if none fits."""
-    known = _in_place(run, functions[0], None, values, node, frame, types)
-    if known is not None:
-        return known
-    special = _one_of_special(run, functions, node, frame)
-    if special is not None:
-        return special
-    fitting = candidates(functions, values, partial(written_as, run, node, frame))
-    if not fitting:
-        return unknown_call(run, functions[0].name, values, node, [], frame)
-    if len(fitting) > MAX_OVERLOADS and not any(map(run.makes_interfaces, fitting)):
-        return _one_of_many(run, fitting, node, frame)
-    return _any_of(
-        run, fitting, lambda each: invoke(run, each, None, values, node, frame, types), node, frame
-    )
+    return call_methods(run, functions, None, values, node, frame, types)
 
 
 MAX_OVERLOADS = 3
 
 
 def _one_of_many(run: Machine, functions: Sequence[Function], node: Node, frame: Frame) -> Value:
-    """Return an unknown for one of many overloads, nobody knows which; a gap if they change what matters."""
+    """Return an unknown for one of many overloads; a gap if they change what matters."""
     run.handle(node, frame)
     run.called.update(functions)
     name, given = functions[0].name, given_to(node, frame)
@@ -227,7 +214,7 @@ def _one_of_special(run: Machine, functions: Sequence[Function], node: Node, fra
 def _any_of(
     run: Machine, functions: Sequence[Function], call: Callable[[Function], Value], node: Node, frame: Frame
 ) -> Value:
-    """Call one of several overloads, nobody knows which; a gap if they do not make the same."""
+    """Call one of several overloads, which of them is not known; a gap if they do not make the same."""
     if len(functions) == 1:
         return call(functions[0])
     found: list[Value] = []
@@ -276,18 +263,17 @@ def call_methods(
         return special
     fitting = candidates(methods, values, partial(written_as, run, node, frame))
     if not fitting:
-        return unknown_call(run, f"{methods[0].owner}::{methods[0].name}", values, node, [], frame)
+        name = "::".join(filter(None, (methods[0].owner, methods[0].name)))
+        return unknown_call(run, name, values, node, [], frame)
     if len(fitting) > MAX_OVERLOADS and not any(map(run.makes_interfaces, fitting)):
         return _one_of_many(run, fitting, node, frame)
     if this_object is not None and not exactly and len(values) < len(fitting[0].parameters):
         _check_defaults(run, fitting[0], this_object, len(values), node, frame)
-    return _any_of(
-        run,
-        fitting,
-        lambda each: invoke(run, each, this_object, values, node, frame, types, bindings),
-        node,
-        frame,
-    )
+
+    def call(each: Function) -> Value:
+        return invoke(run, each, this_object, values, node, frame, types, bindings)
+
+    return _any_of(run, fitting, call, node, frame)
 
 
 def _check_defaults(

@@ -83,7 +83,7 @@ def _never_returns(function: Function) -> bool:
 
 
 def _is_unused(run: Machine, function: Function, call: Node) -> bool:
-    """Return whether nobody looks at what the call gives, or it is a number, a condition or of an enumeration."""
+    """Return whether the result of a call is not used, or is a number, a condition or an enumerator."""
     is_statement = call.type != "call_expression" or (
         call.parent is not None and call.parent.type == "expression_statement"
     )

@@ -207,7 +207,7 @@ def _calls_back(run: Machine, values: Sequence[Value], node: Node, frame: Frame)
     return unknown(f"the result of {text(node.child_by_field_name('function'))[:40]}()")
 
 
-_SPINS = re.compile(r"\bspin\w*")
+_NAMES_SPIN = re.compile(r"\bspin\w*")
 
 
 @library_class("std::thread", "std::jthread")
@@ -216,8 +216,8 @@ def _thread(run: Machine, call: Call) -> None:
     if call.values:
         run.store.others_run()
         kept = (a for value in call.values for a in value if isinstance(a, Lambda | Bound))
-        words = (effects_of(run, a.function if isinstance(a, Bound) else a).words for a in kept)
-        spins = any(map(_SPINS.search, (text(call.node), *chain.from_iterable(words))))
+        words = (effects_of(run, a).words for a in kept)
+        spins = any(map(_NAMES_SPIN.search, (text(call.node), *chain.from_iterable(words))))
         run.spins_beside = run.spins_beside or spins
         _calls_back(run, call.values, call.node, call.frame)
 

@@ -97,26 +97,17 @@ class Unknown(NamedTuple):
     why: str
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Unknown)
+        return type(other) is type(self)
 
     def __ne__(self, other: object) -> bool:
-        return not isinstance(other, Unknown)
+        return type(other) is not type(self)
 
     def __hash__(self) -> int:
-        return hash(Unknown)
+        return hash(type(self))
 
 
 class ReferredTo(Unknown):
-    """What a reference or pointer to a plain value stands for: who writes to it writes to a variable of somebody."""
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, ReferredTo)
-
-    def __ne__(self, other: object) -> bool:
-        return not isinstance(other, ReferredTo)
-
-    def __hash__(self) -> int:
-        return hash(ReferredTo)
+    """What a reference or pointer to a plain value stands for: a write to it changes another variable."""
 
 
 class Const(NamedTuple):
