@@ -14,7 +14,7 @@ from nodl.infer.cpp.findings import AllocatedNode
 from nodl.infer.cpp.ledger import CREATES, SiteAnswer, account, leads_to_interfaces
 from nodl.infer.cpp.models.loaded import host_of, load
 from nodl.infer.cpp.models.nodes import ARGUMENT
-from nodl.infer.cpp.reading.built import Definitions, joined
+from nodl.infer.cpp.reading.built import Definitions
 from nodl.infer.cpp.reading.cmake import Target
 from nodl.infer.cpp.reading.collect import index_file
 from nodl.infer.cpp.reading.declarations import Class, FileIndex, Function, FunctionParameter, Global
@@ -121,9 +121,7 @@ class Sources:
             return definitions
         key = (package.name, definitions)
         if key not in self._elsewhere:
-            libraries = [each for each in package.build.libraries if each.sources]
-            own = [self.workspace.definitions(package, libraries)] if libraries else []
-            self._elsewhere[key] = joined([definitions, *own])
+            self._elsewhere[key] = self.workspace.within(package, definitions)
         return self._elsewhere[key]
 
     def index(self, file: str, definitions: Definitions) -> FileIndex | None:

@@ -31,7 +31,8 @@ class Definitions(NamedTuple):
     """What the sources of one program are compiled with.
 
     ``symbols``: those that all define alike; ``open``: what only some define, or as something else; ``complete``:
-    nothing else is defined on the command line. ``package``: whose sources they are.
+    nothing else is defined on the command line. ``package``: whose sources have these, where all of its libraries
+    together have others; empty if that makes no difference.
     """
 
     symbols: tuple[tuple[str, str], ...] = ()

@@ -43,10 +43,11 @@ class Target:
     links: list[str] = field(default_factory=list)
     automatic: bool = False  # ament_auto: links every library of the package
 
-    def definitions(self, package: str) -> Definitions:
+    @property
+    def definitions(self) -> Definitions:
         """Return what its sources are compiled with, as far as CMake's files say it."""
         known = {name: value for name, value in self.symbols.items() if name not in self.open}
-        return Definitions(tuple(sorted(known.items())), open=tuple(sorted(self.open)), package=package)
+        return Definitions(tuple(sorted(known.items())), open=tuple(sorted(self.open)))
 
     def define(self, symbols: Mapping[str, str], doubtful: Iterable[str]) -> None:
         """Add symbols of the command line; of one that is defined twice, differently, the value is not known."""

@@ -134,6 +134,15 @@ class Workspace:
 
     def definitions(self, package: SourcePackage, targets: Sequence[Target]) -> Definitions:
         """Return what sources of one program are compiled with: as they were built, else as CMake's files say."""
+        own = self._definitions(targets)
+        return own if self.within(package, own) == own else own._replace(package=package.name)
+
+    def within(self, package: SourcePackage, definitions: Definitions) -> Definitions:
+        """Return what files of a package are compiled with: in a program with ``definitions``, or its libraries."""
+        libraries = [each for each in package.build.libraries if each.sources]
+        return joined([definitions, self._definitions(libraries)]) if libraries else definitions
+
+    def _definitions(self, targets: Sequence[Target]) -> Definitions:
         found: list[Definitions] = []
         is_known = True
         for target in targets:
@@ -142,9 +151,9 @@ class Workspace:
                 is_known = is_known and bool(by_target)
                 found += [by_target[target.name]] if target.name in by_target else by_target.values()
         if not found:
-            return joined(each.definitions(package.name) for each in targets)
+            return joined(each.definitions for each in targets)
         as_built = joined(found)
-        return as_built._replace(complete=as_built.complete and is_known, package=package.name)
+        return as_built._replace(complete=as_built.complete and is_known)
 
 
 def find_packages(roots: Iterable[str]) -> dict[str, SourcePackage]:
