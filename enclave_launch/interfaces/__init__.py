@@ -154,11 +154,7 @@ class InterfaceFinder:
             found.append(ProgramDescription(InterfaceOrigin.ANALYSIS, analysed.interfaces))
         hit = self._library.find(subject.package, name)
         if hit:
-            document = hit.document
-            of_this_version = bool(document.versions) and not hit.doubt
-            found.append(
-                ProgramDescription(InterfaceOrigin.LIBRARY, (document.interface,), hit.doubt, of_this_version)
-            )
+            found.append(ProgramDescription(InterfaceOrigin.LIBRARY, (hit.document.interface,), hit.doubt))
         searched = ["looked at " + _shortly(named.searched)]
         searched += [f"--nodl describes {', '.join(named.described)}"] if named.described else []
         searched += [analysed.why] if analysed is not None and analysed.why else []

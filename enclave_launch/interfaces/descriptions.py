@@ -5,8 +5,9 @@
 2. A manifest that a person wrote decides, else what was recorded, else the first complete one of source and library.
 3. If the one that decides leaves something open, the next complete one takes its place, and the names that the first
    does know are added.
-4. If source and library are both complete and one gives a part of the other's names, that one is used; if each gives
-   names that the other lacks, both are. A library document counts here only if it was written for this version.
+4. A source that is complete is what runs here: the library, which was written from another copy of it, adds nothing. A
+   source that leaves something open but has a name that the library lacks is another program than the library's: it
+   decides with what it leaves open.
 5. A record proves what is there, never what is not: names that another description has beyond it are reported, and
    granted with ``--also unseen``. Where runs leave open what a recorded name comes from, a complete description
    that has some of its readings decides.
@@ -53,13 +54,12 @@ class ProgramStart(NamedTuple):
 class ProgramDescription(NamedTuple):
     """The nodes of a program as one source of knowledge has them under one start.
 
-    ``doubt``: it was written for another version. ``of_this_version``: it names the version that is installed.
+    ``doubt``: it was written for another version.
     """
 
     origin: InterfaceOrigin
     interfaces: tuple[NodeInterface, ...]
     doubt: str = ""
-    of_this_version: bool = True
 
 
 def meeting(
@@ -119,15 +119,8 @@ def _chosen(judged: Sequence[_Judged], also_unseen: bool) -> tuple[_Judged, tupl
             return (instead, (first,)) if instead else (first, ())
         return first, others if recorded and also_unseen else ()
     library = judged[-1]
-    if not first.complete:
-        return library, ()
-    if not (library.complete and library.description.of_this_version):
-        return first, ()
-    if first.names.keys() <= library.names.keys():
-        return first, ()
-    if library.names.keys() <= first.names.keys():
-        return library, ()
-    return first, (library,)
+    is_other_program = not first.names.keys() <= library.names.keys()
+    return (first if first.complete or is_other_program else library), ()
 
 
 def _names(description: ProgramDescription, start: ProgramStart) -> tuple[dict[Named, str], tuple[str, ...]]:

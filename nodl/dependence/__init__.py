@@ -49,6 +49,9 @@ class When(NamedTuple):
     until: str = ""
 
 
+ALWAYS = When()
+
+
 class Variation(NamedTuple):
     """The variation of one listed endpoint.
 

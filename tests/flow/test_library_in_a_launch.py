@@ -305,30 +305,38 @@ def test_a_gap_that_only_this_start_has_sends_it_to_the_next_description(
     assert launch(node.format("")).problems
 
 
-@pytest.mark.parametrize("names", ["", ", names: {publishers: {a: {when: {more: true}}}}"])
-def test_of_two_complete_descriptions_the_narrower_is_used_and_the_difference_told(
-    launch: Launch, install: Callable[..., Path], document: Callable[..., Path], names: str
+@pytest.mark.parametrize("of_document", ["b", "c"])
+def test_a_complete_source_decides_and_its_difference_from_the_library_is_told(
+    launch: Launch, install: Callable[..., Path], document: Callable[..., Path], of_document: str
 ) -> None:
-    """A parameter that is not set switches the name of the document off."""
-    source = PYTHON.format(topic="'a'").replace(
-        "rclpy.spin", "node.create_publisher(String, 'b', 1)\nrclpy.spin"
-    )
-    install("pkg", "prog", source=source)
-    own = (document("pkg/prog", "a", VERSIONED.replace("NAMES", names)),)
+    """The user's own copy of a program is what runs, the library knows the original."""
+    install("pkg", "prog", source=PYTHON.format(topic="'b'"))
+    own = (document("pkg/prog", of_document, VERSIONED.replace("NAMES", "")),)
     plan = launch(NODE, library_folders=own)
-    assert allowed(plan, "publish") == ([] if names else ["/a"])
-    assert "descriptions-differ" in codes(plan)
-    assert "publish /b: inferred, not granted" in "\n".join(explained(plan, "/n"))
+    assert allowed(plan, "publish") == ["/b"]
+    assert ("descriptions-differ" in codes(plan)) == (of_document == "c")
+    assert ("publish /c: library, not granted" in "\n".join(explained(plan, "/n"))) == (of_document == "c")
 
 
-def test_of_two_complete_descriptions_that_contradict_each_other_both_are_used(
+OPEN = "\nnode.create_publisher(String, open('f').read(), 1)\nrclpy.spin"
+
+
+def test_an_open_source_with_a_name_that_the_library_lacks_is_another_program(
     launch: Launch, install: Callable[..., Path], document: Callable[..., Path]
 ) -> None:
-    install("pkg", "prog", source=PYTHON.format(topic="'b'"))
+    install("pkg", "prog", source=PYTHON.format(topic="'b'").replace("rclpy.spin", OPEN))
     own = (document("pkg/prog", "a", VERSIONED.replace("NAMES", "")),)
     plan = launch(NODE, library_folders=own)
-    assert allowed(plan, "publish") == ["/a", "/b"]
-    assert "descriptions-differ" in codes(plan)
+    assert plan.problems and "/a" not in allowed(plan, "publish")
+
+
+def test_an_open_source_whose_names_the_library_has_is_what_the_library_describes(
+    launch: Launch, install: Callable[..., Path], document: Callable[..., Path]
+) -> None:
+    install("pkg", "prog", source=PYTHON.format(topic="'a'").replace("rclpy.spin", OPEN))
+    own = (document("pkg/prog", "a", VERSIONED.replace("NAMES", "")),)
+    plan = launch(NODE, library_folders=own)
+    assert allowed(plan, "publish") == ["/a"] and not plan.problems
 
 
 def test_a_document_of_another_version_does_not_contradict_the_source(

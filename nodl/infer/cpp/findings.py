@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from nodl.dependence import ALWAYS, When
 from nodl.infer.cpp.running.values import BOTTOM, Notes, Text, Value, join
 from nodl.node_interface import EndpointKind
 from nodl.source_ref import SourceRef
@@ -23,7 +24,8 @@ class Follows:
 
 @dataclass(frozen=True)
 class PossibleEndpoint:
-    """An interface made at ``source``; ``follows`` where its name derives from another topic."""
+    """An interface made at ``source``; ``follows`` where its name derives from another topic, ``when``: in which
+    releases a library makes it."""
 
     kind: EndpointKind
     name: Text
@@ -31,6 +33,7 @@ class PossibleEndpoint:
     source: SourceRef
     exact: bool = True
     follows: Follows | None = None
+    when: When = ALWAYS
 
 
 @dataclass(eq=False)

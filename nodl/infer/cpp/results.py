@@ -7,7 +7,7 @@ from itertools import pairwise
 
 from nodl.dependence import Dependence, Variation, When
 from nodl.infer.cpp.entry import FixedMapping
-from nodl.infer.cpp.findings import AllocatedNode, Condition, Follows, PossibleEndpoint
+from nodl.infer.cpp.findings import AllocatedNode, Condition, PossibleEndpoint
 from nodl.infer.cpp.program import ProgramFindings
 from nodl.infer.cpp.running.values import NodeNamePart, Text, Value, concatenated, plain
 from nodl.infer.results import certainty_of, own_name
@@ -138,24 +138,27 @@ def _endpoint(found: PossibleEndpoint, record: AllocatedNode) -> list[Endpoint]:
 
 
 def _dependence(record: AllocatedNode, gaps: list[Gap]) -> Dependence | None:
-    """Return the names that follow the final name of another topic, for launch to fill in."""
-    variations: dict[tuple[EndpointKind, str], Variation] = {}
+    """Return the names that follow the final name of another topic or the release, for launch to decide."""
+    found_here: dict[tuple[EndpointKind, str], Variation] = {}
     for found in record.endpoints:
-        if found.follows is None:
-            continue
         for template in _templates(found.name, record):
-            key, variation = (found.kind, template.text), _variation(found.follows, record)
+            variation = _variation(found, record)
             if variation is None:
                 continue
-            if variations.setdefault(key, variation) != variation:
-                gaps.append(Gap(found.source, f"{template} follows the names of several topics, as remapped"))
+            if found_here.setdefault((found.kind, template.text), variation) != variation:
+                why = f"{template} is made in more than one way, which follow different topics or releases"
+                gaps.append(Gap(found.source, why))
+    variations = {key: variation for key, variation in found_here.items() if variation != Variation()}
     if not variations:
         return None
     return Dependence(variations=FixedMapping(variations), defaults=FixedMapping(), options=FixedMapping())
 
 
-def _variation(follows: Follows, record: AllocatedNode) -> Variation | None:
+def _variation(found: PossibleEndpoint, record: AllocatedNode) -> Variation | None:
     """Return the variation; ``None`` if the topic's name has parts that launch does not fill in, which are reported."""
+    follows = found.follows
+    if follows is None:
+        return Variation(when=found.when)
     (template, *others) = _templates(follows.topic, record)
     parts = [_reference(part) for part in template.parts]
     if others or None in parts:

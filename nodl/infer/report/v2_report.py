@@ -30,7 +30,8 @@ _UNKNOWN_QOS = (("history", "SYSTEM_DEFAULT"), ("reliability", "SYSTEM_DEFAULT")
 
 class _Entry(NamedTuple):
     """``name``: as listed, the default; ``template``: how it varies, empty if it does not; ``each``: a list; ``when``:
-    parameters and the tests (in the words of docs/library.md) under which there is such an endpoint."""
+    parameters and the tests (in the words of docs/library.md) under which there is such an endpoint; ``release``: the
+    first or last one that has it, in those words."""
 
     kind: EndpointKind
     name: str
@@ -39,6 +40,7 @@ class _Entry(NamedTuple):
     each: str = ""
     when: tuple[tuple[str, str], ...] = ()
     qos: QosPolicies = ()
+    release: str = ""
 
 
 def to_v2(nodes: Sequence[NodeInterface]) -> dict[str, str]:
@@ -169,7 +171,8 @@ def _names(entries: Iterable[_Entry]) -> list[str]:
                 if first.when
                 else ""
             )
-            lines.append(f"    {_quoted(name)}: {{{each}name: {_quoted(first.template or name)}{when}}}")
+            varied = f"{each}name: {_quoted(first.template or name)}{when}{first.release}"
+            lines.append(f"    {_quoted(name)}: {{{varied}}}")
     return ["names:", *lines] if lines else []
 
 
@@ -187,7 +190,9 @@ def _by_name(entries: Iterable[_Entry]) -> dict[tuple[EndpointKind, str], list[_
 
 def _is_plain(entries: list[_Entry]) -> bool:
     """Return True if the name is there in any case: nothing that it varies with matters then."""
-    return all(not entry.template for entry in entries) and any(not entry.when for entry in entries)
+    return all(not entry.template for entry in entries) and any(
+        not entry.when and not entry.release for entry in entries
+    )
 
 
 def _clashing(entries: Iterable[_Entry]) -> list[tuple[EndpointKind, str]]:
@@ -212,7 +217,9 @@ def _entry(endpoint: Endpoint, depends: Dependence | None = None) -> _Entry | No
     if variation is not None:
         tests = [test for group in variation.when.any_of for test in group]
         told = ((tests[0].parameter, _quoted(tests[0].values[0])),) if tests else ()
-        return _Entry(endpoint.kind, name, endpoint.type, variation.name, "", told, endpoint.qos)
+        since, until = variation.when.since, variation.when.until
+        release = f", since: {since}" * bool(since) + f", until: {until}" * bool(until)
+        return _Entry(endpoint.kind, name, endpoint.type, variation.name, "", told, endpoint.qos, release)
     when = _conditions(endpoint.name)
     if when is None:
         return None

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 
+from nodl.dependence import When
 from nodl.infer.cpp.findings import AllocatedNode, Follows
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES, Call, library_class, library_function, library_method
 from nodl.infer.cpp.models.interfaces import PUB, SRV, SUB, node_of, owner_in, texts_in
@@ -166,9 +167,9 @@ for _what in ("publisher", "camera publisher", "subscriber", "camera subscriber"
 
 @library_class("camera_info_manager::CameraInfoManager")
 def _manager(run: Machine, call: Call) -> None:
-    """Model (node, camera, url): ``set_camera_info`` in humble, ``~/set_camera_info`` from jazzy on.
+    """Model (node, camera, url): ``set_camera_info`` until humble, ``~/set_camera_info`` since iron.
 
-    In rolling a further text is the namespace. Which one is installed is not looked up: both are listed. Source:
+    In rolling a further text is the namespace. Source:
     ros-perception/image_common humble d118138, jazzy d04d2c8, rolling f6e4ab6:
     camera_info_manager/src/camera_info_manager.cpp.
     """
@@ -176,8 +177,9 @@ def _manager(run: Machine, call: Call) -> None:
     if record is None:
         return
     texts = [v for v in texts_in(call.values) if any(isinstance(atom, Text) for atom in v)]
-    names = [concatenated(texts[2] if len(texts) > 2 else literal("~"), literal("/set_camera_info"))]
-    if len(texts) <= 2:
-        names.append(literal("set_camera_info"))
-    for name in names:
-        run.endpoint(record, SRV, name, "sensor_msgs/srv/SetCameraInfo", call)
+    kind = "sensor_msgs/srv/SetCameraInfo"
+    if len(texts) > 2:
+        run.endpoint(record, SRV, concatenated(texts[2], literal("/set_camera_info")), kind, call)
+        return
+    run.endpoint(record, SRV, literal("~/set_camera_info"), kind, call, when=When(since="iron"))
+    run.endpoint(record, SRV, literal("set_camera_info"), kind, call, when=When(until="humble"))

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from itertools import chain
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
+from nodl.dependence import ALWAYS, When
 from nodl.infer.cpp.findings import AllocatedNode, Condition, Follows, PossibleEndpoint
 from nodl.infer.cpp.ledger import CREATES, leads_to_interfaces
 from nodl.infer.cpp.reading.declarations import Class, FileIndex, Function, Scope
@@ -315,7 +316,7 @@ class Machine:
 
     def endpoint(
         self, record: AllocatedNode, kind: EndpointKind, name: Value, type_name: str, call: Call,
-        follows: Follows | None = None,
+        follows: Follows | None = None, when: When = ALWAYS,
     ) -> None:  # fmt: skip
         source = self.place(call.node, call.frame)
         conditions = self.conditions(call.node, call.frame)
@@ -324,7 +325,7 @@ class Machine:
             atoms = unknown("which of several names goes with a condition that callbacks change")
         for atom in atoms:
             parts = atom.parts if isinstance(atom, Text) else (UnknownPart(atom.why),)
-            found = PossibleEndpoint(kind, Text(parts), type_name, source, follows=follows)
+            found = PossibleEndpoint(kind, Text(parts), type_name, source, follows=follows, when=when)
             record.endpoints.setdefault(found, []).append(conditions)
 
     def later(self, values: Iterable[Value], frame: Frame) -> None:

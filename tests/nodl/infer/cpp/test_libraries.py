@@ -6,7 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from nodl.dependence import Situation
+from nodl.dependence.apply import applied
 from nodl.infer import infer_paths
+from nodl.infer.report.v2_report import to_v2
+from nodl.library import Library, LibraryDocuments
 from tests.nodl.infer.cpp.workspace import HEAD, endpoints, gaps, in_class, infer, names, package
 
 pytest.importorskip("tree_sitter_cpp", reason="the extra cpp is not installed")
@@ -75,6 +79,26 @@ def test_a_class_of_nav2_that_nobody_read_is_a_gap(tmp_path: Path) -> None:
 def test_the_service_of_a_camera_is_that_of_either_distribution(tmp_path: Path) -> None:
     system = infer(tmp_path, in_class('camera_info_manager::CameraInfoManager m(this, "left");'))
     assert {name for _, name in endpoints(system)} == {"set_camera_info", "~/set_camera_info"}
+    (node,) = system.nodes
+    described = {
+        distro: {
+            str(each.name)
+            for each in applied(
+                node, Situation(distro, "n", "/"), LibraryDocuments(Library())
+            ).interface.endpoints
+        }
+        for distro in ("humble", "iron", "rolling")
+    }
+    private = {"~/set_camera_info"}
+    assert described == {"humble": {"set_camera_info"}, "iron": private, "rolling": private}
+    (document,) = to_v2(system.nodes).values()
+    assert '"set_camera_info": {name: "set_camera_info", until: humble}' in document
+
+
+def test_a_service_of_the_programs_own_under_the_name_of_a_camera_is_told(tmp_path: Path) -> None:
+    own = 'create_service<std_srvs::srv::Empty>("set_camera_info", cb); '
+    system = infer(tmp_path, in_class(own + 'camera_info_manager::CameraInfoManager m(this, "left");'))
+    assert any("made in more than one way" in gap for gap in gaps(system))
 
 
 def test_the_service_of_a_camera_with_a_namespace(tmp_path: Path) -> None:
