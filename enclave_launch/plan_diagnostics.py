@@ -115,14 +115,13 @@ def _difference(program: str, item: PlannedProcess | PlannedComponent) -> Iterat
             yield record_lacks(program, first.source, _places(beyond), unknown, item.location)
         return
     library = item.descriptions[-1]
-    if library.doubt or not (first.complete and library.complete):
+    if library.doubt or not (first.used and library.complete):
         return
-    apart = {named: place for named, place in library.names.items() if named not in first.names}
-    apart |= {named: place for named, place in first.names.items() if named not in library.names}
+    apart = {named: place for named, place in first.names.items() if named not in library.names}
+    if first.complete:
+        apart |= {named: place for named, place in library.names.items() if named not in first.names}
     if apart:
-        words = ("the source is used", "the document is used", "both are used")
-        used = words[first.used + 2 * library.used - 1]
-        yield descriptions_differ(program, used, library.source, _places(apart), item.location)
+        yield descriptions_differ(program, library.source, _places(apart), item.location)
 
 
 def _places(names: Mapping[Named, str]) -> list[str]:

@@ -63,10 +63,10 @@ def record_undecided(
 
 
 def descriptions_differ(
-    program: str, used: str, other: str, differing: Sequence[str], place: SourceLocation
+    program: str, other: str, differing: Sequence[str], place: SourceLocation
 ) -> Diagnostic:
     names = some_of(differing, _INTERFACES, "; ")
-    text = f"{program}: its source and the library document ({other}) differ, {used}: {names}"
+    text = f"{program}: its source and the library document ({other}) differ, the source is used: {names}"
     remedy = "correct the one that is wrong (secure-nodl library check shows all)"
     return Diagnostic(Code.DESCRIPTIONS_DIFFER, program, text, place, remedy)
 

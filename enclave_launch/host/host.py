@@ -303,7 +303,8 @@ class LoadCache:
     def summary(self, source: DescriptionSource, summarize: Callable[[Any], T]) -> T | None:
         """Return what ``source`` declares; None if it cannot be loaded without a context, or is being summed up.
 
-        A file may include itself under a condition that ends. It declares nothing new then.
+        A file may include itself under a condition that ends. It declares nothing new then. A Python file that does
+        so by a path without a context ends upstream's scan, which asks no condition: ``RecursionError``.
         """
         self._drop_outdated()
         location = source.location_without_context()
@@ -312,6 +313,12 @@ class LoadCache:
             return None if description is None else summarize(description)
         key = (type(source), location)
         if key in self._in_progress:
+            if location.endswith(".py"):
+                raise RecursionError(
+                    f"{location} includes itself: launch looks into all includes for arguments, whatever their "
+                    "conditions, and ends in a RecursionError; name the file by $(dirname) or a substitution "
+                    "that needs the launch"
+                )
             return None
         if key not in self._summaries:
             self._summaries[key] = self._summarize(key, source, summarize)

@@ -76,18 +76,15 @@ def parts_of(text: str) -> Iterator[tuple[str, str, str, int]]:
     depth = 0
     for event in yaml.parse(text, Loader=LIBYAML_LOADER):
         kind = _KINDS.get(type(event))
-        if kind in _BEGINS:
-            depth += 1
-            if depth > MAX_NESTING:
-                raise RefusedParameters(
-                    f"line {event.start_mark.line + 1}: nested more than {MAX_NESTING} deep"
-                )
-        elif kind in _ENDS:
-            depth -= 1
         if kind == "scalar":
             style = event.tag if event.tag == _TEXT_TAG and event.style not in _QUOTES else event.style
             yield kind, event.value, style, event.start_mark.line + 1
         elif kind:
+            depth += (kind in _BEGINS) - (kind in _ENDS)
+            if depth > MAX_NESTING:
+                raise RefusedParameters(
+                    f"line {event.start_mark.line + 1}: nested more than {MAX_NESTING} deep"
+                )
             yield kind, "", "", event.start_mark.line + 1
 
 

@@ -54,10 +54,9 @@ def _strtoll(text: str) -> int | None:
 
 def _strtod(text: str) -> float | str:
     """Convert text to a double; text that does not fit into one (``1e999``, ``1e-999``) is returned as it is."""
-    if named := _NAMED_DOUBLE.fullmatch(text):
-        return float("".join(part for part in named.groups() if part))
     if not _DOUBLE.fullmatch(text):
-        return text
+        named = _NAMED_DOUBLE.fullmatch(text)
+        return float("".join(part for part in named.groups() if part)) if named else text
     number = float(text)
     if 0 < abs(number) < math.inf or "n" in text.lower():  # inf, nan
         return number

@@ -23,7 +23,7 @@ from enclave_launch.description.install import upstream_name
 _TYPE_ONLY = {
     *("UnexpectedCharacters", "UnexpectedEOF", "ParseError", "SyntaxError", "XMLSyntaxError"),
     *("ScannerError", "ParserError", "ConstructorError", "ComposerError"),
-    *("AssertionError", "InvalidNodeNameException", "InvalidNamespaceException"),
+    *("AssertionError", "RecursionError", "InvalidNodeNameException", "InvalidNamespaceException"),
 }
 
 _SET = re.compile(r"\{('[^']*'(?:, '[^']*')+)\}")  # of names: its order is by chance

@@ -328,6 +328,7 @@ def test_an_open_source_with_a_name_that_the_library_lacks_is_another_program(
     own = (document("pkg/prog", "a", VERSIONED.replace("NAMES", "")),)
     plan = launch(NODE, library_folders=own)
     assert plan.problems and "/a" not in allowed(plan, "publish")
+    assert "descriptions-differ" in codes(plan)
 
 
 def test_an_open_source_whose_names_the_library_has_is_what_the_library_describes(
