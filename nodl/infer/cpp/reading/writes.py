@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 from nodl.infer.cpp.syntax import Node, callee_name, children, field_of, text, unwrapped, walk
 
@@ -25,6 +25,9 @@ def writes_of(node: Node) -> frozenset[str]:
     return frozenset(word for each in walk(node) for word in _words_of(each))
 
 
+Passed: TypeAlias = tuple[str, int, int, frozenset[str]]
+
+
 class VariableWrites(NamedTuple):
     """What a piece of code does to variables, by their names.
 
@@ -32,15 +35,17 @@ class VariableWrites(NamedTuple):
         assigned: What is replaced: an object as well as a text or number.
         changed: What is changed in place: texts, numbers and containers; an object stays who it is.
         seen: Objects whose methods are called, and what aliases stand for.
-        passed: Arguments: the function, the argument's position and the variables in it.
+        passed: Arguments: the function, how many it gets, the argument's position and the variables in it.
         lasting: What closures in it write, whenever they run.
+        of_others: Names that stand as members of other objects in it.
     """
 
     assigned: frozenset[str]
     changed: frozenset[str]
     seen: frozenset[str]
-    passed: tuple[tuple[str, int, frozenset[str]], ...]
+    passed: tuple[Passed, ...]
     lasting: frozenset[str]
+    of_others: frozenset[str] = frozenset()
 
 
 _REPLACES = frozenset({"reset", "swap", "emplace", "assign", "store", "exchange", "release", "tie"})
@@ -59,8 +64,12 @@ def written_by(node: Node) -> VariableWrites:
     changed: set[str] = set()
     seen: set[str] = set()
     lasting: set[str] = set()
-    passed: list[tuple[str, int, frozenset[str]]] = []
-    aliases: list[tuple[set[str], set[str]]] = []
+    of_others: set[str] = set()
+    moved: set[str] = set()  # numbers and iterators
+    passed: list[Passed] = []
+    aliases: list[
+        tuple[set[str], set[str], bool]
+    ] = []  # with the variables behind; whether they are iterators
     for each in walk(node):
         words = _words_of(each)
         if each.type == "assignment_expression":
@@ -83,19 +92,30 @@ def written_by(node: Node) -> VariableWrites:
                 changed |= _iterated(argument)
         elif each.type in ("for_range_loop", "declaration") and _is_alias(each):
             seen |= words
-            aliases.append((_in(field_of(each, "declarator")), words))
+            aliases.append((_in(field_of(each, "declarator")), words, False))
+        elif each.type == "field_expression":
+            of_others |= _in(field_of(each, "field")) if text(field_of(each, "argument")) != "this" else set()
+        elif each.type == "update_expression" and words == {text(field_of(each, "argument"))}:
+            moved |= words
         else:
             changed |= words
             if each.type == "init_declarator":
-                aliases.append((_in(field_of(each, "declarator")), _iterated(field_of(each, "value"))))
+                aliases.append((_in(field_of(each, "declarator")), _iterated(field_of(each, "value")), True))
             lasting |= (
                 writes_of(each) if each.type == "lambda_expression" and not _runs_at_once(each) else set()
             )
-    for names, behind in aliases:
+    # From the last on: an alias may stand for one that was declared before.
+    for names, behind, is_iterator in reversed(aliases):
         assigned |= behind if names & assigned else set()
-        changed |= behind if names & changed else set()
+        changed |= behind if names & (changed if is_iterator else changed | moved) else set()
+        passed += [(name, given, at, frozenset(behind)) for name, given, at, words in passed if names & words]
     return VariableWrites(
-        frozenset(assigned), frozenset(changed), frozenset(seen), tuple(passed), frozenset(lasting)
+        frozenset(assigned),
+        frozenset(changed | moved),
+        frozenset(seen),
+        tuple(passed),
+        frozenset(lasting),
+        frozenset(of_others),
     )
 
 
@@ -134,10 +154,11 @@ def _receivers(callee: Node | None) -> set[str]:
     return _in(field_of(callee, "argument"))
 
 
-def _passed(callee: str, arguments: Node | None) -> list[tuple[str, int, frozenset[str]]]:
+def _passed(callee: str, arguments: Node | None) -> list[Passed]:
+    given = children(arguments)
     return [
-        (callee, index, frozenset(_in(each)))
-        for index, each in enumerate(children(arguments))
+        (callee, len(given), index, frozenset(_in(each)))
+        for index, each in enumerate(given)
         if each.type in _VARIABLES
     ]
 

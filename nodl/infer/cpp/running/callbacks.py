@@ -5,14 +5,14 @@ Run until nothing changes. A callback that makes no interface runs too when it m
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Set
 from dataclasses import dataclass, field
 from functools import partial
 
 from nodl.infer.cpp.reading.declarations import Class
 from nodl.infer.cpp.running.effects import effects_of, looked_at
 from nodl.infer.cpp.running.invocation import HOOKS, call_lambda, invoke
-from nodl.infer.cpp.running.machine import NEXT, Frame, Machine
+from nodl.infer.cpp.running.machine import NEXT, Frame, Machine, is_new_since
 from nodl.infer.cpp.running.memory import Reads, name_of
 from nodl.infer.cpp.running.values import (
     BOTTOM,
@@ -67,12 +67,12 @@ def run_callbacks(run: Machine) -> None:
     run.store.as_others_find_it()
     for number in range(MAX_ROUNDS):
         _find_overrides(run)
-        mark = run.store.mark()
+        mark, steps = run.store.mark(), run.steps
         if not _round(rounds):
             return
         run.store.as_others_find_it()
         if number:
-            _widen(run, mark, number >= PATIENCE)
+            _widen(run, mark, steps, number >= PATIENCE)
     place = next(iter(run.callbacks.values()))[1].file.file
     run.gap_at(SourceRef(place), "callbacks change variables for more rounds than are followed")
 
@@ -84,18 +84,18 @@ def run_meanwhile(run: Machine, frame: Frame) -> None:
     if run.calls_back:
         return
     words = frame.function.words if frame.function is not None else frozenset[str]()
-    read = looked_at(run) | words
+    read = looked_at(run).keys() | words
     run.calls_back = True
     rounds = _Rounds(run, names_read=set(read))
     for number in range(PATIENCE):
-        mark = run.store.mark()
+        mark, steps = run.store.mark(), run.steps
         if not _round(rounds, partial(_changes_one_of, run, read)):
             break
-        _widen(run, mark, number == PATIENCE - 1)
+        _widen(run, mark, steps, number == PATIENCE - 1)
     run.calls_back = False
 
 
-def _changes_one_of(run: Machine, names: frozenset[str], atom: object) -> bool:
+def _changes_one_of(run: Machine, names: Set[str], atom: object) -> bool:
     written = (effects_of(run, each).written for each in _with_held(run, atom))
     return any(not names.isdisjoint(each.assigned | each.changed) for each in written)
 
@@ -185,12 +185,12 @@ def _makes(run: Machine, atom: object) -> bool:
     return isinstance(atom, Bound) and run.makes_interfaces(atom.function)
 
 
-def _widen(run: Machine, mark: int, give_up: bool) -> None:
+def _widen(run: Machine, mark: int, steps: int, give_up: bool) -> None:
     """Widen lists that grow: they lose their order and length; in the end what still changes is not known."""
     earlier = run.store.before(mark)
     for cell, value in run.store.changes(mark).items():
         before = earlier[cell]
-        if set(before) == set(value):
+        if set(before) == set(value) or is_new_since(steps, cell):
             continue
         if any(isinstance(atom, Seq) for atom in value):
             value = one_sequence(value)

@@ -493,9 +493,9 @@ def construct_class(
         run.called.add(constructor)
         run.active.append(constructor)
     inner.depth = frame.depth + 1
-    inner.path, inner.active = path, True
+    inner.path = path
     inner.conditions = run.conditions(node, frame)
-    inner.mark = run.store.mark()
+    run.begin(inner)
     if constructor is not None:
         bind_parameters(run, constructor, arguments, inner)
     written = list(constructor.initialisers) if constructor else []

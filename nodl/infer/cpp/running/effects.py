@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 from nodl.infer.cpp.ledger import CREATES, Reach, makes_by_words
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES
 from nodl.infer.cpp.reading.declarations import Function
 from nodl.infer.cpp.reading.names import Names
-from nodl.infer.cpp.reading.writes import VariableWrites, written_by
+from nodl.infer.cpp.reading.writes import FILLS, VariableWrites, written_by
 from nodl.infer.cpp.running.foreign import Leaving, leaving
 from nodl.infer.cpp.running.memory import Cell
-from nodl.infer.cpp.running.values import Bound, Lambda
+from nodl.infer.cpp.running.values import Bound, Lambda, Obj
 from nodl.infer.cpp.syntax import Node, callee_name, field_of, text, walk, words_in
 
 if TYPE_CHECKING:
@@ -35,6 +35,11 @@ _AS_A_VALUE, _CHANGED, _REPLACED = 0, 1, 2
 
 _PLAIN_VALUES = frozenset({"Parameter", "ParameterValue", "Node", "LifecycleNode"})
 """Classes of rclcpp whose name alone does nothing; whether a node is made is asked of ``leaving``."""
+
+
+_ANY = ""
+Owners: TypeAlias = Mapping[str, frozenset[str]]
+"""Names of variables, each with the classes whose members it may mean: ``_ANY``, those of any."""
 
 
 class CallEffects:
@@ -94,26 +99,70 @@ class CallEffects:
     @cached_property
     def written(self) -> VariableWrites:
         """Return what it does to variables, arguments of the program's own functions as these take them."""
-        run, parts = self._run, [written_in(each) for each in self.functions]
-        if isinstance(self._of, Lambda):
-            parts.append(written_by(self._of.node))
+        run, parts = self._run, [part for _, part in self._parts]
         assigned = set[str]().union(*(each.assigned for each in parts))
         changed = set[str]().union(*(each.changed for each in parts))
-        seen = set[str]().union(*(each.seen for each in parts))
-        passed = {each for part in parts for each in part.passed}
-        for callee, index, words in passed:
-            how = _taken(run, callee, index)
-            if how >= _CHANGED:
-                changed |= words
-            if how == _REPLACED:
-                assigned |= words
+        seen = frozenset[str]().union(*(each.seen for each in parts))
+        of_others = set[str]().union(*(each.of_others for each in parts))
         for name in (assigned | changed) & run.names.functions_by_name.keys():
             for each in run.names.functions_by_name[name]:
                 behind = _referred_to(each)  # f() = x writes what f() gives
                 changed |= behind
+                of_others |= behind
                 assigned |= behind if name in assigned else set()
         lasting = frozenset[str]().union(*(each.lasting for each in parts))
-        return VariableWrites(frozenset(assigned), frozenset(changed), frozenset(seen), (), lasting)
+        return VariableWrites(
+            frozenset(assigned), frozenset(changed), seen, (), lasting, frozenset(of_others)
+        )
+
+    @cached_property
+    def owners(self) -> Owners:
+        """Return whose variables the names are that it writes."""
+        found: dict[str, set[str]] = {name: {_ANY} for name in self.written.of_others}
+        for function, part in self._parts:
+            owner = _ANY if function is None else _class_of(self._run, function)
+            for name in part.assigned | part.changed | part.seen:
+                found.setdefault(name, set()).update([owner] if owner is not None else [])
+        return {name: frozenset(classes) for name, classes in found.items()}
+
+    @cached_property
+    def _parts(self) -> list[tuple[Function | None, VariableWrites]]:
+        """Return what each function does to variables, with what it passes to the program's own."""
+        own: list[tuple[Function | None, VariableWrites]] = [
+            (each, written_in(each)) for each in self.functions
+        ]
+        if isinstance(self._of, Lambda):
+            own.append((self._of.frame.function, written_by(self._of.node)))
+        return [(function, _with_passed(self._run, part)) for function, part in own]
+
+
+def _with_passed(run: Machine, part: VariableWrites) -> VariableWrites:
+    assigned, changed = set(part.assigned), set(part.changed)
+    for callee, given, index, words in part.passed:
+        how = _taken(run, callee, given, index)
+        changed |= words if how >= _CHANGED else set()
+        assigned |= words if how == _REPLACED else set()
+    return part._replace(assigned=frozenset(assigned), changed=frozenset(changed))
+
+
+def _class_of(run: Machine, function: Function) -> str | None:
+    """Return the class whose members a function means by their names alone; ``None``: those of no class."""
+    owner = function.owner.rpartition("::")[2]
+    return None if not function.owner else owner if owner in run.names.classes else _ANY
+
+
+def may_mean(run: Machine, owners: Owners, cell: Cell) -> bool:
+    """Return whether code that writes or mentions the names ``owners`` may mean this variable."""
+    owner, name = cell
+    classes = owners.get(name)
+    if classes is None or _ANY in classes or not isinstance(owner, Obj) or owner.cls is None:
+        return classes is not None
+    every = run.names.ancestry(owner.cls)
+    return any(each.name in classes for each in every) or any(
+        base is None and any(name in written for name in classes)
+        for each in every
+        for written, base in run.names.bases(each)
+    )
 
 
 def effects_of(run: Machine, of: Function | Lambda | Bound) -> CallEffects:
@@ -145,19 +194,18 @@ def _leaving(run: Machine, function: Function) -> Leaving:
     return run.leaving[function]
 
 
-def _taken(run: Machine, callee: str, index: int) -> int:
-    """Return how the functions of that name take the argument at ``index``: any other may change it."""
-    key = (callee, index)
+def _taken(run: Machine, callee: str, given: int, index: int) -> int:
+    """Return how the functions of that name with so many arguments take one; any other may change it."""
+    key = (callee, given, index)
     if key not in run.taken:
         run.taken[key] = _CHANGED  # until it is known: functions may call each other
         found = run.names.functions_by_name.get(callee, ())
-        run.taken[key] = max((_taken_by(run, each, index) for each in found), default=_CHANGED)
+        own = [each for each in found if given <= len(each.parameters)]
+        run.taken[key] = max((_taken_by(run, each, index) for each in own), default=_CHANGED)
     return run.taken[key]
 
 
 def _taken_by(run: Machine, function: Function, index: int) -> int:
-    if index >= len(function.parameters):
-        return _CHANGED  # somebody else's function of the same name
     parameter = function.parameters[index]
     if not parameter.written_back:
         return _AS_A_VALUE
@@ -166,7 +214,11 @@ def _taken_by(run: Machine, function: Function, index: int) -> int:
     written = written_in(function)
     if parameter.name in written.assigned:
         return _REPLACED
-    further = (_taken(run, callee, at) for callee, at, words in written.passed if parameter.name in words)
+    further = (
+        _taken(run, callee, given, at)
+        for callee, given, at, words in written.passed
+        if parameter.name in words
+    )
     return max(further, default=_CHANGED) or _CHANGED
 
 
@@ -182,16 +234,20 @@ def _referred_to(function: Function) -> frozenset[str]:
 # --- what leading functions look at --------------------------------------------------------------------------------
 
 
-def looked_at(run: Machine) -> frozenset[str]:
+def looked_at(run: Machine) -> Owners:
     """Return the members and globals that functions which lead to interfaces mention."""
     used = run.used_classes()
     if len(used) not in run.looked_at:
-        leading = (
-            each
-            for each in _may_lead(run.names)
-            if (not each.owner or each.owner.rpartition("::")[2] in used) and run.makes_interfaces(each)
-        )
-        run.looked_at[len(used)] = frozenset[str]().union(*map(_not_local, leading))
+        found: dict[str, set[str]] = {}
+        for each in _may_lead(run.names):
+            owner = each.owner.rpartition("::")[2]
+            if (not owner or owner in used) and run.makes_interfaces(each):
+                own, of_others = _not_local(each)
+                for name in own:
+                    found.setdefault(name, set()).add(owner)
+                for name in of_others:
+                    found.setdefault(name, set()).add(_ANY)
+        run.looked_at[len(used)] = {name: frozenset(classes) for name, classes in found.items()}
     return run.looked_at[len(used)]
 
 
@@ -215,8 +271,10 @@ def _may_lead(names: Names) -> frozenset[Function]:
     return frozenset(found)
 
 
-def _not_local(function: Function) -> frozenset[str]:
-    """Return the variables of others whose value a function may use: not its own, nor those that it only replaces."""
+def _not_local(function: Function) -> tuple[set[str], set[str]]:
+    """Return the variables whose value a function may use, not its own, nor those that it only replaces; and members of
+    other objects.
+    """
     own = {each.name for each in function.parameters}
     found: set[str] = set()
     members: set[str] = set()
@@ -234,7 +292,7 @@ def _not_local(function: Function) -> frozenset[str]:
             continue
         replaced = _replaced(each)
         waiting += [field for field in each.named_children if replaced is None or field.id != replaced.id]
-    return frozenset((found - own) | members)
+    return found - own, members
 
 
 _NAMES = ("identifier", "type_identifier", "namespace_identifier")
@@ -242,18 +300,24 @@ _READS_ALONE = re.compile(r"RCLCPP_\w+|RCUTILS_\w+|.*(?:\.|->)publish")
 
 
 def _replaced(node: Node) -> Node | None:
-    """Return the part of a node that names a variable whose earlier value does not count: ``x`` of ``x = 1``."""
+    """Return the part of a node that names a variable whose value does not count there: ``x`` of ``x = 1`` or
+    ``x.push_back(1);``.
+    """
     if node.type == "field_initializer":
         return node.named_children[0]
+    target = None
     if node.type == "assignment_expression" and text(field_of(node, "operator")) == "=":
         target = field_of(node, "left")
-        return target if _is_variable(target) else None
-    if node.type == "expression_statement" and node.named_children:
-        call = node.named_children[0]
-        callee = field_of(call, "function")
-        empties = callee is not None and text(field_of(callee, "field")) in ("clear", "reset")
-        return call if empties and _is_variable(field_of(callee, "argument")) else None
-    return None
+    elif node.type == "field_expression" and text(field_of(node, "field")) in _ONLY_FILL:
+        call = node.parent
+        is_statement = (
+            call is not None and call.parent is not None and call.parent.type == "expression_statement"
+        )
+        target = field_of(node, "argument") if is_statement else None
+    return target if _is_variable(target) else None
+
+
+_ONLY_FILL = FILLS | {"reserve", "clear", "reset"}
 
 
 def _is_variable(target: Node | None) -> bool:

@@ -127,7 +127,7 @@ def call_lambda(run: Machine, atom: Lambda, values: Sequence[Value], node: Node,
         depth=frame.depth + 1,
     )  # fmt: skip
     inner = run.frame((atom, inner.path), inner)
-    inner.active, inner.mark = True, run.store.mark()
+    run.begin(inner)
     declarator = field_of(atom.node, "declarator")
     for index, parameter in enumerate(parameters_of(declarator) if declarator is not None else ()):
         value = values[index] if index < len(values) else unknown(f"the argument {parameter.name}")
@@ -173,7 +173,7 @@ def _one_of_many(run: Machine, functions: Sequence[Function], node: Node, frame:
         changed |= (written.assigned | written.changed | written.seen) - {p.name for p in each.parameters}
         back = (at for at, p in zip(given, each.parameters, strict=False) if p.written_back)
         changed.update(*map(words_in, back))
-    if not looked_at(run).isdisjoint(changed) or not all(
+    if not changed.isdisjoint(looked_at(run)) or not all(
         effects_of(run, each).only_variables for each in functions
     ):
         which = "specialisation of" if any(each.specialises for each in functions) else "function"
@@ -353,7 +353,7 @@ def _outcome(
 
 
 def _run_body(run: Machine, function: Function, values: Sequence[Value], inner: Frame) -> CallOutcome:
-    inner.active, inner.mark = True, run.store.mark()
+    run.begin(inner)
     run.active.append(function)
     bind_parameters(run, function, values, inner)
     written = [p.name for p in function.parameters if p.written_back]
@@ -457,9 +457,8 @@ def write_back(
         if not parameter.written_back:
             continue
         target = unwrapped(argument)
-        if target is not None and target.type == "pointer_expression":
-            inner = unwrapped(field_of(target, "argument"))
-            target = target if inner is not None and inner.type == "call_expression" else inner
+        if target is not None and text(target).startswith("&"):
+            target = unwrapped(field_of(target, "argument"))
         if target is None or target.type not in _WRITTEN_BACK:
             continue
         if target.type == "call_expression" and not _is_element(target):

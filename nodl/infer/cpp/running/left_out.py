@@ -8,9 +8,9 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 
-from nodl.infer.cpp.reading.declarations import Function, type_text
+from nodl.infer.cpp.reading.declarations import Field, Function, type_text
 from nodl.infer.cpp.running.assignments import assign
-from nodl.infer.cpp.running.effects import CallEffects, effects_of, looked_at
+from nodl.infer.cpp.running.effects import CallEffects, effects_of, looked_at, may_mean
 from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.memory import Cell
 from nodl.infer.cpp.running.values import (
@@ -20,6 +20,7 @@ from nodl.infer.cpp.running.values import (
     Map,
     Obj,
     Seq,
+    Text,
     Unknown,
     Value,
     holds_callable,
@@ -27,7 +28,7 @@ from nodl.infer.cpp.running.values import (
     may_name,
     unknown,
 )
-from nodl.infer.cpp.syntax import Node, children, field_of, unwrapped
+from nodl.infer.cpp.syntax import Node, children, field_of, text, unwrapped
 
 LEAST_SIZE = 3_000
 """Bytes of source, with everything that it may call, from which on leaving a call out is worth its look."""
@@ -98,21 +99,22 @@ def _changes(run: Machine, effects: CallEffects) -> dict[Cell, Value] | None:
     store, written, matters = run.store, effects.written, looked_at(run)
     pointers = run.names.pointers_to_plain
     behind = pointers.keys() & (written.assigned | written.changed)
-    if not matters.isdisjoint(written.lasting) or any(
+    if not written.lasting.isdisjoint(matters) or any(
         not pointers[name].isdisjoint(run.used_classes()) for name in behind
     ):
         return None
     if effects.kept_by is not None:
         cell, is_assigned, is_changed = effects.kept_by
         value = store.get(cell) or BOTTOM
-        if _would_change(value, is_assigned, is_changed) and _decides(run, value):
+        if _would_change(value, is_assigned, is_changed) and _decides(run, cell, value):
             return None
     every = written.assigned | written.changed | written.seen
     found: dict[Cell, Value] = {}
     waiting = [
         (cell, name, name in written.assigned, name in written.changed)
-        for name in (*sorted(every & matters), *sorted(every - matters))
+        for name in (*sorted(every & matters.keys()), *sorted(every - matters.keys()))
         for cell in store.named(name)
+        if may_mean(run, effects.owners, cell)
     ]
     done: set[Cell] = set()
     while waiting:
@@ -122,14 +124,20 @@ def _changes(run: Machine, effects: CallEffects) -> dict[Cell, Value] | None:
         done.add(cell)
         value = store.get(cell) or BOTTOM
         if _would_change(value, is_assigned, is_changed):
-            if name in matters and _decides(run, value):
+            if may_mean(run, matters, cell) and _decides(run, cell, value):
                 effects.kept_by = (cell, is_assigned, is_changed)
                 return None
             found[cell] = value
         if is_assigned:
             waiting += [((obj, field), field, True, True) for obj, field in _members(run, value)]
     for obj, name in _never_set(run, every):
-        if name in matters and name in written.assigned and not _is_number(run, obj, name):
+        if not may_mean(run, effects.owners, (obj, name)):
+            continue
+        if (
+            name in written.assigned
+            and may_mean(run, matters, (obj, name))
+            and not _is_number(run, obj, name)
+        ):
             return None
         found[obj, name] = BOTTOM
     return found
@@ -142,23 +150,32 @@ def _would_change(value: Value, is_assigned: bool, is_changed: bool) -> bool:
     return is_assigned or not _of_objects(value, containers=not is_changed)
 
 
-def _decides(run: Machine, value: Value) -> bool:
-    """Return whether ``value`` may be part of a name or decide a condition."""
+def _decides(run: Machine, cell: Cell, value: Value) -> bool:
+    """Return whether ``value`` of a variable may be part of a name or decide a condition; fractions do not."""
+    owner, name = cell
+    if isinstance(owner, Obj):
+        declared = _declared(run, owner, name)
+        if owner.cls is None or (declared is not None and _FRACTION.fullmatch(declared.type)):
+            value = tuple(atom for atom in value if isinstance(atom, Text | Seq | Group | Map | Obj))
     return any(
-        type(atom) in (bool, int) or (may_name((atom,)) and not _is_of_fractions(run, atom)) for atom in value
+        type(atom) in (bool, int) or (may_name((atom,)) and not _is_of_numbers(run, atom)) for atom in value
     )
 
 
-def _is_of_fractions(run: Machine, atom: Atom) -> bool:
-    """Return whether it is a structure of ``double`` members alone, as a point is, or a list of such."""
+def _is_of_numbers(run: Machine, atom: Atom) -> bool:
+    """Return whether it is a number, a structure of such that makes no interfaces, as a point is, or a list of such."""
+    if isinstance(atom, int | float | Unknown):
+        return True
     if isinstance(atom, Seq):
-        return all(_is_of_fractions(run, inner) for item in atom.items for inner in item)
+        return all(_is_of_numbers(run, inner) for item in atom.items for inner in item)
     if not isinstance(atom, Obj) or atom.cls is None or atom.node is not None:
         return False
     classes = run.names.ancestry(atom.cls)
-    fields = [field for each in classes for field in each.fields.values()]
-    return not any(run.names.methods.get(each) for each in classes) and all(
-        not each.pointer and _FRACTION.fullmatch(each.type) for each in fields
+    methods = (
+        each for cls in classes for listed in run.names.methods.get(cls, {}).values() for each in listed
+    )
+    return not any(map(run.makes_interfaces, methods)) and all(
+        not each.pointer and _NUMBERS.fullmatch(each.type) for cls in classes for each in cls.fields.values()
     )
 
 
@@ -181,8 +198,14 @@ def _never_set(run: Machine, names: frozenset[str]) -> Iterator[tuple[Obj, str]]
 
 
 def _is_number(run: Machine, obj: Obj, name: str) -> bool:
-    declared = next(each.fields[name] for each in run.names.ancestry(obj.cls) if name in each.fields)
-    return not declared.pointer and _NUMBERS.fullmatch(declared.type) is not None
+    declared = _declared(run, obj, name)
+    return declared is not None and not declared.pointer and _NUMBERS.fullmatch(declared.type) is not None
+
+
+def _declared(run: Machine, obj: Obj, name: str) -> Field | None:
+    """Return the data member of that name of a class of the program."""
+    classes = run.names.ancestry(obj.cls) if obj.cls is not None else ()
+    return next((each.fields[name] for each in classes if name in each.fields), None)
 
 
 def _of_objects(value: Value, containers: bool) -> bool:
@@ -203,7 +226,7 @@ def _targets(function: Function, node: Node) -> list[Node | None]:
     found: list[Node | None] = []
     for parameter, argument in zip(function.parameters, children(field_of(node, "arguments")), strict=False):
         target = unwrapped(argument) if parameter.written_back else None
-        if target is not None and target.type == "pointer_expression":
+        if target is not None and text(target).startswith("&"):
             target = unwrapped(field_of(target, "argument"))
         if parameter.written_back:
             found.append(target if target is not None and target.type in (*_VARIABLES, "this") else None)

@@ -17,7 +17,7 @@ from nodl.infer.cpp.ledger import CREATES, leads_to_interfaces
 from nodl.infer.cpp.reading.declarations import Class, FileIndex, Function, Scope
 from nodl.infer.cpp.reading.names import Names
 from nodl.infer.cpp.reading.type_names import Type
-from nodl.infer.cpp.running.memory import AbstractStore, Changes, Memory
+from nodl.infer.cpp.running.memory import AbstractStore, Cell, Changes, Memory
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     Atom,
@@ -39,7 +39,7 @@ from nodl.source_ref import SourceRef
 
 if TYPE_CHECKING:
     from nodl.infer.cpp.libraries import Call
-    from nodl.infer.cpp.running.effects import CallEffects
+    from nodl.infer.cpp.running.effects import CallEffects, Owners
     from nodl.infer.cpp.running.foreign import Leaving
 
 NEXT, RETURN, BREAK, CONTINUE = 1, 2, 4, 8
@@ -139,8 +139,8 @@ class Machine:
         self._known: set[Class] = set()
         self.effects: dict[tuple[object, int], CallEffects] = {}  # by how many classes were used
         self.leaving: dict[Function, Leaving] = {}
-        self.taken: dict[tuple[str, int], int] = {}
-        self.looked_at: dict[int, frozenset[str]] = {}
+        self.taken: dict[tuple[str, int, int], int] = {}
+        self.looked_at: dict[int, Owners] = {}
         self._leading: dict[tuple[object, int], bool] = {}
 
     # --- running ------------------------------------------------------------------------------------------
@@ -211,6 +211,10 @@ class Machine:
             self.store.merge(going, doubt)
         self.left = None
         return outcome
+
+    def begin(self, frame: Frame) -> None:
+        """Begin a call: its variables are new."""
+        frame.active, frame.mark, frame.started = True, self.store.mark(), self.steps
 
     def settle(self, mark: int, alternatives: list[Changes], going: bool) -> None:
         """Join what left early with the present state, if that is reached at all."""
@@ -382,9 +386,10 @@ _CALLS_ALL = frozenset({"fold_expression", "co_await_expression", "generic_expre
 
 @dataclass(eq=False)
 class Loop:
-    """``continue`` ends an iteration, begun at ``mark``; ``break`` the loop, begun at ``start``."""
+    """``continue`` ends an iteration, begun at ``mark``; ``break`` the loop, begun at ``start`` and this step."""
 
     start: int
+    steps: int
     mark: int = 0
     breaks: list[Changes] = field(default_factory=list)
     continues: list[Changes] = field(default_factory=list)
@@ -408,6 +413,7 @@ class Frame:
     returned: Value = BOTTOM
     exits: list[Changes] = field(default_factory=list)
     mark: int = 0
+    started: int = 0  # at which step
     loops: list[Loop] = field(default_factory=list)
     blocks: list[dict[str, tuple[bool, Value, str | None, Node | None]]] = field(default_factory=list)
     """For each block that runs: what names that it declares stood for before."""
@@ -431,3 +437,8 @@ class Frame:
                 return frame.kept[name]
             frame = frame.outer
         return None
+
+
+def is_new_since(steps: int, cell: Cell) -> bool:
+    """Return whether it is a variable of a call that began after so many steps, which nobody saw before."""
+    return isinstance(cell[0], Frame) and cell[0].started > steps

@@ -25,6 +25,7 @@ from nodl.infer.cpp.running.machine import (
     Loop,
     Machine,
     StatementHandler,
+    is_new_since,
     statement,
 )
 from nodl.infer.cpp.running.memory import Changes
@@ -222,7 +223,7 @@ def switch_statement(run: Machine, node: Node, frame: Frame) -> int:
     subject = settled(run, run.evaluate(field_of(condition, "value") or unwrapped(condition), frame))
     cases = [c for c in children(field_of(node, "body")) if c.type == "case_statement"]
     chosen = _chosen_case(run, node, cases, subject, frame)
-    loop = _Switch(run.store.mark())
+    loop = _Switch(run.store.mark(), run.steps)
     frame.loops.append(loop)
     starts = range(len(cases)) if chosen is None else chosen
     certain = chosen is not None
@@ -523,7 +524,7 @@ def _over(
     if not steps and exact:
         run.kill(body, frame, "the loop runs over nothing")
         return NEXT
-    loop = Loop(run.store.mark())
+    loop = Loop(run.store.mark(), run.steps)
     returns, outer_path, outcome = 0, frame.path, NEXT
     for again in range(1 if exact else 2):
         for index, step in enumerate(steps if outcome & NEXT else ()):
@@ -542,20 +543,22 @@ def _over(
             returns |= outcome & RETURN
             if not outcome & NEXT:
                 break
-        if not exact and (not _forget_order(run, body, loop.start) or again):
+        if not exact and (not _forget_order(run, body, loop) or again):
             break
     frame.path = outer_path
     return returns | _after(run, loop, outcome)
 
 
-def _forget_order(run: Machine, body: Node | None, start: int) -> bool:
+def _forget_order(run: Machine, body: Node | None, loop: Loop) -> bool:
     """Make what turns in an order that is not known have changed unknown, and lists have any order.
 
     Returns:
         Whether another turn may make something else of it.
     """
-    before, found, kept = run.store.before(start), False, body is not None and run.subtree_matters(body)
-    for cell, value in run.store.changes(start).items():
+    before, found, kept = run.store.before(loop.start), False, body is not None and run.subtree_matters(body)
+    for cell, value in run.store.changes(loop.start).items():
+        if is_new_since(loop.steps, cell):
+            continue
         both = (*before[cell], *value)
         changed = before[cell] != BOTTOM and set(before[cell]) != set(value)
         if changed and any(isinstance(atom, Text | int | float) for atom in both):
@@ -603,7 +606,7 @@ def while_statement(run: Machine, node: Node, frame: Frame) -> int:
 def _counted(run: Machine, node: Node, frame: Frame) -> int:
     """Run as often as the condition is certainly true; after that any number of times."""
     condition, body, update = (field_of(node, name) for name in ("condition", "body", "update"))
-    loop = Loop(run.store.mark())
+    loop = Loop(run.store.mark(), run.steps)
     returns, outer_path = 0, frame.path
     for index in range(MAX_UNROLLED):
         if run.spins_beside:
@@ -668,7 +671,11 @@ def _repeated(
         returns |= run.branches([once, lambda: NEXT]) & RETURN
         before = run.store.before(mark)
         changes = run.store.changes(mark).items()
-        moved = {cell: value for cell, value in changes if set(before[cell]) != set(value)}
+        moved = {
+            cell: value
+            for cell, value in changes
+            if set(before[cell]) != set(value) and not is_new_since(loop.steps, cell)
+        }
         if not moved:
             break
         if round_ >= MAX_ROUNDS - 1:

@@ -155,3 +155,80 @@ def test_a_call_is_left_out_where_its_result_is_a_number_by_whatever_name(
     method = f"{types} {result} compute() {{ sum = 1; return {result}(); }}"
     system = infer(tmp_path, with_method(method, f"auto found = compute(); {MAKES}"))
     assert (names(system), gaps(system), left) == (["a"], [], ["compute"] if is_left_out else [])
+
+
+OTHER = 'struct Other { std::string topic; void change() { topic = "b"; } };'
+
+
+def test_a_member_of_another_class_with_the_same_name_is_another_variable(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    left = calls_left_out(monkeypatch)
+    system = infer(tmp_path, in_class(f"other.change(); {MAKES}", f"{MEMBERS} Other other;", before=OTHER))
+    assert (names(system), gaps(system), left) == (["a"], [], ["change"])
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        'struct Other { template<class N> void change(N & node) { node.topic = "b"; } };',
+        'struct Other { std::string & topic; void change() { topic = "b"; } };',
+        'struct Other { void change(std::string & topic) { topic = "b"; } };',
+    ],
+    ids=["of its argument", "through a reference", "that it is given"],
+)
+def test_it_is_the_same_where_another_class_writes_to_the_members_object(other: str, tmp_path: Path) -> None:
+    arguments = "*this" if "node" in other else "topic" if "(std::" in other else ""
+    body = f"Other other{'{topic}' if not arguments else ''}; other.change({arguments}); {MAKES}"
+    system = infer(tmp_path, in_class(body, MEMBERS, before=other))
+    assert names(system) != ["a"] or gaps(system)
+
+
+def test_it_is_the_same_where_a_base_writes_to_its_own_member(tmp_path: Path) -> None:
+    base = 'struct Base { std::string base_topic = "a"; void change() { base_topic = "b"; } };'
+    derived = "struct Derived : public Base { std::string get() { return base_topic; } };"
+    body = "Derived d; d.change(); create_publisher<std_msgs::msg::String>(d.get(), 1);"
+    system = infer(tmp_path, in_class(body, MEMBERS, before=f"{base} {derived}"))
+    assert names(system) != ["a"] or gaps(system)
+
+
+@pytest.mark.parametrize(
+    ("turn", "is_left_out"),
+    [
+        ("sum += it->size();", True),
+        ('*it = "b";', False),
+        ('auto & s = *it; s = "b";', False),
+        ("further(*it);", False),
+    ],
+)
+def test_an_iterator_that_moves_on_changes_no_element(
+    turn: str, is_left_out: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    left = calls_left_out(monkeypatch)
+    methods = f"""
+    void further(std::string & s) {{ s = "b"; }}
+    void change() {{ for (auto it = list.begin(); it != list.end(); ++it) {{ {turn} }} }}
+    """
+    body = "change(); for (const auto & each : list) { create_publisher<std_msgs::msg::String>(each, 1); }"
+    system = infer(tmp_path, with_method(methods, body))
+    if is_left_out:
+        assert (names(system), gaps(system), left) == (["a"], [], ["change"])
+    else:
+        assert names(system) != ["a"] or gaps(system)
+
+
+def test_an_overload_with_fewer_parameters_is_not_the_one_that_is_called(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    left = calls_left_out(monkeypatch)
+    methods = """
+    void find(std::string & s) { s = "b"; }
+    bool find(const std::string & s, int count) { return count > 0; }
+    void compute() { sum = find(topic, 1) ? 1 : 2; }
+    """
+    system = infer(tmp_path, with_method(methods, f"compute(); {MAKES}"))
+    assert (names(system), gaps(system), left) == (["a"], [], ["compute"])
+    system = infer(
+        tmp_path, with_method(methods.replace("find(topic, 1) ?", "find(topic), 1 ?"), f"compute(); {MAKES}")
+    )
+    assert names(system) != ["a"] or gaps(system)
