@@ -143,8 +143,10 @@ def _own_method(run: Machine, name: str, site: CallSite) -> Value | None:
 
 def _of_named_class(run: Machine, this: Obj, head: str, last: str, site: CallSite) -> Value | None:
     kind = run.type_of(head, site.frame)
-    cls = run.class_of(kind, site.frame)
-    methods = run.names.find_methods(cls, last) if cls in run.names.ancestry(this.cls) else []
+    ancestry = run.names.ancestry(this.cls)
+    # A class finds its bases by their bare names, whatever their namespaces ([class.pre]/2).
+    cls = run.class_of(kind, site.frame) or next((each for each in ancestry if each.name == head), None)
+    methods = run.names.find_methods(cls, last) if cls in ancestry else []
     if methods:
         return site.call_methods(methods, this, exactly=True)
     known = NODE_BASES | {this.foreign_base, this.foreign_base.rpartition("::")[2]}

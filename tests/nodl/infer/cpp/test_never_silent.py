@@ -75,6 +75,13 @@ class App : public Base { public: App() { node_ = rclcpp::Node::make_shared("n")
   node_->create_publisher<std_msgs::msg::String>("a", 1); } };
 int main() { App app; }
 """,
+    "in the same method of a base class, called by its bare name": HEAD
+    + """
+namespace base { class B : public rclcpp::Node { public: explicit B(std::string n) : rclcpp::Node(n) {}
+  void setup() { create_publisher<std_msgs::msg::String>("a", 1); } }; }
+class App : public base::B { public: App() : B("app") { setup(); } void setup() { B::setup(); } };
+int main() { App app; }
+""",
     "in a timer's lambda": in_class(
         "create_wall_timer(1s, [this]() { create_publisher<std_msgs::msg::String>(\"a\", 1); });"
     ),
