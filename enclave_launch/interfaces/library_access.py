@@ -6,6 +6,7 @@ index, documents of the library and the configuration files that launch names.
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cached_property
 
@@ -21,6 +22,7 @@ from nodl.ament_index import list_resources, package_version
 from nodl.dependence import Launched, Situation, Spawned
 from nodl.dependence.apply import applied, own_name
 from nodl.library import SHIPPED, Hit, Library, LibraryDocuments
+from nodl.names import InvalidNameError
 from nodl.node_interface import Certainty, NodeInterface
 from nodl.ros_arguments import ParameterFileArgument, parse_ros_arguments, split_options
 
@@ -178,7 +180,23 @@ def launched(evaluation: Evaluation) -> Launched:
     return Launched(
         robot_description=_robot_description(evaluation),
         spawned=tuple(spawned for process in spawners for spawned in _spawned(process)),
+        masks=tuple(_masks(evaluation)),
     )
+
+
+_FILTER_INFO = ("costmap_filter_info_server", "nav2_map_server::CostmapFilterInfoServer")
+
+
+def _masks(evaluation: Evaluation) -> Iterator[tuple[str, str]]:
+    """Yield what servers of filter info tell (nav2_map_server, costmap_filter_info_server.cpp)."""
+    started: list[ResolvedProcess | ResolvedComponent] = [*evaluation.processes, *evaluation.components]
+    for item in started:
+        program = item.executable if isinstance(item, ResolvedProcess) else item.plugin
+        if item.package == "nav2_map_server" and program in _FILTER_INFO:
+            situation = StartedProgram(item, None, evaluation.distro).situation(_FILTER_INFO[0])
+            told_on = str(situation.parameters.get("filter_info_topic", "costmap_filter_info"))
+            with contextlib.suppress(InvalidNameError):  # rcl refuses it, so that nothing is told
+                yield situation.remap(told_on), str(situation.parameters.get("mask_topic", "filter_mask"))
 
 
 def _robot_description(evaluation: Evaluation) -> str:

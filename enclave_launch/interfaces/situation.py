@@ -75,14 +75,15 @@ class StartedProgram:
 
     def parameters(self, node: str | None) -> Mapping[str, object]:
         """Return what launch sets for the node that the source calls ``node``."""
-        return self._situation(node).parameters
+        return self.situation(node).parameters
 
     def final_name(self, node: str | None) -> tuple[str | None, str | None]:
         """Return the node's name and namespace under the remap rules of the launch."""
-        situation = self._situation(node)
+        situation = self.situation(node)
         return situation.node, situation.namespace
 
-    def _situation(self, node: str | None) -> Situation:
+    def situation(self, node: str | None) -> Situation:
+        """Return the situation of the node that the source calls ``node``."""
         started = self._started
         interface = NodeInterface(
             package=started.package,

@@ -163,10 +163,11 @@ class Spawned(NamedTuple):
 
 class Launched(NamedTuple):
     """What else the launch starts, as far as this node depends on it. ``robot_description``: the URDF that a node has
-    as its parameter."""
+    as its parameter. ``masks``: of costmap filters, the final topic of the filter info and the mask's as told there."""
 
     robot_description: str = ""
     spawned: tuple[Spawned, ...] = ()
+    masks: tuple[tuple[str, str], ...] = ()
 
 
 class Situation(NamedTuple):

@@ -71,6 +71,41 @@ global_costmap:
     assert not any("transform_listener" in n and "parameters" in n for n in allowed(plan, "serve_services"))
 
 
+INFO_SERVER = (
+    '<node pkg="nav2_map_server" exec="costmap_filter_info_server" name="info" namespace="{0}">'
+    '<param name="filter_info_topic" value="told"/><param name="mask_topic" value="{1}"/></node>'
+)
+
+
+def test_the_mask_of_a_costmap_filter_is_what_the_launchs_own_server_tells(
+    launch: Launch, tmp_path: Path
+) -> None:
+    file = tmp_path / "nav2.yaml"
+    file.write_text("""
+global_costmap:
+  global_costmap:
+    ros__parameters:
+      filters: [keepout]
+      keepout: {plugin: nav2_costmap_2d::KeepoutFilter, filter_info_topic: /robot/told}
+""")
+    planner = NAV2.format("planner", file)
+    plan = launch(planner + INFO_SERVER.format("robot", "mask"))
+    assert not plan.problems
+    assert {"/robot/told", "/global_costmap/mask"} <= set(allowed(plan, "subscribe"))
+    elsewhere = launch(planner + INFO_SERVER.format("other", "mask"))
+    assert "no costmap_filter_info_server of this launch tells the mask on /robot/told" in problems(elsewhere)
+    assert "/global_costmap/mask" not in allowed(elsewhere, "subscribe")
+
+
+def test_servo_is_another_program_in_humble(launch: Launch) -> None:
+    node = '<node pkg="moveit_servo" exec="{}" name="servo"><param name="moveit_servo.joint_topic" value="/js"/></node>'
+    old = launch(node.format("servo_node_main"), "humble")
+    assert "/servo/start_servo" in allowed(old, "serve_services") and "/js" in allowed(old, "subscribe")
+    new = launch(node.format("servo_node"))
+    assert "/servo/start_servo" not in allowed(new, "serve_services")
+    assert "/servo/switch_command_type" in allowed(new, "serve_services")
+
+
 def test_a_planner_that_nobody_describes_stops_a_secure_start(launch: Launch, tmp_path: Path) -> None:
     file = tmp_path / "nav2.yaml"
     file.write_text(

@@ -14,6 +14,7 @@ from nodl.dependence.configuration import rviz
 from nodl.dependence.configuration.behavior_tree import of_tree
 from nodl.dependence.configuration.cartographer import of_lua
 from nodl.dependence.configuration.configured import Configured
+from nodl.dependence.configuration.costmap_filter import of_filter_info
 from nodl.dependence.configuration.ros2_control import of_robot_description
 from nodl.dependence.configuration.ros_gz_bridge import of_arguments, of_configuration
 from nodl.dependence.configuration.rslidar import of_sensors
@@ -43,6 +44,8 @@ def read_configuration(kind: str, file: str, situation: Situation, place: Source
         return Configured(
             gaps=(Gap(place, f"launch names no {kind} file, from which its topics would follow"),)
         )
+    if kind == "costmap_filter":
+        return of_filter_info(file, situation, place)
     if kind == "behavior_tree":
         return of_tree(file, situation)
     if kind == "cartographer":
