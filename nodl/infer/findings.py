@@ -86,6 +86,7 @@ class Findings:
         self.node_of: dict[Instance, NodeRecord] = {}
         self.gaps: dict[tuple[SourceRef, str], None] = {}
         self.homeless: NodeRecord | None = None
+        self.made = 0  # how many nodes and interfaces were found so far
         self.global_arguments: Value = BOTTOM  # a list handed to rclpy.init(args=...)
 
     @property
@@ -94,12 +95,9 @@ class Findings:
         unknown = any(type(each.name) is Unknown for record in self.nodes for each in record.endpoints)
         return unknown or bool(self.gaps) or any(record.gaps for record in self.nodes)
 
-    def count(self) -> int:
-        """Return how many interfaces were found so far."""
-        return sum(len(record.endpoints) for record in self.nodes)
-
     def add_node(self, record: NodeRecord) -> NodeRecord:
         self.nodes.setdefault(record)
+        self.made += 1
         return record
 
     def gap(self, source: SourceRef, why: str) -> None:

@@ -19,7 +19,7 @@ import sys
 import tokenize
 import unicodedata
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from typing import NamedTuple
 
 from enclave_common.files import read_bytes
@@ -145,8 +145,7 @@ class ProgramTarget(NamedTuple):
 class Program:
     """Finds and parses modules below ``roots``; one object serves many runs."""
 
-    def __init__(self, roots: Iterable[str] = (), prefixes: Sequence[str] = ()):
-        self.prefixes = prefixes  # of installed packages
+    def __init__(self, roots: Iterable[str] = ()):
         self.roots = list(dict.fromkeys(os.path.abspath(root) for root in roots))
         # What was asked of the disk, with a digest of what it said.
         self.asked: dict[tuple[str, str], str] = {}

@@ -71,7 +71,7 @@ class _Finder:
     def __init__(self, prefixes: Sequence[str]):
         self._sites = [site for prefix in prefixes for site in _sites_of(prefix)]
         folders = (folder for site in self._sites for folder in (site, *_linked_folders(site)))
-        self.program = Program(folders, prefixes)
+        self.program = Program(folders)
 
     def target(self, path: str, package: str, executable: str) -> ProgramTarget:
         text = read_text(path, errors="replace")

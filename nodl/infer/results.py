@@ -133,7 +133,7 @@ def templates(name: object) -> list[NameTemplate]:
         return [NameTemplate.literal(name)]
     if isinstance(name, Text):
         results: list[tuple[Part, ...]] = [()]
-        for index, piece in enumerate(_without_implied(name.pieces)):
+        for index, piece in enumerate(name.pieces):
             choices = _parts(piece, first=index == 0)
             results = [(*result, choice) for result in results for choice in choices]
             if len(results) > MAX_ALTERNATIVES:
@@ -141,18 +141,6 @@ def templates(name: object) -> list[NameTemplate]:
         return [NameTemplate(melted(result)) for result in results]
     why = name.why if isinstance(name, Unknown) else "not a text"
     return [NameTemplate((UnknownPart(why),))]
-
-
-def _without_implied(pieces: tuple[Piece, ...]) -> list[Piece]:
-    """Drop conditions on an element of a list that the text has been narrowed by: ``for x in names: if x: f(x)``."""
-    narrowed = {
-        piece._replace(edits=(*piece.edits[:index], (edit[1][0], edit[1][1:])))
-        for piece in pieces
-        if isinstance(piece, Input)
-        for index, edit in enumerate(piece.edits)
-        if edit[0] == "where"
-    }
-    return [piece for piece in pieces if piece not in narrowed]
 
 
 def own_name(what: str, first: bool) -> str:

@@ -125,8 +125,8 @@ def text_of(pieces: Iterable[Piece]) -> TextAtom:
 
 
 def is_one_of_several(piece: Input) -> bool:
-    """Return True if it stands for several texts: an element of a list, a part of a text that is split, a number."""
-    several = any(method in ("split", "range", "key") for method, _ in piece.edits)
+    """Return True if it stands for several texts: an element of a list, a name below a prefix."""
+    several = any(method == "key" for method, _ in piece.edits)
     return (piece.item == "each" or several) and not is_condition(piece)
 
 
@@ -196,12 +196,6 @@ def _common_prefix(texts: Sequence[str]) -> str:
     low, high = min(texts), max(texts)
     length = next((i for i, (a, b) in enumerate(zip(low, high, strict=False)) if a != b), len(low))
     return low[:length]
-
-
-def may_be(text: Text, name: str) -> bool:
-    """Return True if the text, as far as it is known, can be ``name``."""
-    head, tail = _literal_end(text, 0), _literal_end(text, -1)
-    return name.startswith(head) and name.endswith(tail) and len(name) >= len(head) + len(tail)
 
 
 def _literal_end(text: TextAtom, index: int) -> str:

@@ -57,6 +57,7 @@ def unknown(why: str) -> Value:
 
 ANY: Value = unknown("a value that the program computes")
 BOOLEAN: Value = (True, False)
+OF_LAUNCH: Value = unknown("what only a launch decides")
 
 
 class Absent:

@@ -49,7 +49,7 @@ class CachedAnswer:
 
     @cached_property
     def _key(self) -> str:
-        return digest("python", _analyser(), self._program.roots, self._program.prefixes, self._question)
+        return digest("python", _analyser(), self._program.roots, self._question)
 
     def find(self) -> Any:
         """Return the cached answer, or None if there is none or a file that it depends on has changed."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import functools
 
 from nodl.infer.interpreter import imports
 from nodl.infer.interpreter.define import enumeration_member, is_enumeration, linearized, program_classes
@@ -42,14 +41,10 @@ from nodl.infer.values import (
 MAX_DOTS = 8
 
 
-_COPIES = frozenset({"dict", "list", "sorted", "len"})
-_READS = frozenset({"copy", "items", "keys", "values", "get"})
-
-
 def _of_instance(run: Run, obj: Instance, name: str, node: ast.AST, frame: Frame) -> Value:
     held = obj.cells.get(name)
     if name == "__dict__":
-        return _variables(run, obj, node, frame)
+        return run.variables_of(node, frame)
     if isinstance(obj.cls, External):
         HeapObject.looked_into.add(id(obj.cells))
         return present(foreign.instance_attribute(run, obj, obj.cls.path, name) if held is None else held)
@@ -72,29 +67,6 @@ def _of_instance(run: Run, obj: Instance, name: str, node: ast.AST, frame: Frame
     if getter:
         return run.call(getter, Arguments([(obj,), (name,)]), node, frame)
     return unknown(f"attribute {name}, which nothing analysed sets")
-
-
-def _variables(run: Run, obj: Instance, node: ast.AST, frame: Frame) -> Value:
-    """Return what ``obj.__dict__`` holds: unknown where the program only reads or copies it, else also a gap."""
-    if obj in run.findings.node_of or node not in _read_in_place(frame.module.source.tree):
-        return run.variables_of(node, frame)
-    for held in list(obj.cells.values()):
-        run.escape_value(held)
-    return unknown("what an object holds, as a dictionary")
-
-
-@functools.lru_cache(maxsize=64)
-def _read_in_place(tree: ast.AST) -> frozenset[ast.AST]:
-    """Return the dictionaries of variables that are copied or read where they are named: ``dict(x.__dict__)``."""
-    found: set[ast.AST] = set()
-    for call in ast.walk(tree):
-        if isinstance(call, ast.Call):
-            if isinstance(call.func, ast.Name) and call.func.id in _COPIES:
-                found.update(call.args[:1])
-            elif isinstance(call.func, ast.Attribute) and call.func.attr in _READS:
-                found.add(call.func.value)
-            found.update(each.value for each in call.keywords if each.arg is None)
-    return frozenset(each for each in found if isinstance(each, ast.Attribute) and each.attr == "__dict__")
 
 
 def _is_of_a_node(atom: object) -> bool:

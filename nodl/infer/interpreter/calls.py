@@ -7,9 +7,7 @@ import functools
 
 from nodl.infer.interpreter.conditions import under
 from nodl.infer.interpreter.define import (
-    enumeration_members,
     foreign_bases,
-    functions_of,
     is_enumeration,
     linearized,
     methods_in,
@@ -18,11 +16,9 @@ from nodl.infer.interpreter.define import (
 )
 from nodl.infer.interpreter.run import MAX_DEPTH, Arguments, Call, Run
 from nodl.infer.models import foreign
-from nodl.infer.text import constant_text
 from nodl.infer.values import (
     ANY,
     BOTTOM,
-    CONSTANTS,
     NONE,
     OTHER,
     BoundMethod,
@@ -40,7 +36,6 @@ from nodl.infer.values import (
     Partial,
     Value,
     join,
-    sole,
     unknown,
 )
 
@@ -201,48 +196,15 @@ def _keywords(run: Run, node: ast.AST, given: Arguments, used: set[str]) -> Valu
     return (obj,)
 
 
-def _member_by_value(run: Run, cls: ClassValue, call: Call) -> Value:
-    """Return the member with a value that is known; unknown where a method of the class may decide."""
-    given = constant_text(sole(call.args.at(0)))
-    members = enumeration_members(run, cls)
-    values = [constant_text(sole(member.cells["value"])) for member in members]
-    decides = any(not _DECIDE_MEMBERS.isdisjoint(base.cells) for base in program_classes(cls))
-    if all(isinstance(each, CONSTANTS) for each in (given, *values)) and not decides:
-        found = (member for member, value in zip(members, values, strict=True) if value == given)
-        first = next(found, None)
-        if first is not None:
-            return (first,)
-    return unknown("a member of an enumeration that is looked up by its value")
-
-
-_DECIDE_MEMBERS = frozenset({"_missing_", "__new__", "__init__", "__eq__", "_generate_next_value_"})
-
-
 def instantiate(run: Run, cls: ClassValue, call: Call) -> Value:
     """Return a new object: its constructor is the first one in the method resolution order."""
     for base in program_classes(cls):
         run.instantiated.setdefault(base.node)
     if is_enumeration(cls):
-        return _member_by_value(run, cls, call)
-    made = _made_by_new(run, cls, call)
-    if made is not None:
-        return made
+        return unknown("a member of an enumeration that is looked up by its value")
     instance = new_instance(run, cls, call)
     initialise(run, cls, instance, call)
     return (instance,)
-
-
-def _made_by_new(run: Run, cls: ClassValue, call: Call) -> Value | None:
-    """Return what the program's own ``__new__`` gives, initialised where it is an object of the class."""
-    for base in program_classes(cls):
-        if "__new__" in base.cells:
-            constructors = functions_of(base.cells["__new__"])
-            made = run.call(constructors, call.args.preceded((cls,)), call.node, call.frame)
-            for atom in (each for each in made if isinstance(each, Instance)):
-                if isinstance(atom.cls, ClassValue) and cls in linearized(atom.cls):
-                    initialise(run, atom.cls, atom, call)
-            return made
-    return None
 
 
 def initialise(run: Run, cls: ClassValue, instance: Instance, call: Call) -> None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import ast
 import functools
 import operator
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterator
 from functools import partial
 from typing import Any, TypeVar
 
@@ -23,15 +23,15 @@ from nodl.infer.text import (
     TextAtom,
     constant_text,
     input_of,
-    is_condition,
     is_one_of_several,
     make_text,
     pieces_of,
-    with_edit,
 )
 from nodl.infer.values import (
+    BOOLEAN,
     BOTTOM,
     CONSTANTS,
+    OF_LAUNCH,
     BoundMethod,
     ClassValue,
     Dictionary,
@@ -43,21 +43,20 @@ from nodl.infer.values import (
     Sequence,
     Value,
     contains,
+    join,
     join_all,
     sole,
 )
-from nodl.name_template import EDITS, either_of
+from nodl.name_template import EDITS
 
 T = TypeVar("T")
 
-OPPOSITE = {
+_OPPOSITE = {
     "only if true": "only if false", "only if false": "only if true",
     "only if equal": "only if different", "only if different": "only if equal",
     "only if among": "only if not among", "only if not among": "only if among",
-    "only if above": "only if not above", "only if not above": "only if above",
     "only if starting": "only if not starting", "only if not starting": "only if starting",
     "only if ending": "only if not ending", "only if not ending": "only if ending",
-    "only if either": "only if neither", "only if neither": "only if either",
 }  # fmt: skip
 
 
@@ -98,7 +97,6 @@ _BUILT_IN: dict[str, type] = {
     f"builtins.{kind.__name__}": kind for kind in (str, int, float, bool, bytes, list, tuple, set, dict)
 }
 _SEQUENCES: dict[str, type] = {kind.__name__: kind for kind in (list, tuple, set)}
-_GIVE_TEXT = EDITS | {"split", "part", "after", "key"}
 
 
 def is_instance(value: Value, classes: Value) -> bool | None:
@@ -117,7 +115,7 @@ def is_instance(value: Value, classes: Value) -> bool | None:
 
 
 def _kind_of(atom: object) -> type | None:
-    """Return the built-in class of a value; ``None``: not known. A parameter has the type that it is declared with."""
+    """Return the built-in class of a value; ``None``: not known."""
     atom = constant_text(atom)
     if isinstance(atom, CONSTANTS):
         return type(atom)
@@ -125,26 +123,7 @@ def _kind_of(atom: object) -> type | None:
         return _SEQUENCES.get(atom.kind)
     if isinstance(atom, Dictionary):
         return dict if atom.kind == "dict" else None
-    if not isinstance(atom, Text):
-        return None
-    pieces = [piece for piece in atom.pieces if not (isinstance(piece, Input) and is_condition(piece))]
-    asked = pieces[0] if len(pieces) == 1 else None
-    if not isinstance(asked, Input) or (asked.edits and asked.edits[-1][0] in _GIVE_TEXT):
-        return str if asked is None or isinstance(asked, Input) else None
-    if asked.edits or not isinstance(asked.owner, NodeRecord) or asked.name in asked.owner.loose:
-        return None
-    kinds = {_kind_of_default(default, asked.item) for default in asked.owner.default(asked.name)}
-    return kinds.pop() if len(kinds) == 1 else None
-
-
-def _kind_of_default(default: object, item: int | str | None) -> type | None:
-    """Return the class of a parameter with this default, or of an element of it. rclpy gives only texts as a list."""
-    if not isinstance(default, Sequence):
-        return _kind_of(default) if item is None else None
-    elements = default.items.any_element()
-    if default.kind != "list" or not elements or any(_kind_of(each) is not str for each in elements):
-        return None
-    return list if item is None else str
+    return None
 
 
 def decide(run: Run, test: ast.expr, frame: Frame) -> bool | None:
@@ -157,13 +136,10 @@ def condition_of(run: Run, test: ast.expr, frame: Frame) -> Guard | None:
     """Return what ``test`` requires of a parameter; ``None`` if that cannot be said."""
     if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not):
         return opposite(condition_of(run, test.operand, frame))
-    if isinstance(test, ast.BoolOp):
-        parts = (condition_of(run, part, frame) for part in test.values)
-        return _combined(parts, isinstance(test.op, ast.And))
     if not _may_ask(test):
         return None
     if isinstance(test, ast.Compare):
-        return _combined((_comparison(run, each, frame) for each in _links(test)), True)
+        return _comparison(run, test, frame) if len(test.ops) == 1 else None
     if isinstance(test, ast.Call) and isinstance(test.func, ast.Attribute) and test.func.attr in _AFFIXES:
         return _of_affix(run, test, test.func, frame)
     asked, defaults = _asked(run, test, frame)
@@ -173,30 +149,7 @@ def condition_of(run: Run, test: ast.expr, frame: Frame) -> Guard | None:
         return Guard(asked, "only if true", ())
     if all(isinstance(default, str) for default in defaults):
         return Guard(asked, "only if different", ("",))
-    return Guard(asked, "only if different", ("0",)) if _whole_numbers(defaults) else None
-
-
-def _combined(parts: Iterable[Guard | None], all_of: bool) -> Guard | None:
-    """Return the condition that holds where all ``parts`` do, or one of them; they must ask for one parameter."""
-    known: list[Guard] = []
-    for part in parts:
-        if part is None or (known and part.asked != known[0].asked):
-            return None
-        known.append(part)
-    if len(known) == 1:
-        return known[0]
-    edits = [(part.edit, part.given) for part in known]
-    return Guard(known[0].asked, *(either_of(edits) if all_of else either_of(*([each] for each in edits))))
-
-
-@functools.lru_cache(maxsize=8192)
-def _links(test: ast.Compare) -> tuple[ast.Compare, ...]:
-    """Return the comparisons of a chain: of ``1 < n < 3``, ``1 < n`` and ``n < 3``."""
-    sides = [test.left, *test.comparators]
-    return tuple(
-        ast.Compare(left, [op], [right])
-        for left, op, right in zip(sides, test.ops, test.comparators, strict=False)
-    )
+    return None
 
 
 _AFFIXES = {"startswith": "only if starting", "endswith": "only if ending"}
@@ -216,7 +169,7 @@ def opposite(condition: Guard | None) -> Guard | None:
     """Return the condition that holds where ``condition`` does not; ``None``: what no element of a list is."""
     if condition is None or condition.asked.item is not None:
         return None
-    return condition._replace(edit=OPPOSITE[condition.edit])
+    return condition._replace(edit=_OPPOSITE[condition.edit])
 
 
 def conditions_of(run: Run, test: ast.expr, holds: bool, frame: Frame) -> tuple[Guard, ...]:
@@ -224,15 +177,12 @@ def conditions_of(run: Run, test: ast.expr, holds: bool, frame: Frame) -> tuple[
     if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not):
         return conditions_of(run, test.operand, not holds, frame)
     if isinstance(test, ast.BoolOp):
-        parts = test.values
         if isinstance(test.op, ast.And) != holds:  # of several parts nobody knows which
-            neutral = isinstance(test.op, ast.And)
-            parts = [part for part in parts if _truth_again(run, part, frame) is not neutral]
-        if isinstance(test.op, ast.And) == holds or len(parts) == 1:
-            return tuple(each for part in parts for each in conditions_of(run, part, holds, frame))
+            return ()
+        return tuple(each for part in test.values for each in conditions_of(run, part, holds, frame))
     condition = condition_of(run, test, frame)
     found = condition if holds else opposite(condition)
-    return () if found is None else (found,)
+    return () if found is None or is_one_of_several(found.asked) else (found,)
 
 
 def under(run: Run, conditions: tuple[Guard, ...], action: Callable[[], T]) -> T:
@@ -246,27 +196,55 @@ def under(run: Run, conditions: tuple[Guard, ...], action: Callable[[], T]) -> T
 
 def sides_of(
     run: Run, test: ast.expr, frame: Frame, action: Callable[[bool], T]
-) -> tuple[Guard | None, list[Callable[[], T]]]:
-    """Return what ``test`` asks of a parameter, and ``action`` for either outcome, under what is certain then."""
+) -> tuple[Callable[[Value, Value], Value] | None, list[Callable[[], T]], set[bool]]:
+    """Return how values are joined after a test, and ``action`` for either outcome, under what is certain then.
+
+    Last come the outcomes that only a launch decides, and no condition says.
+
+    What is made where a launch decides in a way that no condition says is a gap, until a launch decides.
+    """
     held = {holds: conditions_of(run, test, holds, frame) for holds in (True, False)}
-    if not all(held.values()) and _reads_parameter(run, test, frame):
-        run.asks_launch = True
+    asks = not all(held.values()) and _reads_parameter(run, test, frame)
+    run.asks_launch = run.asks_launch or asks
+    left_open = {holds for holds in held if asks and not held[holds]}
 
     def side(holds: bool) -> T:
+        made = run.findings.made
         narrowed(run, test, holds, frame)
-        return under(run, held[holds], partial(action, holds))
+        outcome = under(run, held[holds], partial(action, holds))
+        if holds in left_open and run.findings.made > made:
+            run.gap(test, frame, DEPENDS)
+        return outcome
 
-    return condition_of(run, test, frame), [partial(side, True), partial(side, False)]
+    condition = condition_of(run, test, frame)
+    joined = partial(either, run, condition) if condition or asks else None
+    return joined, [partial(side, True), partial(side, False)], left_open
+
+
+DEPENDS = "what is made under this test depends on a launch"
 
 
 def _reads_parameter(run: Run, test: ast.expr, frame: Frame) -> bool:
     """Return whether a variable, a field or a call in ``test`` gives what a parameter or the node's name decides."""
-    parts = (part for part in ast.walk(test) if isinstance(part, ast.Name | ast.Attribute | ast.Call))
-    return any(is_of_launch(atom) for part in parts if _may_ask(part) for atom in _answer(run, part, frame))
+    return any(map(is_of_launch, _read_in(run, test, frame)))
+
+
+def reads_one_of_several(run: Run, test: ast.expr, frame: Frame) -> bool:
+    """Return whether a variable, a field or a call in ``test`` gives one of the elements of a parameter."""
+    inputs = map(input_of, _read_in(run, test, frame))
+    return any(asked is not None and is_one_of_several(asked) for asked in inputs)
+
+
+def _read_in(run: Run, test: ast.expr, frame: Frame) -> Iterator[object]:
+    for part in ast.walk(test):
+        if isinstance(part, ast.Name | ast.Attribute | ast.Call) and _may_ask(part):
+            yield from _answer(run, part, frame)
 
 
 def is_of_launch(atom: object) -> bool:
-    """Return whether a launch decides a text: it has an input in it, or what the node is called."""
+    """Return whether a launch decides a value: a text with an input in it, or with what the node is called."""
+    if atom is OF_LAUNCH[0]:
+        return True
     pieces = atom.pieces if isinstance(atom, Text) else ()
     return any(isinstance(piece, NodePart | Input) for piece in pieces)
 
@@ -274,17 +252,10 @@ def is_of_launch(atom: object) -> bool:
 def where_either(first: tuple[Guard, ...], second: tuple[Guard, ...]) -> tuple[Guard, ...]:
     """Return what is certain of parameters where all of ``first`` or all of ``second`` hold."""
     found = {each: None for each in first if each in second}
-    left = [each for each in first if each not in found], [each for each in second if each not in found]
-    for asked in dict.fromkeys(each.asked for each in first if each.asked.item is None):
+    for asked in dict.fromkeys(each.asked for each in first):
         texts = [_texts_left(asked, guards) for guards in (first, second)]
-        sides = sorted(([each for each in guards if each.asked == asked] for guards in left), key=len)
         if all(texts):
             found[Guard(asked, "only if among", tuple(dict.fromkeys((*texts[0], *texts[1]))))] = None
-        elif len(sides[0]) == 1:  # ``a``, or ``not a`` and ``b``, is ``a`` or ``b``
-            others = [each for each in sides[1] if each != opposite(sides[0][0])]
-            if others:
-                edits = [[(each.edit, each.given) for each in side] for side in (sides[0], others)]
-                found[Guard(asked, *either_of(*edits))] = None
     return tuple(found)
 
 
@@ -298,15 +269,19 @@ def _texts_left(asked: Input, guards: tuple[Guard, ...]) -> tuple[str, ...]:
     return tuple(text for text in min(listed, key=len, default=()) if text not in others)
 
 
-def either(run: Run, condition: Guard, first: Value, second: Value) -> Value:
+def either(run: Run, condition: Guard | None, first: Value, second: Value) -> Value:
     """Return what a variable holds: ``first`` where the condition holds, else ``second``.
 
-    Only texts carry a condition: which function, class or container is meant only a launch can say.
+    Only texts carry a condition: which truth, function, class or container is meant, and which text where no condition
+    says what is asked, only a launch can say.
     """
+    chosen = _CHOSEN if condition else (*_CHOSEN, *CONSTANTS, Text)
+    both = (*first, *second)
     if any(
-        isinstance(atom, _CHOSEN) and not (atom in first and atom in second) for atom in (*first, *second)
+        isinstance(atom, chosen) and not (contains(first, atom) and contains(second, atom)) for atom in both
     ):
         run.asks_launch = True
+        second = join(second, OF_LAUNCH)
     sides = ((condition, first, second), (opposite(condition), second, first))
     return join_all(
         tuple(
@@ -319,25 +294,18 @@ def either(run: Run, condition: Guard, first: Value, second: Value) -> Value:
     )
 
 
-_CHOSEN = (FunctionValue, ClassValue, BoundMethod, Sequence, Dictionary)
+_CHOSEN = (bool, FunctionValue, ClassValue, BoundMethod, Sequence, Dictionary)
 
 
 def _comparison(run: Run, test: ast.Compare, frame: Frame) -> Guard | None:
+    """Return what a comparison with texts or whole numbers asks of a parameter."""
     asked, defaults = _asked(run, test.left, frame)
     other, op = test.comparators[0], type(test.ops[0])
-    if asked is None:
+    if asked is None and not issubclass(op, (ast.In, ast.NotIn)):
         asked, defaults = _asked(run, other, frame)
         other = test.left
-        if (
-            asked is not None
-            and issubclass(op, ast.In)
-            and all(isinstance(each, Sequence) for each in defaults)
-        ):
-            asked, defaults, op = asked._replace(item="each"), ("",), ast.Eq
-        op = _MIRRORED.get(op, op)
-        if issubclass(op, (ast.In, ast.NotIn)):
-            return None
-    if asked is None or not (all(type(each) is str for each in defaults) or _whole_numbers(defaults)):
+    whole = all(type(default) is int for default in defaults)
+    if asked is None or not (whole or all(type(each) is str for each in defaults)):
         return None
     value = _answer(run, other, frame)
     if issubclass(op, (ast.In, ast.NotIn)):
@@ -345,25 +313,9 @@ def _comparison(run: Run, test: ast.Compare, frame: Frame) -> Guard | None:
         edit = "only if among" if issubclass(op, ast.In) else "only if not among"
         return None if among is None else Guard(asked, edit, among)
     bound = value[0] if len(value) == 1 else None
-    if type(bound) is not type(defaults[0]):
-        return None
-    if isinstance(bound, int) and op in _BOUNDS:
-        edit, less = _BOUNDS[op]
-        return Guard(asked, edit, (str(bound - less),))
-    if not isinstance(bound, (str, int)) or not issubclass(op, (ast.Eq, ast.NotEq)):
+    if type(bound) is not type(defaults[0]) or not issubclass(op, (ast.Eq, ast.NotEq)):
         return None
     return Guard(asked, "only if equal" if issubclass(op, ast.Eq) else "only if different", (str(bound),))
-
-
-_MIRRORED: dict[type, type] = {ast.Lt: ast.Gt, ast.Gt: ast.Lt, ast.LtE: ast.GtE, ast.GtE: ast.LtE}
-_BOUNDS: dict[type, tuple[str, int]] = {
-    ast.Gt: ("only if above", 0), ast.GtE: ("only if above", 1),
-    ast.LtE: ("only if not above", 0), ast.Lt: ("only if not above", 1),
-}  # fmt: skip
-
-
-def _whole_numbers(defaults: Value) -> bool:
-    return all(type(default) is int for default in defaults)
 
 
 def _texts_in(value: Value) -> tuple[str, ...] | None:
@@ -382,13 +334,6 @@ def _texts_in(value: Value) -> tuple[str, ...] | None:
 def _answer(run: Run, node: ast.expr, frame: Frame) -> Value:
     """Return the value of a part of a test; a call is not made again."""
     return run.answers.get(node, BOTTOM) if isinstance(node, ast.Call) else run.evaluate(node, frame)
-
-
-def _truth_again(run: Run, part: ast.expr, frame: Frame) -> bool | None:
-    """Return the truth of a part of a test, ``None`` also where it would have to call something again."""
-    if isinstance(part, ast.Call) or _only_reads(part):
-        return truth(_answer(run, part, frame))
-    return None
 
 
 def _asked(run: Run, node: ast.expr, frame: Frame) -> tuple[Input | None, Value]:
@@ -438,31 +383,21 @@ def narrowed(run: Run, test: ast.expr, outcome: bool, frame: Frame) -> None:
     elif isinstance(test, ast.BoolOp) and isinstance(test.op, ast.And) == outcome:
         for part in test.values:
             narrowed(run, part, outcome, frame)
-    whole = test
+    holds: Callable[[object], bool | None] = truth_of
+    if isinstance(test, ast.Compare) and len(test.ops) == 1 and isinstance(test.comparators[0], ast.Constant):
+        op, other = test.ops[0], run.evaluate(test.comparators[0], frame)
+        test, holds = test.left, lambda atom: compare_values(op, (atom,), other)
     cells: dict[object, Value] = {}
     key: object = None
-    holds: Callable[[object], bool | None] = truth_of
-    if isinstance(test, ast.Compare) and isinstance(
-        test.comparators[0], ast.Constant | ast.Name | ast.Attribute | ast.Tuple
-    ):
-        op, other = test.ops[0], run.evaluate(test.comparators[0], frame)
-        if len(test.ops) == 1:
-            test, holds = test.left, lambda atom: compare_values(op, (atom,), other)
     if isinstance(test, ast.Name):
         cells, key = frame.cells, test.id
     elif isinstance(test, ast.Attribute) and isinstance(test.value, ast.Name):
-        owner = frame.cells.get(test.value.id, ())
-        if len(owner) == 1 and isinstance(owner[0], Instance) and not owner[0].summary:
-            cells, key = owner[0].cells, test.attr
+        owner = sole(frame.cells.get(test.value.id))
+        if isinstance(owner, Instance) and not owner.summary:
+            cells, key = owner.cells, test.attr
     value = cells.get(key, ())
     kept = tuple(atom for atom in value if holds(atom) in (outcome, None))
-    asked = input_of(sole(kept))
-    if asked is not None and is_one_of_several(asked):
-        condition = condition_of(run, whole, frame)
-        if condition is not None and condition.asked == asked:
-            edit = condition.edit if outcome else OPPOSITE[condition.edit]
-            run.state.write(cells, key, (with_edit(asked, "where", (edit, *condition.given)),))
-    elif kept and len(kept) < len(value):
+    if kept and len(kept) < len(value):
         run.state.write(cells, key, kept)
 
 
@@ -475,16 +410,19 @@ def compare(run: Run, node: ast.Compare, frame: Frame) -> Value:
     """Compare: certain for constants, else either."""
     left = run.evaluate(node.left, frame)
     results: set[bool | None] = set()
+    asks = False
     for op, comparator in zip(node.ops, node.comparators, strict=True):
         if isinstance(op, (ast.In, ast.NotIn)) and _all_variables(run, comparator, frame):
             results.add(None)  # ``'node' in locals()``
             continue
         right = run.evaluate(comparator, frame)
-        results.add(compare_values(op, left, right))
+        outcome = compare_values(op, left, right)
+        results.add(outcome)
+        asks = asks or (outcome is None and any(map(is_of_launch, (*left, *right))))
         left = right
-    if results == {True}:
-        return (True,)
-    return (False,) if False in results else (True, False)
+    if results == {True} or False in results:
+        return (results == {True},)
+    return OF_LAUNCH if asks else BOOLEAN
 
 
 def _all_variables(run: Run, node: ast.expr, frame: Frame) -> bool:

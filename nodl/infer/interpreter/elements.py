@@ -6,11 +6,10 @@ import ast
 import sys
 from functools import partial
 
-from nodl.infer.interpreter.conditions import is_of_launch, is_parameter, only_if
+from nodl.infer.interpreter.conditions import is_of_launch
 from nodl.infer.interpreter.define import enumeration_members, is_constant, is_enumeration, setter_of
-from nodl.infer.interpreter.formatting import is_whole_number
 from nodl.infer.interpreter.run import Arguments, Run
-from nodl.infer.text import Guard, Input, Text, constant_text, input_of, is_one_of_several, make_text
+from nodl.infer.text import Input, Text, constant_text, make_text
 from nodl.infer.values import (
     ABSENT,
     ANY,
@@ -18,6 +17,7 @@ from nodl.infer.values import (
     ITEMS,
     LAZY,
     MODULES,
+    OF_LAUNCH,
     OTHER,
     OTHER_KEYS,
     RESULT,
@@ -85,52 +85,8 @@ def _element(run: Run, atom: object, key: Value, node: ast.Subscript, frame: Fra
     return (atom,) if isinstance(atom, Unknown) else ANY
 
 
-def entries_by_parameter(obj: object, key: Value) -> list[tuple[Guard, Value]] | None:
-    """Return what each value of the parameter that is the ``key`` chooses; ``None``: not such a look-up."""
-    asked = input_of(key[0]) if len(key) == 1 else None
-    if asked is None or not is_parameter(asked) or not isinstance(obj, (Dictionary, Sequence)):
-        return None
-    kind = int if is_whole_number(key[0]) else str
-    entries = _certain_entries(obj)
-    if entries is None or any(type(constant) is not kind for constant, _ in entries):
-        return None
-    return [(Guard(asked, "only if equal", (str(constant),)), value) for constant, value in entries]
-
-
-def chosen_by_parameter(obj: Dictionary | Sequence, key: Value, default: Value | None = None) -> Value | None:
-    """Return the texts of a dictionary or list, each if the parameter that is the ``key`` says so.
-
-    ``default``: what is taken for any other value. ``None``: not such a look-up.
-    """
-    entries = entries_by_parameter(obj, key)
-    if not entries or any(len(value) != 1 for _, value in entries):
-        return None
-    if default is not None and is_one_of_several(entries[0][0].asked):
-        return None
-    keys = tuple(guard.given[0] for guard, _ in entries)
-    other = entries[0][0]._replace(edit="only if not among", given=keys)
-    chosen = [(guard, value[0]) for guard, value in entries] + [(other, atom) for atom in default or ()]
-    found = [only_if(guard, atom) for guard, atom in chosen if isinstance(atom, (str, Text))]
-    return tuple(found) if len(found) == len(chosen) else None
-
-
-def _certain_entries(obj: Dictionary | Sequence) -> list[tuple[object, Value]] | None:
-    """Return each key or index with what is there, if all are known."""
-    if isinstance(obj, Sequence):
-        exact = obj.items.exact
-        if exact is None:
-            return None
-        return [pair for start in (0, -len(exact)) for pair in enumerate(exact, start)]
-    if obj.is_open or not all(certain for _, _, certain in obj.entries()):
-        return None
-    return [(cell.constant, value) for cell, value, _ in obj.entries()]
-
-
 def dictionary_item(run: Run, obj: Dictionary, key: Value, node: ast.AST, frame: Frame) -> Value:
     """Return what ``obj[key]`` gives; fills a ``defaultdict``."""
-    chosen = chosen_by_parameter(obj, key)
-    if chosen is not None:
-        return chosen
     key = tuple(map(constant_text, key))
     result: Value = BOTTOM
     everything = False
@@ -141,9 +97,8 @@ def dictionary_item(run: Run, obj: Dictionary, key: Value, node: ast.AST, frame:
         everywhere = everywhere and certain
         everything = everything or not (held or is_constant(atom))
     if everything:
-        run.asks_launch = run.asks_launch or any(map(is_of_launch, key))
         run.spend(len(obj.cells))
-        result = join(result, values_of(obj).any_element())
+        result = chosen_by_launch(run, key, join(result, values_of(obj).any_element()))
         everywhere = False
     result = with_other_entries(obj, result)
     if obj.escaped or not result:
@@ -161,16 +116,10 @@ def with_other_entries(obj: Dictionary, found: Value) -> Value:
 
 def _sequence_item(run: Run, sequence: Sequence, key: Value) -> Value:
     items = sequence.items
-    chosen = chosen_by_parameter(sequence, key)
-    if chosen is not None:
-        return chosen
     if items.exact is None:
         found = items.any_element()
-        if len(key) == 1 and type(key[0]) is int:
-            found = _part(found, key[0])
         one_of_several = len(found) > 1 and all(type(index) is int for index in key)
         return join(found, ANY) if one_of_several else found or ANY
-    run.asks_launch = run.asks_launch or any(map(is_of_launch, key))
     if all(isinstance(index, int) for index in key):
         length = len(items.exact)
         result: Value = BOTTOM
@@ -178,16 +127,15 @@ def _sequence_item(run: Run, sequence: Sequence, key: Value) -> Value:
             if isinstance(index, int) and -length <= index < length:
                 result = join(result, items.exact[index])
         return result or ANY
-    return items.any_element() or ANY
+    return chosen_by_launch(run, key, items.any_element()) or ANY
 
 
-def _part(value: Value, index: int) -> Value:
-    """Return what stands at ``index``, if ``value`` is any part of a text that is split."""
-    asked = input_of(value[0]) if len(value) == 1 else None
-    if asked is None or not asked.edits or asked.edits[-1][0] != "split":
-        return value
-    part = ("part", (str(index), *asked.edits[-1][1]))
-    return (make_text((asked._replace(edits=(*asked.edits[:-1], part)),)),)
+def chosen_by_launch(run: Run, key: Value, found: Value) -> Value:
+    """Return one of ``found``, the entries of a table: which one, only a launch says if it decides the ``key``."""
+    if len(found) < 2 or not any(map(is_of_launch, key)):
+        return found
+    run.asks_launch = True
+    return join(found, OF_LAUNCH)
 
 
 def _sliced(run: Run, sequence: Sequence, bounds: slice | None, node: ast.AST) -> Value:
@@ -421,11 +369,11 @@ def _unpack(run: Run, targets: list[ast.expr], value: Value, frame: Frame) -> No
     element = items.any_element() or ANY
     if exact is not None:
         element = _any_of(element)
-    for index, target in enumerate(targets):
+    for target in targets:
         if isinstance(target, ast.Starred):
             assign(run, target, run.sequence(target, "list", Items(None, element)), frame)
         else:
-            assign(run, target, element if starred else _part(element, index), frame)
+            assign(run, target, element, frame)
 
 
 def delete(run: Run, target: ast.expr, frame: Frame) -> None:

@@ -11,41 +11,36 @@ from functools import partial
 from nodl.infer.interpreter.conditions import (
     compare,
     decide,
-    either,
+    is_of_launch,
     narrowed,
-    only_if,
     sides_of,
     truth,
     truth_of,
-    under,
 )
 from nodl.infer.interpreter.define import make_function
 from nodl.infer.interpreter.elements import (
     assign,
     copy_dictionary,
     elements,
-    entries_by_parameter,
     store_item,
     subscript,
 )
-from nodl.infer.interpreter.formatting import as_texts, f_string, is_whole_number, percent
+from nodl.infer.interpreter.formatting import as_texts, f_string, percent
 from nodl.infer.interpreter.loops import comprehension, dict_comprehension
 from nodl.infer.interpreter.run import Arguments, Evaluator, Run
 from nodl.infer.text import (
-    Guard,
     Hole,
     Text,
     TextAtom,
     concatenate,
     concatenations,
-    input_of,
     make_text,
-    with_edit,
 )
 from nodl.infer.values import (
     ANY,
     BOTTOM,
     NONE,
+    OF_LAUNCH,
     OTHER,
     ClassValue,
     Dictionary,
@@ -61,7 +56,6 @@ from nodl.infer.values import (
     join,
     join_all,
     present,
-    sole,
     unknown,
 )
 
@@ -127,16 +121,7 @@ def _arithmetic_atoms(run: Run, node: ast.AST, a: object, op: ast.operator, b: o
     if isinstance(a, _NUMBERS) and isinstance(b, _NUMBERS) and max(abs(a), abs(b)) < _LARGE:
         result = _ARITHMETIC[type(op)](a, b)
         return (result,) if isinstance(result, _NUMBERS) else ANY
-    if isinstance(op, (ast.Add, ast.Sub)) and type(b) is int and is_whole_number(a):
-        return _plus(a, -b if isinstance(op, ast.Sub) else b)
-    if isinstance(op, ast.Add) and type(a) is int and is_whole_number(b):
-        return _plus(b, a)
     return (b,) if isinstance(b, Unknown) else (a,) if isinstance(a, Unknown) else ANY
-
-
-def _plus(number: Text, added: int) -> Value:
-    asked = input_of(number)
-    return ANY if asked is None else (with_edit(asked, "plus", (str(added),)),)
 
 
 def _add(run: Run, node: ast.AST, left: Value, right: Value) -> Value:
@@ -224,27 +209,13 @@ def _call(run: Run, node: ast.Call, frame: Frame) -> Value:
         run.doubtful.add(node)
     args = arguments_of(run, node, frame)
     run.at = node, frame
-    if len(callee) > 1 and type(function) is ast.Subscript:
-        result = _call_of_entry(run, function, callee, args, node, frame)
-    else:
-        result = run.call(callee, args, node, frame)
+    made = run.findings.made
+    result = run.call(callee, args, node, frame)
+    if OF_LAUNCH[0] in callee and run.findings.made > made:
+        run.gap(node, frame, "which function is called here only a launch decides")
     if node in run.answers:
         run.answers[node] = result
     return result
-
-
-def _call_of_entry(
-    run: Run, entry: ast.Subscript, callee: Value, args: Arguments, node: ast.Call, frame: Frame
-) -> Value:
-    """Call what a table has under the value of a parameter: ``DRIVERS[name](self)`` makes one of them."""
-    key = run.evaluate(entry.slice, frame)
-    entries = entries_by_parameter(sole(run.evaluate(entry.value, frame)), key)
-    if not entries:
-        return run.call(callee, args, node, frame)
-    calls = [
-        partial(under, run, (guard,), partial(run.call, value, args, node, frame)) for guard, value in entries
-    ]
-    return join_all(run.state.each(calls))
 
 
 def arguments_of(run: Run, node: ast.Call, frame: Frame) -> Arguments:
@@ -347,9 +318,9 @@ def _conditional(run: Run, node: ast.IfExp, frame: Frame) -> Value:
     def side(holds: bool) -> Value:
         return run.evaluate(node.body if holds else node.orelse, frame)
 
-    condition, sides = sides_of(run, node.test, frame, side)
+    joined, sides, _ = sides_of(run, node.test, frame, side)
     body, orelse = run.state.each(sides)
-    return either(run, condition, body, orelse) if condition else join(body, orelse)
+    return (joined or join)(body, orelse)
 
 
 def _boolean(run: Run, node: ast.BoolOp, frame: Frame) -> Value:
@@ -359,12 +330,12 @@ def _boolean(run: Run, node: ast.BoolOp, frame: Frame) -> Value:
     for index, operand in enumerate(node.values):
         evaluate = partial(_after, run, operand, node.values[:index], not stops_at, frame)
         value = run.state.perhaps(evaluate) if index and type(operand) is not ast.Constant else evaluate()
-        if index == len(node.values) - 1:
-            return join(result, _otherwise(result, value) if stops_at else value)
-        if truth(value) is stops_at:
+        if index == len(node.values) - 1 or truth(value) is stops_at:
             return join(result, value)
-        stays = tuple(atom for atom in value if truth_of(atom) in (stops_at, None))
-        result = join(result, tuple(_where_set(atom) for atom in stays) if stops_at else stays)
+        if any(map(is_of_launch, value)):
+            run.asks_launch = True
+            result = join(result, OF_LAUNCH)
+        result = join(result, tuple(atom for atom in value if truth_of(atom) in (stops_at, None)))
     return result
 
 
@@ -373,23 +344,6 @@ def _after(run: Run, operand: ast.expr, before: list[ast.expr], held: bool, fram
     for test in before:
         narrowed(run, test, held, frame)
     return run.evaluate(operand, frame)
-
-
-def _where_set(atom: object) -> object:
-    """Return an input in front of ``or``: where it is empty, what follows is taken."""
-    asked = input_of(atom)
-    if asked is None or asked.item is not None or "given" in dict(asked.edits):
-        return atom
-    return with_edit(asked, "unless empty", ())
-
-
-def _otherwise(before: Value, value: Value) -> Value:
-    """Return the right side of ``input or value``: what is taken where the input is empty."""
-    asked = input_of(before[0]) if len(before) == 1 else None
-    if asked is None or asked.edits != (("unless empty", ()),):
-        return value
-    condition = Guard(asked._replace(edits=()), "only if equal", ("",))
-    return tuple(only_if(condition, atom) if isinstance(atom, (str, Text)) else atom for atom in value)
 
 
 def _unary(run: Run, node: ast.UnaryOp, frame: Frame) -> Value:

@@ -8,11 +8,9 @@ import string
 from collections.abc import Iterable
 from collections.abc import Sequence as Sequences
 from contextlib import suppress
-from typing import TypeGuard
 
-from nodl.infer.findings import NodeRecord, OptionDefaults
 from nodl.infer.interpreter.run import Arguments, Run
-from nodl.infer.text import Hole, Input, Text, TextAtom, common_text, concatenations, make_text
+from nodl.infer.text import Hole, Text, TextAtom, common_text, concatenations, make_text
 from nodl.infer.values import (
     ANY,
     BOTTOM,
@@ -93,26 +91,12 @@ def formatted(value: Value, spec: str | None) -> list[TextAtom]:
         return as_texts(value)
     texts: list[TextAtom] = []
     for atom in value:
-        if spec == "d" and is_whole_number(atom):
-            texts.append(atom)
-            continue
         if spec is None or not isinstance(atom, (str, int, float)) or _WIDE.search(spec):
             texts.append(_hole("formatted text"))
             continue
         with suppress(ValueError, TypeError, OverflowError):  # an error at run time, no text
             texts.append(format(atom, spec))
     return texts or [_hole("formatted text")]
-
-
-def is_whole_number(atom: object) -> TypeGuard[Text]:
-    """Return True for an input that the program declares as a whole number: written plainly, it is its own text."""
-    if not isinstance(atom, Text) or len(atom.pieces) != 1:
-        return False
-    (piece,) = atom.pieces
-    if not isinstance(piece, Input) or not isinstance(piece.owner, (NodeRecord, OptionDefaults)):
-        return False
-    default = piece.owner.default(piece.name)
-    return bool(default) and all(type(each) is int for each in default)
 
 
 _DIRECTIVE = re.compile(r"%(?:s|(\d*(?:\.\d+)?[dfx]))")

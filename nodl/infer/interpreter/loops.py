@@ -6,7 +6,6 @@ import ast
 import functools
 from collections.abc import Callable
 from functools import partial
-from typing import NamedTuple
 
 from nodl.infer.interpreter.conditions import conditions_of, decide, narrowed, under
 from nodl.infer.interpreter.elements import assign, elements, store_item
@@ -38,27 +37,17 @@ def may_unroll(run: Run, count: int) -> bool:
     return count * run.unrolled <= (MAX_UNROLLED_AGAIN if run.repeated else MAX_UNROLLED)
 
 
-class _Turns(NamedTuple):
-    """What the turns of a loop may come to: control passes it; its end is reached; a ``break`` leaves it."""
-
-    passes: bool
-    finished: bool
-    left: bool
-
-
-def _looped(run: Run, node: Loop, frame: Frame, turns: Callable[[], _Turns]) -> bool:
-    """Run the ``turns`` of a loop, then its ``else``, which a ``break`` skips."""
+def _looped(run: Run, node: Loop, frame: Frame, turns: Callable[[], bool]) -> bool:
+    """Run the ``turns`` of a loop, then perhaps its ``else``. Return False if control cannot pass."""
     before, loop_forks = frame.unsettled, frame.loop_forks
     frame.unsettled = ""
     frame.loop_forks = run.state.forks
-    outcome = turns()
+    passes = turns()
     frame.unsettled, frame.loop_forks = before, loop_forks
     frame.jump = ""
-    if outcome.passes and outcome.finished and node.orelse:
-        if not outcome.left:
-            return run.execute(node.orelse, frame)
+    if passes and node.orelse:
         run.state.maybe(lambda: run.execute(node.orelse, frame))
-    return outcome.passes
+    return passes
 
 
 @functools.lru_cache(maxsize=4096)
@@ -66,16 +55,15 @@ def _breaks(node: Loop) -> bool:
     return any(isinstance(inner, ast.Break) for inner in ast.walk(node))
 
 
-def _for(run: Run, node: For, iterated: Value, frame: Frame) -> _Turns:
-    outcome = _Turns(passes=True, finished=True, left=False)
+def _for(run: Run, node: For, iterated: Value, frame: Frame) -> bool:
     items = elements(run, iterated, node, frame)
     exact = items.exact or ()
     if items.exact is not None and may_unroll(run, len(exact)):
         run.unrolled *= len(exact) or 1
-        outcome = _unrolled(run, node, exact, frame)
+        passes = _unrolled(run, node, exact, frame)
         run.unrolled //= len(exact) or 1
-        if not outcome.passes or elements(run, iterated, node, frame) == items:
-            return outcome
+        if not passes or elements(run, iterated, node, frame) == items:
+            return passes
 
     def turn() -> bool:  # what is iterated over may change meanwhile
         element = elements(run, iterated, node, frame).any_element()
@@ -85,11 +73,11 @@ def _for(run: Run, node: For, iterated: Value, frame: Frame) -> _Turns:
         return run.execute(node.body, frame)
 
     fixpoint(run, frame, turn)
-    return _Turns(True, outcome.finished, outcome.left or _breaks(node))
+    return True
 
 
-def _unrolled(run: Run, node: For, exact: tuple[Value, ...], frame: Frame) -> _Turns:
-    """Run one turn after the other."""
+def _unrolled(run: Run, node: For, exact: tuple[Value, ...], frame: Frame) -> bool:
+    """Run one turn after the other. Return False if control cannot pass."""
     start, guards = run.state.mark(), run.guards
     broken, passes = False, True
     run.state.depth += 1
@@ -104,7 +92,7 @@ def _unrolled(run: Run, node: For, exact: tuple[Value, ...], frame: Frame) -> _T
         run.state.join_seen(start, mixed=True)
     if left:
         run.guards = guards
-    return _Turns(passes or left, passes or broken, left)
+    return passes or left
 
 
 def _followed(run: Run, node: For, index: int, element: Value, frame: Frame) -> tuple[bool, bool]:
@@ -123,9 +111,9 @@ def _followed(run: Run, node: For, index: int, element: Value, frame: Frame) -> 
     return passes or bool(jumped) or frame.jump == "continue", bool(jumped)
 
 
-def _while(run: Run, node: ast.While, frame: Frame) -> _Turns:
+def _while(run: Run, node: ast.While, frame: Frame) -> bool:
     if decide(run, node.test, frame) is False:
-        return _Turns(passes=True, finished=True, left=False)
+        return True
     broken = False
 
     def turn() -> bool:
@@ -140,7 +128,7 @@ def _while(run: Run, node: ast.While, frame: Frame) -> _Turns:
     if not _breaks(node):
         narrowed(run, node.test, False, frame)
     endless = isinstance(node.test, ast.Constant)  # only break, return or an exception leaves ``while True``
-    return _Turns(broken or not endless, not endless, _breaks(node))
+    return broken or not endless
 
 
 def fixpoint(run: Run, frame: Frame, turn: Callable[[], bool]) -> None:

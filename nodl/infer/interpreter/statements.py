@@ -9,8 +9,8 @@ from typing import Any
 from nodl.infer.interpreter import imports, loops
 from nodl.infer.interpreter.conditions import (
     decide,
-    either,
     only_if,
+    reads_one_of_several,
     sides_of,
     where_either,
 )
@@ -19,7 +19,7 @@ from nodl.infer.interpreter.elements import assign, delete
 from nodl.infer.interpreter.expressions import binary_operation
 from nodl.infer.interpreter.run import Arguments, Executor, Run
 from nodl.infer.models import foreign
-from nodl.infer.text import Guard, Text, is_one_of_several
+from nodl.infer.text import Guard, Text
 from nodl.infer.values import (
     ANY,
     LAZY,
@@ -38,8 +38,8 @@ from nodl.infer.values import (
 
 def _expression(run: Run, node: ast.Expr, frame: Frame) -> bool:
     if type(node.value) is not ast.Constant:
-        run.evaluate(node.value, frame)
-        if type(node.value) is ast.Call and _never_returns(run, node.value.func, frame):
+        value = run.evaluate(node.value, frame)
+        if type(node.value) is ast.Call and (not value or _never_returns(run, node.value.func, frame)):
             _leave(run, frame)
             return False
     return True
@@ -57,11 +57,9 @@ def _never_returns(run: Run, function: ast.expr, frame: Frame) -> bool:
 
 
 def _assignment(run: Run, node: ast.Assign, frame: Frame) -> bool:
-    made = run.findings.count()
+    made = run.findings.made
     value = run.evaluate(node.value, frame)
-    if run.findings.count() > made and any(
-        isinstance(atom, Sequence) and atom.kind == LAZY for atom in value
-    ):
+    if run.findings.made > made and any(isinstance(atom, Sequence) and atom.kind == LAZY for atom in value):
         run.gap(node, frame, "interfaces are made where this is iterated over later, which is not followed")
     for target in node.targets:
         assign(run, target, value, frame)
@@ -98,20 +96,23 @@ def _if(run: Run, node: ast.If, frame: Frame) -> bool:
     outcome = decide(run, node.test, frame)
     if outcome is not None:
         return run.execute(node.body if outcome else node.orelse, frame)
-    passing: list[tuple[Guard, ...]] = []
+    passing: dict[bool, tuple[Guard, ...]] = {}
 
     def side(holds: bool) -> bool:
         passes = run.execute(node.body if holds else node.orelse, frame)
         if passes:
-            passing.append(run.guards_at_end)
-        elif condition and is_one_of_several(condition.asked) and _leaves_loop(node, holds):
-            run.gap(node, frame, f"how many elements of {condition.asked.name} come before this is not known")
+            passing[holds] = run.guards_at_end
+        elif _leaves_loop(node, holds) and reads_one_of_several(run, node.test, frame):
+            run.gap(node, frame, "how many elements of a parameter come before this is not known")
         return passes
 
-    condition, sides = sides_of(run, node.test, frame, side)
-    passes = run.state.branches(sides, partial(either, run, condition) if condition else None)
+    joined, sides, left_open = sides_of(run, node.test, frame, side)
+    passes = run.state.branches(sides, joined)
     if passing:
-        run.guards = where_either(passing[0], passing[-1])  # to the end of this block
+        first, *others = passing.values()
+        run.guards = where_either(first, others[0]) if others else first  # to the end of this block
+        if not others and left_open.issuperset(passing):
+            run.left_open.append((node, frame, run.findings.made))
     return passes
 
 
@@ -158,10 +159,7 @@ def _jump(run: Run, node: ast.Break | ast.Continue, frame: Frame) -> bool:
 
 
 def _match(run: Run, node: ast.Match, frame: Frame) -> bool:
-    """Decide cases of values as tests; run any of others, or none unless the last one takes everything."""
-    tests = _as_tests(node)
-    if tests is not None:
-        return run.execute(tests, frame)
+    """Run any of the cases, or none unless the last one takes everything; which one is not followed."""
     subject = run.evaluate(node.subject, frame)
     if not any(isinstance(atom, (Unknown, External)) for atom in subject):
         run.gap(node, frame, "which case of this match statement is taken is not followed")
@@ -169,41 +167,6 @@ def _match(run: Run, node: ast.Match, frame: Frame) -> bool:
     everything = isinstance(last.pattern, ast.MatchAs) and last.pattern.pattern is None and last.guard is None
     sides = [partial(_case, run, case, subject, frame) for case in node.cases]
     return run.state.branches(sides if everything else [*sides, lambda: True])
-
-
-@cache
-def _as_tests(node: ast.Match) -> list[ast.stmt] | None:
-    """Return the statement as ``if`` and ``elif``, which it is if each case lists values or takes everything.
-
-    None if a case is of another form, or if the subject, which each test reads again, is more than a name.
-    """
-    if not isinstance(node.subject, (ast.Name, ast.Attribute, ast.Constant)):
-        return None
-    following: list[ast.stmt] = []
-    for case in reversed(node.cases):
-        test = _as_test(case.pattern, node.subject)
-        if test is None:
-            return None
-        if case.guard is not None:
-            test = ast.BoolOp(ast.And(), [test, case.guard])
-        following = [
-            ast.fix_missing_locations(ast.copy_location(ast.If(test, case.body, following), case.pattern))
-        ]
-    return following
-
-
-def _as_test(pattern: ast.pattern, subject: ast.expr) -> ast.expr | None:
-    if isinstance(pattern, ast.MatchValue):
-        return ast.Compare(subject, [ast.Eq()], [pattern.value])
-    if isinstance(pattern, ast.MatchSingleton):
-        return ast.Compare(subject, [ast.Is()], [ast.Constant(pattern.value)])
-    if isinstance(pattern, ast.MatchAs) and pattern.name is None:
-        return ast.Constant(True)
-    if isinstance(pattern, ast.MatchOr):
-        parts = [_as_test(each, subject) for each in pattern.patterns]
-        known = [part for part in parts if part is not None]
-        return ast.BoolOp(ast.Or(), known) if len(known) == len(parts) else None
-    return None
 
 
 def _case(run: Run, case: ast.match_case, subject: Value, frame: Frame) -> bool:

@@ -8,12 +8,10 @@ from __future__ import annotations
 
 import builtins
 import functools
-import io
 import sys
 
 from nodl.infer.interpreter.run import Call, Run
 from nodl.infer.models import (
-    data_files,
     native,
     ros,
     stdlib,
@@ -225,7 +223,7 @@ def call_foreign_method(run: Run, method: ForeignMethod, call: Call) -> Value:
     """Call a method of a library's class: as its model says, else unknown, and the arguments escape."""
     receiver, path, name = method.receiver, method.path, method.name
     assert isinstance(receiver, Instance)
-    if name not in NODE_ENDPOINTS and (path != data_files.FILE or hasattr(io.TextIOWrapper, name)):
+    if name not in NODE_ENDPOINTS:
         run.understood.add(call.node)
     if is_node_class(path):
         return _call_node_method(run, receiver, path, name, call)

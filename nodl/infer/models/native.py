@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from nodl.infer.interpreter.conditions import is_of_launch
 from nodl.infer.interpreter.define import is_constant
 from nodl.infer.interpreter.elements import (
     change,
-    chosen_by_parameter,
+    chosen_by_launch,
     elements,
     keys_of,
     values_of,
@@ -17,7 +16,7 @@ from nodl.infer.interpreter.elements import (
 from nodl.infer.interpreter.formatting import joined, str_format, text_value
 from nodl.infer.interpreter.run import Call, Run
 from nodl.infer.models.stdlib import call_each, fill
-from nodl.infer.text import MAX_LENGTH, Text, TextAtom, constant_text, edited, input_of, make_text, with_edit
+from nodl.infer.text import MAX_LENGTH, Text, TextAtom, constant_text, edited
 from nodl.infer.values import (
     ABSENT,
     ANY,
@@ -85,22 +84,6 @@ def _text_method(run: Run, text: TextAtom, name: str, call: Call) -> Value:
         return _constant_method(run, text, name, arguments, call)
     if name in ("startswith", "endswith", "isdigit", "isalpha"):
         return BOOLEAN
-    known = constant_text(text)
-    if isinstance(known, str):  # beside the conditions under which it is meant
-        conditions = text.pieces[: len(text.pieces) - bool(known)]
-        made = _constant_method(run, known, name, arguments, call)
-        return tuple(
-            make_text((*conditions, each)) if isinstance(each, str) and each else each for each in made
-        )
-    divided = input_of(text)
-    if name == "split" and divided is not None and all(isinstance(each, str) for each in arguments):
-        part = with_edit(divided, "split", tuple(str(each) for each in arguments))
-        return run.sequence(call.node, "list", Items(None, (part,)))
-    if name == "partition" and divided is not None and len(arguments) == 1 and isinstance(arguments[0], str):
-        separator = arguments[0]
-        before = with_edit(divided, "part", ("0", separator))
-        after = with_edit(divided, "after", (separator,))
-        return run.tuple_of(((before,), (separator, ""), (after,)))
     symbolic = edited(text, name, tuple(argument for argument in arguments if isinstance(argument, str)))
     return unknown(f"the result of str.{name}()") if symbolic is None else (symbolic,)
 
@@ -161,9 +144,6 @@ _SEQUENCE: dict[str, SequenceMethod] = {
 
 def _get(run: Run, owner: Dictionary, call: Call) -> Value:
     key = call.args.at(0) or ANY
-    picked = chosen_by_parameter(owner, key, call.args.at(1, "default"))
-    if picked is not None:
-        return picked
     key = tuple(map(constant_text, key))
     found: Value = BOTTOM
     missing = False
@@ -172,8 +152,7 @@ def _get(run: Run, owner: Dictionary, call: Call) -> Value:
         missing = missing or not certain
         found = join(found, held)
         if not held and not is_constant(atom):
-            run.asks_launch = run.asks_launch or is_of_launch(atom)
-            found = join(found, values_of(owner).any_element())
+            found = chosen_by_launch(run, key, join(found, values_of(owner).any_element()))
     found = with_other_entries(owner, found)
     if missing or owner.is_open:
         found = join(found, call.args.at(1, "default") or NONE)

@@ -253,7 +253,9 @@ def add_endpoint(
     if conditions and isinstance(name, (str, Text)):
         pieces = pieces_of(name)
         name = make_text((*(each for each in conditions if each not in pieces), *(pieces if name else ())))
+    known = len(record.endpoints)
     record.add_endpoint(kind, name, type_name, call.source, qos)
+    run.findings.made += len(record.endpoints) - known
 
 
 def register(run: Run, callback: CallbackArgument, call: Call, at_any_time: bool = False) -> None:

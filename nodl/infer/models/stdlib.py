@@ -7,15 +7,15 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from nodl.infer.interpreter.conditions import is_instance, truth
-from nodl.infer.interpreter.define import expect_methods, new_instance, program_classes
+from nodl.infer.interpreter.conditions import is_instance, is_of_launch, truth
+from nodl.infer.interpreter.define import expect_methods
 from nodl.infer.interpreter.elements import copy_dictionary, elements, store_attribute
-from nodl.infer.interpreter.formatting import as_texts, is_whole_number, text_value
+from nodl.infer.interpreter.formatting import as_texts, text_value
 from nodl.infer.interpreter.imports import import_module
 from nodl.infer.interpreter.run import Arguments, Call, Model, Run
-from nodl.infer.models import data_files, options, ros
+from nodl.infer.models import options
 from nodl.infer.start import NO_LAUNCH
-from nodl.infer.text import Input, Text, concatenations, constant_text, input_of, make_text, may_be, with_edit
+from nodl.infer.text import Input, concatenations, constant_text, make_text
 from nodl.infer.values import (
     ABSENT,
     ANY,
@@ -25,6 +25,7 @@ from nodl.infer.values import (
     LAZY,
     NONE,
     OF_A_NODE,
+    OF_LAUNCH,
     OTHER,
     BoundMethod,
     ClassValue,
@@ -62,8 +63,7 @@ def _str(run: Run, call: Call) -> Value:
 
 
 def _int(run: Run, call: Call) -> Value:
-    atom = sole(call.args.at(0))
-    return (atom,) if is_whole_number(atom) else _number(int, run, call)
+    return OF_LAUNCH if is_of_launch(sole(call.args.at(0))) else _number(int, run, call)
 
 
 def _number(kind: Callable[[Any], object], run: Run, call: Call) -> Value:
@@ -85,8 +85,9 @@ _LONGEST_NUMBER = 40
 
 
 def _bool(run: Run, call: Call) -> Value:
-    known = truth(call.args.at(0) or (False,))
-    return BOOLEAN if known is None else (known,)
+    value = call.args.at(0) or (False,)
+    known = truth(value)
+    return OF_LAUNCH if known is None and any(map(is_of_launch, value)) else boolean(known)
 
 
 def _len(run: Run, call: Call) -> Value:
@@ -94,6 +95,8 @@ def _len(run: Run, call: Call) -> Value:
     atom = constant_text(sole(call.args.at(0)))
     if isinstance(atom, str):
         return (len(atom),)
+    if is_of_launch(atom):
+        return OF_LAUNCH
     if not isinstance(atom, Sequence | Dictionary) or (isinstance(atom, Sequence) and atom.kind == "set"):
         return ANY
     exact = elements(run, (atom,), call.node, call.frame).exact
@@ -110,14 +113,11 @@ def _items(run: Run, call: Call, index: int = 0) -> Items:
 
 
 def _range(run: Run, call: Call) -> Value:
-    """Return the numbers if they are known and few; else any number, tied to an input that bounds it."""
+    """Return the numbers if they are known and few; else any number."""
     bounds = [sole(value) for value in call.args.positional]
     items = Items(None, unknown("a number of a loop"))
     if not bounds or call.args.more:  # range(*bounds)
         return run.sequence(call.node, "tuple", items)
-    counted = input_of(bounds[-1]) if len(bounds) < 3 else None
-    if counted is not None and counted.item is None and (len(bounds) == 1 or isinstance(bounds[0], int)):
-        items = Items(None, (with_edit(counted, "range", tuple(map(str, bounds[:-1]))),))
     integers = [bound for bound in bounds if isinstance(bound, int)]
     if len(integers) == len(bounds) and (len(bounds) in (1, 2) or (len(bounds) == 3 and integers[2])):
         numbers = range(*integers)
@@ -139,16 +139,6 @@ def _enumerate(run: Run, call: Call) -> Value:
         return run.sequence(call.node, LAZY, Items(pairs))
     pair = run.tuple_of((unknown("a number of a loop"), items.any_element() or ANY))
     return run.sequence(call.node, LAZY, Items(None, pair))
-
-
-def _zip(run: Run, call: Call) -> Value:
-    """Return the rows of lists that are all known; unknown otherwise, since nobody knows what goes with what."""
-    columns = [elements(run, value, call.node, call.frame) for value in call.args.positional]
-    known = [column.exact for column in columns if column.exact is not None]
-    if call.args.more or len(known) < len(columns):
-        return ANY
-    rows = tuple(run.tuple_of(row) for row in zip(*known, strict=False))
-    return run.sequence(call.node, LAZY, Items(rows))
 
 
 def _sorted(run: Run, call: Call) -> Value:
@@ -253,25 +243,9 @@ def _setattr(run: Run, call: Call) -> Value:
     if len(known) < len(names):
         run.escape_value(value)
         for atom in owner:
-            if isinstance(atom, HeapObject) and not _is_new(atom, names):
+            if isinstance(atom, HeapObject):
                 run.gap(call.node, call.frame, "an attribute whose name is made at run time is set")
     return NONE
-
-
-def _is_new(obj: HeapObject, names: Value) -> bool:
-    """Return True if no attribute or method of an object of the program can have one of these names."""
-    if not isinstance(obj, Instance) or not isinstance(obj.cls, ClassValue):
-        return False
-    held = {
-        *obj.cells,
-        *(name for base in program_classes(obj.cls) for name in base.cells),
-        *ros.NODE_METHODS,
-    }
-    unknown_ones = [atom for atom in names if not isinstance(atom, str)]
-    known = [name for name in held if isinstance(name, str)]
-    return all(
-        isinstance(atom, Text) and not any(may_be(atom, name) for name in known) for atom in unknown_ones
-    )
 
 
 def _type(run: Run, call: Call) -> Value:
@@ -288,6 +262,12 @@ def _type(run: Run, call: Call) -> Value:
         return unknown("a class made at run time")
     atom = sole(call.args.at(0))
     return (atom.cls,) if isinstance(atom, Instance) else ANY
+
+
+def _isinstance(run: Run, call: Call) -> Value:
+    value = call.args.at(0) or ANY
+    outcome = is_instance(value, call.args.at(1) or ANY)
+    return OF_LAUNCH if outcome is None and any(map(is_of_launch, value)) else boolean(outcome)
 
 
 def _dynamic_code(run: Run, call: Call) -> Value:
@@ -309,19 +289,6 @@ def _variables(run: Run, call: Call) -> Value:
     return run.variables_of(call.node, call.frame)
 
 
-def _object_new(run: Run, call: Call) -> Value:
-    """Model ``object.__new__(cls)``: an object whose constructor has not run."""
-    made: list[object] = []
-    for atom in call.args.at(0) or ANY:
-        if isinstance(atom, ClassValue):
-            for base in program_classes(atom):
-                run.instantiated.setdefault(base.node)
-            made.append(new_instance(run, atom, call))
-        else:
-            made.append(unknown("an object of a class that is not known")[0])
-    return tuple(made)
-
-
 _BUILT_IN: dict[str, Callable[[Run, Call], Value]] = {
     f"builtins.{name}": model
     for name, model in {
@@ -340,7 +307,6 @@ _BUILT_IN: dict[str, Callable[[Run, Call], Value]] = {
         ),
         "sorted": _sorted,
         "enumerate": _enumerate,
-        "zip": _zip,
         "map": _map,
         "dict": _dict,
         "next": chosen,
@@ -348,13 +314,12 @@ _BUILT_IN: dict[str, Callable[[Run, Call], Value]] = {
         "setattr": _setattr,
         "type": _type,
         **dict.fromkeys(("any", "all", "callable", "hasattr"), lambda run, call: BOOLEAN),
-        "isinstance": lambda run, call: boolean(is_instance(call.args.at(0) or ANY, call.args.at(1) or ANY)),
+        "isinstance": _isinstance,
         **dict.fromkeys(("eval", "exec", "compile"), _dynamic_code),
         "__import__": import_dynamic,
         **dict.fromkeys(("vars", "globals", "locals"), _variables),
         "input": lambda run, call: unknown("text that the user types"),
         "object": lambda run, call: ANY,
-        "object.__new__": _object_new,
         "object.__init_subclass__": lambda run, call: NONE,
     }.items()
 }
@@ -381,13 +346,6 @@ def _environment(run: Run, call: Call) -> Value:
             continue
         result = join(result, (make_text((Input("$" + name, run.options),)),))
     return result or unknown("an environment variable")
-
-
-def _set_default_environment(run: Run, call: Call) -> Value:
-    found = _environment(run, call)
-    for name in constant_strings(call.args.at(0) or ANY):
-        run.state.write(run.environment, name, found)
-    return found
 
 
 def _change_environment(run: Run, call: Call) -> Value:
@@ -449,14 +407,6 @@ def _thread_init(run: Run, thread: Instance, call: Call) -> Value:
 # --- containers ---------------------------------------------------------------------------------------------
 
 
-def _loads(parse: Callable[[str], Any]) -> Model:
-    def model(run: Run, call: Call) -> Value:
-        call_now(run, call)
-        return data_files.loaded(run, call, parse)
-
-    return model
-
-
 def _copy(run: Run, call: Call) -> Value:
     """Model ``copy`` and ``deepcopy``: something unknown; a copy of an object of the program is a gap."""
     given = call.args.at(0) or ANY
@@ -477,8 +427,9 @@ FUNCTIONS: dict[str, Model] = {
     "argparse.ArgumentParser": options.made_parser,
     "os.getenv": _environment,
     "os.environ.get": _environment,
-    "os.environ.setdefault": _set_default_environment,
-    **dict.fromkeys(("os.environ.update", "os.environ.pop", "os.putenv"), _change_environment),
+    **dict.fromkeys(
+        ("os.environ.update", "os.environ.setdefault", "os.environ.pop", "os.putenv"), _change_environment
+    ),
     "os.path.join": _path_join,
     "functools.partial": _partial,
     **{f"threading.{name}": _lock for name in ("Lock", "RLock", "Condition", "Semaphore", "Event")},
@@ -489,20 +440,10 @@ FUNCTIONS: dict[str, Model] = {
     **dict.fromkeys(("copy.copy", "copy.deepcopy"), _copy),
     "random.choice": _BUILT_IN["builtins.next"],
     **dict.fromkeys(("importlib.import_module", "importlib.reload"), import_dynamic),
-    **{name: _loads(parse) for name, parse in data_files.PARSERS.items()},
-    "builtins.open": data_files.opened,
-    **dict.fromkeys(("os.path.exists", "os.path.isfile"), data_files.exists),
-    **dict.fromkeys(
-        (f"ament_index_python{module}.get_package_share_directory" for module in ("", ".packages")),
-        data_files.share_directory,
-    ),
 }
 
 METHODS: dict[tuple[str, str], Method] = {
     **options.METHODS,
-    (data_files.FILE, "read"): data_files.read,
-    (data_files.FILE, "__enter__"): data_files.entered,
-    **{(data_files.FILE, name): data_files.closed for name in ("__exit__", "close")},
     ("threading.Thread", "__init__"): _thread_init,
     ("multiprocessing.Process", "__init__"): _thread_init,
 }
