@@ -110,7 +110,7 @@ class Answers:
 
 
 _BUILD_SUFFIXES = (".cmake", ".xml", ".yaml", ".yml")
-_BUILD_NAMES = frozenset({"CMakeLists.txt", "compile_commands.json", "CMakeCache.txt"})
+_BUILD_NAMES = frozenset({"CMakeLists.txt", "CMakeCache.txt"})
 
 
 @lru_cache(maxsize=1)

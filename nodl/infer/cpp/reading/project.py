@@ -10,7 +10,7 @@ from functools import cached_property
 from html import unescape
 
 from enclave_common.files import text_or_nothing
-from nodl.infer.cpp.reading.built import Compiled, Definitions, compiled_sources, joined
+from nodl.infer.cpp.reading.built import Definitions, built_targets, joined
 from nodl.infer.cpp.reading.cmake import SOURCES, Build, Target, read_build
 
 _TAG = re.compile(r"<(?:\w*depend|exec_depend|build_depend)(?:\s[^<>]*)?>\s*([\w\-.]+)\s*</")
@@ -129,31 +129,22 @@ class Workspace:
         return found
 
     @cached_property
-    def _compiled(self) -> Compiled:
-        return compiled_sources(self.build_folders)
+    def _built(self) -> dict[tuple[str, str], Definitions]:
+        return built_targets(self.build_folders)
 
     def definitions(self, package: SourcePackage, targets: Sequence[Target]) -> Definitions:
         """Return what sources of one program are compiled with: as they were built, else as CMake's files say."""
-        own = self._definitions(targets)
+        own = self._definitions(package, targets)
         return own if self.within(package, own) == own else own._replace(package=package.name)
 
     def within(self, package: SourcePackage, definitions: Definitions) -> Definitions:
         """Return what files of a package are compiled with: in a program with ``definitions``, or its libraries."""
         libraries = [each for each in package.build.libraries if each.sources]
-        return joined([definitions, self._definitions(libraries)]) if libraries else definitions
+        return joined([definitions, self._definitions(package, libraries)]) if libraries else definitions
 
-    def _definitions(self, targets: Sequence[Target]) -> Definitions:
-        found: list[Definitions] = []
-        is_known = True
-        for target in targets:
-            for file in (each for each in target.sources if each.endswith(SOURCES)):
-                by_target = self._compiled.get(os.path.realpath(file), {})
-                is_known = is_known and bool(by_target)
-                found += [by_target[target.name]] if target.name in by_target else by_target.values()
-        if not found:
-            return joined(each.definitions for each in targets)
-        as_built = joined(found)
-        return as_built._replace(complete=as_built.complete and is_known)
+    def _definitions(self, package: SourcePackage, targets: Iterable[Target]) -> Definitions:
+        compiled = [each for each in targets if any(file.endswith(SOURCES) for file in each.sources)]
+        return joined(self._built.get((package.name, each.name), each.definitions) for each in compiled)
 
 
 def find_packages(roots: Iterable[str]) -> dict[str, SourcePackage]:
