@@ -7,6 +7,8 @@ symbol that is not known keeps its directives; those lines are remembered as ``u
 
 from __future__ import annotations
 
+import ast
+import operator
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -330,13 +332,15 @@ _WORD = re.compile(
 )
 _CLOSERS = {")": "(", "]": "[", "}": "{"}
 
-# Compilers for ROS 2's Linux targets define or never define these (GCC and Clang, predefined macros).
-_KNOWN_SYMBOLS: dict[str, bool] = {
-    "_WIN32": False, "WIN32": False, "_MSC_VER": False, "__APPLE__": False, "__MINGW32__": False, "_WIN64": False,
-    "__CYGWIN__": False, "__ANDROID__": False, "__QNX__": False, "__linux__": True, "__unix__": True, "__GNUC__": True,
-    "__cplusplus": True, "__EMSCRIPTEN__": False, "__CUDACC__": False, "_DEBUG": False,
+# What compilers for ROS 2's Linux targets define, with its value if that is always the same, and what they never define
+# (GCC and Clang, predefined macros).
+_PREDEFINED: dict[str, int | None] = {
+    "__linux__": 1, "__unix__": 1, "__GNUC__": None, "__cplusplus": None, "__has_include": None, "true": 1, "false": 0,
 }  # fmt: skip
-_VALUES = {"__cplusplus": 201703, "__GNUC__": 13, "true": 1, "false": 0}
+_NEVER_DEFINED = frozenset({
+    "_WIN32", "WIN32", "_WIN64", "_MSC_VER", "__MINGW32__", "__CYGWIN__", "__APPLE__", "__ANDROID__", "__QNX__",
+    "__EMSCRIPTEN__", "__CUDACC__", "_DEBUG",
+})  # fmt: skip
 
 
 class Macro(NamedTuple):
@@ -426,133 +430,91 @@ def _quoted(value: str) -> str:
 # --- conditions ---------------------------------------------------------------------------------------------
 
 
+MAX_CONDITION = 1_000
+"""Characters of an ``#if`` that is looked at."""
+_OPEN = "open"
+_OPERAND = re.compile(
+    r"__has_include\s*\(\s*[<\"](?P<header>[^>\"]*)[>\"]\s*\)"
+    r"|\bdefined\s*\(\s*(?P<within>\w+)\s*\)|\bdefined\s+(?P<behind>\w+)"
+    r"|\b(?P<called>[A-Za-z_]\w*)\s*\((?P<given>[^()]*)\)"
+    r"|\b(?P<number>\d+)[uUlL]*\b|\b(?P<symbol>[A-Za-z_]\w*)"
+)
+_SIGNS = {r"&&": " and ", r"\|\|": " or ", r"!(?!=)": "~"}  # ~ binds as tightly as ! does
+_COMPARE: dict[type[ast.cmpop], Callable[[int, int], bool]] = {
+    ast.Eq: operator.eq, ast.NotEq: operator.ne, ast.Lt: operator.lt, ast.Gt: operator.gt,
+    ast.LtE: operator.le, ast.GtE: operator.ge,
+}  # fmt: skip
+
+
 def decided(
     condition: str, macros: Mapping[str, Macro], complete: bool, has_include: Callable[[str], bool | None]
 ) -> bool | None:
     """Return the value of an ``#if``; ``None`` if a symbol in it may be defined where we cannot see it."""
-    tokens = re.findall(r"[A-Za-z_]\w*|\d+|&&|\|\||[!<>=]=|[()!<>+\-*,./\"]", condition)
+
+    def operand(match: re.Match[str]) -> str:
+        found: int | None
+        if match["header"]:
+            found = has_include(match["header"])
+        elif name := match["within"] or match["behind"]:
+            found = _is_defined(name, macros, complete)
+        elif match["called"]:
+            found = _at_least(match["called"], match["given"], macros)
+        else:
+            found = int(match["number"]) if match["number"] else _number(match["symbol"], macros, complete)
+        return _OPEN if found is None else str(int(found))
+
+    written = _OPERAND.sub(operand, condition[:MAX_CONDITION])
+    for sign, in_python in _SIGNS.items():
+        written = re.sub(sign, in_python, written)
     try:
-        value = _Condition(tokens, macros, complete, has_include).value()
-    except (IndexError, ValueError, RecursionError):
+        value = _evaluated(ast.parse(written.strip(), mode="eval").body)
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
         return None
     return None if value is None else bool(value)
 
 
-class _Condition:
-    """``||``, ``&&``, comparisons, ``!``, ``defined``; every value may be unknown."""
-
-    def __init__(
-        self,
-        tokens: list[str],
-        macros: Mapping[str, Macro],
-        complete: bool,
-        has_include: Callable[[str], bool | None],
-    ):
-        self.tokens, self.macros, self.complete, self.has_include = tokens, macros, complete, has_include
-
-    def value(self) -> int | None:
-        found = self._or()
-        if self.tokens:
-            raise ValueError(self.tokens)
-        return found
-
-    def _or(self) -> int | None:
-        left = self._and()
-        while self.tokens and self.tokens[0] == "||":
-            self.tokens.pop(0)
-            right = self._and()
-            left = 1 if left or right else (None if left is None or right is None else 0)
-        return left
-
-    def _and(self) -> int | None:
-        left = self._compared()
-        while self.tokens and self.tokens[0] == "&&":
-            self.tokens.pop(0)
-            right = self._compared()
-            left = 0 if left == 0 or right == 0 else (None if left is None or right is None else 1)
-        return left
-
-    def _compared(self) -> int | None:
-        left = self._unary()
-        while self.tokens and self.tokens[0] in ("==", "!=", "<", ">", "<=", ">="):
-            operator, right = self.tokens.pop(0), self._unary()
-            left = None if left is None or right is None else int(_COMPARE[operator](left, right))
-        return left
-
-    def _unary(self) -> int | None:
-        token = self.tokens.pop(0)
-        if token == "!":
-            value = self._unary()
-            return None if value is None else int(not value)
-        if token == "(":
-            value = self._or()
-            self._expect(")")
-            return value
-        if token.isdigit():
-            return int(token)
-        if token == "defined":
-            return self._defined()
-        return self._symbol(token)
-
-    def _expect(self, token: str) -> None:
-        if self.tokens.pop(0) != token:
-            raise ValueError(token)
-
-    def _defined(self) -> int | None:
-        parenthesis = self.tokens[0] == "("
-        if parenthesis:
-            self.tokens.pop(0)
-        name = self.tokens.pop(0)
-        if parenthesis:
-            self._expect(")")
-        if name == "__has_include":
-            return 1
-        if name in self.macros:
-            return None if self.macros[name].uncertain else 1
-        if name in _KNOWN_SYMBOLS:
-            return int(_KNOWN_SYMBOLS[name])
-        return 0 if self.complete else None
-
-    def _version(self, name: str, given: list[str]) -> int | None:
-        """Decide ``RCLCPP_VERSION_GTE(28, 0, 0)``, of the ``version.h`` that ament_generate_version_header() writes."""
-        wanted = [int(token) for token in given if token.isdigit()]
-        if not name.endswith("_VERSION_GTE") or len(wanted) != 3:
-            return None
-        stem = name.removesuffix("GTE")
-        present = [self._symbol(stem + part) if stem + part in self.macros else None for part in _VERSION]
-        if None in present:
-            return None
-        return int([number for number in present if number is not None] >= wanted)
-
-    def _symbol(self, name: str) -> int | None:
-        if self.tokens and self.tokens[0] == "(":
-            inside = []
-            depth = 0
-            while True:
-                token = self.tokens.pop(0)
-                depth += (token == "(") - (token == ")")
-                inside.append(token)
-                if depth == 0:
-                    break
-            if name == "__has_include":
-                found = self.has_include("".join(inside[2:-2]))
-                return None if found is None else int(found)
-            return self._version(name, inside)
-        if name in _VALUES:
-            return _VALUES[name]
-        macro = self.macros.get(name)
-        if macro is not None and macro.parameters is None and not macro.uncertain:
-            body = macro.body.strip("() LlUu")
-            return (
-                int(body)
-                if body.isdigit()
-                else (1 if body in ("", "true", "ON") else 0 if body == "false" else None)
-            )
-        return 0 if self.complete and macro is None else None
+def _evaluated(node: ast.expr) -> int | None:
+    """Return the value of a condition that is written as in Python; ``None`` if something open decides it."""
+    if isinstance(node, ast.Constant) and isinstance(node.value, int):
+        return node.value
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.Invert):
+        inner = _evaluated(node.operand)
+        return None if inner is None else int(not inner)
+    if isinstance(node, ast.BoolOp):
+        found = [_evaluated(each) for each in node.values]
+        decisive = isinstance(node.op, ast.Or)
+        if any(each is not None and bool(each) is decisive for each in found):
+            return int(decisive)
+        return None if None in found else int(not decisive)
+    if isinstance(node, ast.Compare) and len(node.ops) == 1:
+        left, right = _evaluated(node.left), _evaluated(node.comparators[0])
+        return None if left is None or right is None else int(_COMPARE[type(node.ops[0])](left, right))
+    return None
 
 
-_VERSION = ("MAJOR", "MINOR", "PATCH")
-_COMPARE: dict[str, Callable[[int, int], bool]] = {
-    "==": lambda a, b: a == b, "!=": lambda a, b: a != b, "<": lambda a, b: a < b,
-    ">": lambda a, b: a > b, "<=": lambda a, b: a <= b, ">=": lambda a, b: a >= b,
-}  # fmt: skip
+def _is_defined(name: str, macros: Mapping[str, Macro], complete: bool) -> bool | None:
+    if name in macros:
+        return None if macros[name].uncertain else True
+    if name in _PREDEFINED:
+        return True
+    is_ours = complete and not name.startswith("_")  # other compilers and processors define names with _
+    return False if is_ours or name in _NEVER_DEFINED else None
+
+
+def _at_least(name: str, given: str, macros: Mapping[str, Macro]) -> bool | None:
+    """Decide ``RCLCPP_VERSION_GTE(28, 0, 0)``, of the ``version.h`` that ament_generate_version_header() writes."""
+    wanted = [int(each) for each in re.findall(r"\d+", given)]
+    stem = name.removesuffix("GTE")
+    present = [_number(stem + part, macros, False) for part in ("MAJOR", "MINOR", "PATCH")]
+    known = [each for each in present if each is not None]
+    return known >= wanted if name.endswith("_VERSION_GTE") and len(known) == 3 == len(wanted) else None
+
+
+def _number(name: str, macros: Mapping[str, Macro], complete: bool) -> int | None:
+    macro = macros.get(name)
+    if macro is None and _is_defined(name, macros, complete) is False:
+        return 0
+    if macro is None or macro.parameters is not None or macro.uncertain:
+        return _PREDEFINED.get(name) if macro is None else None
+    body = macro.body.strip("() LlUu")
+    return int(body) if body.isdecimal() else {"": 1, "true": 1, "ON": 1, "false": 0}.get(body)

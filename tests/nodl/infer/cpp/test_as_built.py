@@ -19,6 +19,7 @@ pytest.importorskip("tree_sitter_cpp", reason="the extra cpp is not installed")
 
 PUB = "create_publisher<std_msgs::msg::String>"
 
+
 def build(source: Path) -> None:
     """Configure a package as colcon does: ``build/<package>`` beside ``src``."""
     if not (shutil.which("cmake") and shutil.which("make")):
