@@ -41,19 +41,6 @@ def _silent_in_nav2(run: Machine, call: Call) -> None:
     """Make nothing: plugins' bases are abstract, a layer keeps what it is given, the others know no node."""
 
 
-@library_method(_LAYER, "joinWithParentNamespace")
-def _joined(run: Machine, call: Call) -> Value:
-    """Return the topic if it is absolute; another one follows the namespace above that of the costmap."""
-    given = call.value(0)
-    absolute = given and all(str(getattr(atom, "parts", ("",))[0]).startswith("/") for atom in given)
-    return given if absolute else unknown("a topic beside the costmap's namespace")
-
-
-@library_method(_LAYER, "getFullName")
-def _parameter_of_layer(run: Machine, call: Call) -> Value:
-    return unknown("the name of a layer's parameter")
-
-
 def _base_of_hardware(run: Machine, call: Call) -> Value:
     return unknown("what the base of a hardware component answers")
 

@@ -11,8 +11,7 @@ from nodl.infer.cpp.models.parameters import parameter_names
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.constructors import construct
 from nodl.infer.cpp.running.machine import Machine
-from nodl.infer.cpp.running.values import Param, Value, join, literal, unknown
-from nodl.infer.cpp.syntax import field_of, text
+from nodl.infer.cpp.running.values import Param, Value, join, unknown
 
 
 @library_class("pluginlib::ClassLoader")
@@ -53,12 +52,4 @@ def _made(run: Machine, name: str, base: Type, call: Call) -> Value:
     "getPluginManifestPath",
 )  # fmt: skip
 def _asks(run: Machine, call: Call) -> Value:
-    names = parameter_names(run, call.value(0))
-    if len(names) == 1 and names[0] is not None and len(call.values) == 1:
-        entry = run.names.plugins.get(names[0])
-        asked = text(field_of(call.node, "function"))
-        if asked.endswith("getClassType") and entry is not None:
-            return literal(entry)
-        if asked.endswith("getName"):
-            return literal(names[0].rpartition("::")[2].rpartition("/")[2])
     return unknown("what pluginlib knows")

@@ -37,10 +37,9 @@ from nodl.infer.cpp.models.interfaces import (
     texts_in,
 )
 from nodl.infer.cpp.models.nodes import become_node
-from nodl.infer.cpp.models.parameters import read
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.machine import Machine
-from nodl.infer.cpp.running.values import BOTTOM, NodeNamePart, Text, Value, concatenated, literal, unknown
+from nodl.infer.cpp.running.values import BOTTOM, Text, Value, concatenated, literal, unknown
 from nodl.name_template import ParameterPart
 from nodl.node_interface import EndpointKind
 
@@ -60,27 +59,21 @@ _DIAGNOSTICS = "diagnostic_msgs/msg/DiagnosticArray"
 
 ROWS: dict[str, tuple[Makes, ...]] = {
     # ros2/geometry2 humble d0dbd516, jazzy 646342c6, rolling 1b005c65: tf2_ros/include/tf2_ros/transform_broadcaster.h,
-    # static_transform_broadcaster.h, buffer_client.h
+    # static_transform_broadcaster.h
     "tf2_ros::TransformBroadcaster": (Makes(PUB, "/tf", TF),),
     "tf2_ros::StaticTransformBroadcaster": (Makes(PUB, "/tf_static", TF),),
-    "tf2_ros::BufferClient": (Makes(CALL, "{0}", "tf2_msgs/action/LookupTransform"),),
     # ros/diagnostics ros2 431926f: diagnostic_updater/include/diagnostic_updater/diagnostic_updater.hpp
     "diagnostic_updater::Updater": (Makes(PUB, "/diagnostics", _DIAGNOSTICS),),
     # ros/bond_core ros2 e6d0fc2: bondcpp/src/bond.cpp
     "bond::Bond": (Makes(PUB, "{0}", "bond/msg/Status"), Makes(SUB, "{0}", "bond/msg/Status")),
     # ros2/rclcpp humble 99f1d8d12, jazzy 985e320de, rolling a0a2a067d: rclcpp/parameter_event_handler.hpp
     "rclcpp::ParameterEventHandler": (Makes(SUB, "/parameter_events", "rcl_interfaces/msg/ParameterEvent"),),
-    "rclcpp::ParameterEventsSubscriber": (
-        Makes(SUB, "/parameter_events", "rcl_interfaces/msg/ParameterEvent"),
-    ),
     # ros-visualization/interactive_markers humble b4e6a0d, rolling 165a0e6: src/interactive_marker_server.cpp
     "interactive_markers::InteractiveMarkerServer": (
         Makes(SRV, "{0}/get_interactive_markers", "visualization_msgs/srv/GetInteractiveMarkers"),
         Makes(PUB, "{0}/update", "visualization_msgs/msg/InteractiveMarkerUpdate"),
         Makes(SUB, "{0}/feedback", "visualization_msgs/msg/InteractiveMarkerFeedback"),
     ),
-    # ros/diagnostics ros2 431926f: self_test/include/self_test/test_runner.hpp
-    "self_test::TestRunner": (Makes(SRV, "{node}/self_test", "diagnostic_msgs/srv/SelfTest"),),
     # Where the sources of nav2 are not in reach. ros-navigation/navigation2 humble 3c3db59d6, jazzy f4108e5b1,
     # kilted 71a1d84f4, main a3a97043e: nav2_util (nav2_ros_common in main) simple_action_server.hpp,
     # service_client.hpp, odometry_utils.hpp, lifecycle_service_client.hpp, twist_publisher.hpp,
@@ -148,11 +141,7 @@ def _make(row: Sequence[Makes], run: Machine, call: Call) -> None:
     for each in row:
         kind = call.interface if each.type == "T0" else each.type
         alone = Call(call.node, call.frame, [], receiver=owner)
-        assert owner.node is not None
-        own = (Text((NodeNamePart(owner.node, "name"),)),)
-        name = each.name.removeprefix("{node}")
-        named = _named(name, texts_in(call.values))
-        add(run, owner, each.kind, concatenated(own, named) if name != each.name else named, kind, alone)
+        add(run, owner, each.kind, _named(each.name, texts_in(call.values)), kind, alone)
 
 
 _GIVEN = re.compile(r"\{(\d)(?:=([^}]*))?\}")
@@ -221,20 +210,6 @@ def _may_be_node(value: Value) -> bool:
     return not value or not all(isinstance(atom, bool) for atom in value)
 
 
-@library_class("rclcpp::node_interfaces::NodeInterfaces")
-def _node_interfaces(run: Machine, call: Call) -> Value | None:
-    """Model rclcpp/node_interfaces/node_interfaces.hpp: parts of a node, which stand for it."""
-    owner = owner_in(call.values)
-    return (owner,) if owner is not None else None
-
-
-@library_class("tf2_ros::StaticTransformListener")
-def _static_listener(run: Machine, call: Call) -> None:
-    record = node_of(run, call, "tf2_ros::StaticTransformListener")
-    if record is not None:
-        run.endpoint(record, SUB, literal("/tf_static"), TF, call)
-
-
 @library_class("tf2_ros::Buffer")
 def _buffer(run: Machine, call: Call) -> None:
     """Model tf2_ros/src/buffer.cpp: with a node, the service ``tf2_frames`` on it."""
@@ -243,27 +218,8 @@ def _buffer(run: Machine, call: Call) -> None:
         run.endpoint(owner.node, SRV, literal("tf2_frames"), "tf2_msgs/srv/FrameGraph", call)
 
 
-@library_class("tf2_ros::BufferServer")
-def _buffer_server(run: Machine, call: Call) -> None:
-    """Model tf2_ros/buffer_server.h: (buffer, node, action name, ...)."""
-    _make((Makes(ACT, "{0}", "tf2_msgs/action/LookupTransform"),), run, replace(call, values=call.values[1:]))
-
-
-@library_class("robot_localization::RosRobotLocalizationListener")
-def _robot_localization(run: Machine, call: Call) -> None:
-    """Model robot_localization/src/ros_robot_localization_listener.cpp: two topics, and a listener with a node of its
-    own.
-    """
-    row = (
-        Makes(SUB, "odom/filtered", "nav_msgs/msg/Odometry"),
-        Makes(SUB, "acceleration/filtered", "geometry_msgs/msg/AccelWithCovarianceStamped"),
-    )
-    _make(row, run, call)
-    listener(run, replace(call, values=[]))
-
-
 # --- nav2, where its sources are not in reach: nav2_ros_common (interface_factories.hpp, lifecycle_node.hpp,
-# service_server.hpp), nav_2d_utils (odom_subscriber.hpp), of the commits above -------------------------------------
+# service_server.hpp), of the commits above -------------------------------------
 
 
 def _action(kind: EndpointKind, run: Machine, call: Call) -> Value:
@@ -291,15 +247,6 @@ def _service(run: Machine, call: Call) -> None:
         events = concatenated(name, literal("/_service_event"), (Text((part,)),))
         run.endpoint(record, PUB, events, f"{kind}_Event" if kind else "", call)
     run.later(call.values, call.frame)
-
-
-@library_class("nav_2d_utils::OdomSubscriber")
-def _odometry(run: Machine, call: Call) -> None:
-    """Model (node, default topic): the parameter ``odom_topic`` names it."""
-    record, texts = node_of(run, call), texts_in(call.values)
-    if record is not None:
-        topic = read(run, record, literal("odom_topic"), texts[0] if texts else literal("odom"))
-        run.endpoint(record, SUB, topic, "nav_msgs/msg/Odometry", call)
 
 
 @node_class("nav2_util::LifecycleNode", "nav2::LifecycleNode")

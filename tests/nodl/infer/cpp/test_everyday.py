@@ -243,11 +243,12 @@ def test_what_waits_for_a_node_makes_nothing_on_it(executor: str, tmp_path: Path
     assert (names(system), gaps(system)) == (["a"], [])
 
 
-def test_a_self_test_is_a_service_below_the_name_of_the_node(tmp_path: Path) -> None:
-    body = "t = std::make_shared<self_test::TestRunner>(get_node_base_interface(), get_node_services_interface());"
-    system = infer(tmp_path, in_class(body, "std::shared_ptr<self_test::TestRunner> t;"))
-    ((made,),) = (node.endpoints for node in system.nodes)
-    assert (made.kind.value, str(made.name), gaps(system)) == ("service_server", "{node}/self_test", [])
+@pytest.mark.parametrize(
+    "cls", ["self_test::TestRunner", "tf2_ros::BufferServer", "rclcpp::node_interfaces::NodeInterfaces<A>"]
+)
+def test_a_class_of_a_library_that_is_not_in_the_table_is_a_gap(cls: str, tmp_path: Path) -> None:
+    system = infer(tmp_path, in_class(f"t = std::make_shared<{cls}>(this);", f"std::shared_ptr<{cls}> t;"))
+    assert any(cls.partition("<")[0] in why for why in gaps(system))
 
 
 def test_a_class_of_a_plugin_loader_is_no_component(tmp_path: Path) -> None:

@@ -56,12 +56,6 @@ def test_of_nav2(body: str, expected: set[tuple[str, str]], tmp_path: Path) -> N
     assert endpoints(system) == expected | BOND
 
 
-def test_an_odometry_subscriber_asks_a_parameter(tmp_path: Path) -> None:
-    system = infer(tmp_path, nav2("nav_2d_utils::OdomSubscriber o(self);"))
-    (name,) = [e.name for n in system.nodes for e in n.endpoints if "bond" not in str(e.name)]
-    assert (name.fill({}).text, name.fill({"odom_topic": "wheels"}).text) == ("odom", "wheels")
-
-
 def test_the_events_of_a_service_follow_its_parameter(tmp_path: Path) -> None:
     system = infer(tmp_path, nav2('nav2::ServiceServer<std_srvs::srv::Empty> s("go", self, cb);'))
     events = [e.name for n in system.nodes for e in n.endpoints if "_service_event" in str(e.name)]
