@@ -116,16 +116,13 @@ class _Collector:
         prefix = "::".join((*scope, *([name] if name else [])))
         self.index.enums.add(name)
         listed = [child for child in children(body) if child.type == "enumerator"]
-        numbers = [text(field_of(each, "value")) for each in listed]
-        if not _all_differ(numbers):
+        if not _all_differ([text(field_of(each, "value")) for each in listed]):
             return
-        for at, child in enumerate(listed):
-            number = int(numbers[at]) if any(numbers[1:]) else int(numbers[0] or 0) + at
+        for child in listed:
             constant = text(field_of(child, "name"))
             full = f"{prefix}::{constant}" if prefix else constant
             for key in (constant, f"{name}::{constant}", full):
                 self.index.enumerators.setdefault(key, full)
-            self.index.numbered.setdefault((name, number), []).append(full)
 
     # --- functions --------------------------------------------------------------------------------------
 
@@ -320,9 +317,9 @@ def _plain_name(name: str) -> str:
 
 def _all_differ(numbers: Sequence[str]) -> bool:
     """Return whether enumerators with these numbers, as written, are certainly all different."""
-    if not any(numbers[1:]):
-        return not numbers or numbers[0].isdecimal() or not numbers[0]
-    return all(map(str.isdecimal, numbers)) and len({int(each) for each in numbers}) == len(numbers)
+    return not any(numbers[1:]) or (
+        all(map(str.isdecimal, numbers)) and len({*map(int, numbers)}) == len(numbers)
+    )
 
 
 def _initialiser(item: Node) -> tuple[str, Node]:

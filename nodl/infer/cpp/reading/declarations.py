@@ -159,8 +159,6 @@ class FileIndex:
     using: list[str] = field(default_factory=list)  # using namespace
     enums: set[str] = field(default_factory=set)
     enumerators: dict[str, str] = field(default_factory=dict)  # qualified and last name -> qualified
-    # Enumeration and number -> qualified.
-    numbered: dict[tuple[str, int], list[str]] = field(default_factory=dict)
     errors: list[tuple[int, int, str]] = field(default_factory=list)  # first byte, line, text
     all_functions: list[Function] = field(default_factory=list)
     sites: tuple[Site, ...] | None = None  # where it may make interfaces, when asked

@@ -68,7 +68,6 @@ class Names:
         self.globals: dict[str, list[Global]] = {}
         self.aliases: dict[str, list[tuple[FileIndex, str, str, Scope]]] = {}
         self.enumerators: dict[str, str] = {}
-        self.numbered: dict[tuple[str, int], set[str]] = {}  # (enumeration, number) -> enumerators
         self.enums: set[str] = set()
         self._bases: dict[str, tuple[str, ...]] = {}
         self.hidden: dict[Class, frozenset[str]] = {}  # what ``inheritance.hidden`` found
@@ -94,8 +93,6 @@ class Names:
             last = qualified.rpartition("::")[2]
             self.aliases.setdefault(last, []).append((index, qualified, target, scope))
         self.enumerators.update(index.enumerators)
-        for key, listed in index.numbered.items():
-            self.numbered.setdefault(key, set()).update(listed)
         self.enums |= index.enums
 
     def _attach(self) -> None:

@@ -23,7 +23,6 @@ from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.arithmetic import as_type
 from nodl.infer.cpp.running.contents import copied, elements_copied, handed_over, items_of, takes_another
 from nodl.infer.cpp.running.foreign import unmodelled
-from nodl.infer.cpp.running.launch_values import settled
 from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
 from nodl.infer.cpp.running.overloads import candidates
 from nodl.infer.cpp.running.references import as_referred_to
@@ -31,8 +30,6 @@ from nodl.infer.cpp.running.static_types import check_hidden, given_to, seen_cla
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     END,
-    Atom,
-    Const,
     Group,
     Map,
     Obj,
@@ -232,15 +229,8 @@ def _repeated(
 
 
 def cast(run: Machine, kind: Type, value: Value) -> Value:
-    """Evaluate ``static_cast<T>(x)``: a number as T holds it, an enumerator or the object itself."""
-    if kind.last not in run.names.enums:
-        return as_type(kind.name, value)
-    found: list[Atom] = []
-    for atom in settled(run, value):
-        named = run.names.numbered.get((kind.last, atom), set()) if type(atom) is int else set()
-        known = Const(next(iter(named))) if len(named) == 1 else Unknown("an enumerator")
-        found.append(atom if isinstance(atom, Const) else known)
-    return tuple(dict.fromkeys(found))
+    """Evaluate ``static_cast<T>(x)``: a number as T holds it, or the object itself; which enumerator is not known."""
+    return unknown("an enumerator") if kind.last in run.names.enums else as_type(kind.name, value)
 
 
 def text_of(run: Machine, values: Sequence[Value]) -> Value:

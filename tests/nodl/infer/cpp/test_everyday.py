@@ -629,24 +629,10 @@ def test_the_inner_braces_of_an_array_hold_its_elements(
     assert names(infer(tmp_path, in_class(use, before=before))) == expected
 
 
-CAST = {
-    "counted": ("enum class M { A, B, C };", ["B"]),
-    "numbered": ("enum class M { B = 1, A = 0 };", ["B"]),
-    "numbered by an expression": ("enum class M { A = 0, B = A + 1 };", ["A", "B", "else"]),
-    "of one name in two namespaces": (
-        "namespace n { enum class M { X, Y }; } enum class M { A, B };",
-        ["A", "B", "else"],
-    ),
-}
-
-
-@pytest.mark.parametrize(("declared", "made"), CAST.values(), ids=CAST)
-def test_a_number_that_is_cast_to_an_enumeration_is_its_enumerator(
-    declared: str, made: list[str], tmp_path: Path
-) -> None:
+def test_which_enumerator_a_number_is_cast_to_is_not_known(tmp_path: Path) -> None:
     cases = "".join(f'case M::{each}: {PUB}("{each}", 1); break;' for each in "AB")
     use = f'switch (static_cast<M>(1)) {{ {cases} default: {PUB}("else", 1); }}'
-    assert names(infer(tmp_path, in_class(use, before=f"{declared}\n"))) == made
+    assert names(infer(tmp_path, in_class(use, before="enum class M { A, B };\n"))) == ["A", "B", "else"]
 
 
 RANGES = {
