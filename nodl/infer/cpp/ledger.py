@@ -321,8 +321,8 @@ class Reach:
             if word in self.run.names.classes:
                 self._use(word)
             if word not in POINTER_MEMBERS:  # a pointer makes nothing of what it points to
-                for _, _, target, _ in self.run.names.aliases.get(word, ()):
-                    self._mention(_WORD.findall(target))
+                for alias in self.run.names.aliases.get(word, ()):
+                    self._mention(_WORD.findall(alias.target))
 
     def _use(self, name: str) -> None:
         if name not in self.used:

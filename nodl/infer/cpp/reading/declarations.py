@@ -60,6 +60,10 @@ class Function:
     _words: frozenset[str] | None = None
 
     @property
+    def qualified(self) -> str:
+        return "::".join((*self.scope, self.name))
+
+    @property
     def words(self) -> frozenset[str]:
         """Return every identifier in it but for its own name, and for scopes: whoever it may call is among them."""
         if self._words is None:
@@ -141,6 +145,10 @@ class Global:
     file: FileIndex
     pointer: bool
     specialises: tuple[str, ...] | None = None  # the arguments of its class, as written
+
+    @property
+    def qualified(self) -> str:
+        return "::".join((*self.scope, self.name))
 
 
 @dataclass(eq=False, slots=True)

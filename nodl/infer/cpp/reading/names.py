@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cached_property, update_wrapper
-from typing import Any, Concatenate, ParamSpec, TypeVar
+from typing import Any, Concatenate, NamedTuple, ParamSpec, TypeVar
 
 from nodl.infer.cpp.reading.declarations import Class, FileIndex, Function, Global, Scope
 from nodl.infer.cpp.reading.known_headers import KNOWN_HEADERS
@@ -55,6 +55,18 @@ _PLAIN = re.compile(
 )
 
 
+class Alias(NamedTuple):
+    """A name that stands for another one, ``target``, as written in ``scope``."""
+
+    qualified: str
+    target: str
+    scope: Scope
+    file: FileIndex
+
+
+Named = TypeVar("Named", Class, Function, Global, Alias)
+
+
 class Names:
     """``files``: the sources and headers of the program. ``visible``: file -> every file that it includes."""
 
@@ -66,7 +78,7 @@ class Names:
         self.functions: dict[str, list[Function]] = {}
         self.declared: dict[str, list[Function]] = {}
         self.globals: dict[str, list[Global]] = {}
-        self.aliases: dict[str, list[tuple[FileIndex, str, str, Scope]]] = {}
+        self.aliases: dict[str, list[Alias]] = {}
         self.enumerators: dict[str, str] = {}
         self.enums: set[str] = set()
         self._bases: dict[str, tuple[str, ...]] = {}
@@ -91,7 +103,7 @@ class Names:
         _extend(self.globals, index.globals)
         for qualified, (target, scope) in index.aliases.items():
             last = qualified.rpartition("::")[2]
-            self.aliases.setdefault(last, []).append((index, qualified, target, scope))
+            self.aliases.setdefault(last, []).append(Alias(qualified, target, scope, index))
         self.enumerators.update(index.enumerators)
         self.enums |= index.enums
 
@@ -168,14 +180,19 @@ class Names:
         listed = self.classes.get(last)
         if not listed:
             return None
-        for qualified in self._candidates(name, scope, file):
-            matches = [each for each in listed if each.qualified == qualified]
-            if matches:
-                return self._nearest([each for each in matches if each.specialises is None] or matches, file)
-        if "::" in name:
-            matches = [each for each in listed if each.qualified.endswith("::" + name)]
-            return matches[0] if len(matches) == 1 else None
-        return None
+        matches = self._named(listed, name, scope, file)
+        if matches:
+            return self._nearest([each for each in matches if each.specialises is None] or matches, file)
+        ending = [each for each in listed if "::" in name and each.qualified.endswith("::" + name)]
+        return ending[0] if len(ending) == 1 else None
+
+    def _named(self, listed: Iterable[Named], name: str, scope: Scope, file: FileIndex) -> list[Named]:
+        """Return those of ``listed`` that a name means: the ones in the nearest scope."""
+        listed = list(listed)
+        for qualified in self._candidates(name, scope, file) if listed else ():
+            if matches := [each for each in listed if each.qualified == qualified]:
+                return matches
+        return []
 
     def _candidates(self, name: str, scope: Scope, file: FileIndex) -> Iterable[str]:
         name = name.lstrip(":")
@@ -198,10 +215,11 @@ class Names:
             self._bases[qualified] = tuple(b.qualified for c in found for b in self.ancestry(c)[1:])
         return self._bases[qualified]
 
-    def _nearest(self, matches: list[Class], file: FileIndex) -> Class:
+    def _nearest(self, matches: Sequence[Named], file: FileIndex) -> Named:
+        """Return the last one in the file itself, else the first in its headers, else the first anywhere."""
         own = [each for each in matches if each.file.file == file.file]
         seen = [each for each in matches if each.file.file in self.visible(file.file)]
-        return (own or seen or matches)[-1 if own else 0]
+        return own[-1] if own else (seen or matches)[0]
 
     @_once
     def find_functions(self, name: str, scope: Scope, file: FileIndex) -> list[Function]:
@@ -211,37 +229,24 @@ class Names:
             for each in self.functions.get(name.rpartition("::")[2], ())
             if self._class_of_method(each) is None
         ]
-        if not listed:
-            return []
-        target = self._alias_prefix(name, scope, file)
-        for qualified in self._candidates(target, scope, file):
-            matches = [each for each in listed if "::".join((*each.scope, each.name)) == qualified]
-            if matches:
-                own = [each for each in matches if each.file.file == file.file]
-                return own or matches
-        return []
+        matches = self._named(listed, self._alias_prefix(name, scope, file), scope, file) if listed else []
+        return [each for each in matches if each.file.file == file.file] or matches
 
     def _alias_prefix(self, name: str, scope: Scope, file: FileIndex) -> str:
         first, separator, rest = name.partition("::")
         if not separator:
             return name
-        target = self.alias(first, scope, file)
-        return f"{target[0]}::{rest}" if target else name
+        alias = self.alias(first, scope, file)
+        return f"{alias.target}::{rest}" if alias else name
 
     @_once
     def find_global(self, name: str, scope: Scope, file: FileIndex) -> Global | None:
         listed = self.globals.get(name.rpartition("::")[2])
         if not listed:
             return None
-        target = self._alias_prefix(name, scope, file)
-        for qualified in self._candidates(target, scope, file):
-            matches = [each for each in listed if "::".join((*each.scope, each.name)) == qualified]
-            if matches:
-                with_value = [each for each in matches if each.value is not None] or matches
-                own = [each for each in with_value if each.file.file == file.file]
-                seen = [each for each in with_value if each.file.file in self.visible(file.file)]
-                return (own or seen or with_value)[0]
-        return None
+        matches = self._named(listed, self._alias_prefix(name, scope, file), scope, file)
+        with_value = [each for each in matches if each.value is not None] or matches
+        return self._nearest(with_value, file) if with_value else None
 
     @_once
     def bases(self, cls: Class) -> list[tuple[str, Class | None]]:
@@ -320,19 +325,9 @@ class Names:
     # --- types ------------------------------------------------------------------------------------------
 
     @_once
-    def alias(self, name: str, scope: Scope, file: FileIndex) -> tuple[str, Scope, FileIndex] | None:
-        listed = self.aliases.get(name.rpartition("::")[2])
-        if not listed:
-            return None
-        for qualified in self._candidates(name, scope, file):
-            matches = [each for each in listed if each[1] == qualified]
-            if matches:
-                own = [each for each in matches if each[0] is file] or [
-                    each for each in matches if each[0].file in self.visible(file.file)
-                ]
-                index, _, target, inner = (own or matches)[-1 if own else 0]
-                return target, inner, index
-        return None
+    def alias(self, name: str, scope: Scope, file: FileIndex) -> Alias | None:
+        matches = self._named(self.aliases.get(name.rpartition("::")[2], ()), name, scope, file)
+        return self._nearest(matches, file) if matches else None
 
     def resolve(
         self,
@@ -372,11 +367,11 @@ class Names:
         arguments = tuple(self.resolve(each, scope, file, bindings, depth + 1) for each in given)
         if name in _WRAPPERS and arguments:
             return arguments[0]._replace(pointer=True)
-        target = self.alias(name, scope, file)
-        if target is not None and target[0] != written:
-            inner = self.resolve(target[0], target[1], target[2], None, depth + 1)
+        alias = self.alias(name, scope, file)
+        if alias is not None and alias.target != written:
+            inner = self.resolve(alias.target, alias.scope, alias.file, None, depth + 1)
             if bindings and not given:
-                inner = self._resolve(target[0], target[1], target[2], bindings, depth + 1)
+                inner = self._resolve(alias.target, alias.scope, alias.file, bindings, depth + 1)
             return inner._replace(pointer=pointer or inner.pointer, arguments=arguments or inner.arguments)
         return self._qualified(name, arguments, pointer, scope, file, bindings, depth)
 

@@ -209,9 +209,9 @@ def _qualified(run: Machine, name: str, frame: Frame) -> str:
     head, separator, last = name.rpartition("::")
     if separator:
         return f"{run.type_of(head, frame).name}::{last}"
-    target = run.names.alias(name, frame.scope, frame.file)
-    if target is not None and "::" in target[0]:
-        return target[0].lstrip(":")
+    alias = run.names.alias(name, frame.scope, frame.file)
+    if alias is not None and "::" in alias.target:
+        return alias.target.lstrip(":")
     whole = f"std::{name}"
     if name in ("to_string", "make_shared", "make_unique", "move", "bind", "ref"):
         return whole

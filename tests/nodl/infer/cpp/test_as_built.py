@@ -26,7 +26,7 @@ def build(source: Path) -> None:
         assert os.environ.get("CI") != "true", "apt install cmake make"
         pytest.skip("CMake is not installed")
     target = source.parents[1] / "build" / source.name
-    words = ["cmake", "-G", "Unix Makefiles", "-S", source, "-B", target]
+    words = ["cmake", "-G", "Unix Makefiles", "-S", str(source), "-B", str(target)]
     subprocess.run(words, check=True, capture_output=True)
 
 
