@@ -398,17 +398,7 @@ class Names:
                 return inner._replace(arguments=arguments, pointer=pointer)
             if prefix != head:
                 return Type(f"{prefix}::{last}", arguments, pointer)
-            if (found := self._used(head, file)) is not None:
-                return Type(f"{found}::{last}", arguments, pointer)
         return Type(name, arguments, pointer)
-
-    def _used(self, head: str, file: FileIndex) -> str | None:
-        """Resolve ``msg`` under ``using namespace std_msgs``."""
-        if head not in ("msg", "srv", "action"):
-            return None
-        used = self.used_namespaces(file.file)
-        packages = [u for u in used if u.endswith(("_msgs", "_interfaces"))]
-        return f"{packages[0]}::{head}" if len(packages) == 1 else None
 
     def _member(self, outer: Type, rest: str, pointer: bool, scope: Scope, file: FileIndex) -> Type:
         """Resolve a type named inside of another: ``Foo<T>::SharedPtr``, ``ActionT::Goal``."""
