@@ -279,7 +279,7 @@ def _construct_entry(run: Machine, entry: Entry) -> None:
         run.gap_at(SourceRef(entry.place), why)
         return
     kind = run.names.resolve(entry.cls, (), index)
-    cls = run.names.class_of(kind, (), index) or run.names.only_class(entry.cls)
+    cls = run.names.class_of(kind, (), index)
     if cls is None:
         why = f"the class {entry.cls} was not found in the sources of its library"
         run.gap_at(SourceRef(index.file), why)

@@ -132,7 +132,8 @@ class BuildReader:
             if "LISTS" in given:
                 items = [part for word in items for part in variables.get(word, "").split(";") if part]
             for item in items:
-                self.run(body, Layer(variables, {given[0]: item}))
+                variables[given[0]] = item
+                self.run(body, variables)
         elif name == "if":
             self._if(words, body, variables)
 
@@ -180,7 +181,12 @@ class BuildReader:
         inner |= {f"ARGV{index}": word for index, word in enumerate(given)}
         for parameter in inner:
             self._note_doubt(parameter)
-        self.run(body, {**variables, **inner} if own else Layer(variables, inner))
+        if own:
+            variables = dict(variables)
+        before = {parameter: variables.get(parameter, "") for parameter in inner}
+        variables.update(inner)
+        self.run(body, variables)
+        variables.update(before)
 
     def _target(self, name: str, given: list[str], variables: dict[str, str]) -> None:
         if "IMPORTED" in given or "ALIAS" in given:
@@ -285,9 +291,6 @@ class BuildReader:
     def _do_remove_definitions(self, given: list[str], variables: dict[str, str]) -> None:
         self.everywhere.open |= compile_definitions(given).keys()
 
-    def _do_add_compile_options(self, given: list[str], variables: dict[str, str]) -> None:
-        self._define(self.everywhere, compile_definitions(given, only_flags=True))
-
     def _define(self, target: Target, symbols: Mapping[str, str]) -> None:
         target.define(symbols, symbols if self.doubtful else ())
 
@@ -307,7 +310,10 @@ class BuildReader:
         self.included.append(file)
         with suppress(OSError):
             listed = list(commands(read_text(file, errors="replace")))
-            self.run(listed, Layer(variables, {"CMAKE_CURRENT_LIST_DIR": os.path.dirname(file)}))
+            before = variables["CMAKE_CURRENT_LIST_DIR"]
+            variables["CMAKE_CURRENT_LIST_DIR"] = os.path.dirname(file)
+            self.run(listed, variables)
+            variables["CMAKE_CURRENT_LIST_DIR"] = before
         self.included.pop()
 
     def _do_generate_parameter_library(self, given: list[str], variables: dict[str, str]) -> None:
@@ -387,19 +393,6 @@ def commands(source: str) -> Iterator[Command]:
             return
 
 
-class Layer(dict[str, str]):
-    """Variables of a loop or macro: new ones here, all others written through."""
-
-    def __init__(self, outer: dict[str, str], own: dict[str, str]):
-        super().__init__({**outer, **own})
-        self._outer, self._own = outer, set(own)
-
-    def __setitem__(self, name: str, value: str) -> None:
-        super().__setitem__(name, value)
-        if name not in self._own:
-            self._outer[name] = value
-
-
 def end_of_block(listed: Sequence[Command], start: int) -> int:
     """Return the index of the command that closes the block at ``start``; of the last command if none does."""
     name = listed[start][0]
@@ -456,13 +449,13 @@ def recursive_pattern(pattern: str) -> str:
     return os.path.join(folder.replace("**", "*"), "**", name)
 
 
-def compile_definitions(words: list[str], only_flags: bool = False) -> dict[str, str]:
-    """Return macros with their values, ``1`` by default; with ``only_flags`` only words that start with ``-D``."""
+def compile_definitions(words: list[str]) -> dict[str, str]:
+    """Return macros with their values, ``1`` by default."""
     found = {}
     for word in words:
         if word.startswith("-D"):
             word = word[2:]
-        elif only_flags or word.startswith(("-", "$")) or word in LINK_WORDS:
+        elif word.startswith(("-", "$")) or word in LINK_WORDS:
             continue
         name, _, value = word.partition("=")
         found[name] = value.replace('\\"', '"') or "1"

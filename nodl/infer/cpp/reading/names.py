@@ -257,11 +257,6 @@ class Names:
             found.append((written, self.class_of(kind, cls.scope, cls.file)))
         return found
 
-    def only_class(self, name: str) -> Class | None:
-        """Return the class of that name in whatever namespace; ``None`` unless it is the only one."""
-        listed = self.classes.get(name.rpartition("::")[2], ())
-        return listed[0] if len(listed) == 1 else None
-
     def class_of(self, kind: Type, scope: Scope, file: FileIndex) -> Class | None:
         """Return the class of a type; of a template that has specialisations this is noted as a doubt."""
         cls = self.find_class(kind.name, scope, file)

@@ -8,7 +8,6 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES, Call, is_harmless_class
 from nodl.infer.cpp.reading.declarations import (
@@ -26,7 +25,7 @@ from nodl.infer.cpp.running.foreign import unmodelled
 from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
 from nodl.infer.cpp.running.overloads import candidates
 from nodl.infer.cpp.running.references import as_referred_to
-from nodl.infer.cpp.running.static_types import check_hidden, given_to, seen_class, seen_type, written_as
+from nodl.infer.cpp.running.static_types import check_hidden, given_to, seen_class, seen_type
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     END,
@@ -466,7 +465,7 @@ def construct_class(
         return
     this.bindings[cls] = run.names.bindings(cls, kind)
     own = run.names.find_methods(cls, cls.name) if cls.name in run.names.methods[cls] else []
-    fitting = candidates(own, arguments, partial(written_as, run, node, frame))
+    fitting = candidates(own, arguments)
     is_of_text = any(isinstance(atom, Text) for value in arguments for atom in value)
     if len(fitting) > 1 and (is_of_text or any(run.makes_interfaces(f) or _holds_text(f) for f in fitting)):
         run.gap(node, frame, f"which constructor of {cls.name} is meant here is not known")

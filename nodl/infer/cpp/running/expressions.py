@@ -10,7 +10,7 @@ from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.reading.writes import FILLS
 from nodl.infer.cpp.running.arithmetic import added, computed
 from nodl.infer.cpp.running.assignments import as_declared, assign
-from nodl.infer.cpp.running.constructors import as_map, cast, construct, default_value, initial_value, made
+from nodl.infer.cpp.running.constructors import cast, construct, default_value, initial_value, made
 from nodl.infer.cpp.running.contents import copied, elements_copied, items_of
 from nodl.infer.cpp.running.invocation import by_operator, pointed_to
 from nodl.infer.cpp.running.launch_values import decided, in_doubt, settled, settled_text
@@ -163,14 +163,8 @@ def qualified(run: Machine, node: Node, frame: Frame) -> Value:
 
 @expression("initializer_list")
 def initializer_list(run: Machine, node: Node, frame: Frame) -> Value:
-    """Evaluate braces without a type: a map if every item is a pair that starts with a text, else a list."""
-    items = [run.evaluate(child, frame) for child in children(node)]
-    pairs = [
-        item for item in items if len(item) == 1 and isinstance(item[0], Seq) and len(item[0].items) == 2
-    ]
-    if items and len(pairs) == len(items) and all(has_text(p[0].items[0]) for p in pairs):
-        return as_map(items)
-    return (Seq(tuple(items)),)
+    """Evaluate braces without a type: a list."""
+    return (Seq(tuple(run.evaluate(child, frame) for child in children(node))),)
 
 
 @expression("initializer_pair")
@@ -328,8 +322,6 @@ def binary(run: Machine, node: Node, frame: Frame) -> Value:
         return _streamed(run, left_node, left, right_node, right, frame)
     if operator == "+" and (has_text(left) or has_text(right)):
         return added(left, right)
-    if operator == "/" and any(isinstance(atom, Text) for atom in (*left, *right)):
-        return concatenated(left, literal("/"), right)
     if len(left) == 1 and len(right) == 1:
         return computed(operator, settled(run, left)[0], settled(run, right)[0])
     return unknown(f"the value of {text(node)[:60]}")

@@ -19,7 +19,7 @@ from nodl.infer.cpp.running.left_out import leave_out
 from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
 from nodl.infer.cpp.running.memory import MEMORY_DEPTH, CallOutcome, Changes
 from nodl.infer.cpp.running.overloads import candidates, chosen
-from nodl.infer.cpp.running.static_types import declared_type, given_to, written_as
+from nodl.infer.cpp.running.static_types import declared_type, given_to
 from nodl.infer.cpp.running.unknown_calls import may_be_written as may_be_written
 from nodl.infer.cpp.running.unknown_calls import unknown_call
 from nodl.infer.cpp.running.values import Bound, Lambda, Obj, Value, join, join_in_doubt, unknown
@@ -261,7 +261,7 @@ def call_methods(
     special = _one_of_special(run, methods, node, frame)
     if special is not None:
         return special
-    fitting = candidates(methods, values, partial(written_as, run, node, frame))
+    fitting = candidates(methods, values)
     if not fitting:
         name = "::".join(filter(None, (methods[0].owner, methods[0].name)))
         return unknown_call(run, name, values, node, [], frame)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 from nodl.infer.cpp.reading.declarations import Function, FunctionParameter
 from nodl.infer.cpp.running.values import Bound, Lambda, Map, Obj, Seq, Text, Value
@@ -15,31 +15,14 @@ def chosen(functions: Sequence[Function], arguments: Sequence[Value]) -> Functio
     return found[0] if found else None
 
 
-def candidates(
-    functions: Sequence[Function],
-    arguments: Sequence[Value],
-    written: Callable[[], Sequence[str]] = tuple,
-) -> Sequence[Function]:
+def candidates(functions: Sequence[Function], arguments: Sequence[Value]) -> Sequence[Function]:
     """Find the overloads that fit best: all of them where their looks do not tell them apart, as ``f() const`` and
-    ``f()``. ``written``: see ``written_as``."""
+    ``f()``."""
     fitting = [each for each in functions if _takes(each, len(arguments))]
     if len(fitting) <= 1:
         return fitting or (functions if len(functions) == 1 else ())
-    kinds = [*written(), *[""] * len(arguments)]
-    scores = [sum(map(_likeness, each.parameters, arguments, kinds)) for each in fitting]
+    scores = [sum(map(_likeness, each.parameters, arguments)) for each in fitting]
     return [each for each, score in zip(fitting, scores, strict=True) if score == max(scores)]
-
-
-def _of_text(kind: str, written: str, is_generic: bool) -> float:
-    """Rate a parameter's type for a text: a literal is rather any template's ``T``, or ``true``, than a
-    ``std::string`` ([over.ics.rank]).
-    """
-    whole = kind.partition("<")[0]  # a list of texts is none
-    if "char" in whole or "string" in whole:
-        return {"char": 3 if "char" in kind else 2, "string": -3 if "char" in kind else 3}.get(written, 3)
-    if is_generic:
-        return 2.8 if written == "char" else 1
-    return 2.6 if written == "char" and "bool" in kind else -3
 
 
 _GENERIC = re.compile(r"(?:const )?[A-Z]\w*(?: ?[&*]+)?")
@@ -50,14 +33,17 @@ def _takes(function: Function, count: int) -> bool:
     return function.variadic or required <= count <= len(function.parameters)
 
 
-def _likeness(parameter: FunctionParameter, value: Value, written: str) -> float:
-    """Rate how well an argument fits a parameter, by their looks."""
+def _likeness(parameter: FunctionParameter, value: Value) -> int:
+    """Rate how well an argument fits a parameter, by their looks.
+
+    A text may be a literal, which is rather a template's ``T`` or ``true`` than a ``std::string`` ([over.ics.rank]).
+    """
     atom = value[0] if value else None
     kind = parameter.type
     is_text = "string" in kind or "char" in kind
     is_generic = _GENERIC.fullmatch(kind) is not None and "Descriptor" not in kind
     if isinstance(atom, Text):
-        return _of_text(kind, written, is_generic)
+        return 3 if is_generic or _OF_TEXT.search(kind.partition("<")[0]) else -3
     if isinstance(atom, Obj):
         names = {atom.type.last, *(c.name for c in atom.bindings)}
         if atom.node is not None and ("Node" in kind or "node" in kind):
@@ -77,4 +63,5 @@ def _likeness(parameter: FunctionParameter, value: Value, written: str) -> float
     return 0
 
 
+_OF_TEXT = re.compile(r"string|char|bool")
 _NUMBER = re.compile(r"int|double|float|size_t|long")

@@ -120,23 +120,6 @@ def declared_type(run: Machine, node: Node, frame: Frame) -> tuple[Type, bool]:
     return kind, outside.pointer or kind.pointer
 
 
-def written_as(run: Machine, call: Node, frame: Frame) -> list[str]:
-    """Return for each argument of a call or an object's declaration ``char`` for a literal or ``const char *``,
-    ``string`` for a ``std::string``, else nothing.
-    """
-    found = []
-    for each in given_to(call, frame):
-        kind, pointer = declared_type(run, each, frame)
-        is_string = (kind.name in ("std::string", "string") and not kind.pointer) or text(each).startswith(
-            "std::string("
-        )
-        is_char = (
-            each.type in _LITERALS or (pointer and kind.name == "char") or text(each).endswith(".c_str()")
-        )
-        found.append("char" if is_char else "string" if is_string else "")
-    return found
-
-
 def given_to(call: Node, frame: Frame) -> list[Node]:
     """Return the arguments of a call or an object's declaration as they are written."""
     return children(_given(call, frame))
@@ -151,9 +134,6 @@ def _given(call: Node, frame: Frame) -> Node | None:
     if call.type == "field_initializer":
         return call.named_children[-1]
     return call if call.type in ("argument_list", "initializer_list") else field_of(call, "arguments")
-
-
-_LITERALS = ("string_literal", "raw_string_literal", "concatenated_string")
 
 
 def is_pointer(run: Machine, node: Node, frame: Frame) -> bool:
