@@ -1,7 +1,7 @@
 """MoveIt's interfaces to ``move_group`` and to the robot's description.
 
 Source: moveit/moveit2 humble 2b2030dd, jazzy 4d841063, main 8fcb5d23: move_group_interface.cpp,
-planning_scene_interface.cpp, current_state_monitor.cpp, synchronized_string_parameter.cpp.
+current_state_monitor.cpp, synchronized_string_parameter.cpp.
 """
 
 from __future__ import annotations
@@ -57,27 +57,6 @@ library_method(
     _MOVE_GROUP, "getCurrentState", "startStateMonitor", "getCurrentJointValues", "getRandomPose", "getCurrentPose",
     "getCurrentRPY",
 )(_joint_states)  # fmt: skip
-
-
-@library_class("moveit::planning_interface::PlanningSceneInterface")
-def _scene_interface(run: Machine, call: Call) -> None:
-    """Model (namespace, whether to wait): it has a node of its own, named by an address."""
-    made = run.obj(("own node", call.this), Type("rclcpp::Node"), heap=True)
-    given = [
-        concatenated(literal("planning_scene_interface_"), unknown("an address")),
-        call.value(0) or literal(""),
-    ]
-    record = become_node(run, replace(call, values=given, receiver=made))
-    record.description = call.this.type.name
-    run.endpoint(record, PUB, literal("planning_scene"), "moveit_msgs/msg/PlanningScene", call)
-    for name in ("get", "apply"):
-        kind = f"moveit_msgs/srv/{name.title()}PlanningScene"
-        run.endpoint(record, CLI, literal(f"{name}_planning_scene"), kind, call)
-
-
-@library_class("robot_model_loader::RobotModelLoader", "rdf_loader::RDFLoader")
-def _loader(run: Machine, call: Call) -> None:
-    _described(run, call)
 
 
 def _described(run: Machine, call: Call) -> AllocatedNode | None:

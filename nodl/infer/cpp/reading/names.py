@@ -305,11 +305,10 @@ class Names:
             index = self.files.get(each)
             for header in index.source.foreign if index is not None else ():
                 folder = header.partition("/")[0]
-                is_foreign = folder not in KNOWN_HEADERS and (not self.depends or folder in self.depends)
-                if "/" in header and is_foreign and not _INTERFACES.search(header):
+                if "/" in header and folder not in KNOWN_HEADERS and not _INTERFACES.search(header):
                     if name.partition("::")[0] == folder:
                         return header
-                    is_possible = "::" not in name or folder in self.depends
+                    is_possible = folder in self.depends or ("::" not in name and not self.depends)
                     found = found or (header if is_possible else "")
         if not found and "::" in name and name.partition("::")[0] in self.depends:
             return f"package {name.partition('::')[0]}"
