@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from nodl.infer.cpp.reading.declarations import Class, Field, FileIndex, Function
 from nodl.infer.cpp.reading.type_names import POINTER_MEMBERS
-from nodl.infer.cpp.syntax import Node, field_of, line_of
+from nodl.infer.cpp.syntax import Node, field_of, line_of, text
 from nodl.source_ref import SourceRef
 
 if TYPE_CHECKING:
@@ -99,7 +99,7 @@ def account(run: Machine, files: Iterable[FileIndex]) -> list[SiteAnswer]:
     settled |= {(answer.site.file, answer.site.line) for answer in answers if not answer.dead}
     for function in sorted(reachable | run.called, key=lambda f: (f.file.file, f.node.start_byte)):
         for site in open_calls(run, function):
-            if (site.file, site.line) not in settled:
+            if (site.file, site.line) not in settled and not _is_settled(run, function):
                 whose = (
                     f"{site.word}() was not followed here"
                     if function in run.called
@@ -107,6 +107,10 @@ def account(run: Machine, files: Iterable[FileIndex]) -> list[SiteAnswer]:
                 )
                 answers.append(SiteAnswer(site, False, f"{whose}: it may make interfaces"))
     return answers
+
+
+def _is_settled(run: Machine, function: Function) -> bool:
+    return function not in run.called and _is_overridden(run, function)
 
 
 def open_calls(run: Machine, function: Function) -> Iterator[Site]:
@@ -174,6 +178,8 @@ def _answer(
     if function not in run.called:
         if function not in reachable:
             return SiteAnswer(site, True, f"nothing in the program calls {function}")
+        if _is_overridden(run, function):
+            return SiteAnswer(site, True, f"every object of the program overrides {function}")
         return SiteAnswer(
             site, False, f"{site.word}: it was not understood who calls {function}, and for which node"
         )
@@ -189,6 +195,20 @@ def _class_around(index: FileIndex, site: Site) -> Class | None:
         if around and (inner is None or cls.node.start_byte > inner.node.start_byte):
             inner = cls
     return inner
+
+
+def _is_overridden(run: Machine, function: Function) -> bool:
+    """Return whether no object has the method, since its class overrides it, and nobody calls it by its class."""
+    if not function.virtual or not function.owner:
+        return False
+    last = function.owner.rpartition("::")[2]
+    holders = [
+        cls for cls in run.made_classes() if any(each.name == last for each in run.names.ancestry(cls))
+    ]
+    if not holders or any(function in run.names.find_methods(cls, function.name) for cls in holders):
+        return False
+    by_class = re.compile(rf"\b{last}\s*::\s*{re.escape(function.name)}\s*\(")
+    return not any(by_class.search(text(each.body)) for each in run.called)
 
 
 def _body_start(function: Function) -> int:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from itertools import repeat
 
 from nodl.infer.cpp.reading.declarations import Function, FunctionParameter
 from nodl.infer.cpp.running.values import Bound, Lambda, Map, Obj, Seq, Text, Value
@@ -21,7 +22,7 @@ def candidates(functions: Sequence[Function], arguments: Sequence[Value]) -> Seq
     fitting = [each for each in functions if _takes(each, len(arguments))]
     if len(fitting) <= 1:
         return fitting or (functions if len(functions) == 1 else ())
-    scores = [sum(map(_likeness, each.parameters, arguments)) for each in fitting]
+    scores = [sum(map(_likeness, each.parameters, arguments, repeat(each.templates))) for each in fitting]
     return [each for each, score in zip(fitting, scores, strict=True) if score == max(scores)]
 
 
@@ -33,7 +34,7 @@ def _takes(function: Function, count: int) -> bool:
     return function.variadic or required <= count <= len(function.parameters)
 
 
-def _likeness(parameter: FunctionParameter, value: Value) -> int:
+def _likeness(parameter: FunctionParameter, value: Value, templates: Sequence[str]) -> int:
     """Rate how well an argument fits a parameter, by their looks.
 
     A text may be a literal, which is rather a template's ``T`` or ``true`` than a ``std::string`` ([over.ics.rank]).
@@ -43,7 +44,8 @@ def _likeness(parameter: FunctionParameter, value: Value) -> int:
     is_text = "string" in kind or "char" in kind
     is_generic = _GENERIC.fullmatch(kind) is not None and "Descriptor" not in kind
     if isinstance(atom, Text):
-        return 3 if is_generic or _OF_TEXT.search(kind.partition("<")[0]) else -3
+        is_template = not {*re.findall(r"\w+", kind)}.isdisjoint(templates)
+        return 3 if is_template or _OF_TEXT.search(kind.partition("<")[0]) else 1 if is_generic else -3
     if isinstance(atom, Obj):
         names = {atom.type.last, *(c.name for c in atom.bindings)}
         if atom.node is not None and ("Node" in kind or "node" in kind):
