@@ -217,7 +217,11 @@ def _qualified(run: Machine, name: str, frame: Frame) -> str:
         return whole
     if (whole in STANDARD or name in STANDARD_TYPES) and run.names.is_standard(name, frame.scope, frame.file):
         return whole
-    return name
+    return f"rclcpp::{name}" if name in _FOUND_BY_THE_NODE else name
+
+
+_FOUND_BY_THE_NODE = ("spin", "spin_some", "spin_until_future_complete")
+"""Functions of rclcpp found through their argument, a node, where the program has none ([basic.lookup.argdep])."""
 
 
 def _static_maker(run: Machine, head: str, last: str, site: CallSite) -> Value | None:

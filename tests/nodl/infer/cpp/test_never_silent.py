@@ -82,6 +82,9 @@ namespace base { class B : public rclcpp::Node { public: explicit B(std::string 
 class App : public base::B { public: App() : B("app") { setup(); } void setup() { B::setup(); } };
 int main() { App app; }
 """,
+    "of a node that is spun without a namespace": in_class(
+        'create_publisher<std_msgs::msg::String>("a", 1);'
+    ).replace("rclcpp::spin(", "spin("),
     "in a timer's lambda": in_class(
         "create_wall_timer(1s, [this]() { create_publisher<std_msgs::msg::String>(\"a\", 1); });"
     ),
