@@ -10,11 +10,10 @@ from nodl.infer.cpp.reading.declarations import Class, Field
 from nodl.infer.cpp.running.arithmetic import added, as_type, computed
 from nodl.infer.cpp.running.constructors import in_braces
 from nodl.infer.cpp.running.contents import copied, elements_copied, overwrite
+from nodl.infer.cpp.running.effects import referred_to
 from nodl.infer.cpp.running.machine import Frame, Machine, expression
-from nodl.infer.cpp.running.references import REFERRED_TO, is_plain, through
+from nodl.infer.cpp.running.references import REFERRED_TO, forget, is_plain, leads_into, through
 from nodl.infer.cpp.running.static_types import (
-    TEXTS,
-    WHOLE_NUMBERS,
     current_object,
     declared_type,
     is_pointer,
@@ -25,7 +24,6 @@ from nodl.infer.cpp.running.static_types import (
 )
 from nodl.infer.cpp.running.values import (
     BOTTOM,
-    Group,
     Map,
     Obj,
     Param,
@@ -36,12 +34,13 @@ from nodl.infer.cpp.running.values import (
     as_one_map,
     has_text,
     join,
+    lost,
     open_sequence,
     plain,
     unknown,
 )
 from nodl.infer.cpp.running.variables import static_member
-from nodl.infer.cpp.syntax import Node, children, field_of, text, unwrapped, walk
+from nodl.infer.cpp.syntax import Node, children, field_of, text, unwrapped
 from nodl.name_template import UnknownPart
 
 
@@ -138,115 +137,65 @@ def as_declared(run: Machine, left: Node, value: Value, frame: Frame) -> Value:
 
 
 def assign(run: Machine, target: Node, value: Value, frame: Frame) -> None:
-    """Write to a variable, a member, an element."""
+    """Write to a variable, a member, an element; what is written to anything else makes unknown what it leads to."""
     inner = unwrapped(target)
-    if inner is None:
+    if inner is None or inner.type.endswith("literal"):
         return
     if inner.type in ("identifier", "field_identifier", "qualified_identifier"):
         _assign_name(run, inner, value, frame)
     elif inner.type == "field_expression":
         _assign_field(run, inner, value, frame)
     elif inner.type == "subscript_expression":
-        _assign_element(run, inner, value, frame)
+        _write_element(
+            run, inner, field_of(inner, "argument") or inner, field_of(inner, "indices"), value, frame
+        )
     elif inner.type == "pointer_expression":
-        argument = field_of(inner, "argument")
-        if argument is not None:
-            _through_pointer(run, argument, value, frame)
-            assign(run, argument, value, frame)
+        _through_pointer(run, field_of(inner, "argument") or inner, value, frame)
     elif inner.type == "call_expression":
         _assign_result(run, inner, value, frame)
-    elif not inner.type.endswith("literal"):
-        through(run, inner, frame)
+    else:
+        forget(run, inner, frame, written=value)
 
 
 def _assign_result(run: Machine, call: Node, value: Value, frame: Frame) -> None:
-    """Run ``f() = x``: an option or element of a known library; else what is written is not known."""
+    """Run ``f() = x``: an option or element of a known library; else what it gives a reference to is not known."""
     function = field_of(call, "function")
-    if text(function) in ("std::tie", "tie"):
-        for each in children(field_of(call, "arguments")):
-            assign(run, each, unknown("what is taken apart"), frame)
-        return
-    if _TEMPORARY.match(text(call)):
-        return
-    name = text(field_of(function, "field"))
-    owner = field_of(function, "argument")
+    name, owner = text(field_of(function, "field")), field_of(function, "argument")
     holders = run.evaluate(owner, frame) if owner is not None else BOTTOM
     models = [LIBRARY_METHODS.get((atom.type.name, name)) for atom in holders if isinstance(atom, Obj)]
     if models and all(models):
         for atom, model in zip(holders, models, strict=True):
             if model is not None:
                 model(run, Call(call, frame, [value], receiver=atom))
-    elif (
-        owner is not None
-        and name == "at"
-        and holders
-        and all(isinstance(atom, Seq | Map) for atom in holders)
-    ):
+    elif owner is not None and name == "at" and any(isinstance(atom, Seq | Map) for atom in holders):
         _write_element(run, call, owner, field_of(call, "arguments"), value, frame)
-    elif _is_of_numbers(run, owner or function, frame):
-        return
-    elif any(isinstance(atom, Text | Seq | Map | Param) for atom in value) or _gives_reference(run, function):
-        run.gap(call, frame, f"what {text(call)[:60]} = ... writes to is not known")
-
-
-_TEMPORARY = re.compile(r"std::(?:string|vector<[^()]*>)\(")
-
-
-def _is_of_numbers(run: Machine, target: Node | None, frame: Frame) -> bool:
-    """Return whether it is an array of numbers, whose elements are never known: ``matrix(0, 0) = x``."""
-    return target is not None and declared_type(run, target, frame)[0].name.startswith(_ARRAYS)
-
-
-_ARRAYS = ("Eigen::", "cv::Mat", "casadi::", "xt::")
+    elif text(function).startswith("const_cast"):
+        through(run, call, frame)
+    elif is_plain(value) or _gives_reference(run, function) or text(function) in ("std::tie", "tie"):
+        forget(run, call, frame, written=value, told=owner is not None or _gives_reference(run, function))
 
 
 def _gives_reference(run: Machine, callee: Node | None) -> bool:
     """Return whether a function of the program gives a reference."""
     listed = run.names.functions_by_name.get(text(callee).partition("<")[0].rpartition("::")[2], ())
-    declarators = [field_of(each.node, "declarator") for each in listed]
-    return any(each is not None and each.type == "reference_declarator" for each in declarators)
+    return any(map(referred_to, listed))
 
 
 def _through_pointer(run: Machine, pointer: Node, value: Value, frame: Frame) -> None:
-    """Run ``*p = x`` where ``p`` is an iterator, or a pointer of which nobody knows to what."""
-    kind, owner = declared_type(run, pointer, frame)[0], frame.owner_of(text(pointer))
-    before = run.evaluate(pointer, frame)
-    shared = "shared_ptr" in owner.types.get(text(pointer), "") if owner is not None else False
+    """Run ``*p = x``: ``p`` is the variable that it stands for, an optional or an argument; else it may be any."""
+    name = text(pointer)
+    before, owner = run.evaluate(pointer, frame), frame.owner_of(name)
     by_operator = any(run.methods_of(atom, "operator*") for atom in before)
-    if by_operator or REFERRED_TO in before or (shared and is_plain(value)):
+    iterates = owner is not None and name not in owner.aliases and leads_into(owner.initial.get(name))
+    is_elsewhere = any(isinstance(atom, Seq) and atom.place for atom in before) or (
+        owner is not None and "shared_ptr" in owner.types.get(name, "") and is_plain(value)
+    )
+    if by_operator or iterates:
+        forget(run, pointer, frame, written=value)
+    elif REFERRED_TO in before or is_elsewhere or points_to_plain(run, pointer, frame, _ANYTHING):
         through(run, pointer, frame)
-    if points_to_plain(run, pointer, frame, TEXTS) or (
-        is_plain(value) and points_to_plain(run, pointer, frame, WHOLE_NUMBERS)
-    ):
-        through(run, pointer, frame)
-    elif (
-        owner is None
-        and is_plain(value)
-        and kind.name
-        and not kind.pointer
-        and is_pointer(run, pointer, frame)
-    ):
-        through(run, pointer, frame)  # a member
-    if owner is None or text(pointer) in owner.aliases:
-        return
-    if owner.function is not None and any(p.name == text(pointer) for p in owner.function.parameters):
-        return
-    if is_plain(before) and is_plain(value) and set(before) != set(value):
-        through(run, pointer, frame)
-    elif not kind.pointer and not all(isinstance(atom, Obj) for atom in (*before, *value)):
-        _element_written(run, pointer, frame)
-
-
-def _element_written(run: Machine, iterator: Node, frame: Frame) -> None:
-    """Forget what the containers hold that an iterator was made of: one of their elements is written."""
-    owner = frame.owner_of(text(iterator))
-    initial = owner.initial.get(text(iterator)) if owner is not None else None
-    if owner is None or initial is None:
-        return
-    for each in walk(initial):
-        held = run.evaluate(each, owner) if each.type == "identifier" else BOTTOM
-        if is_plain(held):
-            assign(run, each, join(held, unknown("what is written to an element")), owner)
+    elif not all(isinstance(atom, Obj) for atom in (*before, *value)) or not before:
+        assign(run, pointer, value, frame)
 
 
 def _assign_name(run: Machine, target: Node, value: Value, frame: Frame) -> None:
@@ -254,11 +203,10 @@ def _assign_name(run: Machine, target: Node, value: Value, frame: Frame) -> None
     owner = frame.owner_of(name)
     if owner is not None and name in owner.aliases:
         alias = owner.aliases[name]
-        if alias is None:
-            through(run, target, frame)
-        else:
+        if alias is not None:
             assign(run, alias, value, owner)
             return
+        forget(run, target, frame, written=value)
     if owner is not None:
         run.store.set((owner, name), value)
         return
@@ -290,20 +238,15 @@ def _writes_through(field: Field, value: Value) -> bool:
 
 
 def _assign_field(run: Machine, node: Node, value: Value, frame: Frame) -> None:
-    owners = run.evaluate(field_of(node, "argument"), frame)
-    operator = text(field_of(node, "operator"))
+    """Write to a member of each object that it may be; of an unknown one to that of every object."""
+    argument, operator = field_of(node, "argument"), text(field_of(node, "operator"))
+    owners = run.evaluate(argument, frame)
     if "*" in operator or node.has_error:
         through(run, node, frame)
-    if operator == "->" and any(run.methods_of(atom, "operator->") for atom in owners):
+    if operator == "->":
         owners = run.calls.pointed_to(run, owners, "operator->", node, frame)
     name = text(field_of(node, "field")).rpartition("::")[2]
     objects = [atom for atom in owners if isinstance(atom, Obj)]
-    if is_plain(value) and re.search(r"->second\.", text(node)) and not objects:
-        through(run, node, frame)
-    if any(isinstance(atom, Group) for atom in owners) and name in ("first", "second") and is_plain(value):
-        through(run, node, frame)
-    if any(not isinstance(atom, Obj) or atom.cls is None for atom in owners) or not owners:
-        run.later([value], frame)  # a library keeps it and may call it
     for each in objects:
         declaring = next((cls for cls in run.names.ancestry(each.cls) if name in cls.fields), None)
         if declaring is not None and _writes_through(declaring.fields[name], value):
@@ -314,35 +257,50 @@ def _assign_field(run: Machine, node: Node, value: Value, frame: Frame) -> None:
         cell = (each, name)
         before = run.store.get(cell) or BOTTOM
         run.store.set(cell, value if strong else join(before, value))
+    if not owners or any(not isinstance(atom, Obj) or atom.cls is None for atom in owners):
+        run.later([value], frame)  # a library keeps it and may call it
+    if len(objects) < len(owners) or not owners:
+        _forget_members(run, node, argument, name, value, frame)
 
 
-def _assign_element(run: Machine, node: Node, value: Value, frame: Frame) -> None:
-    container = field_of(node, "argument")
-    if container is not None:
-        _write_element(run, node, container, field_of(node, "indices"), value, frame)
+def _forget_members(
+    run: Machine, node: Node, argument: Node | None, name: str, value: Value, frame: Frame
+) -> None:
+    """Run ``x.name = value`` where the object is not known: of whatever has such a member, it may be the one."""
+    if argument is not None and name in ("first", "second"):
+        forget(run, argument, frame, written=value)
+    seen = seen_type(run, argument, frame)
+    cls = run.class_of(seen, frame)
+    if seen.name in ("", "auto") or cls is not None:
+        for cell in run.store.named(name):
+            before = run.store.get(cell) or BOTTOM
+            if isinstance(cell[0], Obj) and cell[0].cls is not None and before:
+                run.store.set(cell, join(lost(before, f"what is written to {text(node)[:40]}"), value))
 
 
 def _write_element(
     run: Machine, node: Node, container: Node, indices: Node | None, value: Value, frame: Frame
 ) -> None:
     keys = [run.evaluate(child, frame) for child in children(indices)]
-    found: list[Value] = []
     held = run.evaluate(container, frame)
     refers = is_plain(held) or REFERRED_TO in held
     if refers and is_plain(value) and points_to_plain(run, container, frame, _ANYTHING):
         through(run, node, frame)  # p[0] = x is *p = x
+    found: list[Value] = []
     for atom in held:
         if run.methods_of(atom, "operator[]"):
-            through(run, node, frame)
+            forget(run, node, frame, written=value)
         if isinstance(atom, Map) and keys:
             found.append((with_entry(atom, keys[0], value),))
-        elif isinstance(atom, Seq):
+        elif isinstance(atom, Seq) and not atom.place:
             found.append((_with_item(atom, keys[0] if keys else BOTTOM, value),))
         elif isinstance(atom, Text | Param):
             found.append(unknown("a text of which a letter is written"))
         else:
             found.append((atom,))
-    if found:
+    if any(isinstance(atom, Seq) and atom.place for atom in held):
+        forget(run, container, frame, written=value)
+    elif found:
         assign(run, container, join(*found), frame)
 
 

@@ -28,7 +28,7 @@ from nodl.infer.cpp.running.containers import CONTAINER_METHODS, container_call,
 from nodl.infer.cpp.running.contents import handed_over
 from nodl.infer.cpp.running.invocation import CallSite, call_functions, call_values, pointed_to
 from nodl.infer.cpp.running.machine import Frame, Machine, expression
-from nodl.infer.cpp.running.references import REFERRED_TO, is_plain, through
+from nodl.infer.cpp.running.references import REFERRED_TO, forget, is_plain, keep_reference, through
 from nodl.infer.cpp.running.standard import CASTS, STANDARD, as_algorithm, may_write, writes_elements
 from nodl.infer.cpp.running.static_types import (
     GIVES_INNER,
@@ -107,13 +107,10 @@ def _named_call(run: Machine, name: str, site: CallSite) -> Value:
 
 def _cast(run: Machine, name: str, site: CallSite) -> Value:
     value = run.evaluate(site.given[0], site.frame) if site.given else BOTTOM
-    if name in ("std::ref", "std::cref") and is_plain(value):
-        later = join(value, unknown("what is written through a reference to it"))
-        if name == "std::ref":
-            assign(run, site.given[0], later, site.frame)
-        return later
+    if name == "std::ref" and is_plain(value):
+        keep_reference(run, site.given[0], site.frame)
     if name == "std::move" and is_plain(value):
-        assign(run, site.given[0], join(value, unknown("what is left after std::move")), site.frame)
+        forget(run, site.given[0], site.frame, "what is left after std::move", told=False)
     return cast(run, site.types[0], value) if name == "static_cast" else value
 
 
@@ -278,6 +275,8 @@ def method_call(run: Machine, site: CallSite) -> Value:
         return BOTTOM
     if name in FILLS and (REFERRED_TO in receiver or points_to_plain(run, subject, frame, TEXTS)):
         through(run, subject, frame)
+    elif name in FILLS and any(isinstance(atom, Unknown) for atom in receiver):
+        forget(run, subject, frame, told=False)
     found: list[Value] = []
     before = run.store.mark()
     alternatives = []

@@ -24,7 +24,7 @@ from nodl.infer.cpp.running.contents import copied, elements_copied, handed_over
 from nodl.infer.cpp.running.foreign import unmodelled
 from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
 from nodl.infer.cpp.running.overloads import candidates
-from nodl.infer.cpp.running.references import as_referred_to
+from nodl.infer.cpp.running.references import as_referred_to, is_plain, keep_reference, leads_into
 from nodl.infer.cpp.running.static_types import check_hidden, given_to, seen_class, seen_type
 from nodl.infer.cpp.running.values import (
     BOTTOM,
@@ -98,7 +98,7 @@ def initial_value(run: Machine, value: Node, frame: Frame, reference: bool = Fal
             return initial_value(run, inner[0], frame, reference)
         return BOTTOM if not inner else run.evaluate(value, frame)
     found = run.evaluate(value, frame)
-    if reference or _gives_iterator(value) or _gives_pointer(run, value):
+    if reference or leads_into(value) or _gives_pointer(run, value):
         return found
     if any(isinstance(atom, Seq | Map) for atom in found):
         return elements_copied(run, seen_type(run, value, frame), found, value, frame)
@@ -117,17 +117,6 @@ def _gives_pointer(run: Machine, value: Node) -> bool:
     return bool(listed) and all(
         each is not None and each.type == "pointer_declarator" for each in declarators
     )
-
-
-def _gives_iterator(value: Node) -> bool:
-    """Return whether it is ``x.find(...)`` or ``std::find_if(...)``: the element itself, seen through an iterator."""
-    callee = text(field_of(value, "function")) if value.type == "call_expression" else ""
-    return _ITERATORS.search(callee) is not None
-
-
-_ITERATORS = re.compile(
-    r"(?:^std::|[.>])(?:ranges::)?(?:c?r?(?:begin|end)|find\w*|(?:lower|upper|equal)_\w+|(?:min|max)_element|next|prev)$"
-)
 
 
 def converted(run: Machine, kind: Type, value: Value, node: Node, frame: Frame) -> Value:
@@ -190,7 +179,7 @@ def _sequence(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame
         if (cls is not None or inner.name in SEQUENCES) and each.type == "initializer_list"
         else run.evaluate(each, frame)
         if inner.pointer and (inner.name == "char" or each.type.endswith("literal"))
-        else as_referred_to(run.evaluate(each, frame))
+        else _pointed_to(run, each, frame)
         if inner.pointer
         else copied(run, run.evaluate(each, frame), each, frame, cls)
         for each in given
@@ -207,6 +196,14 @@ def _sequence(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame
         return elements_copied(run, kind, (found,), node, frame)
     count = items[0][0] if len(items[0]) == 1 else None
     return _repeated(run, node, inner, count, frame, items[1] if len(items) > 1 else None)
+
+
+def _pointed_to(run: Machine, given: Node, frame: Frame) -> Value:
+    """Return what an element that is a pointer or reference shows; a plain variable may be written through it."""
+    value = run.evaluate(given, frame)
+    if is_plain(value) and given.type in ("identifier", "field_expression"):
+        keep_reference(run, given, frame)
+    return as_referred_to(value)
 
 
 def _repeated(
@@ -354,6 +351,10 @@ def construct(
         check_hidden(run, cls, node, frame)
         _check_operators(run, cls, node, frame)
         _start_fields(run, made_object, cls)
+        if any(cls.name in run.names.pointers_to_plain.get(field, ()) for field in cls.fields):
+            for each, value in zip(given_to(node, frame), arguments, strict=False):
+                if is_plain(value):
+                    keep_reference(run, each, frame)
         construct_class(run, made_object, cls, kind, arguments, node, frame)
         return (made_object,)
     model = LIBRARY_CLASSES.get(kind.name)

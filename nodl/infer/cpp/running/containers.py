@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
+from itertools import chain
 
 from nodl.infer.cpp.running.arithmetic import added
 from nodl.infer.cpp.running.assignments import assign, with_entry
@@ -13,12 +14,14 @@ from nodl.infer.cpp.running.expressions import element
 from nodl.infer.cpp.running.invocation import CallSite
 from nodl.infer.cpp.running.launch_values import settled_text
 from nodl.infer.cpp.running.machine import Machine
+from nodl.infer.cpp.running.references import forget
 from nodl.infer.cpp.running.standard import called_now
 from nodl.infer.cpp.running.static_types import declared_type
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     END,
     NPOS,
+    Atom,
     Group,
     Map,
     Obj,
@@ -29,6 +32,7 @@ from nodl.infer.cpp.running.values import (
     Value,
     as_one_map,
     literal,
+    lost,
     open_sequence,
     plain,
     unknown,
@@ -64,6 +68,8 @@ def container_call(run: Machine, atom: object, name: str, site: CallSite) -> Val
     values = site.values
     called_now(run, values, site.node, site.frame)
     run.handle(site.node, site.frame)
+    if name in ("swap", "splice", "merge") and site.given:
+        forget(run, site.given[0], site.frame, written=_held_by([(atom,)]), told=False)
     if isinstance(atom, Map):
         return _map_call(run, atom, name, site)
     if isinstance(atom, Param) and name in _PARAMETER_VIEWS:
@@ -116,11 +122,9 @@ def _added(run: Machine, atom: object, name: str, site: CallSite) -> Value:
     if not isinstance(atom, Seq):
         assign(run, receiver, (open_sequence((value, (atom,))),), frame)
         return value
-    place = site.values[0] if name == "insert" and len(given) == 2 else BOTTOM
-    first = name in ("push_front", "emplace_front") or place == (atom,)
-    keeps_order = first or place == (END,) or name in ("push_back", "emplace_back", "push")
-    longer = (value, *atom.items) if first else (*atom.items, value)
-    is_exact = keeps_order and not atom.open and kind.name not in ORDERED
+    at_end = name in ("push_back", "emplace_back", "push") or END in site.values[0][:1]
+    is_exact = at_end and not atom.open and kind.name not in ORDERED
+    longer = (*atom.items, value)
     assign(run, receiver, (Seq(longer) if is_exact else open_sequence(longer),), frame)
     return value
 
@@ -128,12 +132,9 @@ def _added(run: Machine, atom: object, name: str, site: CallSite) -> Value:
 def _inserted(run: Machine, atom: object, source: Value, site: CallSite) -> Value:
     """Run ``a.insert(a.end(), b.begin(), b.end())``."""
     items = [item for each in source for item in items_of(run, each)[0]]
-    exact = isinstance(atom, Seq) and all(items_of(run, each)[1] for each in source)
     longer = (*(atom.items if isinstance(atom, Seq) else ((atom,),)), *items)
     kind, _ = declared_type(run, site.receiver, site.frame)
-    after = elements_copied(
-        run, kind, (Seq(longer) if exact else open_sequence(longer),), site.node, site.frame
-    )
+    after = elements_copied(run, kind, (open_sequence(longer),), site.node, site.frame)
     assign(run, site.receiver, after, site.frame)
     return BOTTOM
 
@@ -141,7 +142,7 @@ def _inserted(run: Machine, atom: object, source: Value, site: CallSite) -> Valu
 def _map_call(run: Machine, atom: Map, name: str, site: CallSite) -> Value:
     values = site.values
 
-    def becomes(after: Map) -> Value:
+    def becomes(after: Atom) -> Value:
         assign(run, site.receiver, (after,), site.frame)
         return unknown(f"the result of {name}()")
 
@@ -159,12 +160,10 @@ def _map_call(run: Machine, atom: Map, name: str, site: CallSite) -> Value:
         return becomes(atom if pairs else atom._replace(open=True))
     if name == "clear":
         return becomes(Map(()))
-    if name == "erase":
-        certain = len(first) == 1 and all(
-            len(k) == 1 and plain(k[0]) is not None for k in (first, *dict(atom.entries))
-        )
-        left = tuple(entry for entry in atom.entries if entry[0] != first)
-        return becomes(atom._replace(entries=left) if certain else atom._replace(open=True))
+    if name == "erase" and _has(atom, first) is not None:
+        return becomes(Map(tuple(entry for entry in atom.entries if entry[0] != first)))
+    if name in _CHANGES:
+        return becomes(lost((atom,), f"what {name}() leaves", _held_by(values))[0])
     if name in ("at", "find", "count", "contains") and values:
         found, has = element(run, atom, first), _has(atom, first)
         if name == "find":
@@ -173,7 +172,7 @@ def _map_call(run: Machine, atom: Map, name: str, site: CallSite) -> Value:
     if name in ("end", "cend"):
         return (END,)
     if name in ("begin", "cbegin"):
-        return (atom,)
+        return (Seq(tuple((Group(entry),) for entry in atom.entries), atom.open, place=True),)
     return unknown(f"the result of {name}()")
 
 
@@ -207,10 +206,22 @@ def _entered(atom: Map, key: Value, value: Value) -> Map:
     return as_one_map((*atom.entries, (key, value)), atom.open or not definite)
 
 
-_REARRANGES = frozenset({
+_CHANGES = frozenset({
     "erase", "resize", "pop_back", "pop_front", "assign", "swap", "pop", "remove", "unique", "sort", "reverse",
     "splice", "merge", "remove_if", "extract", "fill",
 })  # fmt: skip
+"""Methods after which only the objects in a container are known, and those of another one that it gets."""
+
+
+def _held_by(values: Sequence[Value]) -> Value:
+    """Return the objects and closures in what a method gets."""
+    found: list[Atom] = []
+    for atom in chain.from_iterable(values):
+        inner = (
+            atom.entries if isinstance(atom, Map) else (atom.items,) if isinstance(atom, Seq | Group) else ()
+        )
+        found += [*_held_by([*chain.from_iterable(inner)])] if inner else [atom]
+    return tuple(found)
 
 
 def _sequence_call(run: Machine, atom: Seq | Group, name: str, site: CallSite) -> Value:
@@ -222,50 +233,21 @@ def _sequence_call(run: Machine, atom: Seq | Group, name: str, site: CallSite) -
         return element(run, atom, first)
     if name in ("end", "cend", "rend"):
         return (END,)
-    if name in ("begin", "cbegin", "data"):
-        return (atom,)
-    if name == "rbegin":
-        return (atom._replace(items=items[::-1]),)
+    if name in ("begin", "cbegin", "data", "rbegin") and isinstance(atom, Seq):
+        return (Seq(items[::-1] if name == "rbegin" else items, atom.open, place=True),)
     if name == "value_or":  # an optional that holds nothing reads as an empty list
         return first if exact and not items else (atom,)
     if name == "size":
         return (len(items),) if exact else unknown("a size")
     if name == "empty":
         return (not items,) if exact else unknown("a condition")
-    if name == "swap" and len(values) == 1 and isinstance(atom, Seq):
-        before = run.evaluate(site.given[0], site.frame)
-        assign(run, site.given[0], (atom,), site.frame)
-        assign(run, site.receiver, before, site.frame)
+    if name == "clear":
+        assign(run, site.receiver, (Seq(()),), site.frame)
     elif name == "assign" and len(values) == 2 and END in values[1]:
         _inserted(run, Seq(()), first, site)
-    elif (after := _rearranged(atom, name, values)) is not None:
-        assign(run, site.receiver, (after,), site.frame)
+    elif name in _CHANGES and isinstance(atom, Seq):
+        assign(run, site.receiver, lost((atom,), f"what {name}() leaves", _held_by(values)), site.frame)
     return unknown(f"the result of {name}()")
-
-
-def _rearranged(atom: Seq | Group, name: str, values: Sequence[Value]) -> Seq | None:
-    """Return what a method that changes a list leaves of it; ``None`` for one that does not."""
-    if name == "clear":
-        return Seq(())
-    if isinstance(atom, Group) or name not in _REARRANGES:
-        return None
-    if name == "pop_back" and not atom.open:
-        return Seq(atom.items[:-1])
-    if not atom.open and (name == "pop_front" or (name == "erase" and list(values) == [(atom,)])):
-        return Seq(atom.items[1:])  # erase(x.begin())
-    items = (
-        (tuple(a for a in item if isinstance(a, Obj)) for item in atom.items)
-        if name in _REMOVES
-        else atom.items
-    )
-    added = values[-1:] if name in ("assign", "fill", "resize") else ()
-    return open_sequence((*filter(None, items), *added, unknown("an element of a list")))
-
-
-_REMOVES = frozenset(
-    {"erase", "resize", "pop_front", "pop", "remove", "unique", "remove_if", "extract", "pop_back"}
-)
-"""Which plain elements they leave is not known."""
 
 
 _SAME_TEXT = frozenset({
@@ -280,10 +262,6 @@ def _text_call(run: Machine, atom: Text | Param, name: str, site: CallSite) -> V
         if name == "str" and values:
             assign(run, site.receiver, values[0], site.frame)
         return (atom,)
-    if name == "swap" and len(values) == 1:
-        assign(run, site.given[0], (atom,), site.frame)
-        assign(run, site.receiver, values[0], site.frame)
-        return BOTTOM
     if name in _CHANGES_TEXT:
         adds = name in ("append", "push_back") and len(values) == 1
         changed = literal("") if name == "clear" else computed_text(run, atom, name, values)

@@ -144,6 +144,8 @@ def iterated(run: Machine, subject: Value) -> tuple[list[Value], bool]:
         items, exact = items_of(run, subject[0])
         return items, exact
     found = [item for atom in subject for item in items_of(run, atom)[0]]
+    if any(isinstance(atom, Unknown) for item in found for atom in item):
+        found = [join(*found)]
     return found or [unknown("an element of something that is not known")], False
 
 

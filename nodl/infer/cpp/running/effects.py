@@ -106,7 +106,7 @@ class CallEffects:
         of_others = set[str]().union(*(each.of_others for each in parts))
         for name in (assigned | changed) & run.names.functions_by_name.keys():
             for each in run.names.functions_by_name[name]:
-                behind = _referred_to(each)  # f() = x writes what f() gives
+                behind = referred_to(each)  # f() = x writes what f() gives
                 changed |= behind
                 of_others |= behind
                 assigned |= behind if name in assigned else set()
@@ -222,7 +222,7 @@ def _taken_by(run: Machine, function: Function, index: int) -> int:
     return max(further, default=_CHANGED) or _CHANGED
 
 
-def _referred_to(function: Function) -> frozenset[str]:
+def referred_to(function: Function) -> frozenset[str]:
     """Return the variables that a function gives references or pointers to."""
     declarator = field_of(function.node, "declarator")
     if declarator is None or declarator.type not in ("reference_declarator", "pointer_declarator"):

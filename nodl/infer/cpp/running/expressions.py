@@ -15,7 +15,7 @@ from nodl.infer.cpp.running.contents import copied, elements_copied, items_of
 from nodl.infer.cpp.running.invocation import by_operator, pointed_to
 from nodl.infer.cpp.running.launch_values import decided, in_doubt, settled, settled_text
 from nodl.infer.cpp.running.machine import NEXT, Frame, Machine, expression
-from nodl.infer.cpp.running.references import as_referred_to
+from nodl.infer.cpp.running.references import as_referred_to, is_plain, keep_reference
 from nodl.infer.cpp.running.static_types import class_of_member, current_object, seen_type
 from nodl.infer.cpp.running.values import (
     BOTTOM,
@@ -409,17 +409,23 @@ def pointer(run: Machine, node: Node, frame: Frame) -> Value:
     own = by_operator(run, "&", found, [], node, frame)
     if own is not None:
         return own
-    return as_referred_to(found) if _is_kept(node) else found
+    if not _is_kept(node) or not is_plain(found) or argument is None:
+        return found
+    keep_reference(run, argument, frame)
+    return as_referred_to(found)
 
 
 def _is_kept(address: Node) -> bool:
-    """Return whether an address becomes an element of a list: ``{&a, &b}``, ``list.push_back(&a)``."""
+    """Return whether somebody keeps an address: ``p = &a``, ``return &a``, ``{&a, &b}``, ``list.push_back(&a)``."""
     parent = address.parent
     call = parent.parent if parent is not None and parent.type == "argument_list" else None
     callee = field_of(call, "function") if call is not None else None
-    return (parent is not None and parent.type == "initializer_list") or (
+    return (parent is not None and parent.type in _KEEPS) or (
         callee is not None and text(field_of(callee, "field")) in FILLS
     )
+
+
+_KEEPS = ("initializer_list", "assignment_expression", "return_statement")
 
 
 def method_pointer(run: Machine, node: Node, frame: Frame) -> Value | None:
@@ -530,9 +536,8 @@ def element(run: Machine, atom: object, key: Value) -> Value:
         items, exact = items_of(run, atom)
         if exact and len(key) == 1 and isinstance(key[0], int) and 0 <= key[0] < len(items):
             return items[key[0]]
-        if not exact and (not key or (len(key) == 1 and isinstance(key[0], int))):
-            return join_in_doubt(items, "an element of a list whose order is not known")
-        return join(*items) if items else unknown("an element of a list")
+        which = "an element of a list, which of them is not known"
+        return join_in_doubt(items, which) if items else unknown(which)
     if isinstance(atom, Unknown):
         return (atom,)
     written = settled_text(run, atom) if isinstance(atom, Text) else None

@@ -19,10 +19,11 @@ from nodl.infer.cpp.running.left_out import leave_out
 from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
 from nodl.infer.cpp.running.memory import MEMORY_DEPTH, CallOutcome, Changes
 from nodl.infer.cpp.running.overloads import candidates, chosen
+from nodl.infer.cpp.running.references import forget, is_plain
 from nodl.infer.cpp.running.static_types import declared_type, given_to
 from nodl.infer.cpp.running.unknown_calls import may_be_written as may_be_written
 from nodl.infer.cpp.running.unknown_calls import unknown_call
-from nodl.infer.cpp.running.values import Bound, Lambda, Obj, Value, join, join_in_doubt, unknown
+from nodl.infer.cpp.running.values import Bound, Lambda, Obj, Seq, Value, join, join_in_doubt, unknown
 from nodl.infer.cpp.syntax import Node, children, field_of, template_arguments, text, unwrapped, words_in
 
 
@@ -459,12 +460,13 @@ def write_back(
         target = unwrapped(argument)
         if target is not None and text(target).startswith("&"):
             target = unwrapped(field_of(target, "argument"))
-        if target is None or target.type not in _WRITTEN_BACK:
-            continue
-        if target.type == "call_expression" and not _is_element(target):
-            continue
         value = left.get(parameter.name)
-        if value is not None and value != run.evaluate(target, frame):
+        if target is None or value is None:
+            continue
+        if target.type not in _WRITTEN_BACK or (target.type == "call_expression" and not _is_element(target)):
+            if is_plain(value):
+                forget(run, target, frame, told=False)
+        elif value != run.evaluate(target, frame):
             assign(run, target, value, frame)
 
 
@@ -475,6 +477,9 @@ def pointed_to(run: Machine, value: Value, operator: str, node: Node, frame: Fra
     """Return what ``x->`` or ``*x`` gives: by the operator of its class if it has one, else ``x`` itself."""
     found: list[Value] = []
     for atom in value:
+        if isinstance(atom, Seq) and atom.place:
+            found.append(unknown("what an iterator shows"))
+            continue
         own = run.methods_of(atom, operator)
         found.append(
             call_methods(run, own, atom, [], node, frame, ()) if own and isinstance(atom, Obj) else (atom,)

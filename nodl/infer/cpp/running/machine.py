@@ -30,6 +30,7 @@ from nodl.infer.cpp.running.values import (
     concatenated,
     plain,
     unknown,
+    without_covered,
 )
 from nodl.infer.cpp.syntax import Node, line_of, text, walk, words_in
 from nodl.infer.start import Start
@@ -327,7 +328,7 @@ class Machine:
         atoms = concatenated(name or unknown("a name that is never set"))
         if self.calls_back and self.undecided and sum(plain(atom) is not None for atom in atoms) > 1:
             atoms = unknown("which of several names goes with a condition that callbacks change")
-        for atom in atoms:
+        for atom in without_covered(atoms):
             parts = atom.parts if isinstance(atom, Text) else (UnknownPart(atom.why),)
             found = PossibleEndpoint(kind, Text(parts), type_name, source, follows=follows, when=when)
             record.endpoints.setdefault(found, []).append(conditions)

@@ -1,23 +1,41 @@
-"""References and pointers to texts, numbers and lists: who reads or writes through one means the variable behind it.
+"""References, pointers and iterators to texts, numbers and containers: who writes through one changes another variable.
 
 Objects are the same ones wherever they are seen; plain values lie in the cells of their variables. A local reference
-stands for the expression that it was made of, what is written through any other is a gap. What a member refers
-to is not known.
+stands for the expression that it was made of, if that means one variable. What is written through any other makes what
+it may lead to unknown; where that cannot be said it is a gap.
 """
 
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from functools import partial
 
-from nodl.infer.cpp.reading.writes import writes_of
+from nodl.infer.cpp.running.effects import effects_of, referred_to
 from nodl.infer.cpp.running.machine import Frame, Machine
-from nodl.infer.cpp.running.values import BOTTOM, Group, Map, Param, ReferredTo, Seq, Text, Unknown, Value
-from nodl.infer.cpp.syntax import Node, children, field_of, text, unwrapped
+from nodl.infer.cpp.running.memory import Cell
+from nodl.infer.cpp.running.static_types import current_object
+from nodl.infer.cpp.running.values import (
+    BOTTOM,
+    Const,
+    Group,
+    Map,
+    Obj,
+    Param,
+    ReferredTo,
+    Seq,
+    Text,
+    Unknown,
+    Value,
+    lost,
+    unknown,
+)
+from nodl.infer.cpp.syntax import Node, callee_name, children, field_of, text, unwrapped, words_in
 
 
 def is_plain(value: Value) -> bool:
     """Return whether a text, number or container is among the alternatives."""
-    return any(isinstance(atom, Text | Seq | Map | Group | Param | int | float) for atom in value)
+    return any(isinstance(atom, Text | Seq | Map | Group | Param | Const | int | float) for atom in value)
 
 
 REFERRED_TO = ReferredTo("what a reference or pointer stands for")
@@ -29,30 +47,49 @@ def as_referred_to(value: Value) -> Value:
 
 
 def bind_reference(run: Machine, name: str, kind: str, initial: Node | None, frame: Frame) -> None:
-    """Bind ``T & name = initial`` or ``T * name = &initial``, which was declared and has its value."""
-    target = unwrapped(initial)
-    if _VIEW.search(kind) and target is not None and target.type in ("identifier", "field_expression"):
-        last = field_of(target, "field") or target
-        if frame.function is not None and text(last) in writes_of(frame.function.node):
-            run.store.set((frame, name), (Unknown(f"what a view of {text(target)} shows later"),))
-    if (
-        target is None
-        or not kind.endswith(("&", "*"))
-        or not is_plain(run.store.get((frame, name)) or BOTTOM)
-    ):
+    """Bind ``T & name = initial`` or ``T * name = &initial``, which was declared and has its value.
+
+    What a view, an iterator or a reference to an element shows is not known if the function changes what is behind it.
+    """
+    target, value = unwrapped(initial), run.store.get((frame, name)) or BOTTOM
+    if target is None or not (is_plain(value) or any(isinstance(atom, Unknown) for atom in value)):
         return
     if kind.endswith("*"):
         target = unwrapped(field_of(target, "argument")) if target.type == "pointer_expression" else None
-    if target is not None and _is_fixed(target):
+    refers = kind.endswith(("&", "*"))
+    if refers and target is not None and _is_fixed(target):
         frame.aliases[name] = target
-    elif (
-        "const"
-        not in text(initial.parent.parent if initial is not None and initial.parent else None).split("=")[0]
-    ):
+    elif (refers or leads_into(initial) or _VIEW.search(kind)) and _changes_behind(run, initial, frame):
+        run.store.set((frame, name), lost(value, f"what {name} shows later"))
+    if refers and name not in frame.aliases and "const" not in _written_type(initial):
         frame.aliases[name] = None
 
 
 _VIEW = re.compile(r"\b(?:string_view|span)\b")
+_INTO = re.compile(
+    r"(?:^std::|[.>])(?:ranges::)?(?:c?r?(?:begin|end)|find\w*|(?:lower|upper|equal)_\w+|(?:min|max)_element|next|prev|data|"
+    r"emplace|insert\w*|try_emplace)$"
+)
+
+
+def leads_into(value: Node | None) -> bool:
+    """Return whether it is ``&x``, ``x.find(...)`` or ``std::find_if(...)``: something itself, seen from elsewhere."""
+    if value is None or value.type != "call_expression":
+        return text(value).startswith("&")
+    return _INTO.search(text(field_of(value, "function"))) is not None
+
+
+def _written_type(initial: Node | None) -> str:
+    return text(initial.parent.parent if initial is not None and initial.parent else None).split("=")[0]
+
+
+def _changes_behind(run: Machine, initial: Node | None, frame: Frame) -> bool:
+    if frame.function is None or initial is None:
+        return False
+    written = effects_of(run, frame.function).written
+    callee = field_of(initial, "function")
+    behind = field_of(callee, "argument") or initial
+    return not words_in(behind).isdisjoint(written.assigned | written.changed)
 
 
 def _is_fixed(target: Node) -> bool:
@@ -69,6 +106,77 @@ def _is_fixed(target: Node) -> bool:
     return target.type in ("identifier", "qualified_identifier")
 
 
+def forget(
+    run: Machine, what: Node, frame: Frame, why: str = "", written: Value = BOTTOM, told: bool = True
+) -> None:
+    """Make what ``what`` may lead to unknown: somebody writes to it, or to a part of it.
+
+    Args:
+        written: Objects among it may be elements afterwards.
+        told: It is a gap if ``what`` leads to no variable.
+    """
+    why = why or f"what is written to {text(what)[:40]}"
+    cells = dict.fromkeys(_behind(run, what, frame, set()))
+    members = [
+        (atom, field)
+        for cell in cells
+        for atom in run.store.get(cell) or BOTTOM
+        if isinstance(atom, Obj) and atom.node is None
+        for cls in run.names.ancestry(atom.cls)
+        for field in cls.fields
+    ]
+    iterators = 0
+    for cell in (*cells, *members):
+        held = run.store.get(cell) or BOTTOM
+        iterators += any(isinstance(atom, Seq) and atom.place for atom in held)
+        if is_plain(held):
+            run.store.set(cell, lost(held, why, written))
+    if (told and not cells) or (iterators and iterators == len(cells)):
+        through(run, what, frame)
+
+
+def keep_reference(run: Machine, what: Node, frame: Frame) -> None:
+    """Make the variable that ``what`` is unknown from now on: somebody keeps a reference to it, and may write to it."""
+    why = f"what is written through a reference to {text(what)[:40]}"
+    run.store.share(partial(forget, run, what, frame, why, told=False), unknown(why))
+
+
 def through(run: Machine, what: Node, frame: Frame) -> None:
     """Add a gap: somebody writes to a plain value through ``what``, and it is not known to which."""
     run.gap(what, frame, f"what {text(what)[:40]} refers to is written: which variable that is is not known")
+
+
+def _behind(run: Machine, what: Node | None, frame: Frame, seen: set[object]) -> Iterator[Cell]:
+    """Yield the variables that an expression names, and those that references and iterators among them lead to."""
+    if what is None or (what.id, frame) in seen or what.type == "lambda_expression":
+        return
+    seen.add((what.id, frame))
+    if what.type in ("identifier", "field_identifier", "qualified_identifier"):
+        yield from _of_name(run, what, frame, seen)
+        return
+    inner: list[Node | None] = [*what.named_children]
+    if what.type == "call_expression":
+        callee = field_of(what, "function") or what
+        inner = [field_of(callee, "argument"), *children(field_of(what, "arguments"))]
+        for function in run.names.functions_by_name.get(re.split(r"::|\.|->", callee_name(callee))[-1], ()):
+            for word in referred_to(function):
+                yield from run.store.named(word)
+    elif what.type == "field_expression":
+        yield from run.store.named(text(field_of(what, "field")))
+        inner = [field_of(what, "argument")]
+    for each in inner:
+        yield from _behind(run, each, frame, seen)
+
+
+def _of_name(run: Machine, name: Node, frame: Frame, seen: set[object]) -> Iterator[Cell]:
+    written = text(name)
+    owner, this = frame.owner_of(written), current_object(frame)
+    if owner is not None:
+        yield owner, written
+        initial = owner.initial.get(written)
+        if owner.types.get(written, "").endswith(("&", "*")) or leads_into(initial):
+            yield from _behind(run, initial, owner, seen)
+    elif this is not None and run.store.get((this, written)) is not None:
+        yield this, written
+    else:
+        yield from run.store.named(written.rpartition("::")[2])

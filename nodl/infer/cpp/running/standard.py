@@ -11,19 +11,16 @@ from nodl.infer.cpp.libraries import Call, library_class
 from nodl.infer.cpp.reading.declarations import parameters_of
 from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.constructors import text_of
-from nodl.infer.cpp.running.contents import copied, items_of
+from nodl.infer.cpp.running.contents import copied
 from nodl.infer.cpp.running.effects import effects_of
 from nodl.infer.cpp.running.machine import NEXT, Frame, Machine, registered
 from nodl.infer.cpp.running.static_types import is_pointer
 from nodl.infer.cpp.running.values import (
     BOTTOM,
-    END,
-    Atom,
     Bound,
     Group,
     Lambda,
     Obj,
-    Param,
     Seq,
     Text,
     Unknown,
@@ -82,41 +79,15 @@ def _to_string(run: Machine, values: Sequence[Value], node: Node, frame: Frame) 
 
 @_standard("std::format", "fmt::format")
 def _format(run: Machine, values: Sequence[Value], node: Node, frame: Frame) -> Value:
-    """Fill the replacement fields of a format string that is known ([format.string.std])."""
-    patterns = [plain(atom) for atom in values[0]] if values else []
-    if len(patterns) != 1 or patterns[0] is None:
-        return unknown("a text of a format that is not known")
-    pieces, following = [], 1
-    for escaped, number, form, letters in _FORMAT.findall(patterns[0]):
-        if escaped or letters:
-            pieces.append(literal(letters or escaped[0]))
-            continue
-        at = int(number) + 1 if number else following
-        following += 1
-        given = values[at] if at < len(values) else BOTTOM
-        pieces.append(tuple(_formatted(atom, form) for atom in given) or unknown("what is formatted"))
-    return concatenated(*pieces)
-
-
-_FORMAT = re.compile(r"(\{\{|\}\})|\{(\d*):?([^{}]*)\}|([^{}]+)")
-"""An escaped brace; a field, by its number and form; other letters."""
-
-
-def _formatted(atom: Atom, form: str) -> Atom:
-    """Return what stands for one argument; a fraction, and forms beyond width of a number, are not known."""
-    if isinstance(atom, bool) and not form:
-        return literal("true" if atom else "false")[0]
-    if isinstance(atom, int) and not isinstance(atom, bool) and re.fullmatch(r"0?\d*d?", form):
-        return literal(format(atom, form))[0]
-    if isinstance(atom, Text) and form in ("", "s"):
-        return atom
-    if (
-        isinstance(atom, Param)
-        and not form
-        and not any(isinstance(each, bool | float) for each in atom.default)
-    ):
-        return atom
-    return Unknown("a value in a format of its own")
+    """Fill the fields ``{}`` of a text with texts and whole numbers; any other field is not known."""
+    pieces = (plain(values[0][0]) or "{?").split("{}") if values and len(values[0]) == 1 else []
+    given = [
+        literal("") if not at else values[at] if at < len(values) else BOTTOM for at in range(len(pieces))
+    ]
+    is_known = all(isinstance(atom, Text) or type(atom) is int for value in given for atom in value)
+    if not pieces or not is_known or any("{" in each or "}" in each for each in pieces):
+        return unknown("a text in a format of its own")
+    return concatenated(*chain.from_iterable(zip(given, map(literal, pieces), strict=True)))
 
 
 @_standard(
@@ -188,15 +159,16 @@ def _calls_back(run: Machine, values: Sequence[Value], node: Node, frame: Frame)
         return run.calls.call_values(run, callee, values[first:], node, frame)
     if text(node).startswith("std::async"):
         run.store.others_run()
-    whole = len(values) > 1 and len(values[0]) == 1 and END in values[1]  # else a part of a list, or none
-    items, exact = items_of(run, values[0][0]) if whole else ([], False)
-    every = exact and text(node).startswith("std::for_each(")
+    items = [
+        item
+        for atom in (values or [BOTTOM])[0]
+        if isinstance(atom, Seq) and atom.place
+        for item in atom.items
+    ]
     for atom in (atom for value in values for atom in value if isinstance(atom, Lambda)):
-        for item in items if every else ():
-            _once(run, atom, [item], node, frame)
-        if not every:  # before what follows, or not
-            once = partial(_once, run, atom, [join(*items)] if items else [], node, frame)
-            run.branches([once, lambda: NEXT], doubt="what a closure that runs meanwhile writes")
+        once = partial(_once, run, atom, [join(*items)] if items else [], node, frame)
+        # Before what follows, or not.
+        run.branches([once, lambda: NEXT], doubt="what a closure that runs meanwhile writes")
     position = next(
         (at for at, value in enumerate(values) if any(isinstance(a, Lambda | Bound) for a in value)), 0
     )

@@ -10,7 +10,6 @@ from nodl.infer.cpp.reading.collect import STRUCTURES, declared_names, local_sco
 from nodl.infer.cpp.reading.declarations import type_text
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.reading.writes import writes_of
-from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.callbacks import run_meanwhile
 from nodl.infer.cpp.running.constructors import declared_value, fields_of
 from nodl.infer.cpp.running.contents import copied, iterated
@@ -29,7 +28,7 @@ from nodl.infer.cpp.running.machine import (
     statement,
 )
 from nodl.infer.cpp.running.memory import Changes
-from nodl.infer.cpp.running.references import REFERRED_TO, bind_reference, is_plain, through
+from nodl.infer.cpp.running.references import bind_reference, forget, is_plain
 from nodl.infer.cpp.running.static_types import element_type, seen_type
 from nodl.infer.cpp.running.values import (
     BOTTOM,
@@ -308,10 +307,12 @@ def declaration(run: Machine, node: Node, frame: Frame) -> int:
     if structured is not None:
         names = [text(each) for each in children(structured[0]) if each.type == "identifier"]
         bind_names(run, names, run.evaluate(structured[1], frame), frame)
-        if "&" in text(node).partition("[")[0] and "const" not in text(node).partition("[")[0]:
-            frame.aliases.update(
-                {name: None for name in names if is_plain(run.store.get((frame, name)) or BOTTOM)}
-            )
+        kind = text(node).partition("[")[0].strip()
+        for name in names:
+            frame.initial[name], frame.types[name] = structured[1], kind
+            bind_reference(run, name, kind, structured[1], frame)
+            if name in frame.aliases:
+                frame.aliases[name] = None  # a part of it
         return NEXT
     path = frame.path
     for name, value, pointer, written in declared_names(node):
@@ -473,18 +474,17 @@ def for_range_loop(run: Machine, node: Node, frame: Frame) -> int:
             by_value = not set("&*") & set(text(declarator)) and not _hold_pointers(run, right, frame)
             cls = run.held_class(run.type_of(written, frame), frame)
             own = copied(run, item, node, frame, cls) if by_value else item
-            run.local(frame, names[0], own, written)
+            run.local(frame, names[0], own, written + ("" if by_value else "&"))
+            frame.initial[names[0]] = right
 
     is_reference = "&" in text(declarator) and "const" not in text(node).split(":")[0]
     may_write = is_reference and body is not None and not writes_of(body).isdisjoint(names)
     held: Changes | None = {} if may_write else None
     outcome = _over(run, body, [partial(bind, item) for item in items], exact, frame, held)
     left = join(*(held.get((frame, name)) or BOTTOM for name in names)) if held else BOTTOM
-    if left and right is not None and any(REFERRED_TO in item for item in items):
-        through(run, right, frame)
     is_plain_one = is_plain(left) or (left != BOTTOM and has_text(subject))  # a letter is not known
-    if right is not None and right.type in _VARIABLES and is_plain_one:
-        assign(run, right, unknown("what a loop writes to the elements"), frame)
+    if right is not None and is_plain_one:
+        forget(run, right, frame, "what a loop writes to the elements")
     return outcome
 
 
@@ -497,9 +497,6 @@ def _by_key(entries: Sequence[Value]) -> list[Value]:
     if len(in_order) != len(entries):
         return list(entries)
     return [in_order[key] for key in sorted(in_order)]
-
-
-_VARIABLES = ("identifier", "field_expression", "subscript_expression", "pointer_expression")
 
 
 def _hold_pointers(run: Machine, right: Node | None, frame: Frame) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -139,10 +140,14 @@ class Param(NamedTuple):
 
 
 class Seq(NamedTuple):
-    """A vector, array or list. ``open``: the items may come any number of times."""
+    """A vector, array or list. ``open``: the items may come any number of times.
+
+    ``place``: an iterator to the first of the items, or, if it is open, to any.
+    """
 
     items: tuple[Value, ...]
     open: bool = False
+    place: bool = False
 
 
 class Map(NamedTuple):
@@ -303,30 +308,42 @@ def one_map(atoms: Value) -> Value:
 
 
 def as_one_map(entries: Iterable[tuple[Value, Value]], is_open: bool) -> Map:
-    """Merge entries of equal keys, and those whose key is not known; too many keys become one that is not known."""
+    """Merge entries of equal keys; if a key is not known, or they are too many, all to one that is not known."""
     found: dict[Value, Value] = {}
-    unknown_one: Value | None = None
     for key, value in entries:
-        if len(key) == 1 and isinstance(key[0], Unknown):
-            key = unknown_one = unknown_one or key
         found[key] = join(found[key], value) if key in found else value
-    if len(found) > MAX_ITEMS:
-        found = {unknown("one of many keys"): join(*found.values())}
+    strange = next((key for key in found if any(isinstance(atom, Unknown) for atom in key)), None)
+    if strange is not None or len(found) > MAX_ITEMS:
+        found = {strange or unknown("one of many keys"): join(*found.values())}
         is_open = True
     return Map(tuple(found.items()), is_open)
 
 
 def open_sequence(items: Iterable[Value]) -> Seq:
-    """Make a list whose ``items`` come in any order and number; equal ones and those not known once."""
-    found: dict[Value, None] = {}
-    unknown_one: Value | None = None
-    for item in items:
-        if len(item) == 1 and type(item[0]) is Unknown:
-            unknown_one = unknown_one or item
-        else:
-            found.setdefault(item)
-    every = (*found, unknown_one) if unknown_one is not None else tuple(found)
-    return Seq(every if len(every) <= MAX_ITEMS else (join(*every),), open=True)
+    """Make a list whose ``items`` come in any order and number; if one is not known, or too many are, one for all."""
+    found = dict.fromkeys(items)
+    is_known = not any(type(atom) is Unknown for item in found for atom in item)
+    return Seq(tuple(found) if is_known and len(found) <= MAX_ITEMS else (join(*found),), open=True)
+
+
+def lost(value: Value, why: str, written: Value = BOTTOM) -> Value:
+    """Return what is left where somebody writes: objects and closures; texts, numbers and elements are not known.
+
+    ``written``: objects among it may be elements.
+    """
+    return join(*((_lost(atom, why, written),) for atom in value))
+
+
+def _lost(atom: Atom, why: str, written: Value) -> Atom:
+    if isinstance(atom, Seq):
+        more = tuple(each for each in written if isinstance(each, Obj | Lambda | Bound))
+        return Seq((lost(join(*atom.items, more, unknown(why)), why, written),), True, atom.place)
+    if isinstance(atom, Map):
+        items = (lost(value, why, written) for _, value in atom.entries)
+        return Map(((unknown(why), join(*items, unknown(why))),), True)
+    if isinstance(atom, Group):
+        return Group(tuple(lost(item, why, written) for item in atom.items))
+    return atom if isinstance(atom, Obj | Lambda | Bound) or atom == END else Unknown(why)
 
 
 def unknown(why: str) -> Value:
@@ -376,6 +393,22 @@ def concatenated(*values: Value) -> Value:
         if len(results) > MAX_ALTERNATIVES:
             return unknown("too many possible texts")
     return tuple(dict.fromkeys(Text(melted(part for part in parts if part != "")) for parts in results))
+
+
+def without_covered(texts: Value) -> Value:
+    """Return possible names without those that another one, of which a part is not known, covers."""
+    patterns = [
+        "".join(re.escape(part) if isinstance(part, str) else ".*" for part in atom.parts)
+        for atom in texts
+        if isinstance(atom, Text) and any(isinstance(part, UnknownPart) for part in atom.parts)
+    ]
+    covering = re.compile("|".join(patterns))
+    known = [plain(atom) for atom in texts]
+    return tuple(
+        atom
+        for atom, name in zip(texts, known, strict=True)
+        if name is None or not patterns or covering.fullmatch(name) is None
+    )
 
 
 def spread(atom: Atom) -> list[tuple[Part | NodeNamePart, ...]]:

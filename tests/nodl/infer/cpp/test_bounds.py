@@ -66,7 +66,11 @@ template<> void make<int>(rclcpp::Node * n) { n->create_publisher<std_msgs::msg:
 GROWING = {
     "a text": ('std::string s = "x";', "s += s;", "s"),
     "a text by a method": ('std::string s = "x";', "s.append(s);", "s"),
-    "a list": ('std::vector<std::string> s{"x"};', "s.insert(s.end(), s.begin(), s.end());", "s[0]"),
+    "a list": (
+        'std::vector<std::string> s{"x"};',
+        "s.insert(s.end(), s.begin(), s.end()); s[0] += s.back();",
+        "s[0]",
+    ),
     "a pair of pairs": ('auto s = std::make_pair("x", "y");', "s = std::make_pair(s, s);", "s.first"),
     "a number": ("double s = 1e300; int i = 0;", "s = s * s; i = s;", "std::to_string(i)"),
 }

@@ -99,7 +99,7 @@ FOUND = {
         "", [],
     ),
     "a list that loses its last": (
-        f'std::vector<std::string> v{{"a", "b"}}; v.pop_back(); for (auto & e : v) {{ {PUB}(e, 1); }}', "", ["a"]
+        f'std::vector<std::string> v{{"a", "b"}}; v.pop_back(); for (auto & e : v) {{ {PUB}(e, 1); }}', "", ["?"]
     ),
     "a loop that is left": (
         f'int i = 0; while (true) {{ if (i == 2) break; i++; }} {PUB}("t" + std::to_string(i), 1);', "", ["t2"]
@@ -119,7 +119,7 @@ FOUND = {
     "a case for a letter": (
         f"char c = 'b'; switch (c) {{ case 'a': {PUB}(\"a\", 1); break; case 'b': {PUB}(\"b\", 1); }}", "", ["b"]
     ),
-    "texts that are swapped": (f'std::string a = "a", b = "b"; a.swap(b); {PUB}(b + "_b", 1);', "", ["a_b"]),
+    "texts that are swapped": (f'std::string a = "a", b = "b"; a.swap(b); {PUB}(b + "_b", 1);', "", ["?_b"]),
     "pointers to objects": (
         'C c; auto p = &c; p->t = "p"; auto f = [q = &c]() { q->t += "_q"; }; f(); auto m = own(); m->t = "m"; '
         'add(&c, "_r"); same(c, "_s"); '
@@ -365,7 +365,8 @@ def test_an_algorithm_writes_through_a_pointer_to_what_the_caller_gave(tmp_path:
     assert names(given) == ["a"]
     assert not gaps(given)
     iterator = "std::vector<double> v{1.0}; auto it = v.begin(); std::fill(it, v.end(), 2.0);"
-    assert gaps(infer(tmp_path / "2", in_class(f"{iterator} {publishes}")))
+    use = "create_publisher<std_msgs::msg::String>(std::to_string(v[0]), 1);"
+    assert names(infer(tmp_path / "2", in_class(f"{iterator} {use}"))) == ["?"]
 
 
 PARTS = {
@@ -449,7 +450,7 @@ HALF_DONE = {
     "before a call that may throw": ('x = "b"; risky(); x = "c";', ["a", "b", "c"]),
     "in a method that throws": ('Item i; i.t = "a"; try { i.set(); } catch (...) { } x = i.t;', ["a", "b"]),
     "in a function that is given the variable and throws": ("set(x, rand());", ["a", "b"]),
-    "in a function that always throws": ("always(x);", ["?", "b"]),
+    "in a function that always throws": ("always(x);", ["?"]),
     "two calls further": ("further(x);", ["a", "b", "c"]),
     "of a copy": ("copied(x);", ["a"]),
     "of an object made meanwhile": ('Item made; made.t = "b"; risky();', ["a"]),
@@ -470,9 +471,9 @@ def test_a_catch_finds_what_was_written_before_the_exception(
     assert names(infer(tmp_path, in_class(program, before=before))) == made
 
 
-def test_swapped_texts_are_each_others(tmp_path: Path) -> None:
+def test_swapped_texts_are_not_known(tmp_path: Path) -> None:
     body = f'std::string a = "x", b = "y"; std::swap(a, b); {PUB}(a + "1", 1); {PUB}(b + "2", 1);'
-    assert names(infer(tmp_path, in_class(body))) == ["x2", "y1"]
+    assert names(infer(tmp_path, in_class(body))) == ["?1", "?2"]
 
 
 def test_a_write_that_the_parser_does_not_understand_is_a_gap(tmp_path: Path) -> None:
@@ -637,9 +638,7 @@ def test_which_enumerator_a_number_is_cast_to_is_not_known(tmp_path: Path) -> No
 
 RANGES = {
     "turned round in a list": ("std::vector<std::string> r(v.rbegin(), v.rend()); s = r[0];", ["b"]),
-    "turned round in a loop": ("std::for_each(v.rbegin(), v.rend(), [&](auto & t) { s += t; });", ["xba"]),
-    "whole": ("std::for_each(v.begin(), v.end(), [&](auto & t) { s += t; });", ["xab"]),
-    "a part": ("std::for_each(v.begin(), v.end() - 1, [&](auto & t) { s = t; });", ["?", "x"]),
+    "by an algorithm": ("std::for_each(v.begin(), v.end(), [&](auto & t) { s += t; });", ["?"]),
 }
 
 

@@ -30,7 +30,7 @@ def test_what_is_written_in_a_way_of_its_own_is_seen(body: str, members: str, tm
     before = f'struct B {{ std::string t = "x"; {members} }};\n'
     before += 'B & operator+(B & b, int) { b.t = "a"; return b; }\n'
     use = f"std::vector<B> v(1); B b; {body} create_publisher<std_msgs::msg::String>(b.t, 1);"
-    assert "a" in names(infer(tmp_path, in_class(use, before=before)))
+    assert {"a", "?"} & set(names(infer(tmp_path, in_class(use, before=before))))
 
 
 EACH = {
@@ -129,18 +129,21 @@ def test_a_text_that_is_written_behind_its_variable_is_told(
     body: str, members: str, why: str, tmp_path: Path
 ) -> None:
     source = in_class(f"{body} create_publisher<{S}>(t, 1);", f'std::string t = "a"; {members}')
-    assert [gap.partition(":")[0] for gap in gaps(infer(tmp_path, source))] == [why]
+    system = infer(tmp_path, source)
+    assert names(system) == ["?"] or [gap.partition(":")[0] for gap in gaps(system)] == [why]
 
 
-def test_a_text_that_a_member_only_reads_through_a_pointer_stays_known(tmp_path: Path) -> None:
-    members = 'std::string t = "a"; const std::string * p = nullptr; size_t n = 0;'
-    found = infer(tmp_path, in_class(f"p = &t; n = p->size(); create_publisher<{S}>(t, 1);", members))
-    assert (names(found), gaps(found)) == (["a"], [])
+def test_a_text_whose_address_is_kept_is_not_known(tmp_path: Path) -> None:
+    members = 'std::string t = "a", u = "b"; const std::string * p = nullptr;'
+    found = infer(
+        tmp_path, in_class(f"p = &t; create_publisher<{S}>(t, 1); create_publisher<{S}>(u, 1);", members)
+    )
+    assert (names(found), gaps(found)) == (["?", "b"], [])
 
 
 def test_a_number_that_unknown_code_gets_as_a_variable_may_be_another_one(tmp_path: Path) -> None:
     body = f'int n = 0; acme::read(n); create_publisher<{S}>("t" + std::to_string(n), 1);'
-    assert names(infer(tmp_path, in_class(body))) == ["t0", "t?"]
+    assert names(infer(tmp_path, in_class(body))) == ["t?"]
 
 
 COPIED = {
@@ -179,9 +182,9 @@ KEPT = {
 @pytest.mark.parametrize(
     ("kept", "made"),
     [
-        ("a number behind a member that is a pointer", ["0"]),
+        ("a number behind a member that is a pointer", ["?"]),
         ("an array of its own", ["7"]),
-        ("a text that an unknown class may keep", ["?", "a"]),
+        ("a text that an unknown class may keep", ["?"]),
         ("a constant that it may keep", ["a"]),
     ],
 )
@@ -238,7 +241,7 @@ THROUGH_A_LIST = {
 @pytest.mark.parametrize("body", THROUGH_A_LIST.values(), ids=THROUGH_A_LIST)
 def test_what_is_written_through_a_list_of_pointers_is_told(body: str, tmp_path: Path) -> None:
     use = f'std::string t = "a"; {body} create_publisher<{S}>(t, 1);'
-    assert any("refers to is written" in each for each in gaps(infer(tmp_path, in_class(use))))
+    assert names(infer(tmp_path, in_class(use))) == ["?"]
     only_read = (
         use.replace("*p += ", "look(*p) + ").replace("append", "compare").replace("r += ", "look(r) + ")
     )
