@@ -18,7 +18,8 @@ import collections
 import functools
 import itertools
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from nodl.infer.interpreter.calls import SPECIAL_FOLLOWED, has_yield
@@ -483,7 +484,10 @@ class _Net:
         self._meant.update(("", name) for name in scope.attributes | scope.set)
         names = set(scope.names)
         for place in scope.calls:
-            seen = place.node in self._evaluated or is_dead(place.around, self._names[scope.path])
+            entries = self._run.entries.get(scope.node) if scope.node is not None else None
+            seen = place.node in self._evaluated or all(
+                self._is_dead(place, scope, entry) for entry in entries or (None,)
+            )
             if not seen or place.node in self._run.doubtful:
                 if isinstance(place.node.func, ast.Name):
                     names.add(place.name)
@@ -542,7 +546,7 @@ class _Net:
                     self._gap(
                         scope, place.node, f"{place.name}() is called on something that is not understood"
                     )
-            elif not is_dead(place.around, self._names[scope.path]):
+            elif not self._is_dead(place, scope, entry):
                 self._gap(scope, place.node, self._skipped(scope, place, entry))
 
     def _skipped(self, scope: FunctionText, place: CallPlace, entry: FunctionEntry | None) -> str:
@@ -550,6 +554,9 @@ class _Net:
         line = getattr(entry and entry.call, "lineno", 0)
         where = f" where {scope.name} is called at {caller.path.rpartition('/')[2]}:{line}" if caller else ""
         return f"{place.name}() was not reached{where}; what it would make there is not listed"
+
+    def _is_dead(self, place: CallPlace, scope: FunctionText, entry: FunctionEntry | None) -> bool:
+        return is_dead(place.around, self._names[scope.path], _literals(scope, entry and entry.call))
 
     def _gap(self, scope: FunctionText, node: ast.AST, why: str) -> None:
         self.gaps.append(Gap(SourceRef(scope.path, getattr(node, "lineno", 0)), why))
@@ -560,12 +567,14 @@ _CONSTRUCTORS = frozenset({"__init__", "__new__", "__post_init__"})
 
 # --- literals in the text -----------------------------------------------------------------------------------
 
+Literals = Mapping[str, object]  # by parameter
 
-def is_dead(around: tuple[ast.AST, ...], module: str) -> bool:
+
+def is_dead(around: tuple[ast.AST, ...], module: str, literals: Literals = MappingProxyType({})) -> bool:
     """Return True if a test of literals, or of the ``module``'s name, keeps control from the last of ``around``."""
     for outer, inner in itertools.pairwise(around):
         if isinstance(outer, (ast.If, ast.While, ast.IfExp)):
-            outcome = _decided(outer.test, module)
+            outcome = _decided(outer.test, module, literals)
             body = outer.body if isinstance(outer.body, list) else [outer.body]
             orelse = outer.orelse if isinstance(outer.orelse, list) else [outer.orelse]
             if (outcome is False and inner in body) or (
@@ -575,22 +584,57 @@ def is_dead(around: tuple[ast.AST, ...], module: str) -> bool:
         if isinstance(outer, ast.BoolOp) and inner in outer.values:
             stops = isinstance(outer.op, ast.Or)
             before = outer.values[: outer.values.index(inner)]
-            if any(_decided(each, module) is stops for each in before):
+            if any(_decided(each, module, literals) is stops for each in before):
                 return True
     return False
 
 
-def _decided(test: ast.expr, module: str) -> bool | None:
-    """Return the truth of a literal, or of a test of ``__name__`` or ``TYPE_CHECKING``; ``None`` for all others."""
+def _decided(test: ast.expr, module: str, literals: Literals) -> bool | None:
+    """Return the truth of a literal, or of a test of ``__name__``, ``TYPE_CHECKING`` or a parameter that is one;
+    ``None`` for all others."""
     if isinstance(test, ast.Constant):
         return bool(test.value)
+    if isinstance(test, ast.Name) and test.id in literals:
+        return bool(literals[test.id])
     if isinstance(test, (ast.Name, ast.Attribute)) and last_name(test) == "TYPE_CHECKING":
         return False
     if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not):
-        outcome = _decided(test.operand, module)
+        outcome = _decided(test.operand, module, literals)
         return None if outcome is None else not outcome
-    if isinstance(test, ast.Compare) and last_name(test.left) == "__name__" and len(test.ops) == 1:
+    if isinstance(test, ast.Compare) and isinstance(test.left, ast.Name) and len(test.ops) == 1:
+        known = {**literals, "__name__": module}
         other, op = test.comparators[0], test.ops[0]
-        if isinstance(other, ast.Constant) and isinstance(op, (ast.Eq, ast.NotEq)):
-            return (module == other.value) is isinstance(op, ast.Eq)
+        if test.left.id in known and isinstance(other, ast.Constant):
+            equal = known[test.left.id] == other.value
+            if isinstance(op, (ast.Eq, ast.NotEq)) or other.value is None:
+                return equal is isinstance(op, (ast.Eq, ast.Is))
     return None
+
+
+def _literals(scope: FunctionText, entry: ast.AST | None) -> Literals:
+    """Return the parameters for which the call ``entry`` of this function has a literal, or leaves the default, one."""
+    node = scope.node
+    if isinstance(node, ast.Lambda) or node is None or node.decorator_list or not isinstance(entry, ast.Call):
+        return {}
+    called = last_name(entry.func)
+    constructs = scope.name == "__init__" and scope.cls is not None and called == scope.cls.name
+    if not (constructs or called == scope.name) or any(each.arg is None for each in entry.keywords):
+        return {}
+    arguments = [*node.args.posonlyargs, *node.args.args]
+    defaults = dict(
+        zip(reversed([each.arg for each in arguments]), reversed(node.args.defaults), strict=False)
+    )
+    bound = scope.cls is not None or isinstance(entry.func, ast.Attribute)  # with self, or perhaps
+    given = len(entry.args) + bound
+    if any(isinstance(each, ast.Starred) for each in entry.args):
+        given = len(arguments)
+    values: dict[str, ast.expr | None] = {each.arg: defaults.get(each.arg) for each in arguments[given:]}
+    values.update(
+        (each.arg, default) for each, default in zip(node.args.kwonlyargs, node.args.kw_defaults, strict=True)
+    )
+    values.update((each.arg, each.value) for each in entry.keywords if each.arg is not None)
+    return {
+        name: value.value
+        for name, value in values.items()
+        if isinstance(value, ast.Constant) and name not in scope.stored
+    }

@@ -8,6 +8,7 @@ import functools
 from nodl.infer.interpreter.conditions import under
 from nodl.infer.interpreter.define import (
     foreign_bases,
+    functions_of,
     is_enumeration,
     linearized,
     methods_in,
@@ -202,9 +203,25 @@ def instantiate(run: Run, cls: ClassValue, call: Call) -> Value:
         run.instantiated.setdefault(base.node)
     if is_enumeration(cls):
         return unknown("a member of an enumeration that is looked up by its value")
+    made = _made_by_new(run, cls, call)
+    if made is not None:
+        return made
     instance = new_instance(run, cls, call)
     initialise(run, cls, instance, call)
     return (instance,)
+
+
+def _made_by_new(run: Run, cls: ClassValue, call: Call) -> Value | None:
+    """Return what the program's own ``__new__`` gives, initialised where it is an object of the class."""
+    for base in program_classes(cls):
+        if "__new__" in base.cells:
+            constructors = functions_of(base.cells["__new__"])
+            made = run.call(constructors, call.args.preceded((cls,)), call.node, call.frame)
+            for atom in (each for each in made if isinstance(each, Instance)):
+                if isinstance(atom.cls, ClassValue) and cls in linearized(atom.cls):
+                    initialise(run, atom.cls, atom, call)
+            return made
+    return None
 
 
 def initialise(run: Run, cls: ClassValue, instance: Instance, call: Call) -> None:

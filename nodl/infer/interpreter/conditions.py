@@ -177,9 +177,12 @@ def conditions_of(run: Run, test: ast.expr, holds: bool, frame: Frame) -> tuple[
     if isinstance(test, ast.UnaryOp) and isinstance(test.op, ast.Not):
         return conditions_of(run, test.operand, not holds, frame)
     if isinstance(test, ast.BoolOp):
+        parts = test.values
         if isinstance(test.op, ast.And) != holds:  # of several parts nobody knows which
-            return ()
-        return tuple(each for part in test.values for each in conditions_of(run, part, holds, frame))
+            neutral = isinstance(test.op, ast.And)
+            parts = [part for part in parts if _truth_again(run, part, frame) is not neutral]
+        if isinstance(test.op, ast.And) == holds or len(parts) == 1:
+            return tuple(each for part in parts for each in conditions_of(run, part, holds, frame))
     condition = condition_of(run, test, frame)
     found = condition if holds else opposite(condition)
     return () if found is None or is_one_of_several(found.asked) else (found,)
@@ -196,32 +199,26 @@ def under(run: Run, conditions: tuple[Guard, ...], action: Callable[[], T]) -> T
 
 def sides_of(
     run: Run, test: ast.expr, frame: Frame, action: Callable[[bool], T]
-) -> tuple[Callable[[Value, Value], Value] | None, list[Callable[[], T]], set[bool]]:
+) -> tuple[Callable[[Value, Value], Value] | None, list[Callable[[], T]]]:
     """Return how values are joined after a test, and ``action`` for either outcome, under what is certain then.
-
-    Last come the outcomes that only a launch decides, and no condition says.
 
     What is made where a launch decides in a way that no condition says is a gap, until a launch decides.
     """
     held = {holds: conditions_of(run, test, holds, frame) for holds in (True, False)}
     asks = not all(held.values()) and _reads_parameter(run, test, frame)
     run.asks_launch = run.asks_launch or asks
-    left_open = {holds for holds in held if asks and not held[holds]}
 
     def side(holds: bool) -> T:
         made = run.findings.made
         narrowed(run, test, holds, frame)
         outcome = under(run, held[holds], partial(action, holds))
-        if holds in left_open and run.findings.made > made:
-            run.gap(test, frame, DEPENDS)
+        if asks and not held[holds] and run.findings.made > made:
+            run.gap(test, frame, "what is made under this test depends on a launch")
         return outcome
 
     condition = condition_of(run, test, frame)
     joined = partial(either, run, condition) if condition or asks else None
-    return joined, [partial(side, True), partial(side, False)], left_open
-
-
-DEPENDS = "what is made under this test depends on a launch"
+    return joined, [partial(side, True), partial(side, False)]
 
 
 def _reads_parameter(run: Run, test: ast.expr, frame: Frame) -> bool:
@@ -334,6 +331,13 @@ def _texts_in(value: Value) -> tuple[str, ...] | None:
 def _answer(run: Run, node: ast.expr, frame: Frame) -> Value:
     """Return the value of a part of a test; a call is not made again."""
     return run.answers.get(node, BOTTOM) if isinstance(node, ast.Call) else run.evaluate(node, frame)
+
+
+def _truth_again(run: Run, part: ast.expr, frame: Frame) -> bool | None:
+    """Return the truth of a part of a test, ``None`` also where it would have to call something again."""
+    if isinstance(part, ast.Call) or _only_reads(part):
+        return truth(_answer(run, part, frame))
+    return None
 
 
 def _asked(run: Run, node: ast.expr, frame: Frame) -> tuple[Input | None, Value]:

@@ -139,7 +139,7 @@ def define_class(run: Run, node: ast.ClassDef, frame: Frame) -> bool:
 
 
 _HOOKS = frozenset({
-    "__new__", "__setattr__", "__getattribute__", "__delattr__", "__get__", "__set__", "__set_name__",
+    "__setattr__", "__getattribute__", "__delattr__", "__get__", "__set__", "__set_name__",
     "__init_subclass__", "__class_getitem__", "__prepare__", "__instancecheck__",
 })  # fmt: skip
 
@@ -159,6 +159,13 @@ def _made_otherwise(
         run.escape_value((cls,))
     if any(isinstance(base, Unknown) for base in linearized(cls)):
         run.escape_value((cls,))
+
+
+def functions_of(value: Value) -> Value:
+    """Return ``value`` with the functions themselves in place of class and static methods."""
+    return tuple(
+        each for atom in value for each in (atom.function if isinstance(atom, ClassMethod) else (atom,))
+    )
 
 
 def _decorated_class(run: Run, value: Value, cls: ClassValue, decorator: ast.expr, frame: Frame) -> Value:

@@ -318,7 +318,7 @@ def _conditional(run: Run, node: ast.IfExp, frame: Frame) -> Value:
     def side(holds: bool) -> Value:
         return run.evaluate(node.body if holds else node.orelse, frame)
 
-    joined, sides, _ = sides_of(run, node.test, frame, side)
+    joined, sides = sides_of(run, node.test, frame, side)
     body, orelse = run.state.each(sides)
     return (joined or join)(body, orelse)
 

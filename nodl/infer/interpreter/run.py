@@ -188,8 +188,6 @@ class Run(Allocations):
         self.settle: Callable[[Run], None] = lambda run: None  # runs the callbacks; set by who drives the run
         self.guards: tuple[Guard, ...] = ()  # of parameters, that hold at the current point
         self.guards_at_end: tuple[Guard, ...] = ()  # of the latest block
-        # Tests that only a launch decides, after which control may have left the block; how much was made before.
-        self.left_open: list[tuple[ast.AST, Frame, int]] = []
         self.answers: dict[ast.expr, Value] = {}  # what the calls in tests gave the last time
         self.environment = ContentCells()  # variables that the program sets itself
         self.unrolled = 1  # turns of the unrolled loops around, multiplied
@@ -213,17 +211,13 @@ class Run(Allocations):
         """Run statements in order. False: control cannot reach the end of ``body``."""
         self.spend(len(body))
         statements, guards = self._statements, self.guards
-        passes, left_open = True, len(self.left_open)
+        passes = True
         for statement in body:
             handler = statements.get(type(statement))
             if handler is not None and not handler(self, statement, frame):
                 passes = False
                 break
         self.guards_at_end, self.guards = self.guards, guards
-        while len(self.left_open) > left_open:
-            node, where, made = self.left_open.pop()
-            if self.findings.made > made:
-                self.gap(node, where, "what is made after this test depends on a launch")
         return passes
 
     def spend(self, count: int) -> None:

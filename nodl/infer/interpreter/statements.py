@@ -96,31 +96,30 @@ def _if(run: Run, node: ast.If, frame: Frame) -> bool:
     outcome = decide(run, node.test, frame)
     if outcome is not None:
         return run.execute(node.body if outcome else node.orelse, frame)
-    passing: dict[bool, tuple[Guard, ...]] = {}
+    passing: list[tuple[Guard, ...]] = []
 
     def side(holds: bool) -> bool:
         passes = run.execute(node.body if holds else node.orelse, frame)
         if passes:
-            passing[holds] = run.guards_at_end
-        elif _leaves_loop(node, holds) and reads_one_of_several(run, node.test, frame):
-            run.gap(node, frame, "how many elements of a parameter come before this is not known")
+            passing.append(run.guards_at_end)
+        elif _leaves_turn(node, holds) and reads_one_of_several(run, node.test, frame):
+            run.gap(node, frame, "which elements of a parameter come to this is not known")
         return passes
 
-    joined, sides, left_open = sides_of(run, node.test, frame, side)
+    joined, sides = sides_of(run, node.test, frame, side)
     passes = run.state.branches(sides, joined)
     if passing:
-        first, *others = passing.values()
-        run.guards = where_either(first, others[0]) if others else first  # to the end of this block
-        if not others and left_open.issuperset(passing):
-            run.left_open.append((node, frame, run.findings.made))
+        run.guards = where_either(passing[0], passing[-1])  # to the end of this block
     return passes
 
 
 @cache
-def _leaves_loop(node: ast.If, holds: bool) -> bool:
-    """Return True if this side of a test may end the loop around it."""
+def _leaves_turn(node: ast.If, holds: bool) -> bool:
+    """Return True if this side of a test may end the turn of the loop around it, or the loop."""
     body = node.body if holds else node.orelse
-    return any(isinstance(each, (ast.Return, ast.Break)) for part in body for each in ast.walk(part))
+    return any(
+        isinstance(each, (ast.Return, ast.Break, ast.Continue)) for part in body for each in ast.walk(part)
+    )
 
 
 def _return(run: Run, node: ast.Return, frame: Frame) -> bool:

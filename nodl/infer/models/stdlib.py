@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any
 
 from nodl.infer.interpreter.conditions import is_instance, is_of_launch, truth
-from nodl.infer.interpreter.define import expect_methods
+from nodl.infer.interpreter.define import expect_methods, new_instance, program_classes
 from nodl.infer.interpreter.elements import copy_dictionary, elements, store_attribute
 from nodl.infer.interpreter.formatting import as_texts, text_value
 from nodl.infer.interpreter.imports import import_module
@@ -289,6 +289,19 @@ def _variables(run: Run, call: Call) -> Value:
     return run.variables_of(call.node, call.frame)
 
 
+def _object_new(run: Run, call: Call) -> Value:
+    """Model ``object.__new__(cls)``: an object whose constructor has not run."""
+    made: list[object] = []
+    for atom in call.args.at(0) or ANY:
+        if isinstance(atom, ClassValue):
+            for base in program_classes(atom):
+                run.instantiated.setdefault(base.node)
+            made.append(new_instance(run, atom, call))
+        else:
+            made.append(unknown("an object of a class that is not known")[0])
+    return tuple(made)
+
+
 _BUILT_IN: dict[str, Callable[[Run, Call], Value]] = {
     f"builtins.{name}": model
     for name, model in {
@@ -320,6 +333,7 @@ _BUILT_IN: dict[str, Callable[[Run, Call], Value]] = {
         **dict.fromkeys(("vars", "globals", "locals"), _variables),
         "input": lambda run, call: unknown("text that the user types"),
         "object": lambda run, call: ANY,
+        "object.__new__": _object_new,
         "object.__init_subclass__": lambda run, call: NONE,
     }.items()
 }

@@ -43,8 +43,7 @@ def test_what_literals_forbid_is_no_gap(body: str, infer: Infer) -> None:
 @pytest.mark.parametrize(
     ("body", "main"),
     [
-        ("self.make('a') if loud else None", "N()"),
-        ("self.make('a') if loud else None", "N('other', loud=False)"),
+        ("self.make('a') if loud else None", "N(loud=0 * 1)"),
         ("self.make('a') if loud else None", "N(**{'loud': False})"),
         ("self.make('a') if loud else None", "N('plain', False)"),
         ("loud = not True; self.make('a') if loud else None", "N()"),
@@ -55,6 +54,29 @@ def test_what_literals_forbid_is_no_gap(body: str, infer: Infer) -> None:
 )
 def test_what_only_values_forbid_is_a_gap(body: str, main: str, infer: Infer) -> None:
     assert any("make() was not reached" in why for why in _gaps(infer, body, main, "DEBUG = False"))
+
+
+@pytest.mark.parametrize(
+    ("body", "main"),
+    [
+        ("self.make('a') if loud else None", "N()"),
+        ("self.make('a') if loud else None", "N('other', loud=False)"),
+        ("if not loud:\n                return\n            self.make('a')", "N(loud=True)"),
+        ("self.make('a') if kind == 'other' else None", "N()"),
+        ("self.make('a') if kind is not None else None", "N(kind=None)"),
+    ],
+)
+def test_what_a_parameter_that_is_a_literal_forbids_is_no_gap(body: str, main: str, infer: Infer) -> None:
+    assert not _gaps(infer, body, main)
+
+
+def test_a_literal_of_one_caller_says_nothing_of_another(infer: Infer) -> None:
+    """The second caller's value is unknown to the text, and False."""
+    body = "self.make('a') if loud else None"
+    gaps = _gaps(infer, body, "N(loud=False)\n        N(loud=0 * 1)")
+    (why,) = [each for each in gaps if "was not reached" in each]
+    first = 1 + next(at for at, text in enumerate(PROGRAM.split("\n")) if "{main}" in text)
+    assert f"where __init__ is called at main.py:{first + 1}" in why
 
 
 @pytest.mark.parametrize("test", ["typing.TYPE_CHECKING", "TYPE_CHECKING"])

@@ -120,11 +120,13 @@ def test_a_parameter_that_a_function_of_the_program_reads_decides(tmp_path: Path
     assert _names(node, {"mode": "b"}) == {"b"}
 
 
-def test_what_is_made_unless_a_parameter_and_something_else_forbid_it_is_a_gap(tmp_path: Path) -> None:
+def test_a_parameter_decides_what_else_is_known_to_leave_open(tmp_path: Path) -> None:
     rows = "for name, optional in (('gps', False), ('imu', True)):\n"
     skip = "    if optional and not p('all', False):\n        continue\n    self.P(name)"
     node = _inferred(tmp_path, rows + skip)
-    assert any("depends on a launch" in gap.why for gap in node.gaps)
+    assert not node.gaps
+    assert _names(node, {}) == {"gps"}
+    assert _names(node, {"all": True}) == {"gps", "imu"}
 
 
 def test_a_parameter_decides_in_a_comprehension(tmp_path: Path) -> None:
