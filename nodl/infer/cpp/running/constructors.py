@@ -59,10 +59,6 @@ _SCALARS = frozenset({
 })  # fmt: skip
 
 
-MAX_ELEMENTS = 32
-"""Of a list that is made with so many elements; of longer ones one element stands for all."""
-
-
 def is_plain_type(name: str) -> bool:
     """Return whether it is a text, number or container."""
     return name in SEQUENCES or name in MAPS or name in _TEXTS or name in _SCALARS
@@ -194,8 +190,7 @@ def _sequence(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame
         listed = [item for part, _ in parts for item in part]
         found = Seq(tuple(listed)) if len(parts) == 1 and parts[0][1] else open_sequence(listed)
         return elements_copied(run, kind, (found,), node, frame)
-    count = items[0][0] if len(items[0]) == 1 else None
-    return _repeated(run, node, inner, count, frame, items[1] if len(items) > 1 else None)
+    return _repeated(run, node, inner, frame, items[1] if len(items) > 1 else None)
 
 
 def _pointed_to(run: Machine, given: Node, frame: Frame) -> Value:
@@ -206,20 +201,13 @@ def _pointed_to(run: Machine, given: Node, frame: Frame) -> Value:
     return as_referred_to(value)
 
 
-def _repeated(
-    run: Machine, node: Node, inner: Type, count: object, frame: Frame, value: Value | None = None
-) -> Value:
-    """Return so many elements of type ``inner``: each its own object, or one for all if that is not known."""
-
-    def element(where: Frame) -> Value:
-        if value is not None:
-            return copied(run, value, node, where, run.held_class(inner, where))
-        return default_value(run, node, inner, where) if inner.name and not inner.pointer else BOTTOM
-
-    if isinstance(count, int) and 0 <= count <= MAX_ELEMENTS:
-        return (Seq(tuple(element(replace(frame, path=(*frame.path, at))) for at in range(count))),)
+def _repeated(run: Machine, node: Node, inner: Type, frame: Frame, value: Value | None = None) -> Value:
+    """Return several elements of type ``inner``, however many: one stands for all."""
     run.repeated += 1
-    one = element(frame)
+    if value is not None:
+        one = copied(run, value, node, frame, run.held_class(inner, frame))
+    else:
+        one = default_value(run, node, inner, frame) if inner.name and not inner.pointer else BOTTOM
     run.repeated -= 1
     return (open_sequence((one,)),)
 
@@ -306,8 +294,7 @@ def default_value(run: Machine, node: Node, kind: Type, frame: Frame) -> Value:
     if kind.name in _TEXTS:
         return literal("")
     if kind.name == "std::array" and kind.arguments and not kind.arguments[0].pointer:
-        size = kind.arguments[1].name if len(kind.arguments) > 1 else ""
-        return _repeated(run, node, kind.arguments[0], int(size) if size.isdigit() else None, frame)
+        return _repeated(run, node, kind.arguments[0], frame)
     if kind.name in SEQUENCES:
         return (Seq(()),)
     if kind.name in MAPS:

@@ -136,7 +136,7 @@ PROGRAMS: dict[str, tuple[str, str, str, set[str], set[str]]] = {
         {"x", "y", "c", "none"}, set(),
     ),
     "a copy of a list has elements of its own": (
-        "std::vector<S> v(1); std::vector<S> a = v; std::vector<S> b(v); std::vector<S> c(v.begin(), v.end()); H h{v};"
+        "std::vector<S> v{S()}; std::vector<S> a = v, b(v), c(v.begin(), v.end()); H h{v};"
         'std::vector<S> d; d.assign(v.begin(), v.end()); H i; i.v = v; auto & r = v; r[0].t = "kept";'
         'a[0].t = "a"; b[0].t = "b"; c[0].t = "c"; d[0].t = "e"; h.v[0].t = "h"; i.v[0].t = "i"; pub(v[0].t);'
         "pub(a[0].t); pub(b[0].t); pub(c[0].t); pub(d[0].t); pub(h.v[0].t); pub(i.v[0].t);", "",
@@ -152,7 +152,7 @@ PROGRAMS: dict[str, tuple[str, str, str, set[str], set[str]]] = {
         {"pair", "a", "shown", "later"}, {"b"},
     ),
     "elements that are swapped": (
-        'std::vector<S> v(2); v[1].t = "b"; std::swap(v[0], v[1]); pub(v[0].t + "_0"); pub(v[1].t + "_1");', "",
+        'std::vector<S> v{S(), S()}; v[1].t = "b"; std::swap(v[0], v[1]); pub(v[0].t + "_0"); pub(v[1].t + "_1");', "",
         'struct S { std::string t = "a"; };\n', set(), {"a_0", "b_1"},
     ),
     "an entry that is erased by its name is gone": (

@@ -29,7 +29,7 @@ WRITTEN = {
 def test_what_is_written_in_a_way_of_its_own_is_seen(body: str, members: str, tmp_path: Path) -> None:
     before = f'struct B {{ std::string t = "x"; {members} }};\n'
     before += 'B & operator+(B & b, int) { b.t = "a"; return b; }\n'
-    use = f"std::vector<B> v(1); B b; {body} create_publisher<std_msgs::msg::String>(b.t, 1);"
+    use = f"std::vector<B> v{{B()}}; B b; {body} create_publisher<std_msgs::msg::String>(b.t, 1);"
     assert {"a", "?"} & set(names(infer(tmp_path, in_class(use, before=before))))
 
 
