@@ -208,26 +208,15 @@ def _place(entry: Entry) -> SourceRef:
 
 
 def _possible_plugins(sources: Sources, files: Iterable[FileIndex]) -> list[str]:
-    """Return sources of plugins whose base class a loader of the program loads; for a loader in a template, of those
-    whose base class the program names.
-    """
-    texts = [index.source.text for index in files]
-    wanted: set[str] = set()
-    in_template = False
-    for content in texts:
-        for match in re.finditer(r"ClassLoader\s*<\s*([\w:]+)\s*>", content):
-            base = match[1].rpartition("::")[2]
-            wanted.add(base)
-            in_template = (
-                in_template or re.search(rf"\b(?:typename|class)\s+{base}\s*[,>]", content) is not None
-            )
-    found: list[str] = []
-    for entries in sources.workspace.plugin_classes.values():
-        for each, package in entries:
-            base = each.base.rpartition("::")[2]
-            if base in wanted or (in_template and base and any(base in content for content in texts)):
-                found += library_sources(package)
-    return list(dict.fromkeys(found))
+    """Return sources of plugins whose base class a loader of the program loads."""
+    loaders = (match for index in files for match in _LOADER.finditer(index.source.text))
+    wanted = {match[1].rpartition("::")[2] for match in loaders}
+    entries = (each for listed in sources.workspace.plugin_classes.values() for each in listed)
+    packages = {package.name: package for each, package in entries if each.base.rpartition("::")[2] in wanted}
+    return list(dict.fromkeys(file for package in packages.values() for file in library_sources(package)))
+
+
+_LOADER = re.compile(r"ClassLoader\s*<\s*([\w:]+)\s*>")
 
 
 def _start(run: Machine, entry: Entry) -> None:

@@ -336,9 +336,7 @@ class BuildReader:
                 self.build.renamed[target] = "".join(name)
 
     def _do_rclcpp_components_register_node(self, given: list[str], variables: dict[str, str]) -> None:
-        options = dict(zip(given[1::2], given[2::2], strict=False)) if "PLUGIN" in given else {}
-        if "PLUGIN" not in options:
-            options = {w: given[i + 1] for i, w in enumerate(given[:-1]) if w in ("PLUGIN", "EXECUTABLE")}
+        options = {w: given[i + 1] for i, w in enumerate(given[:-1]) if w in ("PLUGIN", "EXECUTABLE")}
         if "PLUGIN" in options:
             name = options["PLUGIN"].lstrip(":")
             self.build.plugins[name] = options.get("EXECUTABLE")

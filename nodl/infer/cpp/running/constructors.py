@@ -146,13 +146,11 @@ def made(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame: Fra
         if copies(run, cls, values[0]):
             return copied(run, values[0], node, frame, cls)
     if cls is not None and is_aggregate(run, cls) and given:
-        found = _aggregate(run, node, kind, cls, given, frame, values)
-        return found
+        return _aggregate(run, node, kind, cls, given, frame, values)
     values = values or [run.evaluate(each, frame) for each in given]
     if cls is None and len(values) == 1 and _all_of(kind, values[0]):
         return values[0]  # a copy of a library's object
-    found = construct(run, kind, values, node, frame)
-    return found
+    return construct(run, kind, values, node, frame)
 
 
 def in_braces(run: Machine, value: Node, kind: Type, frame: Frame) -> Value:
