@@ -21,8 +21,8 @@ _HEADER = """namespace {space} {{
 class ParamListener {{
 public:
   template <typename N> explicit ParamListener(N node, std::string prefix = "") {{ declare(node, prefix); }}
-  template <typename N, typename L>
-  ParamListener(N node, L logger, std::string prefix = "") {{ declare(node, prefix); }}
+  template <typename N>
+  ParamListener(N node, rclcpp::Logger logger, std::string prefix = "") {{ declare(node, prefix); }}
   template <typename N> void declare(N node, std::string prefix) {{
     if (!prefix.empty() && prefix.back() != '.') {{ prefix += "."; }}
 {declared}

@@ -45,6 +45,15 @@ def test_a_parameter_library_names_parameters_with_their_defaults(tmp_path: Path
     assert [e.name.fill({"out.name": "x"}).text for e in node.endpoints] == ["chatter", "x"]
 
 
+@pytest.mark.parametrize("given", ['"arm"', 'get_logger(), "arm"'])
+def test_a_parameter_library_puts_its_prefix_before_each_name(given: str, tmp_path: Path) -> None:
+    made = f"listener_ = std::make_shared<demo::ParamListener>(get_node_parameters_interface(), {given});"
+    body = f"{made} params_ = listener_->get_params(); {PUB}(params_.topic, 1);"
+    system = infer_paths([_with_listener(tmp_path, body)])
+    assert names(system) == ["param:arm.topic"]
+    assert gaps(system) == []
+
+
 def test_entries_that_other_parameters_name_are_not_known(tmp_path: Path) -> None:
     body = f"for (auto & [name, joint] : params_.joints_map) {{ {PUB}(name, 1); }}"
     assert names(infer_paths([_with_listener(tmp_path, body)])) == ["?"]
