@@ -37,7 +37,7 @@ from nodl.infer.cpp.running.values import (
     plain,
     unknown,
 )
-from nodl.infer.cpp.syntax import Node, children, field_of, text
+from nodl.infer.cpp.syntax import children
 
 
 def is_standard(name: str) -> bool:
@@ -266,7 +266,7 @@ def _text_call(run: Machine, atom: Text | Param, name: str, site: CallSite) -> V
         adds = name in ("append", "push_back") and len(values) == 1
         changed = literal("") if name == "clear" else computed_text(run, atom, name, values)
         found = added((atom,), values[0]) if adds else changed
-        assign(run, _changed(site.receiver), found, site.frame)
+        assign(run, site.receiver, found, site.frame)
         return found
     return computed_text(run, atom, name, values)
 
@@ -312,16 +312,8 @@ _OF_TEXT: dict[str, Callable[..., str | int]] = {
 }  # fmt: skip
 
 
-def _changed(receiver: Node) -> Node:
-    """Return the text that ``text.append(a).append(b)`` changes."""
-    callee = field_of(receiver, "function") if receiver.type == "call_expression" else None
-    if text(field_of(callee, "field")) not in _CHANGES_TEXT:
-        return receiver
-    return _changed(field_of(callee, "argument") or receiver)
-
-
 _CHANGES_TEXT = frozenset({
     "erase", "replace", "insert", "pop_back", "assign", "resize", "remove_prefix", "remove_suffix", "swap", "clear",
-    "push_back", "append",
+    "push_back", "append", "emplace",
 })  # fmt: skip
 """Methods after which the text is another one."""

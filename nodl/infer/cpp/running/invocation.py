@@ -19,7 +19,7 @@ from nodl.infer.cpp.running.left_out import leave_out
 from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
 from nodl.infer.cpp.running.memory import MEMORY_DEPTH, CallOutcome, Changes
 from nodl.infer.cpp.running.overloads import candidates, chosen
-from nodl.infer.cpp.running.references import forget, is_plain
+from nodl.infer.cpp.running.references import forget
 from nodl.infer.cpp.running.static_types import declared_type, given_to
 from nodl.infer.cpp.running.unknown_calls import may_be_written as may_be_written
 from nodl.infer.cpp.running.unknown_calls import unknown_call
@@ -464,7 +464,7 @@ def write_back(
         if target is None or value is None:
             continue
         if target.type not in _WRITTEN_BACK or (target.type == "call_expression" and not _is_element(target)):
-            if is_plain(value):
+            if not all(isinstance(atom, Obj) for atom in value):
                 forget(run, target, frame, told=False)
         elif value != run.evaluate(target, frame):
             assign(run, target, value, frame)

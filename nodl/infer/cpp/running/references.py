@@ -11,7 +11,8 @@ import re
 from collections.abc import Iterator
 from functools import partial
 
-from nodl.infer.cpp.running.effects import effects_of, referred_to
+from nodl.infer.cpp.ledger import CREATES
+from nodl.infer.cpp.running.effects import effects_of, referred_to, written_in
 from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.memory import Cell
 from nodl.infer.cpp.running.static_types import current_object
@@ -84,12 +85,18 @@ def _written_type(initial: Node | None) -> str:
 
 
 def _changes_behind(run: Machine, initial: Node | None, frame: Frame) -> bool:
-    if frame.function is None or initial is None:
-        return False
-    written = effects_of(run, frame.function).written
+    """Return whether the function, or one that it calls, changes what ``initial`` is a part of."""
     callee = field_of(initial, "function")
-    behind = field_of(callee, "argument") or initial
-    return not words_in(behind).isdisjoint(written.assigned | written.changed)
+    is_made = text(callee).startswith("std::") and not leads_into(initial)  # ``std::make_pair(...)``
+    if frame.function is None or initial is None or is_made:
+        return False
+    behind = words_in(field_of(callee, "argument") or initial)
+    for each in effects_of(run, frame.function).functions:
+        written = written_in(each)
+        given = (words for callee, *_, words in written.passed if not CREATES.fullmatch(callee))
+        if not behind.isdisjoint((written.assigned | written.changed).union(*given)):
+            return True
+    return False
 
 
 def _is_fixed(target: Node) -> bool:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -261,3 +262,52 @@ def test_a_destructor_that_changes_what_others_have_is_told(
 ) -> None:
     before = f"struct G {{ int & s; int * p = nullptr; int own = 0; ~G() {{ {body} }} }};\n"
     assert gaps(infer(tmp_path, in_class("int n = 0; { G g{n}; }", before=before))) == told
+
+
+FROM_ELSEWHERE = {
+    "an iterator that was found": (
+        'std::map<std::string, std::string> v{{"k", "a"}};',
+        'auto it = v.find("k");',
+        "it->second",
+    ),
+    "an iterator to the first": ('std::vector<std::string> v{"a"};', "auto it = v.begin();", "*it"),
+    "a reference to an element": ('std::vector<std::string> v{"a"};', "auto & it = v.front();", "it"),
+    "a reference that a method gives": (
+        "std::vector<std::string> & v = kept();",
+        "auto & it = kept()[0];",
+        "it",
+    ),
+    "names of a structured binding": (
+        'auto v = std::make_pair(std::string("a"), 1);',
+        "auto & [it, n] = v;",
+        "it",
+    ),
+}
+FIRST = {"std::map<std::string, std::string> v": 'v.at("k")', "auto v": "v.first"}
+
+
+@pytest.mark.parametrize(("made", "seen", "name"), FROM_ELSEWHERE.values(), ids=FROM_ELSEWHERE)
+def test_what_is_written_from_elsewhere_is_not_known_and_stays_known_if_it_is_not(
+    made: str, seen: str, name: str, tmp_path: Path
+) -> None:
+    first = FIRST.get(re.split(r"[{=]", made)[0].strip(), "v[0]")
+    members = 'std::vector<std::string> l_{"a"}; std::vector<std::string> & kept() { return l_; }'
+    use = f"{made} {seen} {{}} create_publisher<{S}>({first}, 1);"
+    written = infer(tmp_path / "written", in_class(use.replace("{} ", f'{name} = "b"; '), members))
+    assert set(names(written)) <= {"?", "b"} or gaps(written)
+    assert names(infer(tmp_path / "read", in_class(use.replace("{} ", ""), members))) == ["a"]
+
+
+def test_what_an_iterator_shows_may_have_changed_since(tmp_path: Path) -> None:
+    body = 'std::map<std::string, std::string> m{{"k", "a"}}; auto it = m.find("k");'
+    use = f"create_publisher<{S}>(it->second, 1);"
+    assert names(infer(tmp_path / "1", in_class(f'{body} m["k"] = "b"; {use}'))) == ["?"]
+    assert names(infer(tmp_path / "2", in_class(f"{body} {use}"))) == ["a"]
+
+
+def test_what_a_function_writes_behind_a_pointer_into_an_array_is_not_known(tmp_path: Path) -> None:
+    before = 'void up(std::string * p, size_t n) { for (size_t i = 0; i < n; ++i) { p[i] = "b"; } }\n'
+    use = f"create_publisher<{S}>(a[1], 1);"
+    for call, made in (("up(a + 1, 1);", ["?"]), ("", ["a"])):
+        body = f'std::string a[] = {{"z", "a"}}; {call} {use}'
+        assert names(infer(tmp_path / str(len(call)), in_class(body, before=before))) == made
