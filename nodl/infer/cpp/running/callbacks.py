@@ -23,9 +23,8 @@ from nodl.infer.cpp.running.values import (
     Text,
     Value,
     as_one_map,
+    in_any_order,
     join,
-    one_map,
-    one_sequence,
     open_sequence,
     unknown,
 )
@@ -192,10 +191,7 @@ def _widen(run: Machine, mark: int, steps: int, give_up: bool) -> None:
         before = earlier[cell]
         if set(before) == set(value) or is_new_since(steps, cell):
             continue
-        if any(isinstance(atom, Seq) for atom in value):
-            value = one_sequence(value)
-        if any(isinstance(atom, Map) for atom in value):
-            value = one_map(value)
+        value = in_any_order(value)
         run.store.set(cell, join(*(_settled(atom, before) for atom in value)) if give_up else value)
 
 

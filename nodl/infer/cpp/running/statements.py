@@ -40,9 +40,9 @@ from nodl.infer.cpp.running.values import (
     Text,
     Value,
     has_text,
+    in_any_order,
     join,
     may_name,
-    one_sequence,
     plain,
     unknown,
 )
@@ -563,7 +563,7 @@ def _forget_order(run: Machine, body: Node | None, loop: Loop) -> bool:
             run.store.set(cell, join(rest, unknown("a value that a loop in any order changes")))
             found = True
         elif changed and any(isinstance(atom, Seq | Map | Group) for atom in value):
-            run.store.set(cell, one_sequence(value))
+            run.store.set(cell, in_any_order(value))
             kept = True
     return found and kept
 

@@ -288,23 +288,20 @@ def join_in_doubt(values: Sequence[Value], why: str) -> Value:
 
 
 def _one_container(atoms: Value) -> Value:
-    if sum(isinstance(atom, Seq) for atom in atoms) > MAX_SEQUENCES:
-        atoms = one_sequence(atoms)
-    if sum(isinstance(atom, Map) for atom in atoms) > MAX_SEQUENCES:
-        atoms = one_map(atoms)
-    return atoms
+    crowded = any(sum(isinstance(atom, kind) for atom in atoms) > MAX_SEQUENCES for kind in (Seq, Map))
+    return in_any_order(atoms) if crowded else atoms
 
 
-def one_sequence(atoms: Value) -> Value:
-    """Join many possible lists to one whose items come any number of times."""
-    items = [item for atom in atoms if isinstance(atom, Seq) for item in atom.items]
-    return (*(atom for atom in atoms if not isinstance(atom, Seq)), open_sequence(items))
-
-
-def one_map(atoms: Value) -> Value:
-    """Join many possible maps to one that may hold the entries of each."""
-    entries = [entry for atom in atoms if isinstance(atom, Map) for entry in atom.entries]
-    return (*(atom for atom in atoms if not isinstance(atom, Map)), as_one_map(entries, True))
+def in_any_order(atoms: Value) -> Value:
+    """Join many possible lists to one whose items come any number of times, and maps to one with all their entries."""
+    found: list[Atom] = [atom for atom in atoms if not isinstance(atom, Seq | Map)]
+    lists = [atom for atom in atoms if isinstance(atom, Seq)]
+    maps = [atom for atom in atoms if isinstance(atom, Map)]
+    if lists:
+        found.append(open_sequence(item for atom in lists for item in atom.items))
+    if maps:
+        found.append(as_one_map([entry for atom in maps for entry in atom.entries], True))
+    return tuple(found)
 
 
 def as_one_map(entries: Iterable[tuple[Value, Value]], is_open: bool) -> Map:
