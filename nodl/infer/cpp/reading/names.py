@@ -163,6 +163,16 @@ class Names:
                     found.setdefault(field.name, set()).add(cls.name)
         return found
 
+    @cached_property
+    def static_members(self) -> dict[str, list[Class]]:
+        """Return the names of static data members, with the classes that have them."""
+        found: dict[str, list[Class]] = {}
+        for cls in (each for listed in self.classes.values() for each in listed):
+            for field in cls.fields.values():
+                if field.static:
+                    found.setdefault(field.name, []).append(cls)
+        return found
+
     @_once
     def spoken_of(self, function: Function) -> frozenset[str]:
         """Return the functions, classes and aliases of the program whose names a function mentions."""

@@ -12,6 +12,7 @@ from functools import partial
 from nodl.infer.cpp.reading.declarations import Class
 from nodl.infer.cpp.running.effects import effects_of, looked_at
 from nodl.infer.cpp.running.invocation import HOOKS, call_lambda, invoke
+from nodl.infer.cpp.running.left_out import forget_writes
 from nodl.infer.cpp.running.machine import NEXT, Frame, Machine, is_new_since
 from nodl.infer.cpp.running.memory import Reads, name_of
 from nodl.infer.cpp.running.values import (
@@ -33,6 +34,7 @@ from nodl.source_ref import SourceRef
 PATIENCE = 3
 """Rounds after which a variable that callbacks still change counts as not known."""
 MAX_ROUNDS = 32
+MAX_CALLERS = 8
 Key = tuple[object, object]
 
 
@@ -145,6 +147,11 @@ def _call(rounds: _Rounds, key: Key, atom: object, frame: Frame, certainly: bool
     ):
         return False
 
+    if last is None and isinstance(atom, Lambda) and _runs_often_enough(rounds, atom):
+        forgotten = forget_writes(run, atom)
+        if forgotten is not None:
+            return forgotten
+
     def go() -> int:
         reads = run.store.watched(partial(_run, run, atom, frame))
         rounds.last[key] = _Ran(reads, len(run.nodes))
@@ -176,6 +183,16 @@ def _matters(rounds: _Rounds, atom: object) -> bool:
         ):
             return True
     return False
+
+
+def _runs_often_enough(rounds: _Rounds, closure: Lambda) -> bool:
+    """Return whether a closure that leads to no interface runs for many callers already: answers that ask again."""
+    callers = sum(code == closure.node.id for code, _ in rounds.last)
+    return (
+        callers >= MAX_CALLERS
+        and not _makes(rounds.run, closure)
+        and not any(effects_of(rounds.run, closure).leaving)
+    )
 
 
 def _makes(run: Machine, atom: object) -> bool:

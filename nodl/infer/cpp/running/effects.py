@@ -13,7 +13,7 @@ from nodl.infer.cpp.reading.declarations import Function
 from nodl.infer.cpp.reading.names import Names
 from nodl.infer.cpp.reading.writes import FILLS, VariableWrites, written_by
 from nodl.infer.cpp.running.foreign import Leaving, leaving
-from nodl.infer.cpp.running.memory import Cell
+from nodl.infer.cpp.running.memory import Cell, name_of
 from nodl.infer.cpp.running.values import Bound, Lambda, Obj
 from nodl.infer.cpp.syntax import Node, callee_name, field_of, text, walk, words_in
 
@@ -153,8 +153,7 @@ def _class_of(run: Machine, function: Function) -> str | None:
 
 def may_mean(run: Machine, owners: Owners, cell: Cell) -> bool:
     """Return whether code that writes or mentions the names ``owners`` may mean this variable."""
-    owner, name = cell
-    classes = owners.get(name)
+    owner, classes = cell[0], owners.get(name_of(cell))
     if classes is None or _ANY in classes or not isinstance(owner, Obj) or owner.cls is None:
         return classes is not None
     every = run.names.ancestry(owner.cls)

@@ -8,7 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 
-from nodl.infer.cpp.reading.declarations import Field, Function, type_text
+from nodl.infer.cpp.reading.declarations import Class, Field, Function, Global, type_text
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.effects import CallEffects, effects_of, looked_at, may_mean
 from nodl.infer.cpp.running.machine import Frame, Machine
@@ -17,6 +17,7 @@ from nodl.infer.cpp.running.values import (
     BOTTOM,
     Atom,
     Group,
+    Lambda,
     Map,
     Obj,
     Seq,
@@ -94,16 +95,39 @@ def _is_unused(run: Machine, function: Function, call: Node) -> bool:
     return not kind.pointer and (_NUMBERS.fullmatch(kind.name) is not None or kind.last in run.names.enums)
 
 
-def _changes(run: Machine, effects: CallEffects) -> dict[Cell, Value] | None:
-    """Return the variables that may change, with their values; ``None`` if one of them matters and is known now."""
-    store, written, matters = run.store, effects.written, looked_at(run)
+def forget_writes(run: Machine, closure: Lambda) -> bool | None:
+    """Make all that a closure may write unknown, instead of running it.
+
+    Returns:
+        Whether anything was known before; ``None`` if it may write to what nobody knows by name.
+    """
+    effects = effects_of(run, closure)
+    changes = _changes(run, effects, certainly=True)
+    if changes is None:
+        return None
+    for name in effects.written.assigned | effects.written.changed:
+        owner = closure.frame.owner_of(name)
+        value = run.store.get((owner, name)) if owner is not None else None
+        if owner is not None and value and _would_change(value, True, True):
+            changes[owner, name] = value
+    for cell, value in changes.items():
+        run.store.set(cell, join(value, unknown("what a callback may have written")))
+    return bool(changes)
+
+
+def _changes(run: Machine, effects: CallEffects, certainly: bool = False) -> dict[Cell, Value] | None:
+    """Return the variables that may change, with their values.
+
+    ``None`` if they are not known by their names or, unless ``certainly``, if one of them matters and is known now.
+    """
+    store, written, matters = run.store, effects.written, {} if certainly else looked_at(run)
     pointers = run.names.pointers_to_plain
     behind = pointers.keys() & (written.assigned | written.changed)
     if not written.lasting.isdisjoint(matters) or any(
         not pointers[name].isdisjoint(run.used_classes()) for name in behind
     ):
         return None
-    if effects.kept_by is not None:
+    if effects.kept_by is not None and not certainly:
         cell, is_assigned, is_changed = effects.kept_by
         value = store.get(cell) or BOTTOM
         if _would_change(value, is_assigned, is_changed) and _decides(run, cell, value):
@@ -130,16 +154,13 @@ def _changes(run: Machine, effects: CallEffects) -> dict[Cell, Value] | None:
             found[cell] = value
         if is_assigned:
             waiting += [((obj, field), field, True, True) for obj, field in _members(run, value)]
-    for obj, name in _never_set(run, every):
-        if not may_mean(run, effects.owners, (obj, name)):
-            continue
-        if (
-            name in written.assigned
-            and may_mean(run, matters, (obj, name))
-            and not _is_number(run, obj, name)
-        ):
-            return None
-        found[obj, name] = BOTTOM
+    for name in every:
+        for cell in _never_set(run, name):
+            if not may_mean(run, effects.owners, cell):
+                continue
+            if name in written.assigned and may_mean(run, matters, cell) and not _is_number(run, cell, name):
+                return None
+            found[cell] = BOTTOM
     return found
 
 
@@ -188,24 +209,29 @@ def _members(run: Machine, value: Value) -> Iterator[tuple[Obj, str]]:
                     yield atom, name
 
 
-def _never_set(run: Machine, names: frozenset[str]) -> Iterator[tuple[Obj, str]]:
-    """Yield members of these names that no object has set yet."""
-    for obj in list(run.objects.values()):
-        for each in run.names.ancestry(obj.cls):
-            for name in each.fields.keys() & names:
-                if not each.fields[name].static and run.store.get((obj, name)) is None:
-                    yield obj, name
+def _never_set(run: Machine, name: str) -> Iterator[Cell]:
+    """Yield members, globals and static members of that name that nothing has set or read yet."""
+    owners: list[object] = [
+        obj
+        for obj in list(run.objects.values())
+        if isinstance(declared := _declared(run, obj, name), Field) and not declared.static
+    ]
+    cells = [(owner, name) for owner in (*owners, *run.names.static_members.get(name, ()))]
+    cells += [(each, "") for each in run.names.globals.get(name, ())]
+    yield from (cell for cell in cells if run.store.get(cell) is None)
 
 
-def _is_number(run: Machine, obj: Obj, name: str) -> bool:
-    declared = _declared(run, obj, name)
+def _is_number(run: Machine, cell: Cell, name: str) -> bool:
+    declared = _declared(run, cell[0], name)
     return declared is not None and not declared.pointer and _NUMBERS.fullmatch(declared.type) is not None
 
 
-def _declared(run: Machine, obj: Obj, name: str) -> Field | None:
-    """Return the data member of that name of a class of the program."""
-    classes = run.names.ancestry(obj.cls) if obj.cls is not None else ()
-    return next((each.fields[name] for each in classes if name in each.fields), None)
+def _declared(run: Machine, owner: object, name: str) -> Field | Global | None:
+    """Return how a member of a class of the program, or a global, is declared."""
+    if isinstance(owner, Global):
+        return owner
+    cls = owner.cls if isinstance(owner, Obj) else owner if isinstance(owner, Class) else None
+    return next((each.fields[name] for each in run.names.ancestry(cls) if name in each.fields), None)
 
 
 def _of_objects(value: Value, containers: bool) -> bool:

@@ -232,3 +232,23 @@ def test_an_overload_with_fewer_parameters_is_not_the_one_that_is_called(
         tmp_path, with_method(methods.replace("find(topic, 1) ?", "find(topic), 1 ?"), f"compute(); {MAKES}")
     )
     assert names(system) != ["a"] or gaps(system)
+
+
+@pytest.mark.parametrize("read_before", [True, False])
+@pytest.mark.parametrize(
+    ("before", "name"),
+    [
+        ('std::string shared = "a";', "shared"),
+        ('namespace x { static std::string shared = "a"; } using namespace x;', "shared"),
+        ('struct S { static std::string shared; }; std::string S::shared = "a";', "S::shared"),
+    ],
+    ids=["a global", "in a namespace", "a static member"],
+)
+def test_what_is_written_outside_of_objects_is_never_taken_for_the_earlier_value(
+    before: str, name: str, read_before: bool, tmp_path: Path
+) -> None:
+    method = f'void change() {{ {name} = "b"; }}'
+    reads = f"auto length = {name}.size();" if read_before else ""
+    body = f"{reads} change(); create_publisher<std_msgs::msg::String>({name}, 1);"
+    system = infer(tmp_path, in_class(body, f"{MEMBERS} {method}", before=before))
+    assert names(system) != ["a"] or gaps(system)

@@ -8,7 +8,7 @@ import pytest
 
 from nodl.infer.cpp.running.memory import AbstractStore, CallOutcome, Memory
 from nodl.infer.cpp.running.values import Notes, Value, literal
-from tests.nodl.infer.cpp.workspace import in_class, infer, names
+from tests.nodl.infer.cpp.workspace import gaps, in_class, infer, names
 
 pytest.importorskip("tree_sitter_cpp", reason="the extra cpp is not installed")
 
@@ -111,3 +111,26 @@ def test_a_method_that_may_write_a_name_leaves_each_that_callbacks_gave_it(tmp_p
     other = 'create_wall_timer(2s, [this]() { name = "c"; });'
     members = 'bool now(); void may(bool is) { if (is) { name = "a"; } } std::string name = "b";'
     assert names(infer(tmp_path, in_class(made + other, members))) == ["a", "b", "c"]
+
+
+ASKS_AGAIN = """
+  void first() { client->async_send_request(request, [this](Future) { second(); first(); WRITES }); }
+  void second() { client->async_send_request(request, [this](Future) { first(); second(); third(); }); }
+  void third() { client->async_send_request(request, [this](Future) { first(); second(); third(); }); }
+  std::shared_ptr<rclcpp::Client<std_srvs::srv::Empty>> client; std::shared_ptr<std_srvs::srv::Empty::Request> request;
+  std::string name = "a";
+"""
+ASKS = """
+  client = create_client<std_srvs::srv::Empty>("asked"); first(); second();
+  create_wall_timer(1s, [this]() { create_publisher<std_msgs::msg::String>(name, 1); });
+"""
+
+
+def test_answers_that_ask_again_in_all_orders_are_followed_to_their_end(tmp_path: Path) -> None:
+    system = infer(tmp_path, in_class(ASKS, ASKS_AGAIN.replace("WRITES", "")))
+    assert (names(system), gaps(system)) == (["a", "asked"], [])
+
+
+def test_what_they_change_is_not_taken_for_unchanged(tmp_path: Path) -> None:
+    system = infer(tmp_path, in_class(ASKS, ASKS_AGAIN.replace("WRITES", 'name = name + "b";')))
+    assert set(names(system)) > {"a", "asked"} or gaps(system)
