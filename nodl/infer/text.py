@@ -125,8 +125,8 @@ def text_of(pieces: Iterable[Piece]) -> TextAtom:
 
 
 def is_one_of_several(piece: Input) -> bool:
-    """Return True if it stands for several texts: an element of a list, a name below a prefix."""
-    several = any(method == "key" for method, _ in piece.edits)
+    """Return True if it stands for several texts: an element of a list, a part of a text, a name below a prefix."""
+    several = any(method in ("split", "key") for method, _ in piece.edits)
     return (piece.item == "each" or several) and not is_condition(piece)
 
 

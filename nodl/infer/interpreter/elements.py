@@ -9,7 +9,7 @@ from functools import partial
 from nodl.infer.interpreter.conditions import is_of_launch
 from nodl.infer.interpreter.define import enumeration_members, is_constant, is_enumeration, setter_of
 from nodl.infer.interpreter.run import Arguments, Run
-from nodl.infer.text import Input, Text, constant_text, make_text
+from nodl.infer.text import Input, Text, constant_text, input_of, make_text
 from nodl.infer.values import (
     ABSENT,
     ANY,
@@ -118,6 +118,8 @@ def _sequence_item(run: Run, sequence: Sequence, key: Value) -> Value:
     items = sequence.items
     if items.exact is None:
         found = items.any_element()
+        if len(key) == 1 and type(key[0]) is int:
+            found = _part(found, key[0])
         one_of_several = len(found) > 1 and all(type(index) is int for index in key)
         return join(found, ANY) if one_of_several else found or ANY
     if all(isinstance(index, int) for index in key):
@@ -136,6 +138,15 @@ def chosen_by_launch(run: Run, key: Value, found: Value) -> Value:
         return found
     run.asks_launch = True
     return join(found, OF_LAUNCH)
+
+
+def _part(value: Value, index: int) -> Value:
+    """Return what stands at ``index``, if ``value`` is any part of a text that is split."""
+    asked = input_of(value[0]) if len(value) == 1 else None
+    if asked is None or not asked.edits or asked.edits[-1][0] != "split":
+        return value
+    part = ("part", (str(index), *asked.edits[-1][1]))
+    return (make_text((asked._replace(edits=(*asked.edits[:-1], part)),)),)
 
 
 def _sliced(run: Run, sequence: Sequence, bounds: slice | None, node: ast.AST) -> Value:
@@ -369,11 +380,11 @@ def _unpack(run: Run, targets: list[ast.expr], value: Value, frame: Frame) -> No
     element = items.any_element() or ANY
     if exact is not None:
         element = _any_of(element)
-    for target in targets:
+    for index, target in enumerate(targets):
         if isinstance(target, ast.Starred):
             assign(run, target, run.sequence(target, "list", Items(None, element)), frame)
         else:
-            assign(run, target, element, frame)
+            assign(run, target, element if starred else _part(element, index), frame)
 
 
 def delete(run: Run, target: ast.expr, frame: Frame) -> None:

@@ -16,7 +16,7 @@ from nodl.infer.interpreter.elements import (
 from nodl.infer.interpreter.formatting import joined, str_format, text_value
 from nodl.infer.interpreter.run import Call, Run
 from nodl.infer.models.stdlib import call_each, fill
-from nodl.infer.text import MAX_LENGTH, Text, TextAtom, constant_text, edited
+from nodl.infer.text import MAX_LENGTH, Text, TextAtom, constant_text, edited, input_of, with_edit
 from nodl.infer.values import (
     ABSENT,
     ANY,
@@ -84,6 +84,10 @@ def _text_method(run: Run, text: TextAtom, name: str, call: Call) -> Value:
         return _constant_method(run, text, name, arguments, call)
     if name in ("startswith", "endswith", "isdigit", "isalpha"):
         return BOOLEAN
+    divided = input_of(text)
+    if name == "split" and divided is not None and all(isinstance(each, str) for each in arguments):
+        part = with_edit(divided, "split", tuple(str(each) for each in arguments))
+        return run.sequence(call.node, "list", Items(None, (part,)))
     symbolic = edited(text, name, tuple(argument for argument in arguments if isinstance(argument, str)))
     return unknown(f"the result of str.{name}()") if symbolic is None else (symbolic,)
 

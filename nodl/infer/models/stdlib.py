@@ -141,6 +141,16 @@ def _enumerate(run: Run, call: Call) -> Value:
     return run.sequence(call.node, LAZY, Items(None, pair))
 
 
+def _zip(run: Run, call: Call) -> Value:
+    """Return the rows of lists that are all known; unknown otherwise, since nobody knows what goes with what."""
+    columns = [elements(run, value, call.node, call.frame) for value in call.args.positional]
+    known = [column.exact for column in columns if column.exact is not None]
+    if call.args.more or len(known) < len(columns):
+        return ANY
+    rows = tuple(run.tuple_of(row) for row in zip(*known, strict=False))
+    return run.sequence(call.node, LAZY, Items(rows))
+
+
 def _sorted(run: Run, call: Call) -> Value:
     """Return a list of any of the elements, in any order."""
     element = _items(run, call).any_element()
@@ -320,6 +330,7 @@ _BUILT_IN: dict[str, Callable[[Run, Call], Value]] = {
         ),
         "sorted": _sorted,
         "enumerate": _enumerate,
+        "zip": _zip,
         "map": _map,
         "dict": _dict,
         "next": chosen,
@@ -360,6 +371,13 @@ def _environment(run: Run, call: Call) -> Value:
             continue
         result = join(result, (make_text((Input("$" + name, run.options),)),))
     return result or unknown("an environment variable")
+
+
+def _set_default_environment(run: Run, call: Call) -> Value:
+    found = _environment(run, call)
+    for name in constant_strings(call.args.at(0) or ANY):
+        run.state.write(run.environment, name, found)
+    return found
 
 
 def _change_environment(run: Run, call: Call) -> Value:
@@ -441,9 +459,8 @@ FUNCTIONS: dict[str, Model] = {
     "argparse.ArgumentParser": options.made_parser,
     "os.getenv": _environment,
     "os.environ.get": _environment,
-    **dict.fromkeys(
-        ("os.environ.update", "os.environ.setdefault", "os.environ.pop", "os.putenv"), _change_environment
-    ),
+    "os.environ.setdefault": _set_default_environment,
+    **dict.fromkeys(("os.environ.update", "os.environ.pop", "os.putenv"), _change_environment),
     "os.path.join": _path_join,
     "functools.partial": _partial,
     **{f"threading.{name}": _lock for name in ("Lock", "RLock", "Condition", "Semaphore", "Event")},
