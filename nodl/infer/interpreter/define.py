@@ -130,6 +130,8 @@ def define_class(run: Run, node: ast.ClassDef, frame: Frame) -> bool:
     body.entry = frame.entry
     run.execute(node.body, body)
     run.classes.setdefault(node, cls)
+    if any(isinstance(base, External) and base.path == "typing.NamedTuple" for base in bases):
+        cls.fields = _fields(run, cls, frame)
     _made_otherwise(run, cls, keywords, node, frame)
     value: Value = (cls,)
     for decorator in reversed(node.decorator_list):
