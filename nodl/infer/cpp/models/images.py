@@ -139,6 +139,12 @@ for _what, _function, _method in (
     library_method("image_transport::ImageTransport", _method)(partial(_image, _what))
 
 
+@library_function("image_transport::getCameraInfoTopic")
+def _beside(run: Machine, call: Call) -> Value:
+    """Leave the topic as it is: what is beside it follows from its name after remapping."""
+    return unknown("the camera_info beside a topic")
+
+
 @library_class("image_transport::SubscriberFilter")
 def _subscriber_filter(run: Machine, call: Call) -> None:
     """Model image_transport/subscriber_filter.hpp: (node, topic, transport)."""

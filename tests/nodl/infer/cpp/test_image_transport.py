@@ -77,6 +77,12 @@ def test_a_resolved_name_is_the_name_as_launch_makes_it(tmp_path: Path) -> None:
     assert names(infer(tmp_path, in_class(body))) == ["a"]
 
 
+def test_the_topic_beside_an_image_is_open_and_leaves_the_image_as_it_is(tmp_path: Path) -> None:
+    body = """std::string image = "cam/image"; std::string info = image_transport::getCameraInfoTopic(image);
+    create_publisher<std_msgs::msg::String>(image, 1); create_publisher<std_msgs::msg::String>(info, 1);"""
+    assert names(infer(tmp_path, in_class(body))) == ["?", "cam/image"]
+
+
 @pytest.mark.parametrize(
     "made",
     [
