@@ -294,6 +294,11 @@ class Names:
         return order
 
     @_once
+    def members(self, cls: Class | None) -> frozenset[str]:
+        """Return the names of the data members of a class and its bases, static ones included."""
+        return frozenset().union(*(each.fields for each in self.ancestry(cls)))
+
+    @_once
     def find_methods(self, cls: Class | None, name: str) -> list[Function]:
         for each in self.ancestry(cls):
             found = self.methods.get(each, {}).get(name)

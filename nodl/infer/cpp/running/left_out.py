@@ -12,7 +12,7 @@ from nodl.infer.cpp.reading.declarations import Class, Field, Function, Global, 
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.effects import CallEffects, effects_of, looked_at, may_mean
 from nodl.infer.cpp.running.machine import Frame, Machine
-from nodl.infer.cpp.running.memory import Cell
+from nodl.infer.cpp.running.memory import Cell, name_of
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     Atom,
@@ -154,13 +154,13 @@ def _changes(run: Machine, effects: CallEffects, certainly: bool = False) -> dic
             found[cell] = value
         if is_assigned:
             waiting += [((obj, field), field, True, True) for obj, field in _members(run, value)]
-    for name in every:
-        for cell in _never_set(run, name):
-            if not may_mean(run, effects.owners, cell):
-                continue
-            if name in written.assigned and may_mean(run, matters, cell) and not _is_number(run, cell, name):
-                return None
-            found[cell] = BOTTOM
+    for cell in _never_set(run, every):
+        name = name_of(cell)
+        if not may_mean(run, effects.owners, cell):
+            continue
+        if name in written.assigned and may_mean(run, matters, cell) and not _is_number(run, cell, name):
+            return None
+        found[cell] = BOTTOM
     return found
 
 
@@ -209,15 +209,18 @@ def _members(run: Machine, value: Value) -> Iterator[tuple[Obj, str]]:
                     yield atom, name
 
 
-def _never_set(run: Machine, name: str) -> Iterator[Cell]:
-    """Yield members, globals and static members of that name that nothing has set or read yet."""
-    owners: list[object] = [
-        obj
+def _never_set(run: Machine, names: frozenset[str]) -> Iterator[Cell]:
+    """Yield members, static members and globals of these names that nothing has set or read yet."""
+    static = run.names.static_members
+    cells: list[Cell] = [
+        (obj, name)
         for obj in list(run.objects.values())
-        if isinstance(declared := _declared(run, obj, name), Field) and not declared.static
+        for name in run.names.members(obj.cls) & names
+        if obj.cls not in static.get(name, ())
     ]
-    cells = [(owner, name) for owner in (*owners, *run.names.static_members.get(name, ()))]
-    cells += [(each, "") for each in run.names.globals.get(name, ())]
+    for name in names:
+        cells += [(cls, name) for cls in static.get(name, ())]
+        cells += [(each, "") for each in run.names.globals.get(name, ())]
     yield from (cell for cell in cells if run.store.get(cell) is None)
 
 
