@@ -297,7 +297,7 @@ class Reach:
 
     def _is_idle(self, function: Function) -> bool:
         owner = function.owner.rpartition("::")[2]
-        if not owner or owner in self.used or function in self.run.called:
+        if not owner or function.static or owner in self.used or function in self.run.called:
             return False
         self.idle.setdefault(owner, []).append(function)
         return True

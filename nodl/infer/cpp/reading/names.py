@@ -11,6 +11,7 @@ from typing import Any, Concatenate, NamedTuple, ParamSpec, TypeVar
 from nodl.infer.cpp.reading.declarations import Class, FileIndex, Function, Global, Scope
 from nodl.infer.cpp.reading.known_headers import KNOWN_HEADERS
 from nodl.infer.cpp.reading.type_names import POINTER_MEMBERS, Type, split_type
+from nodl.infer.cpp.syntax import text
 
 _WRAPPERS = frozenset({
     "std::shared_ptr", "std::unique_ptr", "std::weak_ptr", "std::optional", "boost::shared_ptr",
@@ -172,6 +173,23 @@ class Names:
                 if field.static:
                     found.setdefault(field.name, []).append(cls)
         return found
+
+    @cached_property
+    def operators(self) -> dict[str, list[Function]]:
+        """Return the operators that the program defines, by their signs: ``<<``; not those that convert."""
+        named = ((name.removeprefix("operator"), found) for name, found in self.functions_by_name.items()
+                 if name.startswith("operator"))  # fmt: skip
+        return {
+            sign: found for sign, found in named if sign and not sign[0].isalnum() and sign[0] not in " _"
+        }
+
+    @_once
+    def signs(self, function: Function) -> frozenset[str]:
+        """Return the signs of the program's operators that stand in a function."""
+        source = text(function.node)
+        return frozenset(
+            sign for sign in self.operators if (sign[0] if sign in ("()", "[]") else sign) in source
+        )
 
     @_once
     def spoken_of(self, function: Function) -> frozenset[str]:

@@ -27,8 +27,16 @@ from nodl.infer.cpp.running.constructors import cast, construct, is_plain_type, 
 from nodl.infer.cpp.running.containers import CONTAINER_METHODS, container_call, is_standard
 from nodl.infer.cpp.running.contents import handed_over
 from nodl.infer.cpp.running.invocation import CallSite, call_functions, call_values, pointed_to
+from nodl.infer.cpp.running.left_out import forget_writes
 from nodl.infer.cpp.running.machine import Frame, Machine, expression
-from nodl.infer.cpp.running.references import REFERRED_TO, forget, is_plain, keep_reference, through
+from nodl.infer.cpp.running.references import (
+    REFERRED_TO,
+    forget,
+    is_plain,
+    keep_reference,
+    leads_into,
+    through,
+)
 from nodl.infer.cpp.running.standard import CASTS, STANDARD, as_algorithm, may_write, writes_elements
 from nodl.infer.cpp.running.static_types import (
     GIVES_INNER,
@@ -41,7 +49,7 @@ from nodl.infer.cpp.running.static_types import (
     points_to_plain,
 )
 from nodl.infer.cpp.running.unknown_calls import changed_by_standard, unknown_call, without_source
-from nodl.infer.cpp.running.values import BOTTOM, Bound, Lambda, Obj, Unknown, Value, join, unknown
+from nodl.infer.cpp.running.values import BOTTOM, Atom, Bound, Lambda, Obj, Seq, Unknown, Value, join, unknown
 from nodl.infer.cpp.running.variables import member, variable
 from nodl.infer.cpp.syntax import Node, callee_name, field_of, text, unwrapped
 
@@ -253,7 +261,7 @@ def method_call(run: Machine, site: CallSite) -> Value:
         name = name.rpartition("::")[2]
     receiver = run.evaluate(subject, frame)
     if text(field_of(callee, "operator")) == "->":
-        receiver = pointed_to(run, receiver, "operator->", callee, frame)
+        receiver = join(*(_shown(atom) for atom in pointed_to(run, receiver, "operator->", callee, frame)))
     is_inner = name in GIVES_INNER and not site.given and any(isinstance(atom, Obj) for atom in receiver)
     if is_inner and not any(run.methods_of(atom, name) for atom in receiver):
         return receiver
@@ -290,6 +298,13 @@ def method_call(run: Machine, site: CallSite) -> Value:
         run.store.merge(alternatives)
         run.left = None
     return join(*found)
+
+
+def _shown(atom: Atom) -> Value:
+    """Return the objects that an iterator may show; anything else, also an iterator over texts, as it is."""
+    items = atom.items if isinstance(atom, Seq) and atom.place else ()
+    shown = join(*(items if isinstance(atom, Seq) and atom.open else items[:1]))
+    return shown if any(isinstance(each, Obj) for each in shown) else (atom,)
 
 
 def _could_make(run: Machine, receiver: Node, name: str, frame: Frame) -> bool:
@@ -415,11 +430,14 @@ def _on_unknown(run: Machine, atom: Unknown, name: str, site: CallSite) -> Value
     if kind.name not in ("", "auto") or not is_standard(name):
         run.resolve(node, frame)
     if (kind.name in ("", "auto") or is_own) and not is_standard(name):
-        every = (f for table in run.names.methods.values() for f in table.get(name, ()))
-        possible = [f for f in every if run.makes_interfaces(f)]
-        possible = [f for f in possible if len(values) <= len(f.parameters) + (9 if f.variadic else 0)]
-        if possible:
+        every = [f for table in run.names.methods.values() for f in table.get(name, ())]
+        possible = [f for f in every if len(values) <= len(f.parameters) + (9 if f.variadic else 0)]
+        owner = frame.owner_of(text(subject))
+        for each in possible if owner is not None and leads_into(owner.initial.get(text(subject))) else ():
+            forget_writes(run, each)
+        makes = next((f for f in possible if run.makes_interfaces(f)), None)
+        if makes is not None:
             which = f"which {name}() is called here is not known ({atom.why})"
-            run.gap(node, frame, f"{which}; {possible[0]} makes interfaces")
+            run.gap(node, frame, f"{which}; {makes} makes interfaces")
     handed_over(run, f"{text(subject)[:40]}->{name}()", values, node, frame)
     return unknown(f"the result of {name}()")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from nodl.infer.cpp.ledger import CREATES, Reach, makes_by_words
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES
-from nodl.infer.cpp.reading.declarations import Function
+from nodl.infer.cpp.reading.declarations import Function, type_text
 from nodl.infer.cpp.reading.names import Names
 from nodl.infer.cpp.reading.writes import FILLS, VariableWrites, written_by
 from nodl.infer.cpp.running.foreign import Leaving, leaving
@@ -51,7 +51,16 @@ class CallEffects:
         self._of = of
         # The variable that mattered and was known the last time; whether it is assigned, and changed.
         self.kept_by: tuple[Cell, bool, bool] | None = None
-        self.functions: frozenset[Function] = frozenset((*own, *Reach(run).from_words(words)))
+        self.functions = _with_operators(run, {*own, *Reach(run).from_words(words)})
+
+    @property
+    def may_hide_writes(self) -> bool:
+        """Return True if it may write to what no name tells: by a pointer to a member, or to a static variable of a
+        function that has not run.
+        """
+        return any(_BY_MEMBER.search(text(each.node)) for each in self.functions) or any(
+            _KEEPS.search(text(each.node)) for each in self.functions - self._run.called
+        )
 
     @cached_property
     def size(self) -> int:
@@ -134,6 +143,21 @@ class CallEffects:
         if isinstance(self._of, Lambda):
             own.append((self._of.frame.function, written_by(self._of.node)))
         return [(function, _with_passed(self._run, part)) for function, part in own]
+
+
+_BY_MEMBER = re.compile(r"->\*|\.\*")
+_KEEPS = re.compile(r"\{.*?\bstatic\b(?!\s+const)", re.DOTALL)
+
+
+def _with_operators(run: Machine, functions: set[Function]) -> frozenset[Function]:
+    """Return ``functions`` with the program's operators whose signs stand in them, and what these may call."""
+    found, waiting = set(functions), set(functions)
+    while waiting:
+        signs = frozenset[str]().union(*map(run.names.signs, waiting))
+        fresh = {each for sign in signs for each in run.names.operators[sign]} - found
+        waiting = fresh.union(*(Reach(run).from_words(each.words) for each in fresh)) - found
+        found |= waiting
+    return frozenset(found)
 
 
 def _with_passed(run: Machine, part: VariableWrites) -> VariableWrites:
@@ -221,10 +245,14 @@ def _taken_by(run: Machine, function: Function, index: int) -> int:
     return max(further, default=_CHANGED) or _CHANGED
 
 
+_PROXY = re.compile(r"auto|iterator|span|view|ref")
+
+
 def referred_to(function: Function) -> frozenset[str]:
     """Return the variables that a function gives references or pointers to."""
     declarator = field_of(function.node, "declarator")
-    if declarator is None or declarator.type not in ("reference_declarator", "pointer_declarator"):
+    refers = declarator is not None and declarator.type in ("reference_declarator", "pointer_declarator")
+    if not refers and not _PROXY.search(type_text(function.node)):
         return frozenset()
     returned = (each for each in walk(function.node) if each.type == "return_statement")
     return frozenset[str]().union(*map(words_in, returned))

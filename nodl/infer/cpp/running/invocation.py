@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import zip_longest
 
 from nodl.infer.cpp.libraries import IN_PLACE_OF_SOURCE, Call
 from nodl.infer.cpp.reading.declarations import Function, FunctionParameter, parameters_of, type_text
@@ -453,11 +454,11 @@ def write_back(
     frame: Frame,
 ) -> None:
     """Write what a function does to its reference parameters to the caller's variables."""
-    given = children(field_of(node, "arguments"))
-    for parameter, argument in zip(parameters, given, strict=False):
+    given = children(field_of(node, "arguments"))[: len(parameters)]
+    for parameter, argument in zip_longest(parameters, given):
         if not parameter.written_back:
             continue
-        target = unwrapped(argument)
+        target = unwrapped(argument or parameter.default)
         if target is not None and text(target).startswith("&"):
             target = unwrapped(field_of(target, "argument"))
         value = left.get(parameter.name)

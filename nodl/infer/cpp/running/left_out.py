@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
+from itertools import zip_longest
 
 from nodl.infer.cpp.reading.declarations import Class, Field, Function, Global, type_text
 from nodl.infer.cpp.running.assignments import assign
@@ -59,7 +60,7 @@ def leave_out(run: Machine, function: Function, values: Sequence[Value], node: N
     effects = effects_of(run, function)
     if effects.size < LEAST_SIZE or not effects.only_variables or not _is_unused(run, function, node):
         return False
-    if not run.store.callables.keys().isdisjoint(effects.words):
+    if not run.store.callables.keys().isdisjoint(effects.words) or effects.may_hide_writes:
         return False
     if any(
         holds_callable(atom) or (isinstance(atom, Obj) and atom.node is not None)
@@ -95,23 +96,23 @@ def _is_unused(run: Machine, function: Function, call: Node) -> bool:
     return not kind.pointer and (_NUMBERS.fullmatch(kind.name) is not None or kind.last in run.names.enums)
 
 
-def forget_writes(run: Machine, closure: Lambda) -> bool | None:
-    """Make all that a closure may write unknown, instead of running it.
+def forget_writes(run: Machine, of: Function | Lambda) -> bool | None:
+    """Make all that a function or closure may write unknown, instead of running it.
 
     Returns:
         Whether anything was known before; ``None`` if it may write to what nobody knows by name.
     """
-    effects = effects_of(run, closure)
+    effects = effects_of(run, of)
     changes = _changes(run, effects, certainly=True)
     if changes is None:
         return None
-    for name in effects.written.assigned | effects.written.changed:
-        owner = closure.frame.owner_of(name)
+    for name in effects.written.assigned | effects.written.changed if isinstance(of, Lambda) else ():
+        owner = of.frame.owner_of(name) if isinstance(of, Lambda) else None
         value = run.store.get((owner, name)) if owner is not None else None
         if owner is not None and value and _would_change(value, True, True):
             changes[owner, name] = value
     for cell, value in changes.items():
-        run.store.set(cell, join(value, unknown("what a callback may have written")))
+        run.store.set(cell, join(value, unknown("what a call that is not followed may have written")))
     return bool(changes)
 
 
@@ -253,12 +254,14 @@ def _of_objects(value: Value, containers: bool) -> bool:
 def _targets(function: Function, node: Node) -> list[Node | None]:
     """Return the caller's variables that the call may write to; ``None`` for one that is no plain variable."""
     found: list[Node | None] = []
-    for parameter, argument in zip(function.parameters, children(field_of(node, "arguments")), strict=False):
-        target = unwrapped(argument) if parameter.written_back else None
+    given = children(field_of(node, "arguments"))
+    for parameter, argument in zip_longest(function.parameters, given[: len(function.parameters)]):
+        if not parameter.written_back:
+            continue
+        target = unwrapped(argument)  # without an argument: what stands for it by default
         if target is not None and text(target).startswith("&"):
             target = unwrapped(field_of(target, "argument"))
-        if parameter.written_back:
-            found.append(target if target is not None and target.type in (*_VARIABLES, "this") else None)
+        found.append(target if target is not None and target.type in (*_VARIABLES, "this") else None)
     return found
 
 

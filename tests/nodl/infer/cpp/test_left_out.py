@@ -252,3 +252,60 @@ def test_what_is_written_outside_of_objects_is_never_taken_for_the_earlier_value
     body = f"{reads} change(); create_publisher<std_msgs::msg::String>({name}, 1);"
     system = infer(tmp_path, in_class(body, f"{MEMBERS} {method}", before=before))
     assert names(system) != ["a"] or gaps(system)
+
+
+PUB = "create_publisher<std_msgs::msg::String>({}, 1);"
+NOT_BY_NAME = {
+    "by a pointer to a member": (
+        "", 'void go(std::string Self::* m) { this->*m = "b"; }', "go(&Self::topic);", "topic",
+    ),
+    "by an operator": (
+        "struct C { std::string t = \"a\"; C & operator<<(const char * x) { t = x; return *this; } };",
+        'C c; void go() { c << "b"; }', "go();", "c.t",
+    ),
+    "to a static variable of a function": (
+        'std::string & kept() { static std::string s = "a"; return s; }',
+        'void go() { kept() = "b"; }', "go();", "kept()",
+    ),
+    "to an object that a static method gives": (
+        'struct G { std::string t = "a"; static G & get() { static G g; return g; } };',
+        'void go() { G::get().t = "b"; }', "go();", "G::get().t",
+    ),
+    "to a default argument": (
+        'std::string g = "a"; void set(std::string & s = g) { s = "b"; }', "", "set();", "g",
+    ),
+    "by a method of what an iterator shows": (
+        'struct C { std::string t = "a"; void up() { t = "b"; } };',
+        "std::vector<C> l{C{}}; void go() { for (auto it = l.begin(); it != l.end(); ++it) { it->up(); } }", "go();",
+        "l[0].t",
+    ),
+    "through an iterator that a method gives": (
+        "", 'std::vector<std::string>::iterator first() { return list.begin(); } void go() { *first() = "b"; }',
+        "go();", "list[0]",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("size", [0, 3_000], ids=["left out", "run"])
+@pytest.mark.parametrize(("before", "members", "body", "name"), NOT_BY_NAME.values(), ids=NOT_BY_NAME)
+def test_a_write_that_no_name_tells_is_never_overlooked(
+    before: str,
+    members: str,
+    body: str,
+    name: str,
+    size: int,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("nodl.infer.cpp.running.left_out.LEAST_SIZE", size)
+    source = in_class(body + PUB.format(name), f"{MEMBERS} {members}", before=before).replace("Self", "Demo")
+    system = infer(tmp_path, source)
+    assert names(system) != ["a"] or gaps(system)
+
+
+def test_a_callback_follows_a_static_method_of_a_class_that_nobody_makes(tmp_path: Path) -> None:
+    made = PUB.format('"late"')
+    before = f"struct Helper {{ static void make(rclcpp::Node * n) {{ n->{made} }} }};"
+    members = "void tick() { more(); } void more() { Helper::make(this); }"
+    system = infer(tmp_path, in_class(LATER, f"{MEMBERS} {members}", before=before))
+    assert (names(system), gaps(system)) == (["late"], [])
