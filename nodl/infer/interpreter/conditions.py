@@ -205,8 +205,9 @@ def sides_of(
     What is made where a launch decides in a way that no condition says is a gap, until a launch decides.
     """
     held = {holds: conditions_of(run, test, holds, frame) for holds in (True, False)}
-    asks = not all(held.values()) and _reads_parameter(run, test, frame)
-    run.asks_launch = run.asks_launch or asks
+    read = [] if all(held.values()) else [*filter(is_of_launch, _read_in(run, test, frame))]
+    asks = not all(map(_is_only_if_set, read))  # the names that such a text makes say so themselves
+    run.asks_launch = run.asks_launch or bool(read)
 
     def side(holds: bool) -> T:
         made = run.findings.made
@@ -221,9 +222,10 @@ def sides_of(
     return joined, [partial(side, True), partial(side, False)]
 
 
-def _reads_parameter(run: Run, test: ast.expr, frame: Frame) -> bool:
-    """Return whether a variable, a field or a call in ``test`` gives what a parameter or the node's name decides."""
-    return any(map(is_of_launch, _read_in(run, test, frame)))
+def _is_only_if_set(text: object) -> bool:
+    """Return whether a text is a parameter that a program uses only if launch sets it: else it has no value."""
+    asked = input_of(text)
+    return asked is not None and any(method == "only if set" for method, _ in asked.edits)
 
 
 def reads_one_of_several(run: Run, test: ast.expr, frame: Frame) -> bool:

@@ -50,6 +50,7 @@ def _once(
     return update_wrapper(ask, method)
 
 
+_STATIC = re.compile(r"\bstatic\b(?!\s+const)")
 _PLAIN = re.compile(
     r"(?:const\s+)?(?:std::)?(?:(?:string|char|u?int\d*(?:_t)?|bool|size_t|double|float)|"
     r"(?:vector|(?:unordered_)?(?:map|set)|list|array|deque|optional)<.*>)"
@@ -190,6 +191,17 @@ class Names:
         return frozenset(
             sign for sign in self.operators if (sign[0] if sign in ("()", "[]") else sign) in source
         )
+
+    @_once
+    def has_member_pointers(self, function: Function) -> bool:
+        """Return whether a function uses pointers to members: ``object->*pointer``."""
+        source = text(function.node)
+        return "->*" in source or ".*" in source
+
+    @_once
+    def has_static_variables(self, function: Function) -> bool:
+        """Return whether a function has static variables that are not constant."""
+        return _STATIC.search(text(function.body)) is not None
 
     @_once
     def spoken_of(self, function: Function) -> frozenset[str]:

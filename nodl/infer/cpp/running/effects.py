@@ -58,9 +58,15 @@ class CallEffects:
         """Return True if it may write to what no name tells: by a pointer to a member, or to a static variable of a
         function that has not run.
         """
-        return any(_BY_MEMBER.search(text(each.node)) for each in self.functions) or any(
-            _KEEPS.search(text(each.node)) for each in self.functions - self._run.called
-        )
+        return self._writes_by_member or not self._keeping <= self._run.called
+
+    @cached_property
+    def _writes_by_member(self) -> bool:
+        return any(map(self._run.names.has_member_pointers, self.functions))
+
+    @cached_property
+    def _keeping(self) -> frozenset[Function]:
+        return frozenset(filter(self._run.names.has_static_variables, self.functions))
 
     @cached_property
     def size(self) -> int:
@@ -145,17 +151,14 @@ class CallEffects:
         return [(function, _with_passed(self._run, part)) for function, part in own]
 
 
-_BY_MEMBER = re.compile(r"->\*|\.\*")
-_KEEPS = re.compile(r"\{.*?\bstatic\b(?!\s+const)", re.DOTALL)
-
-
 def _with_operators(run: Machine, functions: set[Function]) -> frozenset[Function]:
     """Return ``functions`` with the program's operators whose signs stand in them, and what these may call."""
     found, waiting = set(functions), set(functions)
     while waiting:
         signs = frozenset[str]().union(*map(run.names.signs, waiting))
         fresh = {each for sign in signs for each in run.names.operators[sign]} - found
-        waiting = fresh.union(*(Reach(run).from_words(each.words) for each in fresh)) - found
+        words = frozenset[str]().union(*(each.words for each in fresh))
+        waiting = (fresh.union(Reach(run).from_words(words)) if fresh else fresh) - found
         found |= waiting
     return frozenset(found)
 
