@@ -106,11 +106,12 @@ def forget_writes(run: Machine, of: Function | Lambda) -> bool | None:
     changes = _changes(run, effects, certainly=True)
     if changes is None:
         return None
-    for name in effects.written.assigned | effects.written.changed if isinstance(of, Lambda) else ():
-        owner = of.frame.owner_of(name) if isinstance(of, Lambda) else None
-        value = run.store.get((owner, name)) if owner is not None else None
-        if owner is not None and value and _would_change(value, True, True):
-            changes[owner, name] = value
+    if isinstance(of, Lambda):
+        for name in effects.written.assigned | effects.written.changed:
+            owner = of.frame.owner_of(name)
+            value = run.store.get((owner, name)) or BOTTOM
+            if value and _would_change(value, True, True):
+                changes[owner, name] = value
     for cell, value in changes.items():
         run.store.set(cell, join(value, unknown("what a call that is not followed may have written")))
     return bool(changes)
