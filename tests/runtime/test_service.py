@@ -339,11 +339,11 @@ def test_events_of_all_kinds_in_a_live_run(tmp_path: Path) -> None:
             target_action=first, on_stdout=lambda event: LogInfo(msg=f"output {event.text}"))),
         RegisterEventHandler(OnProcessExit(
             target_action=first, on_exit=lambda event, context: LogInfo(msg=f"exit {event.returncode}"))),
-        RegisterEventHandler(OnExecutionComplete(target_action=first, on_completion=[LogInfo(msg="complete")])),
+        RegisterEventHandler(OnExecutionComplete(target_action=first, on_completion=[
+            LogInfo(msg="complete"), TimerAction(period=0.1, actions=[Shutdown(reason="enough")])])),
         RegisterEventHandler(OnShutdown(on_shutdown=lambda event, context: LogInfo(msg=f"end: {event.reason}"))),
         first,
         OpaqueCoroutine(coroutine=later),
-        TimerAction(period=0.8, actions=[Shutdown(reason="enough")]),
         TimerAction(period=60.0, actions=[LogInfo(msg="never")]),
     """
     status, lines = finished(tmp_path, f"*({actions})", prelude=prelude)
