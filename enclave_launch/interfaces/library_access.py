@@ -188,15 +188,18 @@ _FILTER_INFO = ("costmap_filter_info_server", "nav2_map_server::CostmapFilterInf
 
 
 def _masks(evaluation: Evaluation) -> Iterator[tuple[str, str]]:
-    """Yield what servers of filter info tell (nav2_map_server, costmap_filter_info_server.cpp)."""
+    """Yield the topic of each server of filter info, and the mask's topic that it publishes there.
+
+    Source: nav2_map_server, costmap_filter_info_server.cpp.
+    """
     started: list[ResolvedProcess | ResolvedComponent] = [*evaluation.processes, *evaluation.components]
     for item in started:
         program = item.executable if isinstance(item, ResolvedProcess) else item.plugin
         if item.package == "nav2_map_server" and program in _FILTER_INFO:
             situation = StartedProgram(item, None, evaluation.distro).situation(_FILTER_INFO[0])
-            told_on = str(situation.parameters.get("filter_info_topic", "costmap_filter_info"))
-            with contextlib.suppress(InvalidNameError):  # rcl refuses it, so that nothing is told
-                yield situation.remap(told_on), str(situation.parameters.get("mask_topic", "filter_mask"))
+            info = str(situation.parameters.get("filter_info_topic", "costmap_filter_info"))
+            with contextlib.suppress(InvalidNameError):  # rcl refuses it: nothing is published
+                yield situation.remap(info), str(situation.parameters.get("mask_topic", "filter_mask"))
 
 
 def _robot_description(evaluation: Evaluation) -> str:

@@ -162,8 +162,11 @@ class Spawned(NamedTuple):
 
 
 class Launched(NamedTuple):
-    """What else the launch starts, as far as this node depends on it. ``robot_description``: the URDF that a node has
-    as its parameter. ``masks``: of costmap filters, the final topic of the filter info and the mask's as told there."""
+    """What else the launch starts, as far as this node depends on it.
+
+    ``robot_description``: the URDF that a node has as its parameter. ``masks``: of costmap filters, the final topic of
+    the filter info and the mask's topic in that message.
+    """
 
     robot_description: str = ""
     spawned: tuple[Spawned, ...] = ()

@@ -69,6 +69,12 @@ def words_in(node: Node) -> frozenset[str]:
     return frozenset(_WORD.findall(text(node)))
 
 
+def addressed(node: Node | None) -> Node | None:
+    """Return ``x`` of ``&x`` and of ``(x)``, any other expression as it is."""
+    inner = unwrapped(node)
+    return unwrapped(field_of(inner, "argument")) if text(inner).startswith("&") else inner
+
+
 def line_of(node: Node) -> int:
     """Return the line that ``node`` begins in, counted from 1."""
     return int(node.start_point[0]) + 1

@@ -1,4 +1,4 @@
-"""What a build says that each target is compiled with. Reads files.
+"""The definitions that a build compiles each target with. Reads files.
 
 CMake leaves the ``flags.make`` of each target below ``build/<package>``, where colcon has it build with make.
 """

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cached_property, update_wrapper
+from itertools import chain
 from typing import Any, Concatenate, NamedTuple, ParamSpec, TypeVar
 
-from nodl.infer.cpp.reading.declarations import Class, FileIndex, Function, Global, Scope
+from nodl.infer.cpp.reading.declarations import Class, Field, FileIndex, Function, Global, Scope
 from nodl.infer.cpp.reading.known_headers import KNOWN_HEADERS
 from nodl.infer.cpp.reading.type_names import POINTER_MEMBERS, Type, split_type
 from nodl.infer.cpp.syntax import text
@@ -159,21 +160,24 @@ class Names:
     def pointers_to_plain(self) -> dict[str, set[str]]:
         """Return the members that are pointers or references to texts, numbers or containers, with their classes."""
         found: dict[str, set[str]] = {}
-        for cls in (each for listed in self.classes.values() for each in listed):
-            for field in cls.fields.values():
-                if field.pointer and _PLAIN.fullmatch(field.type):
-                    found.setdefault(field.name, set()).add(cls.name)
+        for cls, field in self._data_members():
+            if field.pointer and _PLAIN.fullmatch(field.type):
+                found.setdefault(field.name, set()).add(cls.name)
         return found
 
     @cached_property
     def static_members(self) -> dict[str, list[Class]]:
         """Return the names of static data members, with the classes that have them."""
         found: dict[str, list[Class]] = {}
-        for cls in (each for listed in self.classes.values() for each in listed):
-            for field in cls.fields.values():
-                if field.static:
-                    found.setdefault(field.name, []).append(cls)
+        for cls, field in self._data_members():
+            if field.static:
+                found.setdefault(field.name, []).append(cls)
         return found
+
+    def _data_members(self) -> Iterator[tuple[Class, Field]]:
+        for cls in chain.from_iterable(self.classes.values()):
+            for field in cls.fields.values():
+                yield cls, field
 
     @cached_property
     def operators(self) -> dict[str, list[Function]]:

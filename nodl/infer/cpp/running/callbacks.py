@@ -13,7 +13,7 @@ from nodl.infer.cpp.reading.declarations import Class
 from nodl.infer.cpp.running.effects import effects_of, looked_at
 from nodl.infer.cpp.running.invocation import HOOKS, call_lambda, invoke
 from nodl.infer.cpp.running.left_out import forget_writes
-from nodl.infer.cpp.running.machine import NEXT, Frame, Machine, is_new_since
+from nodl.infer.cpp.running.machine import NEXT, Frame, Machine
 from nodl.infer.cpp.running.memory import Reads, name_of
 from nodl.infer.cpp.running.values import (
     BOTTOM,
@@ -35,6 +35,7 @@ PATIENCE = 3
 """Rounds after which a variable that callbacks still change counts as not known."""
 MAX_ROUNDS = 32
 MAX_CALLERS = 8
+"""For which a closure runs that leads to no interface; what it may write for further ones is not known."""
 Key = tuple[object, object]
 
 
@@ -203,12 +204,8 @@ def _makes(run: Machine, atom: object) -> bool:
 
 def _widen(run: Machine, mark: int, steps: int, give_up: bool) -> None:
     """Widen lists that grow: they lose their order and length; in the end what still changes is not known."""
-    earlier = run.store.before(mark)
-    for cell, value in run.store.changes(mark).items():
-        before = earlier[cell]
-        if set(before) == set(value) or is_new_since(steps, cell):
-            continue
-        value = in_any_order(value)
+    for cell, before, present in [*run.moved(mark, steps)]:
+        value = in_any_order(present)
         run.store.set(cell, join(*(_settled(atom, before) for atom in value)) if give_up else value)
 
 

@@ -416,7 +416,7 @@ def pointer(run: Machine, node: Node, frame: Frame) -> Value:
 
 
 def _is_kept(address: Node) -> bool:
-    """Return whether somebody keeps an address: ``p = &a``, ``return &a``, ``{&a, &b}``, ``list.push_back(&a)``."""
+    """Return whether an address is stored: ``p = &a``, ``return &a``, ``{&a, &b}``, ``list.push_back(&a)``."""
     parent = address.parent
     call = parent.parent if parent is not None and parent.type == "argument_list" else None
     callee = field_of(call, "function") if call is not None else None

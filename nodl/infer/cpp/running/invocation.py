@@ -25,7 +25,16 @@ from nodl.infer.cpp.running.static_types import declared_type, given_to
 from nodl.infer.cpp.running.unknown_calls import may_be_written as may_be_written
 from nodl.infer.cpp.running.unknown_calls import unknown_call
 from nodl.infer.cpp.running.values import Bound, Lambda, Obj, Seq, Value, join, join_in_doubt, unknown
-from nodl.infer.cpp.syntax import Node, children, field_of, template_arguments, text, unwrapped, words_in
+from nodl.infer.cpp.syntax import (
+    Node,
+    addressed,
+    children,
+    field_of,
+    template_arguments,
+    text,
+    unwrapped,
+    words_in,
+)
 
 
 @dataclass(eq=False)
@@ -458,9 +467,7 @@ def write_back(
     for parameter, argument in zip_longest(parameters, given):
         if not parameter.written_back:
             continue
-        target = unwrapped(argument or parameter.default)
-        if target is not None and text(target).startswith("&"):
-            target = unwrapped(field_of(target, "argument"))
+        target = addressed(argument or parameter.default)
         value = left.get(parameter.name)
         if target is None or value is None:
             continue

@@ -30,7 +30,7 @@ from nodl.infer.cpp.running.values import (
     may_name,
     unknown,
 )
-from nodl.infer.cpp.syntax import Node, children, field_of, text, unwrapped
+from nodl.infer.cpp.syntax import Node, addressed, children, field_of
 
 LEAST_SIZE = 3_000
 """Bytes of source, with everything that it may call, from which on leaving a call out is worth its look."""
@@ -100,7 +100,7 @@ def forget_writes(run: Machine, of: Function | Lambda) -> bool | None:
     """Make all that a function or closure may write unknown, instead of running it.
 
     Returns:
-        Whether anything was known before; ``None`` if it may write to what nobody knows by name.
+        Whether anything was known before; ``None`` if a pointer hides what it writes to.
     """
     effects = effects_of(run, of)
     changes = _changes(run, effects, certainly=True)
@@ -259,9 +259,7 @@ def _targets(function: Function, node: Node) -> list[Node | None]:
     for parameter, argument in zip_longest(function.parameters, given[: len(function.parameters)]):
         if not parameter.written_back:
             continue
-        target = unwrapped(argument)  # without an argument: what stands for it by default
-        if target is not None and text(target).startswith("&"):
-            target = unwrapped(field_of(target, "argument"))
+        target = addressed(argument)  # without an argument: what stands for it by default
         found.append(target if target is not None and target.type in (*_VARIABLES, "this") else None)
     return found
 

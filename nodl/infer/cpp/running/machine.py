@@ -6,7 +6,7 @@ libraries. A place that was run is noted; the ledger later asks about every othe
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import chain
 from typing import TYPE_CHECKING, Protocol, TypeVar
@@ -217,6 +217,17 @@ class Machine:
         """Begin a call: its variables are new."""
         frame.active, frame.mark, frame.started = True, self.store.mark(), self.steps
 
+    def moved(self, mark: int, steps: int) -> Iterator[tuple[Cell, Value, Value]]:
+        """Yield each variable that has another value than at ``mark``, with that value and the present one.
+
+        Not those of calls that began after ``steps``: each call has new ones.
+        """
+        before = self.store.before(mark)
+        for cell, value in self.store.changes(mark).items():
+            is_new = isinstance(cell[0], Frame) and cell[0].started > steps
+            if not is_new and set(before[cell]) != set(value):
+                yield cell, before[cell], value
+
     def settle(self, mark: int, alternatives: list[Changes], going: bool) -> None:
         """Join what left early with the present state, if that is reached at all."""
         if not alternatives:
@@ -387,10 +398,10 @@ _CALLS_ALL = frozenset({"fold_expression", "co_await_expression", "generic_expre
 
 @dataclass(eq=False)
 class Loop:
-    """``continue`` ends an iteration, begun at ``mark``; ``break`` the loop, begun at ``start`` and this step."""
+    """``continue`` ends an iteration, begun at ``mark``; ``break`` the loop, begun at ``start``."""
 
     start: int
-    steps: int
+    steps: int  # at its begin
     mark: int = 0
     breaks: list[Changes] = field(default_factory=list)
     continues: list[Changes] = field(default_factory=list)
@@ -414,7 +425,7 @@ class Frame:
     returned: Value = BOTTOM
     exits: list[Changes] = field(default_factory=list)
     mark: int = 0
-    started: int = 0  # at which step
+    started: int = 0  # the step that it began at
     loops: list[Loop] = field(default_factory=list)
     blocks: list[dict[str, tuple[bool, Value, str | None, Node | None]]] = field(default_factory=list)
     """For each block that runs: what names that it declares stood for before."""
@@ -438,8 +449,3 @@ class Frame:
                 return frame.kept[name]
             frame = frame.outer
         return None
-
-
-def is_new_since(steps: int, cell: Cell) -> bool:
-    """Return whether it is a variable of a call that began after so many steps, which nobody saw before."""
-    return isinstance(cell[0], Frame) and cell[0].started > steps

@@ -116,11 +116,11 @@ def _is_fixed(target: Node) -> bool:
 def forget(
     run: Machine, what: Node, frame: Frame, why: str = "", written: Value = BOTTOM, told: bool = True
 ) -> None:
-    """Make what ``what`` may lead to unknown: somebody writes to it, or to a part of it.
+    """Make the variables unknown that ``what`` may refer to: they, or parts of them, are written.
 
     Args:
-        written: Objects among it may be elements afterwards.
-        told: It is a gap if ``what`` leads to no variable.
+        written: What is written: objects among it may be elements afterwards.
+        told: Whether to add a gap if ``what`` refers to no known variable.
     """
     why = why or f"what is written to {text(what)[:40]}"
     cells = dict.fromkeys(_behind(run, what, frame, set()))
@@ -143,13 +143,13 @@ def forget(
 
 
 def keep_reference(run: Machine, what: Node, frame: Frame) -> None:
-    """Make the variable that ``what`` is unknown from now on: somebody keeps a reference to it, and may write to it."""
+    """Make the variable ``what`` unknown from now on: a reference to it is stored, and may be written through."""
     why = f"what is written through a reference to {text(what)[:40]}"
     run.store.share(partial(forget, run, what, frame, why, told=False), unknown(why))
 
 
 def through(run: Machine, what: Node, frame: Frame) -> None:
-    """Add a gap: somebody writes to a plain value through ``what``, and it is not known to which."""
+    """Add a gap: a plain value is written through ``what``, and it is not known which."""
     run.gap(what, frame, f"what {text(what)[:40]} refers to is written: which variable that is is not known")
 
 

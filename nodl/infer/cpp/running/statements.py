@@ -24,7 +24,6 @@ from nodl.infer.cpp.running.machine import (
     Loop,
     Machine,
     StatementHandler,
-    is_new_since,
     statement,
 )
 from nodl.infer.cpp.running.memory import Changes
@@ -552,17 +551,14 @@ def _forget_order(run: Machine, body: Node | None, loop: Loop) -> bool:
     Returns:
         Whether another turn may make something else of it.
     """
-    before, found, kept = run.store.before(loop.start), False, body is not None and run.subtree_matters(body)
-    for cell, value in run.store.changes(loop.start).items():
-        if is_new_since(loop.steps, cell):
-            continue
-        both = (*before[cell], *value)
-        changed = before[cell] != BOTTOM and set(before[cell]) != set(value)
-        if changed and any(isinstance(atom, Text | int | float) for atom in both):
+    found, kept = False, body is not None and run.subtree_matters(body)
+    for cell, before, value in [*run.moved(loop.start, loop.steps)]:
+        both = (*before, *value)
+        if before != BOTTOM and any(isinstance(atom, Text | int | float) for atom in both):
             rest = tuple(atom for atom in both if not isinstance(atom, Text | int | float))
             run.store.set(cell, join(rest, unknown("a value that a loop in any order changes")))
             found = True
-        elif changed and any(isinstance(atom, Seq | Map | Group) for atom in value):
+        elif before != BOTTOM and any(isinstance(atom, Seq | Map | Group) for atom in value):
             run.store.set(cell, in_any_order(value))
             kept = True
     return found and kept
@@ -666,16 +662,9 @@ def _repeated(
             return outcome
 
         returns |= run.branches([once, lambda: NEXT]) & RETURN
-        before = run.store.before(mark)
-        changes = run.store.changes(mark).items()
-        moved = {
-            cell: value
-            for cell, value in changes
-            if set(before[cell]) != set(value) and not is_new_since(loop.steps, cell)
-        }
+        moved = [*run.moved(mark, loop.steps)]
         if not moved:
             break
-        if round_ >= MAX_ROUNDS - 1:
-            for cell, value in moved.items():
-                run.store.set(cell, join(before[cell], unknown("a value that changes in a loop")) or value)
+        for cell, before, _ in moved if round_ >= MAX_ROUNDS - 1 else ():
+            run.store.set(cell, join(before, unknown("a value that changes in a loop")))
     return returns

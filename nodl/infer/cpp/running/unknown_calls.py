@@ -24,7 +24,7 @@ from nodl.infer.cpp.running.values import (
     may_name,
     unknown,
 )
-from nodl.infer.cpp.syntax import Node, field_of, text, unwrapped
+from nodl.infer.cpp.syntax import Node, addressed, text
 
 
 def without_source(
@@ -109,9 +109,7 @@ def may_be_written(
             if is_plain(held) and may_name(held) and not any(isinstance(each, Unknown) for each in held):
                 run.store.set((atom, field), join(held, why))
     for each in given:
-        target = unwrapped(each)
-        if target is not None and target.type == "pointer_expression" and text(target).startswith("&"):
-            target = field_of(target, "argument")
+        target = addressed(each)
         if target is None or target.type not in ("identifier", "field_expression"):
             continue
         owner = frame.owner_of(text(target))
