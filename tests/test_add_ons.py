@@ -54,7 +54,7 @@ NEEDS: dict[str, tuple[str, ...]] = {
 
 def copy_without(removed: tuple[str, ...], folder: Path) -> Path:
     for package in PACKAGES:
-        shutil.copytree(ROOT / package, folder / package, ignore=shutil.ignore_patterns("__pycache__"))
+        shutil.copytree(ROOT / package, folder / package)
     for path in removed:
         found = folder / path
         assert found.exists(), f"{path} has moved: name what the add-on is now"

@@ -57,15 +57,16 @@ class Printed(NamedTuple):
         return f"{self.where}: {' '.join(self.words)}"
 
 
-def messages() -> Iterator[tuple[str, str]]:
+def messages(*folders: str) -> Iterator[tuple[str, str]]:
     """Yield the texts of our sources, with something in place of what is filled in."""
-    for file in (file for package in PACKAGES for file in sorted((ROOT / package).rglob("*.py"))):
+    for file in (file for folder in folders for file in sorted((ROOT / folder).rglob("*.py"))):
+        name = file.relative_to(ROOT)
         tree = ast.parse(file.read_text(encoding="utf-8"))
         inner = {
             id(part) for node in ast.walk(tree) if isinstance(node, ast.JoinedStr) for part in ast.walk(node)
         }
         for node in ast.walk(tree):
-            place = f"{file.relative_to(ROOT)}:{getattr(node, 'lineno', 0)}"
+            place = f"{name}:{getattr(node, 'lineno', 0)}"
             if isinstance(node, ast.JoinedStr):
                 parts = (part.value if isinstance(part, ast.Constant) else FILLED_IN for part in node.values)
                 yield place, "".join(map(str, parts))
@@ -85,7 +86,7 @@ def pages() -> Iterator[tuple[str, str]]:
 
 
 def printed() -> Iterator[Printed]:
-    for where, text in (*messages(), *pages()):
+    for where, text in (*messages(*PACKAGES), *pages()):
         for line in re.sub(r"\\\n *", " ", text).splitlines():
             for found in _NAME.finditer(line):
                 yield from _command(where, found[1], line[found.end() :])
@@ -165,8 +166,7 @@ def test_every_option_in_a_remedy_is_one_of_our_commands(folder: str) -> None:
     }
     named = {
         (where, option)
-        for where, text in messages()
-        if where.startswith(f"enclave_launch/{folder}/")
+        for where, text in messages(f"enclave_launch/{folder}")
         for option in re.findall(r"(?<![\w-])--[a-z][a-z-]+", text)
     }
     assert named and [each for each in named if each[1] not in known | OF_OTHERS] == []

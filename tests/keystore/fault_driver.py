@@ -33,7 +33,7 @@ from tests.keystore.kit import filled, options, policy
 
 KILLED = 97
 REPORTED = 3
-NAMES = tuple(f"/robot{number % 5}/node{number}" for number in range(50))
+NAMES = tuple(f"/robot{number % 5}/node{number}" for number in range(12))
 _STEPS = {"open", "os.mkdir", "os.rename", "os.symlink", "os.remove", "os.rmdir", "os.chmod"}
 _ERRORS = {"full": errno.ENOSPC, "read-only": errno.EROFS}
 

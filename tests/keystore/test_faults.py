@@ -24,7 +24,7 @@ from tests.keystore.fault_driver import KILLED, NAMES, REPORTED, install_fault, 
 from tests.keystore.kit import contents, filled, options, policy, snapshot
 
 HERE = Path(__file__).parents[2]
-# Each enclave of a 50-enclave run takes the same steps: by default the first and last steps of the run and an
+# Each enclave of a run of twelve takes the same steps: by default the first and last steps of the run and an
 # even sample between are tried, with EVERY_FAULT=1 all of them (minutes).
 EVERY = os.environ.get("EVERY_FAULT") == "1"
 DENSE, SAMPLE = 24, 12
