@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from nodl.infer.cpp.reading.declarations import Class, Field, FileIndex, Function
 from nodl.infer.cpp.reading.type_names import POINTER_MEMBERS
-from nodl.infer.cpp.syntax import Node, field_of, line_of, text
+from nodl.infer.cpp.syntax import Node, field_of, line_of, text, words_in
 from nodl.source_ref import SourceRef
 
 if TYPE_CHECKING:
@@ -261,8 +261,9 @@ def reachable_functions(run: Machine) -> set[Function]:
 class Reach:
     """What can be called, by name. A method counts when its class, or one derived from it, is made or spoken of."""
 
-    def __init__(self, run: Machine):
-        self.run = run
+    def __init__(self, run: Machine, operators: bool = False):
+        """``operators``: those count, too, whose signs stand in what is reached."""
+        self.run, self.operators = run, operators
         self.by_name = run.names.functions_by_name
         self.mentioned: set[str] = set()
         self.used: set[str] = set()
@@ -281,6 +282,15 @@ class Reach:
         ]
         self.followed = True
         return set(self._each())
+
+    def from_code(self, code: Function | Node) -> Iterator[Function]:
+        """Yield a function, or none for a closure, and those reachable from it; without the made objects' own hooks."""
+        if isinstance(code, Function):
+            self.waiting.append(code)
+        else:
+            self._mention(words_in(code))
+            self._sign(self.run.names.signs_in(code))
+        yield from self._each()
 
     def from_words(self, words: Iterable[str]) -> Iterator[Function]:
         """Yield functions reachable from one that mentions ``words``, without the made objects' own hooks."""
@@ -305,6 +315,8 @@ class Reach:
     def _visit(self, function: Function) -> None:
         if not self.followed or function not in self.run.called:
             self._mention(self.run.names.spoken_of(function))
+            if self.operators:
+                self._sign(self.run.names.signs(function))
             return
         calls, types = open_words(self.run, function, self.by_name)
         self._mention(calls)
@@ -312,14 +324,19 @@ class Reach:
             if name in self.run.names.classes:
                 self._use(name)
 
+    def _sign(self, signs: Iterable[str]) -> None:
+        for sign in signs:
+            self.waiting += self.run.names.operators[sign]
+
     def _mention(self, words: Iterable[str]) -> None:
         for word in words:
             if word in self.mentioned:
                 continue
             self.mentioned.add(word)
             self.waiting += self.by_name.get(word, ())
-            if word in self.run.names.classes:
-                self._use(word)
+            last = word.rpartition("::")[2]
+            if last in self.run.names.classes and (last == word or word in self.run.names.named_as_messages):
+                self._use(last)
             if word not in POINTER_MEMBERS:  # a pointer makes nothing of what it points to
                 for alias in self.run.names.aliases.get(word, ()):
                     self._mention(_WORD.findall(alias.target))

@@ -18,7 +18,7 @@ _LITERAL = re.compile(r'"(?:\\.|[^"\\\n])*"')
 Scope = tuple[str, ...]  # namespaces and classes around a declaration
 
 
-_MENTIONED = re.compile(r"[A-Za-z_]\w*\b(?!\s*::(?!\s*(?:make_|[Cc]reate|Make)))")
+_MENTIONED = re.compile(r"\b(?:msg|srv|action)::\w+|[A-Za-z_]\w*\b(?!\s*::(?!\s*(?:make_|[Cc]reate|Make)))")
 _NUMBERS = frozenset({
     "bool", "int", "double", "float", "size_t", "unsigned", "unsigned int", "std::size_t", "unsigned char",
 })  # fmt: skip
@@ -65,7 +65,10 @@ class Function:
 
     @property
     def words(self) -> frozenset[str]:
-        """Return every identifier in it but for its own name, and for scopes: whoever it may call is among them."""
+        """Return every identifier in it but for its own name, and for scopes: whoever it may call is among them.
+
+        Types of messages stand as ``msg::String``: they are none of the classes of the same last name.
+        """
         if self._words is None:
             named = field_of(function_declarator(self.node), "declarator")
             source, start = self.node.text or b"", self.node.start_byte

@@ -12,7 +12,7 @@ from typing import Any, Concatenate, NamedTuple, ParamSpec, TypeVar
 from nodl.infer.cpp.reading.declarations import Class, Field, FileIndex, Function, Global, Scope
 from nodl.infer.cpp.reading.known_headers import KNOWN_HEADERS
 from nodl.infer.cpp.reading.type_names import POINTER_MEMBERS, Type, split_type
-from nodl.infer.cpp.syntax import text
+from nodl.infer.cpp.syntax import Node, text
 
 _WRAPPERS = frozenset({
     "std::shared_ptr", "std::unique_ptr", "std::weak_ptr", "std::optional", "boost::shared_ptr",
@@ -56,6 +56,16 @@ _PLAIN = re.compile(
     r"(?:const\s+)?(?:std::)?(?:(?:string|char|u?int\d*(?:_t)?|bool|size_t|double|float)|"
     r"(?:vector|(?:unordered_)?(?:map|set)|list|array|deque|optional)<.*>)"
 )
+
+
+_FRESH = r"(?:new\b(?!\s*\()|nullptr\b|NULL\b)"
+_POINTS_AT_NEW = rf"\s*(?:->|\[|[!=]=|=\s*{_FRESH}|[({{]\s*{_FRESH}|\)\s*\{{)"
+"""What follows a pointer where it is used, compared or set to what ``new`` makes."""
+_OF_ONE_STAR = re.compile(r"^[^*&]*\*[^*&]*$")
+
+
+def _is_fresh(value: Node | None) -> bool:
+    return value is None or re.match(rf"[={{\s]*(?:{_FRESH}|\}})", text(value)) is not None
 
 
 class Alias(NamedTuple):
@@ -165,6 +175,29 @@ class Names:
                 found.setdefault(field.name, set()).add(cls.name)
         return found
 
+    @_once
+    def may_show_variables(self, pointer: str) -> bool:
+        """Return whether data members of this name, pointers or references to plain values, may lead to variables.
+
+        Not pointers to fractions, which decide nothing, and those that are only set to what ``new`` makes.
+        """
+        fields = [
+            field
+            for _, field in self._data_members()
+            if field.name == pointer and field.pointer and _PLAIN.fullmatch(field.type)
+        ]
+        if all(field.type in ("double", "float") for field in fields):
+            return False
+        if not all(_OF_ONE_STAR.search(text(field.node)) and _is_fresh(field.default) for field in fields):
+            return True
+        use = re.compile(rf"(return|delete(?:\s*\[\s*\])?)\s+{pointer}\s*;|\b{pointer}\b({_POINTS_AT_NEW})?")
+        return any(
+            not (match[1] or match[2])
+            for function in chain.from_iterable(self.functions_by_name.values())
+            if pointer in function.words
+            for match in use.finditer(text(function.node))
+        )
+
     @cached_property
     def static_members(self) -> dict[str, list[Class]]:
         """Return the names of static data members, with the classes that have them."""
@@ -191,7 +224,10 @@ class Names:
     @_once
     def signs(self, function: Function) -> frozenset[str]:
         """Return the signs of the program's operators that stand in a function."""
-        source = text(function.node)
+        return self.signs_in(function.node)
+
+    def signs_in(self, code: Node) -> frozenset[str]:
+        source = text(code)
         return frozenset(
             sign for sign in self.operators if (sign[0] if sign in ("()", "[]") else sign) in source
         )
@@ -214,7 +250,15 @@ class Names:
 
     @cached_property
     def _declared_words(self) -> frozenset[str]:
-        return frozenset(self.functions_by_name.keys() | self.classes.keys() | self.aliases.keys())
+        return frozenset(
+            self.functions_by_name.keys() | self.classes.keys() | self.aliases.keys() | self.named_as_messages
+        )
+
+    @cached_property
+    def named_as_messages(self) -> frozenset[str]:
+        """Return the program's own classes in namespaces as those of messages: ``msg::String``."""
+        every = (each.qualified.split("::")[-2:] for each in chain.from_iterable(self.classes.values()))
+        return frozenset("::".join(each) for each in every if each[0] in ("msg", "srv", "action"))
 
     # --- classes and functions --------------------------------------------------------------------------
 

@@ -26,6 +26,7 @@ def writes_of(node: Node) -> frozenset[str]:
 
 
 Passed: TypeAlias = tuple[str, int, int, frozenset[str]]
+MemberOf: TypeAlias = tuple[str, str, frozenset[str]]
 
 
 class VariableWrites(NamedTuple):
@@ -37,15 +38,16 @@ class VariableWrites(NamedTuple):
         seen: Objects whose methods are called, and what aliases stand for.
         passed: Arguments: the function, how many it gets, the argument's position and the variables in it.
         lasting: What closures in it write, whenever they run.
-        of_others: Names that stand as members of other objects in it.
+        of_others: Members of other objects in it: with the name of the variable that holds the object, empty for
+            anything but a variable, and the types of local variables of that name.
     """
 
     assigned: frozenset[str]
     changed: frozenset[str]
-    seen: frozenset[str]
-    passed: tuple[Passed, ...]
-    lasting: frozenset[str]
-    of_others: frozenset[str] = frozenset()
+    seen: frozenset[str] = frozenset()
+    passed: tuple[Passed, ...] = ()
+    lasting: frozenset[str] = frozenset()
+    of_others: frozenset[MemberOf] = frozenset()
 
 
 _REPLACES = frozenset({"reset", "swap", "emplace", "assign", "store", "exchange", "release", "tie"})
@@ -64,7 +66,8 @@ def written_by(node: Node) -> VariableWrites:
     changed: set[str] = set()
     seen: set[str] = set()
     lasting: set[str] = set()
-    of_others: set[str] = set()
+    others: set[tuple[str, str]] = set()
+    types: dict[str, set[str]] = {}  # of local variables
     moved: set[str] = set()  # numbers and iterators
     passed: list[Passed] = []
     aliases: list[
@@ -72,6 +75,8 @@ def written_by(node: Node) -> VariableWrites:
     ] = []  # with the variables behind; whether they are iterators
     for each in walk(node):
         words = _words_of(each)
+        for name in declared_in(each):
+            types.setdefault(name, set()).add(text(field_of(each, "type")))
         if each.type == "assignment_expression":
             left = unwrapped(field_of(each, "left"))
             changed |= words
@@ -94,7 +99,7 @@ def written_by(node: Node) -> VariableWrites:
             seen |= words
             aliases.append((_in(field_of(each, "declarator")), words, False))
         elif each.type == "field_expression":
-            of_others |= _in(field_of(each, "field")) if text(field_of(each, "argument")) != "this" else set()
+            others |= _members_of_other(each)
         elif each.type == "update_expression" and words == {text(field_of(each, "argument"))}:
             moved |= words
         else:
@@ -115,8 +120,31 @@ def written_by(node: Node) -> VariableWrites:
         frozenset(seen),
         tuple(passed),
         frozenset(lasting),
-        frozenset(of_others),
+        frozenset((name, held, frozenset(types.get(held, ()))) for name, held in others),
     )
+
+
+_DECLARATIONS = ("declaration", "for_range_loop", "parameter_declaration", "optional_parameter_declaration")
+
+
+def declared_in(node: Node) -> set[str]:
+    """Return the names that a declaration, a parameter or a capture gives to variables."""
+    if node.type == "lambda_capture_initializer":
+        return _in(node.named_children[0])
+    found: set[str] = set()
+    for declarator in node.children_by_field_name("declarator") if node.type in _DECLARATIONS else ():
+        inner = declarator
+        while inner.type in ("init_declarator", "reference_declarator", "pointer_declarator"):
+            inner = field_of(inner, "declarator") or inner.named_children[-1]
+        found |= _in(inner)
+    return found
+
+
+def _members_of_other(node: Node) -> set[tuple[str, str]]:
+    """Return ``m`` and ``x`` of ``x.m``."""
+    held = text(field_of(node, "argument")).removeprefix("this->")
+    names = _in(field_of(node, "field")) if held != "this" else set()
+    return {(name, held if _WORD.fullmatch(held) else "") for name in names}
 
 
 _ALGORITHM = re.compile(

@@ -10,11 +10,11 @@ from dataclasses import dataclass, field
 from functools import partial
 
 from nodl.infer.cpp.reading.declarations import Class
-from nodl.infer.cpp.running.effects import effects_of, looked_at
+from nodl.infer.cpp.running.effects import effects_of, looked_at, may_mean
 from nodl.infer.cpp.running.invocation import HOOKS, call_lambda, invoke
 from nodl.infer.cpp.running.left_out import forget_writes
 from nodl.infer.cpp.running.machine import NEXT, Frame, Machine
-from nodl.infer.cpp.running.memory import Reads, name_of
+from nodl.infer.cpp.running.memory import Cell, Reads, name_of
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     Bound,
@@ -51,7 +51,8 @@ class _Ran:
 class _Rounds:
     run: Machine
     last: dict[Key, _Ran] = field(default_factory=dict)
-    names_read: set[str] = field(default_factory=set)  # by callbacks
+    names_read: Set[str] = frozenset()  # by code that goes on behind them
+    cells_read: dict[str, set[Cell]] = field(default_factory=dict)  # by callbacks, by their names
 
 
 def run_callbacks(run: Machine) -> None:
@@ -88,7 +89,7 @@ def run_meanwhile(run: Machine, frame: Frame) -> None:
     words = frame.function.words if frame.function is not None else frozenset[str]()
     read = looked_at(run).keys() | words
     run.calls_back = True
-    rounds = _Rounds(run, names_read=set(read))
+    rounds = _Rounds(run, names_read=read)
     for number in range(PATIENCE):
         mark, steps = run.store.mark(), run.steps
         if not _round(rounds, partial(_changes_one_of, run, read)):
@@ -156,7 +157,8 @@ def _call(rounds: _Rounds, key: Key, atom: object, frame: Frame, certainly: bool
     def go() -> int:
         reads = run.store.watched(partial(_run, run, atom, frame))
         rounds.last[key] = _Ran(reads, len(run.nodes))
-        rounds.names_read.update(map(name_of, reads.cells))
+        for cell in reads.cells:
+            rounds.cells_read.setdefault(name_of(cell), set()).add(cell)
         return NEXT
 
     run.branches([go] if certainly else [go, lambda: NEXT])
@@ -175,12 +177,17 @@ def _matters(rounds: _Rounds, atom: object) -> bool:
     """Return whether it may make an interface or a node, give one away, or change what a callback has read."""
     for each in _with_held(rounds.run, atom):
         effects = effects_of(rounds.run, each)
-        written = effects.written
+        written = effects.written.assigned | effects.written.changed | effects.written.seen
         if (
             _makes(rounds.run, each)
             or effects.leaving.gives_node
             or effects.leaving.makes_node
-            or not rounds.names_read.isdisjoint(written.assigned | written.changed | written.seen)
+            or not rounds.names_read.isdisjoint(written)
+            or any(
+                may_mean(rounds.run, effects.owners, cell)
+                for name in written & rounds.cells_read.keys()
+                for cell in rounds.cells_read[name]
+            )
         ):
             return True
     return False

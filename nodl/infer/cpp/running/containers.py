@@ -163,7 +163,7 @@ def _map_call(run: Machine, atom: Map, name: str, site: CallSite) -> Value:
     if name == "erase" and _has(atom, first) is not None:
         return becomes(Map(tuple(entry for entry in atom.entries if entry[0] != first)))
     if name in _CHANGES:
-        return becomes(lost((atom,), f"what {name}() leaves", _held_by(values))[0])
+        return becomes(_changed_by(atom, name, values)[0])
     if name in ("at", "find", "count", "contains") and values:
         found, has = element(run, atom, first), _has(atom, first)
         if name == "find":
@@ -211,6 +211,13 @@ _CHANGES = frozenset({
     "splice", "merge", "remove_if", "extract", "fill",
 })  # fmt: skip
 """Methods after which only the objects in a container are known, and those of another one that it gets."""
+_KEEP_NOTHING = frozenset({"erase", "remove", "unique", "sort", "remove_if"})
+"""Those of them that only compare elements with what they get, or by it."""
+
+
+def _changed_by(atom: Map | Seq, name: str, values: Sequence[Value]) -> Value:
+    """Return what a container may be after one of these methods."""
+    return lost((atom,), f"what {name}() leaves", () if name in _KEEP_NOTHING else _held_by(values))
 
 
 def _held_by(values: Sequence[Value]) -> Value:
@@ -246,7 +253,7 @@ def _sequence_call(run: Machine, atom: Seq | Group, name: str, site: CallSite) -
     elif name == "assign" and len(values) == 2 and END in values[1]:
         _inserted(run, Seq(()), first, site)
     elif name in _CHANGES and isinstance(atom, Seq):
-        assign(run, site.receiver, lost((atom,), f"what {name}() leaves", _held_by(values)), site.frame)
+        assign(run, site.receiver, _changed_by(atom, name, values), site.frame)
     return unknown(f"the result of {name}()")
 
 

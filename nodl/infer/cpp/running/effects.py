@@ -11,7 +11,7 @@ from nodl.infer.cpp.ledger import CREATES, Reach, makes_by_words
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES
 from nodl.infer.cpp.reading.declarations import Function, type_text
 from nodl.infer.cpp.reading.names import Names
-from nodl.infer.cpp.reading.writes import FILLS, VariableWrites, written_by
+from nodl.infer.cpp.reading.writes import FILLS, VariableWrites, declared_in, written_by
 from nodl.infer.cpp.running.foreign import Leaving, leaving
 from nodl.infer.cpp.running.memory import Cell, name_of
 from nodl.infer.cpp.running.values import Bound, Lambda, Obj
@@ -22,11 +22,13 @@ if TYPE_CHECKING:
 
 _BEYOND_VARIABLES = re.compile(
     r"\w*declare\w*|set_\w*parameter\w*|NodeOptions|arguments|thread|jthread|async|bind|spin\w*|"
-    r"execute_\w+|handle_(?:message|request|response|loaned_message)|create_\w*timer|add_\w*callback\w*|\w+Listener|"
-    r"const_cast|_?exit|quick_exit|_Exit|abort|terminate"
+    r"execute_\w*[a-z]|handle_(?:message|request|response|loaned_message)|create_\w*timer|add_\w*callback\w*|"
+    r"\w+Listener|const_cast"
 )
-"""Words of code that does more than change variables: it declares parameters, keeps closures, runs callbacks, ends it
-all or writes behind ``const``."""
+"""Words of code that does more than change variables: it declares parameters, keeps closures, runs callbacks or writes
+behind ``const``."""
+_ENDS = re.compile(r"(?<![\w.>])(?:std\s*::\s*|::\s*)?(?:_?exit|quick_exit|_Exit|abort|terminate)\s*\(")
+"""Calls that end the program; not methods of an object: ``goal->abort()``."""
 _PLAIN = re.compile(
     r"string|vector|double|float|bool|int|size_t|char|msg::|Msg|Eigen|Time|Duration|unsigned|long|Point|Pose"
 )
@@ -47,11 +49,12 @@ class CallEffects:
 
     def __init__(self, run: Machine, of: Function | Lambda) -> None:
         self._run = run
-        own, words = ([of], of.words) if isinstance(of, Function) else ([], words_in(of.node))
         self._of = of
         # The variable that mattered and was known the last time; whether it is assigned, and changed.
         self.kept_by: tuple[Cell, bool, bool] | None = None
-        self.functions = _with_operators(run, {*own, *Reach(run).from_words(words)})
+        self.functions = frozenset(
+            Reach(run, operators=True).from_code(of if isinstance(of, Function) else of.node)
+        )
 
     @property
     def may_hide_writes(self) -> bool:
@@ -102,6 +105,8 @@ class CallEffects:
             and not any(map(_BEYOND_VARIABLES.fullmatch, self.words - own))
             and not self._may_init_ros
             and not any(self.leaving)
+            and not any(map(_ends, (each.node for each in self.functions)))
+            and (isinstance(self._of, Function) or not _ends(self._of.node))
         )
 
     @property
@@ -114,30 +119,36 @@ class CallEffects:
     @cached_property
     def written(self) -> VariableWrites:
         """Return what it does to variables, arguments of the program's own functions as these take them."""
-        run, parts = self._run, [part for _, part in self._parts]
-        assigned = set[str]().union(*(each.assigned for each in parts))
-        changed = set[str]().union(*(each.changed for each in parts))
-        seen = frozenset[str]().union(*(each.seen for each in parts))
-        of_others = set[str]().union(*(each.of_others for each in parts))
-        for name in (assigned | changed) & run.names.functions_by_name.keys():
-            for each in run.names.functions_by_name[name]:
-                behind = referred_to(each)  # f() = x writes what f() gives
-                changed |= behind
-                of_others |= behind
-                assigned |= behind if name in assigned else set()
-        lasting = frozenset[str]().union(*(each.lasting for each in parts))
+        parts, behind = [part for _, part in self._parts], self._behind
         return VariableWrites(
-            frozenset(assigned), frozenset(changed), seen, (), lasting, frozenset(of_others)
+            frozenset[str]().union(*(each.assigned for each in (*parts, behind))),
+            frozenset[str]().union(*(each.changed for each in (*parts, behind))),
+            frozenset[str]().union(*(each.seen for each in parts)),
+            (),
+            frozenset[str]().union(*(each.lasting for each in parts)),
+        )
+
+    @cached_property
+    def _behind(self) -> VariableWrites:
+        """Return what is written through functions that give references: ``f() = x``."""
+        own = self._run.names.functions_by_name
+        assigned = frozenset[str]().union(*(part.assigned for _, part in self._parts)) & own.keys()
+        changed = frozenset[str]().union(*(part.changed for _, part in self._parts)) & own.keys()
+        return VariableWrites(
+            frozenset[str]().union(*(referred_to(each) for name in assigned for each in own[name])),
+            frozenset[str]().union(*(referred_to(each) for name in assigned | changed for each in own[name])),
         )
 
     @cached_property
     def owners(self) -> Owners:
         """Return whose variables the names are that it writes."""
-        found: dict[str, set[str]] = {name: {_ANY} for name in self.written.of_others}
+        found: dict[str, set[str]] = {name: {_ANY} for name in self._behind.changed}
         for function, part in self._parts:
             owner = _ANY if function is None else _class_of(self._run, function)
             for name in part.assigned | part.changed | part.seen:
                 found.setdefault(name, set()).update([owner] if owner is not None else [])
+            for name, held, types in part.of_others:
+                found.setdefault(name, set()).update(_classes_of(self._run, function, held, types))
         return {name: frozenset(classes) for name, classes in found.items()}
 
     @cached_property
@@ -147,20 +158,10 @@ class CallEffects:
             (each, written_in(each)) for each in self.functions
         ]
         if isinstance(self._of, Lambda):
-            own.append((self._of.frame.function, written_by(self._of.node)))
+            written = written_by(self._of.node)
+            others = frozenset((name, "", types) for name, _, types in written.of_others)
+            own.append((self._of.frame.function, written._replace(of_others=others)))
         return [(function, _with_passed(self._run, part)) for function, part in own]
-
-
-def _with_operators(run: Machine, functions: set[Function]) -> frozenset[Function]:
-    """Return ``functions`` with the program's operators whose signs stand in them, and what these may call."""
-    found, waiting = set(functions), set(functions)
-    while waiting:
-        signs = frozenset[str]().union(*map(run.names.signs, waiting))
-        fresh = {each for sign in signs for each in run.names.operators[sign]} - found
-        words = frozenset[str]().union(*(each.words for each in fresh))
-        waiting = (fresh.union(Reach(run).from_words(words)) if fresh else fresh) - found
-        found |= waiting
-    return frozenset(found)
 
 
 def _with_passed(run: Machine, part: VariableWrites) -> VariableWrites:
@@ -178,6 +179,21 @@ def _class_of(run: Machine, function: Function) -> str | None:
     return None if not function.owner else owner if owner in run.names.classes else _ANY
 
 
+def _classes_of(run: Machine, function: Function | None, held: str, types: Iterable[str]) -> set[str]:
+    """Return the classes of the program whose object a variable may hold, by the types it is declared with."""
+    if not held or function is None or "->" in run.names.operators:
+        return {_ANY}
+    written = [(each, function.scope, function.file) for each in types]
+    for cls in run.names.classes.get(function.owner.rpartition("::")[2], ()):
+        declaring = (base for base in run.names.ancestry(cls) if held in base.fields)
+        written += [(base.fields[held].type, base.scope, base.file) for base in declaring]
+    found = [
+        run.names.find_class(run.names.resolve(each, scope, file).name, scope, file)
+        for each, scope, file in written
+    ]
+    return {_ANY if cls is None else cls.name for cls in found} or {_ANY}
+
+
 def may_mean(run: Machine, owners: Owners, cell: Cell) -> bool:
     """Return whether code that writes or mentions the names ``owners`` may mean this variable."""
     owner, classes = cell[0], owners.get(name_of(cell))
@@ -189,6 +205,12 @@ def may_mean(run: Machine, owners: Owners, cell: Cell) -> bool:
         for each in every
         for written, base in run.names.bases(each)
     )
+
+
+@lru_cache(maxsize=50_000)
+def _ends(code: Node) -> bool:
+    """Return whether code may end the program."""
+    return _ENDS.search(text(code)) is not None
 
 
 def effects_of(run: Machine, of: Function | Lambda | Bound) -> CallEffects:
@@ -311,8 +333,7 @@ def _not_local(function: Function) -> tuple[set[str], set[str]]:
     waiting = [function.node]
     while waiting:
         each = waiting.pop()
-        if each.type in ("declaration", "for_range_loop", "parameter_declaration"):
-            own |= _declared(each)
+        own |= declared_in(each)
         if each.type == "field_identifier":
             members.add(text(each))
         elif each.type in _NAMES:
@@ -356,15 +377,3 @@ def _is_variable(target: Node | None) -> bool:
         target = field_of(target, "argument")
         return target is not None and target.type == "this"
     return target is not None and target.type == "identifier"
-
-
-def _declared(declaration: Node) -> set[str]:
-    """Return the names that a declaration gives to variables."""
-    found: set[str] = set()
-    for declarator in declaration.children_by_field_name("declarator"):
-        inner = declarator
-        while inner.type in ("init_declarator", "reference_declarator", "pointer_declarator"):
-            inner = field_of(inner, "declarator") or inner.named_children[-1]
-        if inner.type == "identifier":
-            found.add(text(inner))
-    return found

@@ -32,11 +32,16 @@ from nodl.infer.cpp.running.values import (
 )
 from nodl.infer.cpp.syntax import Node, addressed, children, field_of
 
-LEAST_SIZE = 3_000
+LEAST_SIZE = 400
 """Bytes of source, with everything that it may call, from which on leaving a call out is worth its look."""
 _NUMBERS = re.compile(
     r"(?:const\s+)?(?:void|bool|int|double|float|(?:std::)?size_t|unsigned|unsigned int|unsigned char|u?int\d+_t)"
 )
+_OF_NUMBERS = re.compile(
+    r"(?:(?:const|std|vector|array|list|deque|set|map|pair|tuple|optional|(?:unique|shared)_ptr|void|bool|int|double|float|"
+    r"size_t|unsigned|char|u?int\d+_t|\w+::(?:msg|srv|action)::\w+|(?:Unique|Shared)Ptr|\d+)|[<>,&*\s]|::)+"
+)
+"""Types of numbers and messages, and of containers of and pointers to such: few of them are part of a name."""
 _FRACTION = re.compile(r"(?:const\s+)?(?:double|float)")
 _LEADS_ELSEWHERE = re.compile(r"\b(?:auto|It)\b|[Ii]ter")
 """Parameters through which a call may write to variables that are not its arguments."""
@@ -86,11 +91,11 @@ def _never_returns(function: Function) -> bool:
 
 
 def _is_unused(run: Machine, function: Function, call: Node) -> bool:
-    """Return whether the result of a call is not used, or is a number, a condition or an enumerator."""
+    """Return whether the result of a call is not used, or is of numbers, a message, a condition or an enumerator."""
     is_statement = call.type != "call_expression" or (
         call.parent is not None and call.parent.type == "expression_statement"
     )
-    if is_statement or _NUMBERS.fullmatch(type_text(function.node)):
+    if is_statement or _OF_NUMBERS.fullmatch(type_text(function.node)):
         return True
     kind = run.names.resolve(type_text(function.node), function.scope, function.file)
     return not kind.pointer and (_NUMBERS.fullmatch(kind.name) is not None or kind.last in run.names.enums)
@@ -126,7 +131,8 @@ def _changes(run: Machine, effects: CallEffects, certainly: bool = False) -> dic
     pointers = run.names.pointers_to_plain
     behind = pointers.keys() & (written.assigned | written.changed)
     if not written.lasting.isdisjoint(matters) or any(
-        not pointers[name].isdisjoint(run.used_classes()) for name in behind
+        not pointers[name].isdisjoint(run.used_classes()) and run.names.may_show_variables(name)
+        for name in behind
     ):
         return None
     if effects.kept_by is not None and not certainly:

@@ -309,3 +309,77 @@ def test_a_callback_follows_a_static_method_of_a_class_that_nobody_makes(tmp_pat
     members = "void tick() { more(); } void more() { Helper::make(this); }"
     system = infer(tmp_path, in_class(LATER, f"{MEMBERS} {members}", before=before))
     assert (names(system), gaps(system)) == (["late"], [])
+
+
+POINTER = "std::vector<int> * cells = nullptr; int count = 1;"
+BESIDE = {
+    "a message's class is not one in a namespace of the program that is called as theirs": (
+        "namespace own { namespace msg { struct Odom { Odom(rclcpp::Node * n) { "
+        "n->create_publisher<std_msgs::msg::String>(\"o\", 1); } }; } }",
+        "void go() { nav_msgs::msg::Path msg; sum = msg.x; }", "go();",
+        "void go() { own::msg::Odom msg(this); }",
+    ),
+    "a method that is called abort does not end the program": (
+        "std::shared_ptr<rclcpp_action::ServerGoalHandle<int>> goal;", "void go() { goal->abort(); sum = 1; }", "go();",
+        'void go() { topic = "b"; }',
+    ),
+    "a pointer that is only set to what new makes leads to no variable": (
+        "", f"{POINTER} void make() {{ cells = new std::vector<int>(); }} void go() {{ cells->push_back(1); }}",
+        "make(); go();",
+        f"{POINTER} std::vector<int> own; void go() {{ cells = &own; cells->push_back(1); add(); }}"
+        "void add() { if (!own.empty()) { topic = \"b\"; } }",
+    ),
+    "members of the class that a parameter has are no others of that name": (
+        'struct Other { std::string topic; }; void fill(Other & x) { x.topic = "b"; }',
+        "Other other; void go() { fill(other); }", "go();",
+        'void go() { fill(*this); } template<class N> void fill(N & x) { x.topic = "b"; }',
+    ),
+    "numbers that are given back are no name": (
+        "", "std::vector<std::pair<int, double>> go() { sum = 1; return {}; }", "auto found = go();",
+        'std::vector<int> go() { topic = "b"; return {}; }',
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("before", "members", "body", "neighbour"), BESIDE.values(), ids=BESIDE)
+def test_a_call_is_left_out_but_for_its_neighbour(
+    before: str,
+    members: str,
+    body: str,
+    neighbour: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    left = calls_left_out(monkeypatch)
+    system = infer(tmp_path, in_class(body + MAKES, f"{MEMBERS} {members}", before=before))
+    assert (names(system), gaps(system), "go" in left) == (["a"], [], True)
+    source = in_class(f"{body.removeprefix('make();')} {MAKES}", f"{MEMBERS} {neighbour}", before=before)
+    other = infer(tmp_path / "neighbour", source)
+    assert names(other) != ["a"] or gaps(other)
+
+
+@pytest.mark.parametrize(
+    "set_it",
+    [
+        "number = &count; *number = 2;",
+        "auto & slot = number; slot = &count; *number = 2;",
+        "std::swap(number, other); *number = 2;",
+        "point(number, count); *number = 2;",
+    ],
+)
+def test_a_pointer_that_is_set_to_a_variable_leads_to_it(set_it: str, tmp_path: Path) -> None:
+    members = "int count = 1; int * number = nullptr; int * other = &count;"
+    methods = f"void point(int * & p, int & n) {{ p = &n; }} void change() {{ {set_it} }}"
+    body = f"change(); if (count == 1) {{ {MAKES} }}"
+    system = infer(tmp_path, with_method(f"{members} {methods}", body))
+    assert names(system) != ["a"] or gaps(system)
+
+
+def test_a_closure_that_compares_elements_is_none_of_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    left = calls_left_out(monkeypatch)
+    go = 'void tidy() { list.remove_if([](const std::string & s) { return s == "a"; }); }'
+    members = f"{MEMBERS.replace('std::vector', 'std::list')} {go} void go() {{ sum = list.size(); }}"
+    system = infer(tmp_path, in_class(f"tidy(); go(); {MAKES}", members))
+    assert (names(system), gaps(system), "go" in left) == (["a"], [], True)
