@@ -137,6 +137,8 @@ def settle(run: Run, at_end: bool = True) -> None:
                 if at_end:
                     run.state.forget()
                 _call_back(run, callback, arity, turn >= WIDEN_TEXTS_FROM)
+            elif turn == 0:  # the program may have set since then what this callback sets
+                run.state.written_again(run.called_back[callback, arity].written, False)
         if before == (run.state.version(), run.callbacks) and expected.issuperset(run.escaped):
             break
     else:
@@ -182,8 +184,9 @@ def _call_back(run: Run, callback: object, arity: int | None, widen_texts: bool)
     run.state.fresh.clear()
     HeapObject.looked_into = set()
     run.running = set()
-    run.called_back[callback, arity] = Called(run.state.stamp, run.running, HeapObject.looked_into)
-    run.state.repeatedly(_called_from_outside(run, callback, arity), widen_texts)
+    stamp, looked_into = run.state.now(), HeapObject.looked_into
+    written = run.state.repeatedly(_called_from_outside(run, callback, arity), widen_texts)
+    run.called_back[callback, arity] = Called(stamp, run.running, looked_into, written)
     for made in run.born:
         made.summary = True
 

@@ -49,8 +49,8 @@ class ProgramState:
         self.stamp = 0  # of the latest write; a branch that is undone takes it back
         self._stamps = itertools.count(1)
         self.learned = 0  # containers opened to foreign code, which no branch takes back
-        # Stamps of the latest writes, the last one at the end: by name of a variable or field, and by ``id`` of the
-        # cells of a container.
+        # Stamps of the latest writes that stay, and of those taken back, the last one at the end: by name of a global
+        # or field, and by ``id`` of the cells of a container or of a function whose variables inner functions share.
         self.changed: dict[str | int, int] = {}
         # Names of variables that code which runs at any time sets, too.
         self.changed_meanwhile: set[str] = set()
@@ -73,9 +73,8 @@ class ProgramState:
         cells[key] = value
         if not local:
             self.stamp = next(self._stamps)
-            if self.forks <= self.base and id(cells) not in self.fresh:
-                by_name = isinstance(key, str) and key != ITEMS and type(cells) is not ContentCells
-                self._note_change(str(key) if by_name else id(cells), self.stamp)
+            if self.forks <= self.base:
+                self._note_write(cells, key)
 
     def store(self, obj: HeapObject, key: object, value: Value) -> None:
         """Write to an object: strong if it is one concrete object, else weak."""
@@ -88,11 +87,16 @@ class ProgramState:
         obj.escaped = True
         self.learned += 1
         if id(obj.cells) not in self.fresh:
-            self._note_change(id(obj.cells), next(self._stamps))
+            self._note_change(id(obj.cells))
 
-    def _note_change(self, key: str | int, stamp: int) -> None:
+    def _note_write(self, cells: Cells, key: object) -> None:
+        if id(cells) not in self.fresh:
+            by_name = isinstance(key, str) and key != ITEMS and type(cells) not in (ContentCells, LocalCells)
+            self._note_change(str(key) if by_name else id(cells))
+
+    def _note_change(self, key: str | int) -> None:
         self.changed.pop(key, None)
-        self.changed[key] = stamp
+        self.changed[key] = next(self._stamps)
 
     def forget(self) -> None:
         """Drop the trail; only between top-level steps, when nobody holds a mark."""
@@ -102,8 +106,12 @@ class ProgramState:
         """Return the version: equal versions, equal state."""
         return self.stamp, self.learned
 
+    def now(self) -> int:
+        """Return a stamp for ``changes``: unlike ``stamp``, no branch takes it back."""
+        return next(self._stamps)
+
     def changes(self, since: int) -> set[str | int]:
-        """Return what was written after the stamp ``since``, as in ``changed``."""
+        """Return what was written or undone after ``since``, as in ``changed``."""
         later = itertools.takewhile(lambda each: each[1] > since, reversed(self.changed.items()))
         return {key for key, _ in later}
 
@@ -157,9 +165,16 @@ class ProgramState:
         self.maybe(run)
         return given[0]
 
-    def repeatedly(self, action: Alternative, widen_texts: bool) -> None:
-        """Run ``maybe`` as one step towards a fixpoint: what keeps growing is widened."""
-        for outcome in self._run_each((action,)):
+    def repeatedly(self, action: Alternative, widen_texts: bool) -> list[Written]:
+        """Run ``maybe`` as one step towards a fixpoint: what keeps growing is widened. Return what it wrote."""
+        outcomes = self._run_each((action,))
+        self.written_again(outcomes, widen_texts)
+        return outcomes
+
+    def written_again(self, outcomes: list[Written], widen_texts: bool) -> None:
+        """Join with the state what a step wrote that may happen at this point, too."""
+        for outcome in outcomes:
+            self.work += len(outcome)
             for cells, key, value in outcome.values():
                 before = cells.get(key)
                 if before is None:
@@ -195,10 +210,10 @@ class ProgramState:
         self.depth += 1
         self.forks += 1
         action()
-        self.depth -= 1
-        self.forks -= 1
         outcome = self.written(inner)
         self._undo(start)
+        self.depth -= 1
+        self.forks -= 1
         self.stamp = stamp
         self._merge([outcome, {}])
 
@@ -274,11 +289,15 @@ class ProgramState:
         }
 
     def _undo(self, mark: int) -> None:
+        """Take back what was written since ``mark``: a callback that ran meanwhile found something else."""
+        stays = self.forks <= self.base
         for cells, key, old in reversed(self._trail[mark:]):
             if old is None:
                 cells.pop(key, None)
             else:
                 cells[key] = old
+            if stays and (type(cells) is not LocalCells or cells.shared):
+                self._note_write(cells, key)
 
     def _leave(self, mark: int) -> None:
         """Undo a branch that ends in a jump. Its values stay on the trail for ``join_seen`` where the jump leads."""

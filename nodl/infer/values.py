@@ -125,7 +125,7 @@ class HeapObject:
 
     __slots__ = ("cells", "escaped", "summary")
 
-    looked_into: ClassVar[set[int]] = set()  # cells of containers whose contents were asked for, by ``id``
+    looked_into: ClassVar[set[int]] = set()  # cells of containers and functions that were read, by ``id``
 
     def __init__(self) -> None:
         self.cells: Cells = {}
@@ -313,6 +313,13 @@ class Frame:
     @property
     def captured(self) -> bool:
         return type(self.cells) is LocalCells and self.cells.shared
+
+    def look_into(self) -> None:
+        """Note that what runs here reads the variables that it shares with other functions."""
+        frame: Frame | None = self
+        while frame is not None:
+            HeapObject.looked_into.add(id(frame.cells))
+            frame = frame.closure
 
     def capture(self) -> None:
         """Let inner functions see the cells, and those around them, from now on."""

@@ -114,6 +114,7 @@ def _run_body(run: Run, function: FunctionValue, cells: LocalCells, call: Call) 
             run.state.write(earlier, name, join(earlier.get(name, BOTTOM), value))
         cells = earlier
     frame = Frame(function.module, cells, closure, run.state.depth)
+    frame.look_into()
     frame.again = earlier is not None
     frame.function = function
     frame.entry = FunctionEntry(call.node, run.context)

@@ -15,7 +15,7 @@ from nodl.infer.findings import Findings, OptionDefaults
 from nodl.infer.packages import find_package
 from nodl.infer.program import Program, SourceModule
 from nodl.infer.start import NO_LAUNCH
-from nodl.infer.state import Allocations, ProgramState
+from nodl.infer.state import Allocations, ProgramState, Written
 from nodl.infer.text import Guard, Text
 from nodl.infer.values import (
     ANY,
@@ -99,11 +99,14 @@ class Call:  # its fields are read so often that those of a named tuple would co
 
 
 class Called(NamedTuple):
-    """A call of a callback: the stamp of the state before it, what ran in it, the containers it looked into."""
+    """A call of a callback: the stamp of the state before it, what ran in it, the containers it looked into, and what
+    it wrote.
+    """
 
     stamp: int
     functions: set[FunctionValue]
     containers: set[int]
+    written: list[Written]
 
 
 # What one run may cost, counted and not timed so that it ends at the same statement on every machine: expressions
