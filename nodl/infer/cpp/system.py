@@ -117,12 +117,17 @@ def _package_folder(file: Path) -> Path | None:
 
 
 def _source_space(package: Path) -> Path | None:
-    """Return ``src`` of a colcon workspace, or the repository that holds the package beside others."""
+    """Return ``src`` of a colcon workspace, or the repository that holds the package beside others.
+
+    A package that is a repository itself, in no workspace, has none: what lies beside it is not its own.
+    """
     for folder in package.parents:
         if folder.name == "src":
             return folder
         if (folder / ".git").exists():
             return folder
+    if (package / ".git").exists():
+        return None
     siblings = [p for p in package.parent.glob("*/package.xml") if p.parent != package]
     return package.parent if siblings else None
 

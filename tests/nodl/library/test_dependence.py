@@ -284,3 +284,16 @@ def test_a_camera_of_orbbec_publishes_the_streams_that_are_enabled() -> None:
     )
     assert {"color/image_raw", "gyro_accel/sample", "accel/imu_info"} <= given
     assert not {"depth/image_raw", "gyro/sample", "depth_to_color"} & given
+
+
+def test_a_compliant_controller_has_the_inputs_of_motion_and_of_force_below_its_own_name() -> None:
+    documents = LibraryDocuments(Library(), "jazzy")
+
+    def subscribed(kind: str) -> set[str]:
+        node = documents.of_class(f"cartesian_{kind.lower()}_controller/Cartesian{kind}Controller")
+        assert node
+        return {str(e.name) for e in node.endpoints if e.kind is EndpointKind.SUBSCRIPTION}
+
+    assert subscribed("Motion") == {"~/target_frame"}
+    assert subscribed("Force") == {"~/target_wrench", "~/ft_sensor_wrench"}
+    assert subscribed("Compliance") == subscribed("Motion") | subscribed("Force")

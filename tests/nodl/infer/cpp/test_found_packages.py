@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from nodl.infer.cpp.reading.project import find_packages
+from nodl.infer.cpp.system import workspace_of
 
 
 def package(folder: Path, name: str) -> Path:
@@ -30,3 +31,16 @@ def test_folders_that_colcon_ignores_are_left_out(tmp_path: Path) -> None:
     package(tmp_path / "src/ignored/unused", "unused")
     (tmp_path / "src/ignored/COLCON_IGNORE").touch()
     assert set(find_packages([str(tmp_path / "src")])) == {"used"}
+
+
+def test_what_lies_beside_a_repository_is_not_its_workspace_but_what_lies_beside_it_in_src_is(
+    tmp_path: Path,
+) -> None:
+    alone = package(tmp_path / "clones/alone", "alone")
+    package(tmp_path / "clones/other", "other")
+    (alone / ".git").mkdir()
+    assert set(workspace_of([str(alone / "node.cpp")]).packages) == {"alone"}
+    inside = package(tmp_path / "ws/src/inside", "inside")
+    package(tmp_path / "ws/src/beside", "beside")
+    (inside / ".git").mkdir()
+    assert set(workspace_of([str(inside / "node.cpp")]).packages) == {"inside", "beside"}
