@@ -150,13 +150,14 @@ def test_the_other_end_of_rviz_and_of_a_default_of_the_library_is_optional() -> 
     assert code("demo/node", "node.cpp:12") == "no-publisher"
 
 
-def test_of_two_topics_of_transforms_one_may_have_no_publisher() -> None:
+def test_transforms_may_be_published_on_one_topic_of_two_or_by_another_launch() -> None:
     def found(published: str) -> dict[str, str]:
         given = checks(two({"subscribe": ["/r/tf", "/r/tf_static"]}, {"publish": [published]}))
         return {each.subject: each.code for each in given if "publishes" in each.text}
 
     assert found("/r/tf") == {"/r/tf_static": "other-end-optional"}
     assert found("/tf") == {"/r/tf": "no-publisher", "/r/tf_static": "no-publisher"}
+    assert found("/scan") == {"/r/tf": "other-end-optional", "/r/tf_static": "other-end-optional"}
 
 
 def test_a_wildcard_that_planning_told_of_is_not_told_again() -> None:

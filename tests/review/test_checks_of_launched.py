@@ -118,6 +118,8 @@ def test_a_publisher_that_offers_less_than_is_asked_for(
         ('<remap from="x" to="z"/>', []),
         ('<remap from="/x" to="z"/>', []),
         ('<remap from="X" to="z"/>', ["X"]),
+        ('<remap from="/x" to="z"/><remap from="x" to="z"/>', []),
+        ('<remap from="/x" to="z"/><remap from="x" to="y"/>', ["x"]),
         ('<remap from="x" to="z"/><remap from="image" to="z"/>', ["image"]),
         ('<remap from="/rosout" to="/log"/>', []),
         ('<remap from="~/get_parameters" to="/p"/>', []),

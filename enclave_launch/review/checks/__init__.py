@@ -115,7 +115,7 @@ def remaps(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
     """Yield remap rules that change no name.
 
     A rule is used if any node that gets it has a name that it changes. It may be used by a program that is not
-    wholly known."""
+    wholly known. One that is written with and without a slash, so that either fits, is used if one of the two is."""
     used, unknown = _used_rules(document), _not_wholly_known(document)
     dead: dict[tuple[str, str], Item] = {}
     alive: set[tuple[str, str]] = set()
@@ -124,7 +124,9 @@ def remaps(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
             rule = (source, target)
             if source in _BY_CONVENTION:
                 continue
-            if f"{source}:={target}" in used.get(_key(item), ()) or _key(item) in unknown or source == target:
+            relative = source.lstrip("/")
+            both = {f"{relative}:={target}", f"/{relative}:={target}"} & {f"{a}:={b}" for a, b in item.remaps}
+            if both & used.get(_key(item), set()) or _key(item) in unknown or source == target:
                 alive.add(rule)
             dead.setdefault(rule, item)
     for rule, item in sorted(dead.items(), key=lambda each: each[0]):

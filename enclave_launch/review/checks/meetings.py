@@ -74,7 +74,7 @@ def _missing_ends(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]
                 text = f"nothing in this plan {verb} {name}, which {use}"
                 place = _first_place(using)
                 optional = code != "no-subscriber" and using and all(map(_is_optional, using))
-                optional = optional or (here == "subscribe" and _other_transforms(name) in others)
+                optional = optional or (here == "subscribe" and _lacks_transforms_only(name, others))
                 yield finding("other-end-optional" if optional else code, name, text, place)
 
 
@@ -90,11 +90,15 @@ _LIBRARY = "/nodl/library/documents/"
 _TRANSFORMS = {"tf": "tf_static", "tf_static": "tf"}
 
 
-def _other_transforms(topic: str) -> str | None:
-    """Return the topic to which a listener to transforms subscribes beside ``topic``: many robots publish one only."""
+def _lacks_transforms_only(topic: str, published: set[str]) -> bool:
+    """Return True for a topic of transforms that one may lack: many robots publish one of the two only, and a launch of
+    a part of a robot none at all."""
     namespace, slash, last = topic.rpartition("/")
     other = _TRANSFORMS.get(last)
-    return other and namespace + slash + other
+    return other is not None and (
+        namespace + slash + other in published
+        or not any(name.rpartition("/")[2] in _TRANSFORMS for name in published)
+    )
 
 
 def near_names(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
