@@ -241,6 +241,8 @@ class _Collector:
                 ):
                     cls.inherits_constructors = True
                     return
+                if cls is not None:
+                    cls.uses.setdefault(name, []).append(target.rpartition("::")[0])
                 self.index.aliases["::".join((*scope, name))] = (target, scope)
             return
         if node.type == "type_definition":

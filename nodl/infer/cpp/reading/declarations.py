@@ -124,6 +124,7 @@ class Class:
     methods: dict[str, list[Function]] = field(default_factory=dict)
     declared: dict[str, list[Function]] = field(default_factory=dict)  # without body: defaults and virtual
     inherits_constructors: bool = False
+    uses: dict[str, list[str]] = field(default_factory=dict)  # name -> bases of ``using Base::name``
     template_defaults: dict[str, str] = field(default_factory=dict)
     # Arguments as written, of an explicit or partial specialisation.
     specialises: tuple[str, ...] | None = None

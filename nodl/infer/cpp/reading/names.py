@@ -379,10 +379,21 @@ class Names:
     @_once
     def find_methods(self, cls: Class | None, name: str) -> list[Function]:
         for each in self.ancestry(cls):
-            found = self.methods.get(each, {}).get(name)
+            found = self.methods.get(each, {}).get(name, [])
+            if name in each.uses:
+                found = [*found, *self._brought_in(each, name, found)]
             if found:
                 return found
         return []
+
+    def _brought_in(self, cls: Class, name: str, own: Iterable[Function]) -> Iterator[Function]:
+        """Yield the methods of ``using Base::name``, without those that the class declares itself."""
+        taken = {tuple(p.type for p in each.parameters) for each in own}
+        for written in cls.uses[name]:
+            base = self.class_of(self.resolve(written, cls.scope, cls.file), cls.scope, cls.file)
+            for each in self.find_methods(base, name) if base is not cls else ():
+                if tuple(p.type for p in each.parameters) not in taken:
+                    yield each
 
     @_once
     def declarations(self, cls: Class | None, name: str) -> list[Function]:

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from nodl.infer.cpp.libraries import LIBRARY_METHODS, Call
 from nodl.infer.cpp.reading.declarations import Class, Field
 from nodl.infer.cpp.running.arithmetic import added, as_type, computed
-from nodl.infer.cpp.running.constructors import in_braces
+from nodl.infer.cpp.running.constructors import gives_pointer, in_braces
 from nodl.infer.cpp.running.contents import copied, elements_copied, overwrite
 from nodl.infer.cpp.running.effects import referred_to
 from nodl.infer.cpp.running.machine import Frame, Machine, expression
@@ -16,6 +16,7 @@ from nodl.infer.cpp.running.references import REFERRED_TO, forget, is_plain, lea
 from nodl.infer.cpp.running.static_types import (
     current_object,
     declared_type,
+    is_address,
     is_pointer,
     points_to_plain,
     seen_class,
@@ -59,12 +60,14 @@ def assignment(run: Machine, node: Node, frame: Frame) -> Value:
     else:
         value = run.evaluate(right, frame)
     if operator == "=":
-        cls = object_class(run, left, frame)
+        is_shown = is_address(run, left, frame) or gives_pointer(run, right or left)
+        cls = object_class(run, left, frame) if not is_shown else None
         before = run.evaluate(left, frame) if cls is not None else BOTTOM
         objects = bool(before) and all(isinstance(atom, Obj) and atom.cls is not None for atom in before)
         if objects and _assigned(run, before, value, node, frame):
             return before
-        value = copied(run, value, node, frame, cls)
+        if not is_shown:
+            value = copied(run, value, node, frame, cls)
         if any(isinstance(atom, Seq | Map) for atom in value):
             value = elements_copied(run, seen_type(run, left, frame), value, node, frame)
     elif operator == "+=":
@@ -117,7 +120,9 @@ def object_class(run: Machine, left: Node, frame: Frame) -> Class | None:
         return None
     if inner.type == "pointer_expression":
         return seen_class(run, inner, frame)
-    if inner.type in ("subscript_expression", "field_expression"):
+    holder = frame.owner_of(text(inner))
+    by_auto = holder is not None and re.search(r"\bauto ?&+$", holder.types.get(text(inner), "")) is not None
+    if by_auto or inner.type in ("subscript_expression", "field_expression", "call_expression"):
         return run.held_class(seen_type(run, inner, frame), frame)
     return None if is_pointer(run, inner, frame) else run.class_of(declared_type(run, inner, frame)[0], frame)
 

@@ -94,7 +94,7 @@ def initial_value(run: Machine, value: Node, frame: Frame, reference: bool = Fal
             return initial_value(run, inner[0], frame, reference)
         return BOTTOM if not inner else run.evaluate(value, frame)
     found = run.evaluate(value, frame)
-    if reference or leads_into(value) or _gives_pointer(run, value):
+    if reference or leads_into(value) or gives_pointer(run, value):
         return found
     if any(isinstance(atom, Seq | Map) for atom in found):
         return elements_copied(run, seen_type(run, value, frame), found, value, frame)
@@ -103,7 +103,7 @@ def initial_value(run: Machine, value: Node, frame: Frame, reference: bool = Fal
     return copied(run, found, value, frame, cls)
 
 
-def _gives_pointer(run: Machine, value: Node) -> bool:
+def gives_pointer(run: Machine, value: Node) -> bool:
     """Return whether it is ``&x``, or a call of a function of the program that gives a pointer."""
     if value.type != "call_expression":
         return text(value).startswith("&")
@@ -202,12 +202,30 @@ def _pointed_to(run: Machine, given: Node, frame: Frame) -> Value:
 def _repeated(run: Machine, node: Node, inner: Type, frame: Frame, value: Value | None = None) -> Value:
     """Return several elements of type ``inner``, however many: one stands for all."""
     run.repeated += 1
+    mark, steps = run.store.mark(), run.steps
     if value is not None:
         one = copied(run, value, node, frame, run.held_class(inner, frame))
     else:
         one = default_value(run, node, inner, frame) if inner.name and not inner.pointer else BOTTOM
+        if _moved_again(run, mark, steps):
+            one = default_value(run, node, inner, frame)
     run.repeated -= 1
     return (open_sequence((one,)),)
+
+
+def _moved_again(run: Machine, mark: int, steps: int) -> bool:
+    """Make plain values unknown that a constructor changed outside of its object, as each further one changes them.
+
+    Returns:
+        Whether there are any.
+    """
+    found = False
+    for cell, before, value in [*run.moved(mark, steps)]:
+        is_outside = before != BOTTOM or not isinstance(cell[0], Obj)
+        if is_outside and any(isinstance(atom, Text | int | float) for atom in value):
+            run.store.set(cell, unknown("a value that the constructor of each element changes"))
+            found = True
+    return found
 
 
 def cast(run: Machine, kind: Type, value: Value) -> Value:

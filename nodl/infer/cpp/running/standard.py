@@ -14,6 +14,7 @@ from nodl.infer.cpp.running.constructors import text_of
 from nodl.infer.cpp.running.contents import copied
 from nodl.infer.cpp.running.effects import effects_of
 from nodl.infer.cpp.running.machine import NEXT, Frame, Machine, registered
+from nodl.infer.cpp.running.references import is_plain
 from nodl.infer.cpp.running.static_types import is_pointer
 from nodl.infer.cpp.running.values import (
     BOTTOM,
@@ -105,11 +106,14 @@ def _by_value(run: Machine, values: Sequence[Value], call: Node, frame: Frame) -
     return [
         copied(run, value, each, frame)
         if each.type in ("identifier", "field_expression") and not is_pointer(run, each, frame)
+        else unknown("what a reference shows later")
+        if is_plain(value) and _REFERS.match(text(each))
         else value
         for value, each in zip(values, given, strict=True)
     ]
 
 
+_REFERS = re.compile(r"(?:(?:std|boost)::)?c?ref\(")
 _TIES = re.compile(r"\b(?:tie|forward_as_tuple)\b")
 
 

@@ -142,6 +142,21 @@ def is_pointer(run: Machine, node: Node, frame: Frame) -> bool:
     return kind.pointer or (marked and not _is_reference(run, node, frame))
 
 
+def is_address(run: Machine, node: Node, frame: Frame) -> bool:
+    """Return whether a variable, member or element is a pointer: other than an optional it holds no object itself."""
+    name = text(field_of(node, "field") or node)
+    holder = frame.owner_of(name) if node.type == "identifier" else None
+    this = current_object(frame)
+    around = this.cls if this is not None else None
+    argument = field_of(node, "argument") if node.type == "field_expression" else None
+    cls = around if argument is None or argument.type == "this" else seen_class(run, argument, frame)
+    field = next((each.fields[name] for each in run.names.ancestry(cls) if name in each.fields), None)
+    written = (
+        holder.types.get(name, "") if holder is not None else text(field.node) if field is not None else ""
+    )
+    return seen_type(run, node, frame).pointer and "optional" not in written and "&" not in written
+
+
 def _is_reference(run: Machine, node: Node, frame: Frame) -> bool:
     name, this = text(node), current_object(frame)
     owner = frame.owner_of(name)
@@ -173,7 +188,11 @@ def seen_type(run: Machine, node: Node | None, frame: Frame) -> Type:
     if owner is None or owner.type == "this":
         kind, holder = declared_type(run, node, frame)[0], frame.owner_of(text(node))
         initial = holder.initial.get(text(node)) if holder is not None and kind.name == "auto" else None
-        return kind if initial is None or holder is None else seen_type(run, initial, holder)
+        if initial is None or holder is None:
+            return kind
+        around, shown = initial.parent, seen_type(run, initial, holder)
+        is_item = around is not None and around.type == "for_range_loop"
+        return element_type(shown) if is_item else shown
     name = text(field_of(node, "field"))
     for each in run.names.ancestry(seen_class(run, owner, frame)):
         if name in each.fields:

@@ -70,6 +70,13 @@ COVERED: dict[str, tuple[str, str, str, set[str]]] = {
     "a member is written through a pointer to members": (
         'std::string Demo::* p = &Demo::m_; this->*p = "set"; pub(m_);', 'std::string m_ = "plain";', "", {"set"},
     ),
+    "arguments of std::ref are read later": (
+        'std::string s = "a"; auto f = std::bind(&Demo::pub, this, std::ref(s)); s = "b"; f();', "", "", {"b"},
+    ),
+    "each element of an array is made by its constructor": (
+        'Counted all[3]; pub("n" + std::to_string(all[1].id));', "",
+        "struct Counted { static inline int n = 0; int id; Counted() : id(n++) {} };", {"n1"},
+    ),
     "a pointer shares what another one owns": (
         'auto c = std::make_shared<C>(); std::shared_ptr<std::string> part(c, &c->t); *part = "set"; pub(c->t);',
         "", CONFIG, {"set"},
@@ -125,6 +132,31 @@ COVERED: dict[str, tuple[str, str, str, set[str]]] = {
 }  # fmt: skip
 
 KNOWN: dict[str, tuple[str, str, str, set[str]]] = {
+    "a pointer, or member that is one, shows the object that it was given later": (
+        'C a, b; C * p = &a; p = &b; p->t = "b"; pub(b.t); H h; h.c = &a; h.c->t = "a"; pub(a.t);'
+        'p = h.c; p->t = "again"; pub(a.t);',
+        "", CONFIG + "struct H { C * c = nullptr; };", {"b", "a", "again"},
+    ),
+    "an object, or an optional one, is a copy of what it was given later": (
+        'C a, b; a.t = "a"; b = a; b.t = "b"; pub(a.t); std::optional<C> o; o = a; o->t = "o"; pub(a.t + "_still");',
+        "", CONFIG, {"a", "a_still"},
+    ),
+    "an object is assigned through what refers to it": (
+        'C a, b; b.t = "b"; auto & r = a; r = b; pub(a.t); get() = C{"get"}; pub(c_.t);',
+        "C & get() { return c_; } C c_;", CONFIG, {"b", "get"},
+    ),
+    "a class uses what its base has, too, and its own": (
+        'D d; pub(d.k(1)); pub(d.k(1.5)); pub(d.k(std::string("s")));', "",
+        'struct B { std::string k(int) { return "Bi"; } std::string k(const std::string & s) { return s; } };'
+        'struct D : B { using B::k; std::string k(double) { return "Dd"; } };',
+        {"Bi", "Dd", "s"},
+    ),
+    "a class says which of two bases a name is of": (
+        "D d; pub(d.k()); pub(d.A::k());", "",
+        'struct A { std::string k() { return "a"; } }; struct B { std::string k() { return "b"; } };'
+        "struct D : A, B { using B::k; };",
+        {"b", "a"},
+    ),
     "overloads that looks tell apart": (
         'pub(k(1)); pub(k(std::string("x")));',
         'std::string k(int) { return "i"; } std::string k(const std::string &) { return "s"; }',
