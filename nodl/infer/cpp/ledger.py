@@ -324,8 +324,9 @@ class Reach:
             if name in self.run.names.classes:
                 self._use(name)
 
-    def _sign(self, signs: Iterable[str]) -> None:
-        for sign in signs:
+    def _sign(self, signs: frozenset[str]) -> None:
+        for sign in signs - self.mentioned:
+            self.mentioned.add(sign)
             self.waiting += self.run.names.operators[sign]
 
     def _mention(self, words: Iterable[str]) -> None:

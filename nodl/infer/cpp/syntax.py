@@ -121,6 +121,11 @@ def callee_name(callee: Node) -> str:
     return whole
 
 
+def last_name(callee: Node | None) -> str:
+    """Return the name of the function or method that a callee means, without what stands before it."""
+    return re.split(r"::|\.|->", callee_name(callee))[-1] if callee is not None else ""
+
+
 def template_arguments(node: Node | None) -> list[Node]:
     """Return the template arguments that a callee writes out: those of ``f<A, B>``, ``x.f<A>`` and ``a::f<A>``."""
     while node is not None and node.type in ("field_expression", "qualified_identifier", "dependent_name"):

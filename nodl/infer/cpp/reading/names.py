@@ -372,6 +372,25 @@ class Names:
         return order
 
     @_once
+    def classes_held(self, function: Function, held: str, types: frozenset[str]) -> frozenset[str]:
+        """Return the classes whose objects a variable of a function may hold, by how it is declared; none: any class.
+
+        Args:
+            held: Its name, empty for any other expression.
+            types: The types of local variables of that name; a member of the function's class may have it, too.
+        """
+        written = [(each, function.scope, function.file) for each in types]
+        for cls in self.classes.get(function.owner.rpartition("::")[2], ()) if held else ():
+            declaring = (base for base in self.ancestry(cls) if held in base.fields)
+            written += [(base.fields[held].type, base.scope, base.file) for base in declaring]
+        found = [
+            self.find_class(self.resolve(each, scope, file).name, scope, file)
+            for each, scope, file in written
+        ]
+        names = frozenset(cls.name for cls in found if cls is not None)
+        return frozenset() if None in found or "->" in self.operators else names
+
+    @_once
     def members(self, cls: Class | None) -> frozenset[str]:
         """Return the names of the data members of a class and its bases, static ones included."""
         return frozenset().union(*(each.fields for each in self.ancestry(cls)))

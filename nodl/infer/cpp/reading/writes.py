@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from typing import NamedTuple, TypeAlias
 
-from nodl.infer.cpp.syntax import Node, callee_name, children, field_of, text, unwrapped, walk
+from nodl.infer.cpp.syntax import Node, callee_name, children, field_of, last_name, text, unwrapped, walk
 
 _WORD = re.compile(r"[A-Za-z_]\w*")
 _READING = frozenset({
@@ -86,7 +86,7 @@ def written_by(node: Node) -> VariableWrites:
                 assigned |= words
         elif each.type == "call_expression":
             callee = field_of(each, "function")
-            last = re.split(r"::|\.|->", callee_name(callee))[-1] if callee is not None else ""
+            last = last_name(callee)
             receivers = _receivers(callee)
             seen |= receivers
             changed |= receivers if last in FILLS else set()

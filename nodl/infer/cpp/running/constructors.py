@@ -41,7 +41,7 @@ from nodl.infer.cpp.running.values import (
     open_sequence,
     unknown,
 )
-from nodl.infer.cpp.syntax import Node, callee_name, children, field_of, text, walk, words_in
+from nodl.infer.cpp.syntax import Node, children, field_of, last_name, text, walk, words_in
 
 SEQUENCES = frozenset({
     "std::vector", "std::array", "std::list", "std::deque", "std::set", "std::unordered_set", "std::initializer_list",
@@ -107,8 +107,7 @@ def gives_pointer(run: Machine, value: Node) -> bool:
     """Return whether it is ``&x``, or a call of a function of the program that gives a pointer."""
     if value.type != "call_expression":
         return text(value).startswith("&")
-    name = callee_name(field_of(value, "function") or value)
-    listed = run.names.functions_by_name.get(re.split(r"::|->|\.", name)[-1], ())
+    listed = run.names.functions_by_name.get(last_name(field_of(value, "function")), ())
     declarators = [field_of(each.node, "declarator") for each in listed]
     return bool(listed) and all(
         each is not None and each.type == "pointer_declarator" for each in declarators

@@ -148,7 +148,8 @@ class CallEffects:
             for name in part.assigned | part.changed | part.seen:
                 found.setdefault(name, set()).update([owner] if owner is not None else [])
             for name, held, types in part.of_others:
-                found.setdefault(name, set()).update(_classes_of(self._run, function, held, types))
+                classes = self._run.names.classes_held(function, held, types) if function else ()
+                found.setdefault(name, set()).update(classes or [_ANY])
         return {name: frozenset(classes) for name, classes in found.items()}
 
     @cached_property
@@ -159,7 +160,7 @@ class CallEffects:
         ]
         if isinstance(self._of, Lambda):
             written = written_by(self._of.node)
-            others = frozenset((name, "", types) for name, _, types in written.of_others)
+            others = frozenset((name, "", frozenset[str]()) for name, *_ in written.of_others)
             own.append((self._of.frame.function, written._replace(of_others=others)))
         return [(function, _with_passed(self._run, part)) for function, part in own]
 
@@ -177,21 +178,6 @@ def _class_of(run: Machine, function: Function) -> str | None:
     """Return the class whose members a function means by their names alone; ``None``: those of no class."""
     owner = function.owner.rpartition("::")[2]
     return None if not function.owner else owner if owner in run.names.classes else _ANY
-
-
-def _classes_of(run: Machine, function: Function | None, held: str, types: Iterable[str]) -> set[str]:
-    """Return the classes of the program whose object a variable may hold, by the types it is declared with."""
-    if not held or function is None or "->" in run.names.operators:
-        return {_ANY}
-    written = [(each, function.scope, function.file) for each in types]
-    for cls in run.names.classes.get(function.owner.rpartition("::")[2], ()):
-        declaring = (base for base in run.names.ancestry(cls) if held in base.fields)
-        written += [(base.fields[held].type, base.scope, base.file) for base in declaring]
-    found = [
-        run.names.find_class(run.names.resolve(each, scope, file).name, scope, file)
-        for each, scope, file in written
-    ]
-    return {_ANY if cls is None else cls.name for cls in found} or {_ANY}
 
 
 def may_mean(run: Machine, owners: Owners, cell: Cell) -> bool:

@@ -19,6 +19,7 @@ from nodl.infer.cpp.syntax import (
     callee_name,
     children,
     field_of,
+    last_name,
     template_arguments,
     text,
     unwrapped,
@@ -85,7 +86,7 @@ def _made(node: Node) -> tuple[str, Node | None]:
     """Return the class that an expression or declaration makes an object of, as written, and the arguments."""
     if node.type == "call_expression":
         callee, given = field_of(node, "function"), field_of(node, "arguments")
-        made = template_arguments(callee)[:1] if _MAKES.fullmatch(_last(callee)) else []
+        made = template_arguments(callee)[:1] if _MAKES.fullmatch(last_name(callee)) else []
         return text(made[0]) if made else "", given
     if node.type == "new_expression":
         return text(field_of(node, "type")), field_of(node, "arguments")
@@ -103,11 +104,6 @@ def _type_of(declaration: Node) -> str:
     """Return the type that a declaration names; behind ``#endif`` the parser takes ``else`` for one."""
     written = text(field_of(declaration, "type"))
     return "" if written == "else" else written
-
-
-def _last(callee: Node | None) -> str:
-    """Return the last name of a callee."""
-    return re.split(r"::|\.|->", callee_name(callee))[-1] if callee is not None else ""
 
 
 def _class_of(names: Names, written: str, function: Function, deliberate: bool) -> tuple[bool, bool]:
@@ -128,7 +124,7 @@ def _class_of(names: Names, written: str, function: Function, deliberate: bool) 
 
 def _is_unknown_call(names: Names, call: Node) -> bool:
     callee = field_of(call, "function")
-    name, last = callee_name(callee) if callee is not None else "", _last(callee)
+    name, last = callee_name(callee) if callee is not None else "", last_name(callee)
     if last in names.functions_by_name or _KNOWN.fullmatch(last):
         return False
     return name in LIBRARY_FUNCTIONS or not is_harmless_function(name)
@@ -172,7 +168,7 @@ def _is_node(argument: Node, is_node: bool) -> bool:
         return is_node
     if inner.type == "call_expression":
         callee = field_of(inner, "function")
-        last = _last(callee)
+        last = last_name(callee)
         if _GIVES_NODE.fullmatch(last):
             return True
         receiver = field_of(callee, "argument")

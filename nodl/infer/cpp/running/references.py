@@ -31,7 +31,7 @@ from nodl.infer.cpp.running.values import (
     lost,
     unknown,
 )
-from nodl.infer.cpp.syntax import Node, callee_name, children, field_of, text, unwrapped, words_in
+from nodl.infer.cpp.syntax import Node, children, field_of, last_name, text, unwrapped, words_in
 
 
 def is_plain(value: Value) -> bool:
@@ -165,7 +165,7 @@ def _behind(run: Machine, what: Node | None, frame: Frame, seen: set[object]) ->
     if what.type == "call_expression":
         callee = field_of(what, "function") or what
         inner = [field_of(callee, "argument"), *children(field_of(what, "arguments"))]
-        for function in run.names.functions_by_name.get(re.split(r"::|\.|->", callee_name(callee))[-1], ()):
+        for function in run.names.functions_by_name.get(last_name(callee), ()):
             for word in referred_to(function):
                 yield from run.store.named(word)
     elif what.type == "field_expression":
