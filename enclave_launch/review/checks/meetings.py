@@ -44,7 +44,8 @@ def missing_ends(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
     If something of the launch itself is not known, the other end may be there: then one finding says so.
     """
     found = list(_missing_ends(plan, document))
-    gaps = sorted(plan.gaps)
+    without = (each.subject for each in plan.diagnostics if each.code in _WITHOUT_INTERFACES)
+    gaps = sorted(plan.gaps.union(without))
     if not found or not gaps:
         yield from found
         return
@@ -55,6 +56,7 @@ def missing_ends(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
 
 
 _NAMED = 5
+_WITHOUT_INTERFACES = ("executable-without-enclave", "executable-ungranted")  # a simulator, a player of a bag
 
 
 def _missing_ends(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
