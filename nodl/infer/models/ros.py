@@ -18,6 +18,7 @@ from nodl.infer.models.signatures import (
     HELPERS,
     NODE_CALLBACKS,
     NODE_ENDPOINTS,
+    SUBSCRIPTION,
     Argument,
     CallbackArgument,
     EndpointCall,
@@ -544,6 +545,8 @@ def assign_parameters(run: Run, record: NodeRecord, listed: Value, call: Call) -
                     value = present(atom.cells.get("value", ANY))
                     record.assigned[name] = join(record.assigned.get(name, BOTTOM), value)
                     run.state.write(record.cells, name, value)
+                    if name == "use_sim_time" and truth(value) is not False:
+                        add_endpoint(run, record, SUBSCRIPTION, "/clock", "rosgraph_msgs/msg/Clock", call)
             elif isinstance(atom, Unknown):
                 run.findings.gap(call.source, f"parameters set in code are not known: {atom.why}")
 

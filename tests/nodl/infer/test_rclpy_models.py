@@ -29,6 +29,10 @@ CALLS = {
         ("publisher", "t", "std_msgs/msg/String")
     ],
     "node.create_subscription(String, 't', print, 10)": [("subscription", "t", "std_msgs/msg/String")],
+    "node.set_parameters([rclpy.Parameter('use_sim_time', value=True)])": [
+        ("subscription", "/clock", "rosgraph_msgs/msg/Clock")
+    ],
+    "node.set_parameters([rclpy.Parameter('use_sim_time', value=False)])": [],
     "node.create_service(Empty, 's', print)": [("service_server", "s", "std_srvs/srv/Empty")],
     "node.create_client(Empty, 's')": [("service_client", "s", "std_srvs/srv/Empty")],
     "ActionServer(node, NavigateToPose, 'a', print)": [
