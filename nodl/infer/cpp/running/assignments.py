@@ -106,7 +106,7 @@ def _assigned(run: Machine, targets: Sequence[Obj], value: Value, node: Node, fr
         if own:
             run.calls.call_methods(run, own, target, [value], node, frame, ())
         elif all(isinstance(atom, Obj) and atom.cls is not None for atom in value):
-            overwrite(run, targets, value)
+            overwrite(run, targets, value, node, frame)
             break
         else:
             return False

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from dataclasses import replace
 
 from nodl.infer.cpp.reading.declarations import Class, Function
 from nodl.infer.cpp.reading.type_names import Type
@@ -83,7 +84,7 @@ def _copy(run: Machine, atom: object, node: Node, frame: Frame, cls: Class | Non
         for name in each.fields
     }
     kind = atom.type if target is atom.cls else Type(target.qualified)
-    key = ("copy", atom, frame.file.file, node.start_byte, frame.path, target)
+    key = ("copy", atom, frame.file.file, node.start_byte, node.end_byte, frame.path, target)
     twin = run.obj(key, kind, cls=target, bindings=atom.bindings, foreign_base=atom.foreign_base)
     for (each, name), value in cells.items():
         if value is not None:
@@ -125,17 +126,18 @@ def takes_another(constructor: Function) -> bool:
     return constructor.name in words and "&" in given[0].type
 
 
-def overwrite(run: Machine, targets: Sequence[Obj], value: Value) -> None:
+def overwrite(run: Machine, targets: Sequence[Obj], value: Value, node: Node, frame: Frame) -> None:
     """Run ``object = other``: it has the members of the other one then; or may have, of several objects."""
     others = [atom for atom in value if isinstance(atom, Obj) and atom.cls is not None]
     for target in targets:
         for each in run.names.ancestry(target.cls):
             for name in each.fields:
                 cell = (target, name)
-                read = [run.store.get((o, name)) or BOTTOM for o in others]
+                held = join(*(run.store.get((other, name)) or BOTTOM for other in others))
+                read = _member_copied(run, each, name, held, node, replace(frame, path=(*frame.path, target)))
                 is_one = len(targets) == 1 and not target.several
                 before = [] if is_one else [run.store.get(cell) or BOTTOM]
-                run.store.set(cell, join(*before, *read))
+                run.store.set(cell, join(*before, read))
 
 
 def iterated(run: Machine, subject: Value) -> tuple[list[Value], bool]:

@@ -325,7 +325,7 @@ def invoke(
         return unknown(f"the result of {function.name}()")
     inner = Frame(
         function.file, function.scope, function, this_object, bindings or {},
-        path=(*frame.path[-24:], (frame.file.file, node.start_byte)),
+        path=(*frame.path[-24:], (frame.file.file, node.start_byte, node.end_byte)),
         conditions=run.conditions(node, frame), depth=frame.depth + 1,
     )  # fmt: skip
     inner = run.frame((function, this_object, inner.path), inner)

@@ -151,6 +151,15 @@ KNOWN: dict[str, tuple[str, str, str, set[str]]] = {
         'struct D : B { using B::k; std::string k(double) { return "Dd"; } };',
         {"Bi", "Dd", "s"},
     ),
+    "an object within an object is assigned as a copy": (
+        'O a, b; a.c.t = "a"; b = a; b.c.t = "b"; pub(a.c.t); pub(b.c.t + "_b");',
+        "", CONFIG + "struct O { C c; };", {"a", "b_b"},
+    ),
+    "each call of a chain makes an object of its own": (
+        'add("x").add("y"); for (auto & each : all_) pub(each.t);',
+        "Demo & add(std::string t) { all_.push_back({t}); return *this; } std::vector<C> all_;", CONFIG,
+        {"x", "y"},
+    ),
     "a class says which of two bases a name is of": (
         "D d; pub(d.k()); pub(d.A::k());", "",
         'struct A { std::string k() { return "a"; } }; struct B { std::string k() { return "b"; } };'
