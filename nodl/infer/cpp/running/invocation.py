@@ -24,7 +24,7 @@ from nodl.infer.cpp.running.references import forget
 from nodl.infer.cpp.running.static_types import declared_type, given_to
 from nodl.infer.cpp.running.unknown_calls import may_be_written as may_be_written
 from nodl.infer.cpp.running.unknown_calls import unknown_call
-from nodl.infer.cpp.running.values import Bound, Lambda, Obj, Seq, Value, join, join_in_doubt, unknown
+from nodl.infer.cpp.running.values import Atom, Bound, Lambda, Obj, Seq, Value, join, join_in_doubt, unknown
 from nodl.infer.cpp.syntax import (
     Node,
     addressed,
@@ -90,8 +90,16 @@ class CallSite:
 
 
 def call_values(run: Machine, callee: Value, values: Sequence[Value], node: Node, frame: Frame) -> Value:
-    """Call whatever ``callee`` holds."""
+    """Call whatever ``callee`` holds: of several functions any one."""
     found: list[Value] = []
+    if len(callee) > 1:
+
+        def one(atom: Atom) -> int:
+            found.append(call_values(run, (atom,), values, node, frame))
+            return NEXT
+
+        run.branches([partial(one, atom) for atom in callee])
+        return join(*found)
     for atom in callee:
         if isinstance(atom, Lambda):
             found.append(call_lambda(run, atom, values, node, frame))

@@ -160,6 +160,11 @@ KNOWN: dict[str, tuple[str, str, str, set[str]]] = {
         "Demo & add(std::string t) { all_.push_back({t}); return *this; } std::vector<C> all_;", CONFIG,
         {"x", "y"},
     ),
+    "a callback that names its successor": (
+        "next_ = [this]() { t_ = \"first\"; next_ = [this]() { t_ = \"second\"; }; };"
+        + EVERY_SECOND % "next_(); pub(t_);",
+        'std::function<void()> next_; std::string t_ = "none";', "", {"first", "second"},
+    ),
     "a class says which of two bases a name is of": (
         "D d; pub(d.k()); pub(d.A::k());", "",
         'struct A { std::string k() { return "a"; } }; struct B { std::string k() { return "b"; } };'
