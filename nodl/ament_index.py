@@ -13,6 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from enclave_common.files import read_text
+from nodl.package_xml import read_package_xml
 
 PREFIX_VARIABLE = "AMENT_PREFIX_PATH"
 MISSING_PREFIX = "/missing"
@@ -20,7 +21,6 @@ MISSING_PREFIX = "/missing"
 ``/missing/bin``."""
 INDEX_FOLDER = os.path.join("share", "ament_index", "resource_index")
 _LAUNCH_FILE = re.compile(r"launch\.(py|xml|ya?ml)$")  # ros2launch/api/api.py, is_launch_file
-_PACKAGE_VERSION = re.compile(r"<version\b[^<>]*>\s*([0-9]+(?:\.[0-9]+)*)\s*</version>")
 _PACKAGE_NAME = re.compile("[a-zA-Z0-9][a-zA-Z0-9_-]+", re.ASCII)  # REP 127 with its exemptions
 
 
@@ -132,16 +132,7 @@ def package_version(package: str, prefixes: Sequence[str]) -> str | None:
         share = package_share_directory(package, prefixes)
     except (PackageNotFoundError, ValueError):
         return None
-    return package_file_version(os.path.join(share, "package.xml"))
-
-
-def package_file_version(path: str) -> str | None:
-    """Return what a ``package.xml`` says; ``None`` if it does not, or cannot be read."""
-    try:
-        found = _PACKAGE_VERSION.search(read_text(path, errors="replace"))
-    except OSError:
-        return None
-    return found[1] if found else None
+    return read_package_xml(share).version or None
 
 
 def executable_path(package: str, executable: str, prefixes: Sequence[str]) -> str:

@@ -57,9 +57,11 @@ FLOORS: dict[str, tuple[set[str], ...]] = {
         {"__init__", "__main__"},
     ),
     "nodl": (
-        {"source_ref", "types", "names", "ament_index", "endpoint_kind"},
+        {"source_ref", "types", "names", "endpoint_kind"},
         {"errors", "remap", "name_template"},
         {"node_interface", "ros_arguments", "yaml_text", "xml_text"},
+        {"package_xml"},
+        {"ament_index"},
         {"builtin_interfaces"},
         {"dependence"},
         {"document"},

@@ -12,13 +12,12 @@ substitutions, classes that the snapshot would refuse - because they can change 
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Iterator, Sequence
 from enum import Enum
 from functools import lru_cache
 from typing import NamedTuple
 
-from enclave_common.files import read_text
+from nodl.package_xml import read_package_xml
 
 Version = tuple[int, ...]
 ALWAYS: Version = (0,)
@@ -201,12 +200,7 @@ def choose_release(name: str | None, environment_name: str | None, prefixes: Seq
 
 def _installed_version(package: str, prefixes: Sequence[str]) -> Version | None:
     for prefix in prefixes:
-        manifest = os.path.join(prefix, "share", package, "package.xml")
-        try:
-            text = read_text(manifest, errors="replace")
-        except OSError:
-            continue
-        found = re.search(r"<version[^>]*>\s*([0-9.]+)\s*</version>", text[:4096])
-        if found:
-            return tuple(int(part) for part in found.group(1).split(".") if part)
+        version = read_package_xml(os.path.join(prefix, "share", package)).version
+        if version:
+            return tuple(map(int, version.split(".")))
     return None

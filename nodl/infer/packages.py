@@ -12,10 +12,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from enclave_common.files import text_or_nothing
+from nodl.package_xml import read_package_xml
 
 _ENTRY = re.compile(r"\s*([\w.\-]+)\s*=\s*([\w.]+)\s*:\s*([\w.]+)\s*\Z")
-_NAME = re.compile(r"<name>\s*([^<\s]+)\s*</name>")
-_DEPENDS = re.compile(r"<(?:exec_|run_|build_)?depend(?:\s[^>]*)?>\s*([^<\s]+)\s*</")
 _PROGRAMS = re.compile(r"install\s*\(\s*PROGRAMS(.*?)DESTINATION", re.S | re.I)
 
 
@@ -54,13 +53,11 @@ def find_package(file: str) -> Package | None:
 def read_package(folder: str) -> Package:
     """Return what the files in ``folder`` tell; the folder's name stands in where package.xml gives none."""
     base = Path(folder)
-    manifest = text_or_nothing(base / "package.xml")
-    match = _NAME.search(manifest)
-    name = match[1] if match else base.name
+    manifest = read_package_xml(base)
     texts = (*_literal_texts(base / "setup.py"), *text_or_nothing(base / "setup.cfg").splitlines())
     entries = tuple(EntryPoint(*match.groups()) for match in map(_ENTRY.match, texts) if match)
-    dependencies = frozenset(_DEPENDS.findall(manifest))
-    return Package(name, folder, entries, _cmake_programs(base / "CMakeLists.txt"), dependencies)
+    programs = _cmake_programs(base / "CMakeLists.txt")
+    return Package(manifest.name or base.name, folder, entries, programs, manifest.depends)
 
 
 def _literal_texts(path: Path) -> list[str]:

@@ -10,7 +10,6 @@ import os
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
-from nodl.ament_index import package_file_version
 from nodl.dependence import Situation
 from nodl.dependence.apply import applied
 from nodl.infer.packages import read_package
@@ -18,6 +17,7 @@ from nodl.infer.system import infer_paths
 from nodl.library import Library, LibraryDocuments, fits
 from nodl.library.document import LibraryDocument
 from nodl.node_interface import Endpoint, EndpointKind, NodeInterface
+from nodl.package_xml import read_package_xml
 
 _Name = tuple[EndpointKind, str]
 _BUILT_IN = frozenset(("clock", "parameter_events", "rosout"))
@@ -70,7 +70,7 @@ def check(library: Library, folder: str) -> list[LibraryVerdict]:
         source = packages.get(document.package)
         if source is None:
             continue
-        version = package_file_version(os.path.join(source, "package.xml"))
+        version = read_package_xml(source).version or None
         if not fits(document.versions, "", version):
             reason = f"these sources are of version {version}"
             verdicts.append(

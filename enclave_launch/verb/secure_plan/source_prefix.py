@@ -18,13 +18,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from enclave_common.files import read_bytes
 from enclave_launch.errors import UsageError
 from nodl.ament_index import INDEX_FOLDER
-from nodl.errors import InvalidXMLError
 from nodl.infer.cpp.reading.cmake import Build, BuildReader, absolute
 from nodl.infer.cpp.reading.project import find_packages
-from nodl.xml_text import parse_xml
+from nodl.package_xml import read_package_xml
 
 _KEYWORDS = frozenset({
     "DESTINATION", "RENAME", "RUNTIME", "LIBRARY", "ARCHIVE", "OBJECTS", "FRAMEWORK", "BUNDLE", "INCLUDES", "EXPORT",
@@ -76,12 +74,7 @@ def install_sources(sources: Path, target: Path) -> dict[str, Path]:
 
 def _is_python(folder: Path) -> bool:
     """Return True if colcon builds the package with ``setup.py``, whatever else lies beside it (REP 149)."""
-    manifest = str(folder / "package.xml")
-    try:
-        kinds = parse_xml(read_bytes(manifest), manifest).iter("build_type")
-    except (OSError, InvalidXMLError):
-        return False
-    return any(kind.text.strip() == "ament_python" for kind in kinds)
+    return read_package_xml(folder).build_type == "ament_python"
 
 
 class _InstallRules(BuildReader):

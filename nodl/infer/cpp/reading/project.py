@@ -12,10 +12,8 @@ from html import unescape
 from enclave_common.files import text_or_nothing
 from nodl.infer.cpp.reading.built import Definitions, built_targets, joined
 from nodl.infer.cpp.reading.cmake import SOURCES, Build, Target, read_build
+from nodl.package_xml import read_package_xml
 
-_TAG = re.compile(r"<(?:\w*depend|exec_depend|build_depend)(?:\s[^<>]*)?>\s*([\w\-.]+)\s*</")
-_NAME = re.compile(r"<name>\s*([^<\s]+)\s*</name>")
-_EXPORT = re.compile(r'<(\w+)\s+plugin\s*=\s*"([^"]+)"')
 _CLASS = re.compile(r"<class\b((?:\s+[\w:]+\s*=\s*(?:\"[^\"]*\"|'[^']*'))+)\s*/?>")
 _ATTRIBUTE = re.compile(r"([\w:]+)\s*=\s*(?:\"([^\"]*)\"|'([^']*)')")
 _SKIPPED = frozenset({"build", "install", "log", "node_modules", "venv", "site-packages", "__pycache__"})
@@ -37,6 +35,7 @@ class SourcePackage:
     name: str
     folder: str
     depends: frozenset[str] = frozenset()
+    plugin_files: tuple[str, ...] = ()  # that ``package.xml`` names
 
     @cached_property
     def build(self) -> Build:
@@ -44,9 +43,8 @@ class SourcePackage:
 
     @cached_property
     def plugins(self) -> list[PluginClass]:
-        files = list(self.build.plugin_files)
-        manifest = text_or_nothing(os.path.join(self.folder, "package.xml"))
-        files += [p.replace("${prefix}", self.folder) for _, p in _EXPORT.findall(manifest)]
+        named = [each.replace("${prefix}", self.folder) for each in self.plugin_files]
+        files = [*self.build.plugin_files, *named]
         return [each for file in dict.fromkeys(files) for each in plugin_classes(file)]
 
     @cached_property
@@ -169,10 +167,9 @@ def find_packages(roots: Iterable[str]) -> dict[str, SourcePackage]:
 
 def read_source_package(folder: str) -> SourcePackage:
     """Name and dependencies from ``package.xml``; the name of the folder where that gives no name."""
-    manifest = re.sub(r"<!--(?:.|\n)*?-->", "", text_or_nothing(os.path.join(folder, "package.xml")))
-    match = _NAME.search(manifest)
+    manifest = read_package_xml(folder)
     return SourcePackage(
-        match[1] if match else os.path.basename(folder), folder, frozenset(_TAG.findall(manifest))
+        manifest.name or os.path.basename(folder), folder, manifest.depends, manifest.plugins
     )
 
 
