@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
+from enclave_launch.description.argument_types import is_a_subclass
 from enclave_launch.description.entity import Action, LaunchDescriptionEntity, normalize_to_list_of_entities
 from enclave_launch.description.events.event import Event, ProcessExited
 from enclave_launch.description.events.event import Shutdown as ShutdownEvent
@@ -22,6 +23,11 @@ class EmitEvent(TemplateAction):
     """Queue an event; it is handled after all that is being visited now."""
 
     event: Event = stored()
+
+    def __init__(self, *, event: Event, **kwargs: Any) -> None:
+        super().__init__(event=event, **kwargs)
+        if not is_a_subclass(event, Event):
+            raise RuntimeError(f"EmitEvent() expected an event instance, got '{event}'.")
 
     def execute(self, context: LaunchContext) -> None:
         context.emit_event_sync(self.event)
