@@ -129,8 +129,9 @@ def test_missing_ends_are_one_finding_where_not_all_is_known() -> None:
     (found,) = [each for each in checks(checked) if each.code in RULES]
     assert found.code == "ends-not-judged"
     assert found.text == "/x, /y have one end only among what is known, but not all is known of demo/driver"
-    checked["diagnostics"] = [told("executable-without-enclave", "gazebo-1")]
-    assert {each.code for each in checks(checked) if each.code in RULES} == {"ends-not-judged"}
+    for of_an_executable in ("executable-without-enclave", "enclave-ungranted"):
+        checked["diagnostics"] = [told(of_an_executable, "gazebo-1")]
+        assert {each.code for each in checks(checked) if each.code in RULES} == {"ends-not-judged"}
     checked["diagnostics"] = [told("pattern-accepted", "/n")]
     assert "no-publisher" in {each.code for each in checks(checked)}, "no gap: the name is a known pattern"
 

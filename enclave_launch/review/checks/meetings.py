@@ -7,6 +7,7 @@ from itertools import combinations, product
 from typing import Any, NamedTuple
 
 from enclave_common.words import some_of
+from enclave_launch.diagnostics import Code
 from enclave_launch.dry_run import DryRun, Interface, Operation
 from enclave_launch.review.checks.rules import finding
 from enclave_launch.review.document import KIND_OF, GrantedName, PlanDocument, PlanFinding
@@ -56,7 +57,7 @@ def missing_ends(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
 
 
 _NAMED = 5
-_WITHOUT_INTERFACES = ("executable-without-enclave", "executable-ungranted")  # a simulator, a player of a bag
+_WITHOUT_INTERFACES = (Code.EXECUTABLE_WITHOUT_ENCLAVE, Code.ENCLAVE_UNGRANTED)  # a simulator, a player of a bag
 
 
 def _missing_ends(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
