@@ -57,7 +57,8 @@ def missing_ends(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
 
 
 _NAMED = 5
-_WITHOUT_INTERFACES = (Code.EXECUTABLE_WITHOUT_ENCLAVE, Code.ENCLAVE_UNGRANTED)  # a simulator, a player of a bag
+_WITHOUT_INTERFACES = (Code.EXECUTABLE_WITHOUT_ENCLAVE, Code.ENCLAVE_UNGRANTED)
+"""Said of an ``executable``: a simulator, a player of a bag."""
 
 
 def _missing_ends(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
