@@ -81,7 +81,9 @@ def assignment(run: Machine, node: Node, frame: Frame) -> Value:
     else:
         value = _combined(operator[:-1], run.evaluate(left, frame), value)
     value_held = as_declared(run, left, value, frame)
-    if operator == "=" and left.type == "identifier" and is_pointer(run, left, frame):
+    holder = frame.owner_of(text(left))
+    refers = holder is not None and holder.types.get(text(left), "").endswith("&")
+    if operator == "=" and left.type == "identifier" and not refers and is_pointer(run, left, frame):
         _points_elsewhere(run, left, value_held, frame)
     else:
         assign(run, left, value_held, frame)

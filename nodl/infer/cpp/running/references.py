@@ -15,7 +15,7 @@ from nodl.infer.cpp.ledger import CREATES
 from nodl.infer.cpp.running.effects import effects_of, referred_to, written_in
 from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.memory import Cell
-from nodl.infer.cpp.running.static_types import current_object
+from nodl.infer.cpp.running.static_types import current_object, is_address
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     Const,
@@ -53,6 +53,9 @@ def bind_reference(run: Machine, name: str, kind: str, initial: Node | None, fra
     What a view, an iterator or a reference to an element shows is not known if the function changes what is behind it.
     """
     target, value = unwrapped(initial), run.store.get((frame, name)) or BOTTOM
+    if target is not None and kind.endswith("&") and _is_fixed(target) and is_address(run, target, frame):
+        frame.aliases[name] = target  # of a pointer: who sets the one sets the other
+        return
     if target is None or not (is_plain(value) or any(isinstance(atom, Unknown) for atom in value)):
         return
     if kind.endswith("*"):

@@ -318,7 +318,7 @@ def declaration(run: Machine, node: Node, frame: Frame) -> int:
         if any(text(each).startswith(name) for each in functions):
             continue
         fixed = not pointer and any(text(each) in ("const", "constexpr") for each in children(node))
-        kind = ("const " if fixed else "") + written + (("*" if _points(node) else "&") if pointer else "")
+        kind = ("const " if fixed else "") + written + (_marks(node) if pointer else "")
         initial = partial(declared_value, run, node, written, value, pointer, frame)
         if _is_static(node):
             _static_local(run, node, name, kind, initial, frame)
@@ -344,9 +344,14 @@ def _structured(declarators: Sequence[Node]) -> tuple[Node, Node | None] | None:
     return None
 
 
-def _points(node: Node) -> bool:
-    """Return whether a declaration has a ``*``, and not only ``&``."""
-    return any(each.type == "pointer_declarator" for each in walk(node) if each.type.endswith("declarator"))
+def _marks(node: Node) -> str:
+    """Return ``*``, ``&`` or, for a reference to a pointer, ``*&``."""
+    found = [each for each in walk(node) if each.type in ("pointer_declarator", "reference_declarator")]
+    pointers = [each for each in found if each.type == "pointer_declarator"]
+    inner = field_of(pointers[0], "declarator") if pointers else None
+    if inner is not None and inner.type == "reference_declarator":
+        return "*&"
+    return "*" if pointers else "&"
 
 
 def _is_static(node: Node) -> bool:

@@ -30,6 +30,9 @@ COVERED: dict[str, tuple[str, str, str, set[str]]] = {
     "a callback changes what another one reads outside of the class": (
         EVERY_SECOND % 'shared = "b";' + EVERY_SECOND % "pub(shared);", "", 'std::string shared = "a";', {"a", "b"},
     ),
+    "a member that is a pointer is set through a reference to it": (
+        'C a; C *& r = c_; r = &a; c_->t = "a"; pub(a.t);', "C * c_ = nullptr;", CONFIG, {"a"},
+    ),
     "a list of addresses shows what its variables hold later": (
         'std::string a = "a"; std::string * all[] = {&a}; a = "b"; for (auto * each : all) pub(*each);',
         "", "", {"b"},
@@ -136,6 +139,11 @@ KNOWN: dict[str, tuple[str, str, str, set[str]]] = {
         'C a, b; C * p = &a; p = &b; p->t = "b"; pub(b.t); H h; h.c = &a; h.c->t = "a"; pub(a.t);'
         'p = h.c; p->t = "again"; pub(a.t);',
         "", CONFIG + "struct H { C * c = nullptr; };", {"b", "a", "again"},
+    ),
+    "a reference to a pointer is that pointer, and another one is not": (
+        'C a, b; C * p = &a; C *& r = p; r = &b; p->t = "b"; pub(b.t); auto & s = p; s = &a; p->t = "a"; pub(a.t);'
+        'C * q = p; q = &b; p->t = "still"; pub(a.t);',
+        "", CONFIG, {"b", "a", "still"},
     ),
     "an object, or an optional one, is a copy of what it was given later": (
         'C a, b; a.t = "a"; b = a; b.t = "b"; pub(a.t); std::optional<C> o; o = a; o->t = "o"; pub(a.t + "_still");',
