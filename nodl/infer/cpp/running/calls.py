@@ -17,7 +17,7 @@ from nodl.infer.cpp.libraries import (
     NODE_METHODS,
     FunctionModel,
 )
-from nodl.infer.cpp.reading.declarations import Class, Function
+from nodl.infer.cpp.reading.declarations import Class, Function, Scope
 from nodl.infer.cpp.reading.names import STANDARD_TYPES
 from nodl.infer.cpp.reading.type_names import NO_TYPE
 from nodl.infer.cpp.reading.writes import FILLS
@@ -104,13 +104,18 @@ def _named_call(run: Machine, name: str, site: CallSite) -> Value:
     if name in CASTS:
         run.resolve(site.node, site.frame)
         return _cast(run, name, site)
+    if text(site.callee).startswith("::") and "::" not in name:
+        return _free_call(run, name, site, scope=())
+    used = site.frame.bindings.get(name)  # by ``using ns::f`` in this function
+    if used is not None and run.names.find_functions(used.name, (), site.frame.file):
+        return _free_call(run, used.name, site, scope=())
     owner = site.frame.owner_of(name) if "::" not in name else None
     if owner is not None:
         run.resolve(site.node, site.frame)
         values = site.values
         return call_values(run, run.store.get((owner, name)) or BOTTOM, values, site.node, site.frame)
     found = _own_method(run, name, site)
-    return _free_call(run, name, site) if found is None else found
+    return _free_call(run, name, site, site.frame.scope) if found is None else found
 
 
 def _cast(run: Machine, name: str, site: CallSite) -> Value:
@@ -160,13 +165,13 @@ def _of_named_class(run: Machine, this: Obj, head: str, last: str, site: CallSit
     return None
 
 
-def _free_call(run: Machine, name: str, site: CallSite) -> Value:
+def _free_call(run: Machine, name: str, site: CallSite, scope: Scope) -> Value:
     node, frame = site.node, site.frame
     qualified = _qualified(run, name, frame)
     if qualified in _MAKERS:
         kind = site.types[0] if site.types else NO_TYPE
         return construct(run, kind._replace(pointer=False), site.values, node, frame, heap=True)
-    functions = run.names.find_functions(name, frame.scope, frame.file)
+    functions = run.names.find_functions(name, scope, frame.file)
     if functions:
         return call_functions(run, functions, site.values, node, frame, site.types)
     qualified = as_algorithm(qualified, site.given)

@@ -145,6 +145,11 @@ KNOWN: dict[str, tuple[str, str, str, set[str]]] = {
         'C * q = p; q = &b; p->t = "still"; pub(a.t);',
         "", CONFIG, {"b", "a", "still"},
     ),
+    "::f() and using ns::f mean the function, f() the method of that name": (
+        'pub(::topic()); pub(topic()); { using far::topic; pub(topic()); } pub(topic() + "2");', 'std::string topic() { return "own"; }',
+        'std::string topic() { return "global"; } namespace far { std::string topic() { return "far"; } }',
+        {"global", "own", "far", "own2"},
+    ),
     "an object, or an optional one, is a copy of what it was given later": (
         'C a, b; a.t = "a"; b = a; b.t = "b"; pub(a.t); std::optional<C> o; o = a; o->t = "o"; pub(a.t + "_still");',
         "", CONFIG, {"a", "a_still"},
