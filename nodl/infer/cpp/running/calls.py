@@ -172,6 +172,7 @@ def _free_call(run: Machine, name: str, site: CallSite, scope: Scope) -> Value:
         kind = site.types[0] if site.types else NO_TYPE
         return construct(run, kind._replace(pointer=False), site.values, node, frame, heap=True)
     functions = run.names.find_functions(name, scope, frame.file)
+    functions = [*functions, *_beside_arguments(run, name, functions, site)]
     if functions:
         return call_functions(run, functions, site.values, node, frame, site.types)
     qualified = as_algorithm(qualified, site.given)
@@ -190,6 +191,18 @@ def _free_call(run: Machine, name: str, site: CallSite, scope: Scope) -> Value:
                 given_back = unknown_call(run, qualified, site.values, node, [], frame)
         return given_back
     return _made_or_unknown(run, name, qualified, site)
+
+
+def _beside_arguments(run: Machine, name: str, found: list[Function], site: CallSite) -> list[Function]:
+    """Return functions of that name that ``found`` lacks, in the namespaces of the arguments' classes
+    ([basic.lookup.argdep]).
+    """
+    listed = run.names.functions.get(name, ())
+    if len({each.scope for each in listed}) < 2 or text(site.callee).startswith("::"):
+        return []
+    objects = (atom for value in site.values for atom in value if isinstance(atom, Obj))
+    spaces = {tuple(each.cls.qualified.split("::")[:-1]) for each in objects if each.cls is not None}
+    return [each for each in listed if each.scope in spaces and not each.owner and each not in found]
 
 
 def _made_or_unknown(run: Machine, name: str, qualified: str, site: CallSite) -> Value:

@@ -146,9 +146,15 @@ KNOWN: dict[str, tuple[str, str, str, set[str]]] = {
         "", CONFIG, {"b", "a", "still"},
     ),
     "::f() and using ns::f mean the function, f() the method of that name": (
-        'pub(::topic()); pub(topic()); { using far::topic; pub(topic()); } pub(topic() + "2");', 'std::string topic() { return "own"; }',
+        'pub(::topic()); pub(topic()); { using far::topic; pub(topic()); } pub(topic() + "2");',
+        'std::string topic() { return "own"; }',
         'std::string topic() { return "global"; } namespace far { std::string topic() { return "far"; } }',
         {"global", "own", "far", "own2"},
+    ),
+    "a function beside the class of its argument is found, and fits better than one that takes anything": (
+        'pub(topic(far::X{})); pub(topic(1));', "",
+        'namespace far { struct X {}; std::string topic(X) { return "far"; } }'
+        'std::string topic(...) { return "global"; }', {"far", "global"},
     ),
     "an object, or an optional one, is a copy of what it was given later": (
         'C a, b; a.t = "a"; b = a; b.t = "b"; pub(a.t); std::optional<C> o; o = a; o->t = "o"; pub(a.t + "_still");',
