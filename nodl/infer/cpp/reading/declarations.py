@@ -224,12 +224,15 @@ def unnamed(node: Node) -> str:
     return f"unnamed_{line_of(node)}_{node.start_point[1]}"
 
 
+_VARIADIC = ("variadic_parameter_declaration", "variadic_parameter", "...")
+
+
 def parameters_of(declarator: Node, function: Function | None = None) -> list[FunctionParameter]:
     """Return parameters in order, without a lone ``void``; ``...`` or a pack marks ``function`` as variadic."""
     listed = field_of(declarator, "parameters")
     found = []
-    for child in listed.named_children if listed is not None else ():
-        if child.type in ("variadic_parameter_declaration", "variadic_parameter") and function is not None:
+    for child in listed.children if listed is not None else ():
+        if child.type in _VARIADIC and function is not None:
             function.variadic = True
         if not child.type.endswith("parameter_declaration"):
             continue

@@ -23,7 +23,13 @@ def candidates(functions: Sequence[Function], arguments: Sequence[Value]) -> Seq
     if len(fitting) <= 1:
         return fitting or (functions if len(functions) == 1 else ())
     scores = [sum(map(_likeness, each.parameters, arguments, repeat(each.templates))) for each in fitting]
-    return [each for each, score in zip(fitting, scores, strict=True) if score == max(scores)]
+    best = max(scores)
+    unsure = best < _EXACT * len(arguments)  # by a conversion that there may not be: then f(...) is meant
+    rated = zip(fitting, scores, strict=True)
+    return [each for each, score in rated if score == best or (unsure and each.variadic)]
+
+
+_EXACT = 3
 
 
 _GENERIC = re.compile(r"(?:const )?[A-Z]\w*(?: ?[&*]+)?")

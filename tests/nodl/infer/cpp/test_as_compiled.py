@@ -30,6 +30,11 @@ COVERED: dict[str, tuple[str, str, str, set[str]]] = {
     "a callback changes what another one reads outside of the class": (
         EVERY_SECOND % 'shared = "b";' + EVERY_SECOND % "pub(shared);", "", 'std::string shared = "a";', {"a", "b"},
     ),
+    "an argument that no conversion leads to a class is taken by what takes anything": (
+        "pub(topic(1));", "",
+        'struct O { O(const char *) {} }; std::string topic(O) { return "O"; }'
+        'std::string topic(...) { return "dots"; }', {"dots"},
+    ),
     "a member that is a pointer is set through a reference to it": (
         'C a; C *& r = c_; r = &a; c_->t = "a"; pub(a.t);', "C * c_ = nullptr;", CONFIG, {"a"},
     ),
