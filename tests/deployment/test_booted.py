@@ -167,6 +167,7 @@ def test_a_process_is_respawned_as_often_as_the_launch_file_says_however_often_i
     assert "error: flaky-false.service is" in printed
     left = f"go on with\n    secure-keystore units restart flaky-false.service {SPEAKER} {EAR}"
     assert left in printed
+    until(lambda: running.machine.property(name, "ActiveState") == "failed", said)  # it was started again
     assert "flaky-false.service is" in running.keystore("units", "status", status=1)
     running.keystore("units", "remove", "flaky")
     assert f"{EAR}: runs" in running.keystore("units", "status", "/ear")
