@@ -1,4 +1,4 @@
-"""What the ``package.xml`` of a package says (REP 149). Reads that file."""
+"""Read the ``package.xml`` of a package (REP 149)."""
 
 from __future__ import annotations
 
@@ -19,19 +19,21 @@ _VERSION = re.compile(r"[0-9]+(?:\.[0-9]+)*")
 class PackageXml(NamedTuple):
     """The parts that are read; each is empty if the file does not have it.
 
-    ``depends``: packages and rosdep keys, of every kind of dependency; ``plugins``: files that describe plugins, as
-    written.
+    Attributes:
+        build_types: Several if conditions choose between them.
+        depends: Packages and rosdep keys, of every kind of dependency.
+        plugins: Files that describe plugins, as written.
     """
 
     name: str = ""
     version: str = ""
-    build_type: str = ""
+    build_types: frozenset[str] = frozenset()
     depends: frozenset[str] = frozenset()
     plugins: tuple[str, ...] = ()
 
 
 def read_package_xml(folder: str | PathLike[str]) -> PackageXml:
-    """Return what the ``package.xml`` in ``folder`` says: nothing if there is none, or it cannot be read."""
+    """Read the ``package.xml`` in ``folder``; all parts are empty if there is none, or it cannot be read."""
     path = Path(folder, PACKAGE_XML)
     try:
         root = parse_xml(read_bytes(path), str(path))
@@ -41,7 +43,7 @@ def read_package_xml(folder: str | PathLike[str]) -> PackageXml:
     return PackageXml(
         _first(root, "name"),
         version if _VERSION.fullmatch(version) else "",
-        _first(root, "build_type"),
+        frozenset(each.text.strip() for each in root.iter("build_type")),
         frozenset(each.text.strip() for each in root if each.tag.endswith("depend")),
         tuple(each.get("plugin") for each in root.iter() if each.get("plugin")),
     )

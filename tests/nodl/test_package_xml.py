@@ -1,4 +1,4 @@
-"""What a ``package.xml`` says, as colcon reads it: as XML, not as text."""
+"""``package.xml`` is read as XML, as colcon reads it."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def test_each_part_is_read_and_comments_are_not(tmp_path: Path) -> None:
     assert read_package_xml(tmp_path) == PackageXml(
         "robot",
         "1.2.3",
-        "ament_cmake",
+        frozenset({"ament_cmake"}),
         frozenset({"rclcpp", "std_msgs", "ament_lint"}),
         ("${prefix}/plugins.xml",),
     )
@@ -47,3 +47,12 @@ def test_a_file_that_is_not_there_or_no_xml_says_nothing(tmp_path: Path, text: s
 def test_a_version_is_numbers_with_dots(tmp_path: Path, version: str, known: str) -> None:
     (tmp_path / "package.xml").write_text(f"<package><version>{version}</version></package>")
     assert read_package_xml(tmp_path).version == known
+
+
+def test_a_package_for_two_releases_of_ros_has_the_build_types_of_both(tmp_path: Path) -> None:
+    kinds = {"1": "catkin", "2": "ament_python"}
+    lines = (
+        f'<build_type condition="$ROS_VERSION == {ros}">{kind}</build_type>' for ros, kind in kinds.items()
+    )
+    (tmp_path / "package.xml").write_text(f"<package><export>{''.join(lines)}</export></package>")
+    assert read_package_xml(tmp_path).build_types == {"catkin", "ament_python"}

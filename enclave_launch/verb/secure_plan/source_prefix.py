@@ -74,7 +74,7 @@ def install_sources(sources: Path, target: Path) -> dict[str, Path]:
 
 def _is_python(folder: Path) -> bool:
     """Return True if colcon builds the package with ``setup.py``, whatever else lies beside it (REP 149)."""
-    return read_package_xml(folder).build_type == "ament_python"
+    return "ament_python" in read_package_xml(folder).build_types
 
 
 class _InstallRules(BuildReader):
