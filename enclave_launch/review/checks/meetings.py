@@ -95,8 +95,10 @@ _TRANSFORMS = {"tf": "tf_static", "tf_static": "tf"}
 
 
 def _lacks_transforms_only(topic: str, published: set[str]) -> bool:
-    """Return True for a topic of transforms that one may lack: many robots publish one of the two only, and a launch of
-    a part of a robot none at all."""
+    """Return True if ``topic`` has transforms and may be without a publisher.
+
+    Many robots publish on one of the two topics only, and a launch of a part of a robot on none.
+    """
     namespace, slash, last = topic.rpartition("/")
     other = _TRANSFORMS.get(last)
     return other is not None and (

@@ -262,7 +262,11 @@ class Reach:
     """What can be called, by name. A method counts when its class, or one derived from it, is made or spoken of."""
 
     def __init__(self, run: Machine, operators: bool = False):
-        """``operators``: those count, too, whose signs stand in what is reached."""
+        """Begin with the classes that the program has used so far.
+
+        Args:
+            operators: Whether a sign in reached code also reaches the program's operators of that sign.
+        """
         self.run, self.operators = run, operators
         self.by_name = run.names.functions_by_name
         self.mentioned: set[str] = set()
@@ -284,7 +288,10 @@ class Reach:
         return set(self._each())
 
     def from_code(self, code: Function | Node) -> Iterator[Function]:
-        """Yield a function, or none for a closure, and those reachable from it; without the made objects' own hooks."""
+        """Yield the functions reachable from a function, itself included, or from a closure.
+
+        The hooks of objects that were made are not among them.
+        """
         if isinstance(code, Function):
             self.waiting.append(code)
         else:

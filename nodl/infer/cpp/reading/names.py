@@ -60,7 +60,7 @@ _PLAIN = re.compile(
 
 _FRESH = r"(?:new\b(?!\s*\()|nullptr\b|NULL\b)"
 _POINTS_AT_NEW = rf"\s*(?:->|\[|[!=]=|=\s*{_FRESH}|[({{]\s*{_FRESH}|\)\s*\{{)"
-"""What follows a pointer where it is used, compared or set to what ``new`` makes."""
+"""Matches behind a pointer: a member access, a comparison, or an assignment of what ``new`` makes."""
 _OF_ONE_STAR = re.compile(r"^[^*&]*\*[^*&]*$")
 
 
@@ -227,6 +227,7 @@ class Names:
         return self.signs_in(function.node)
 
     def signs_in(self, code: Node) -> frozenset[str]:
+        """Return the signs of the program's operators that stand in a piece of code."""
         source = text(code)
         return frozenset(
             sign for sign in self.operators if (sign[0] if sign in ("()", "[]") else sign) in source

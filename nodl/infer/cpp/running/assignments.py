@@ -81,9 +81,7 @@ def assignment(run: Machine, node: Node, frame: Frame) -> Value:
     else:
         value = _combined(operator[:-1], run.evaluate(left, frame), value)
     value_held = as_declared(run, left, value, frame)
-    holder = frame.owner_of(text(left))
-    refers = holder is not None and holder.types.get(text(left), "").endswith("&")
-    if operator == "=" and left.type == "identifier" and not refers and is_pointer(run, left, frame):
+    if operator == "=" and left.type == "identifier" and is_pointer(run, left, frame):
         _points_elsewhere(run, left, value_held, frame)
     else:
         assign(run, left, value_held, frame)
@@ -91,9 +89,13 @@ def assignment(run: Machine, node: Node, frame: Frame) -> Value:
 
 
 def _points_elsewhere(run: Machine, name: Node, value: Value, frame: Frame) -> None:
-    """Run ``p = &x``: what a pointer to a plain value shows from now on is not known."""
+    """Run ``p = &x``: what a pointer to a plain value shows from now on is not known.
+
+    A reference to a pointer stays bound to it.
+    """
     owner = frame.owner_of(text(name))
-    if owner is not None and text(name) in owner.aliases:
+    is_bound = owner is not None and owner.types.get(text(name), "").endswith("&")
+    if owner is not None and text(name) in owner.aliases and not is_bound:
         owner.aliases[text(name)] = None
         value = unknown(f"what {text(name)} points to")
     _assign_name(run, name, value, frame)

@@ -104,7 +104,7 @@ def _named_call(run: Machine, name: str, site: CallSite) -> Value:
     if name in CASTS:
         run.resolve(site.node, site.frame)
         return _cast(run, name, site)
-    if text(site.callee).startswith("::") and "::" not in name:
+    if _is_global(site) and "::" not in name:
         return _free_call(run, name, site, scope=())
     used = site.frame.bindings.get(name)  # by ``using ns::f`` in this function
     if used is not None and run.names.find_functions(used.name, (), site.frame.file):
@@ -116,6 +116,11 @@ def _named_call(run: Machine, name: str, site: CallSite) -> Value:
         return call_values(run, run.store.get((owner, name)) or BOTTOM, values, site.node, site.frame)
     found = _own_method(run, name, site)
     return _free_call(run, name, site, site.frame.scope) if found is None else found
+
+
+def _is_global(site: CallSite) -> bool:
+    """Return whether it is ``::f()``."""
+    return text(site.callee).startswith("::")
 
 
 def _cast(run: Machine, name: str, site: CallSite) -> Value:
@@ -198,7 +203,7 @@ def _beside_arguments(run: Machine, name: str, found: list[Function], site: Call
     ([basic.lookup.argdep]).
     """
     listed = run.names.functions.get(name, ())
-    if len({each.scope for each in listed}) < 2 or text(site.callee).startswith("::"):
+    if len({each.scope for each in listed}) < 2 or _is_global(site):
         return []
     objects = (atom for value in site.values for atom in value if isinstance(atom, Obj))
     spaces = {tuple(each.cls.qualified.split("::")[:-1]) for each in objects if each.cls is not None}

@@ -30,6 +30,7 @@ def candidates(functions: Sequence[Function], arguments: Sequence[Value]) -> Seq
 
 
 _EXACT = 3
+"""What ``_likeness`` gives an argument that needs no conversion."""
 
 
 _GENERIC = re.compile(r"(?:const )?[A-Z]\w*(?: ?[&*]+)?")

@@ -313,7 +313,7 @@ def test_a_callback_follows_a_static_method_of_a_class_that_nobody_makes(tmp_pat
 
 POINTER = "std::vector<int> * cells = nullptr; int count = 1;"
 BESIDE = {
-    "a message's class is not one in a namespace of the program that is called as theirs": (
+    "a class of messages is not a class of the program with the same last name": (
         "namespace own { namespace msg { struct Odom { Odom(rclcpp::Node * n) { "
         "n->create_publisher<std_msgs::msg::String>(\"o\", 1); } }; } }",
         "void go() { nav_msgs::msg::Path msg; sum = msg.x; }", "go();",
@@ -329,12 +329,12 @@ BESIDE = {
         f"{POINTER} std::vector<int> own; void go() {{ cells = &own; cells->push_back(1); add(); }}"
         "void add() { if (!own.empty()) { topic = \"b\"; } }",
     ),
-    "members of the class that a parameter has are no others of that name": (
+    "a member of the class of a parameter is not a member of another class with the same name": (
         'struct Other { std::string topic; }; void fill(Other & x) { x.topic = "b"; }',
         "Other other; void go() { fill(other); }", "go();",
         'void go() { fill(*this); } template<class N> void fill(N & x) { x.topic = "b"; }',
     ),
-    "numbers that are given back are no name": (
+    "returned numbers are not part of a name": (
         "", "std::vector<std::pair<int, double>> go() { sum = 1; return {}; }", "auto found = go();",
         'std::vector<int> go() { topic = "b"; return {}; }',
     ),
