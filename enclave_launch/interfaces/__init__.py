@@ -29,8 +29,8 @@ from nodl.node_interface import ClientLibrary, NodeInterface
 from nodl.source_ref import SourceRef
 
 if TYPE_CHECKING:
-    from nodl.infer.cpp.reach import SourcesInReach
     from nodl.infer.executable import InferredExecutable
+    from nodl.infer.reach import SourcesInReach
     from nodl.infer.start import Start
 
 SOURCE_VARIABLE = "SECURE_LAUNCH_SOURCE"
@@ -192,7 +192,7 @@ class InterfaceFinder:
 
     @cached_property
     def _sources(self) -> SourcesInReach:
-        from nodl.infer.cpp.reach import SourcesInReach  # an add-on: inference
+        from nodl.infer.reach import SourcesInReach  # an add-on: inference
 
         named = [str(folder) for folder in self._options.source_folders]
         named += [folder for folder in os.environ.get(SOURCE_VARIABLE, "").split(os.pathsep) if folder]

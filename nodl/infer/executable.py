@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING, NamedTuple
 from enclave_common.files import check_regular
 from nodl.ament_index import ExecutableNotInstalledError, PackageNotFoundError, executable_path
 from nodl.dependence import COMPONENT, CONTROLLER, HOST, Dependence
+from nodl.infer.start import LaunchKey
 from nodl.node_interface import NodeInterface
 
 if TYPE_CHECKING:
-    from nodl.infer.cpp.reach import SourcesInReach
+    from nodl.infer.reach import SourcesInReach
     from nodl.infer.start import Start
 
 
@@ -41,27 +42,33 @@ def infer_executable(
     start_of: Start | None = None,
     compiled_only: bool = False,
 ) -> InferredExecutable:
-    """Return the nodes that ``executable`` of an installed package creates; gaps are attached to them.
+    """Return the nodes that ``executable`` of a package creates; gaps are attached to them.
 
-    Compiled programs and components are read from ``sources``; all under what launch gives them (``start_of``).
+    Compiled programs, components and what is not installed are read from ``sources``, all under what launch gives
+    them (``start_of``).
     ``compiled_only``: programs in Python, which are read again each time, are left alone.
     """
     if executable is None:
         return _compiled(package, None, plugin, sources, start_of, f"component {plugin} is compiled code")
+    script = None
     try:
         path = executable_path(package, executable, prefixes)
-    except PackageNotFoundError:
-        what = f"package '{package}' is not installed"
-        return _compiled(package, executable, None, sources, start_of, what)
-    except (ExecutableNotInstalledError, ValueError) as error:
-        return _compiled(package, executable, None, sources, start_of, str(error))
+        what = f"{path} is a compiled program"
+    except (PackageNotFoundError, ExecutableNotInstalledError, ValueError) as error:
+        missing = isinstance(error, PackageNotFoundError)
+        what = f"package '{package}' is not installed" if missing else str(error)
+        script = sources.script(package, executable) if sources is not None else None
+        path = script.file if script is not None else ""
     if not _is_python(path):
-        return _compiled(package, executable, None, sources, start_of, f"{path} is a compiled program")
+        return _compiled(package, executable, None, sources, start_of, what)
     if compiled_only:
         return InferredExecutable((), f"{path} is a Python program")
-    from nodl.infer.python_executable import infer_python
+    from nodl.infer.python_executable import infer_python, infer_script
 
-    return InferredExecutable(*infer_python(path, package, executable, prefixes, start_of))
+    if script is None or sources is None:
+        return InferredExecutable(*infer_python(path, package, executable, prefixes, start_of))
+    key = LaunchKey(package, executable)
+    return InferredExecutable(*infer_script(script, key, prefixes, sources.module_folders, start_of))
 
 
 def infer_plugin(

@@ -1,21 +1,23 @@
 """What a source package installs: its name and its executables. Reads package.xml, setup.py, setup.cfg, CMake.
 
-``setup.py`` is only parsed: entry points are the literal texts ``name = module:function`` in it.
+``setup.py`` is only parsed: entry points are the texts ``name = module:function`` in it, literal or made of literals.
 """
 
 from __future__ import annotations
 
 import ast
 import re
+from collections.abc import Iterable, Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple
 
 from enclave_common.files import text_or_nothing
+from nodl.infer.cpp.reading.cmake import read_build
 from nodl.package_xml import read_package_xml
 
 _ENTRY = re.compile(r"\s*([\w.\-]+)\s*=\s*([\w.]+)\s*:\s*([\w.]+)\s*\Z")
-_PROGRAMS = re.compile(r"install\s*\(\s*PROGRAMS(.*?)DESTINATION", re.S | re.I)
 
 
 class EntryPoint(NamedTuple):
@@ -27,12 +29,12 @@ class EntryPoint(NamedTuple):
 
 
 class Package(NamedTuple):
-    """A source package: the folder with ``package.xml``."""
+    """A source package: the folder with ``package.xml``. ``scripts``: executable -> file, as CMake installs it."""
 
     name: str
     folder: str
     entry_points: tuple[EntryPoint, ...] = ()
-    installed_programs: frozenset[str] = frozenset()
+    scripts: Mapping[str, str] = MappingProxyType({})
     dependencies: frozenset[str] = frozenset()
 
     def entry_points_of(self, module: str) -> list[EntryPoint]:
@@ -56,21 +58,40 @@ def read_package(folder: str) -> Package:
     manifest = read_package_xml(base)
     texts = (*_literal_texts(base / "setup.py"), *text_or_nothing(base / "setup.cfg").splitlines())
     entries = tuple(EntryPoint(*match.groups()) for match in map(_ENTRY.match, texts) if match)
-    programs = _cmake_programs(base / "CMakeLists.txt")
-    return Package(manifest.name or base.name, folder, entries, programs, manifest.depends)
+    return Package(manifest.name or base.name, folder, entries, read_build(folder).scripts, manifest.depends)
 
 
-def _literal_texts(path: Path) -> list[str]:
+def _literal_texts(path: Path) -> Iterator[str]:
     try:
         tree = ast.parse(text_or_nothing(path))
     except (SyntaxError, ValueError):
-        return []
-    constants = (node.value for node in ast.walk(tree) if isinstance(node, ast.Constant))
-    return [value for value in constants if isinstance(value, str)]
+        return
+    named = {
+        target.id: node.value.value
+        for node in tree.body
+        if isinstance(node, ast.Assign) and isinstance(node.value, ast.Constant)
+        for target in node.targets
+        if isinstance(target, ast.Name) and isinstance(node.value.value, str)
+    }
+    for node in ast.walk(tree):
+        text = _text(node, named)
+        if text is not None:
+            yield text
 
 
-def _cmake_programs(path: Path) -> frozenset[str]:
-    names: set[str] = set()
-    for block in _PROGRAMS.findall(text_or_nothing(path)):
-        names.update(word.rpartition("/")[2] for word in block.split())
-    return frozenset(names)
+def _text(node: ast.AST, named: Mapping[str, str]) -> str | None:
+    """Return a text that ``node`` writes, alone or with the constants in ``named``: ``f"{package_name}.main"``."""
+    if isinstance(node, ast.Constant):
+        return node.value if isinstance(node.value, str) else None
+    if isinstance(node, ast.Name):
+        return named.get(node.id)
+    if isinstance(node, ast.FormattedValue) and node.format_spec is None:
+        return _text(node.value, named)
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add):
+        return _joined([node.left, node.right], named)
+    return _joined(node.values, named) if isinstance(node, ast.JoinedStr) else None
+
+
+def _joined(parts: Iterable[ast.AST], named: Mapping[str, str]) -> str | None:
+    texts = [_text(part, named) for part in parts]
+    return None if None in texts else "".join(filter(None, texts))

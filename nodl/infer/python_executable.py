@@ -1,7 +1,8 @@
 """The Python program behind ``lib/<package>/<executable>``: found, and analysed where no earlier answer holds.
 
 Knows plain scripts, the wrappers that setuptools and pip generate for console scripts (which name an entry point
-directly or through ``entry_points.txt``), and the links that ``colcon build --symlink-install`` leaves.
+directly or through ``entry_points.txt``), and the links that ``colcon build --symlink-install`` leaves; for a package
+that is not installed the script or the entry point's function in its source.
 Reads files; runs nothing.
 """
 
@@ -11,7 +12,7 @@ import configparser
 import glob
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from enclave_common.files import read_text
 from nodl.infer.answers.python import CachedAnswer
@@ -41,16 +42,35 @@ def infer_python(
     """
     finder = _Finder(prefixes)
     target = finder.target(path, package, executable)
+    return _inferred(finder.program, target, path, LaunchKey(package, executable), start)
 
+
+def infer_script(
+    target: ProgramTarget,
+    key: LaunchKey,
+    prefixes: Sequence[str],
+    folders: Iterable[str],
+    start: Start | None,
+) -> tuple[tuple[NodeInterface, ...], str, bool]:
+    """Return the nodes of a program that is not installed, as ``infer_python``; ``folders`` hold further modules."""
+    program = _Finder(prefixes).program
+    for folder in (program.top_folder(target.file), *folders):
+        program.add_root(folder)
+    return _inferred(program, target, target.file, key, start)
+
+
+def _inferred(
+    program: Program, target: ProgramTarget, path: str, key: LaunchKey, start: Start | None
+) -> tuple[tuple[NodeInterface, ...], str, bool]:
     def answered(launch: ProgramLaunch, lost: tuple[Gap, ...] | None) -> InferredProgram:
         nodes = [(name, sorted(each.parameters.items()), each[1:]) for name, each in launch.nodes.items()]
         said = (nodes, sorted(launch.inputs.items()))
-        cached = CachedAnswer(finder.program, (path, package, executable, target, said))
+        cached = CachedAnswer(program, (path, key.package, key.executable, target, said))
         answer: InferredProgram | None = cached.find()
         if answer is None:
             from nodl.infer.analysis import infer_program  # the whole analysis of Python comes with it
 
-            answer = infer_program(finder.program, target, path, LaunchKey(package, executable), launch, lost)
+            answer = infer_program(program, target, path, key, launch, lost)
             cached.store(answer)
         return answer
 

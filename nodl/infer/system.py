@@ -106,8 +106,8 @@ def _runs(program: Program, file: str) -> Iterator[tuple[Run, LaunchKey]]:
 def _executable(entries: list[EntryPoint], file: str, package: Package | None) -> str | None:
     if entries:
         return entries[0].executable
-    name = os.path.basename(file)
-    return name if package is not None and name in package.installed_programs else None
+    scripts = package.scripts if package is not None else {}
+    return next((name for name, script in scripts.items() if script == file), None)
 
 
 def _source_files(path: Path) -> Iterator[str]:

@@ -19,8 +19,8 @@ from enclave_common.command_line import PATH, PATHS, Option, one_of
 from nodl.ament_index import search_prefixes
 from nodl.dependence import Situation
 from nodl.dependence.apply import applied, own_name
-from nodl.infer.cpp.reach import SourcesInReach
 from nodl.infer.executable import infer_executable
+from nodl.infer.reach import SourcesInReach
 from nodl.library import Library, LibraryDocuments
 from nodl.lookup import ManifestLookup
 from nodl.names import split_fqn

@@ -23,7 +23,7 @@ VARIANTS = 32
 
 _OWN_SOURCES = (
     "*.py", "dependence/*.py", "document/*.py", "infer/*.py", "infer/answers/*.py", "infer/interpreter/*.py",
-    "infer/models/*.py", "infer/cpp/*.py",
+    "infer/models/*.py", "infer/cpp/*.py", "infer/cpp/reading/*.py",
 )  # fmt: skip
 
 

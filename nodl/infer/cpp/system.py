@@ -290,7 +290,10 @@ class Answering:
             if (executable is not None and key.executable == executable) or (plugin and key.plugin == plugin):
                 return _answer(self._solved(key, entry, start))
         what = f"executable '{executable}'" if executable else f"component {plugin}"
-        return Answer((), f"the CMakeLists.txt of {package.folder} builds no {what}")
+        by_cmake = os.path.isfile(os.path.join(package.folder, "CMakeLists.txt"))
+        return Answer(
+            (), f"{'CMakeLists.txt' if by_cmake else 'setup.py'} in {package.folder} makes no {what}"
+        )
 
     def of_plugin(self, name: str, instance: str, start: Start | None) -> Answer:
         """Infer what the plugin that descriptions call ``name`` makes when a host loads it as ``instance``.

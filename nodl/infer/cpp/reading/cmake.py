@@ -1,7 +1,7 @@
-"""What a ``CMakeLists.txt`` builds: targets with sources, definitions and links, registered components, plugin files.
+"""What a ``CMakeLists.txt`` builds: targets with sources, definitions and links, registered components, plugins.
 
-Reads files below the package; runs nothing. Conditions are not decided, except tests (left out): both sides count, and
-what only one of them defines is open.
+Also which scripts it installs as executables. Reads files below the package; runs nothing. Conditions are not decided,
+except tests (left out): both sides count, and what only one of them defines is open.
 """
 
 from __future__ import annotations
@@ -68,6 +68,7 @@ class Build:
     renamed: dict[str, str] = field(default_factory=dict)  # target -> OUTPUT_NAME
     # Header of generate_parameter_library -> YAML.
     parameter_files: dict[str, str] = field(default_factory=dict)
+    scripts: dict[str, str] = field(default_factory=dict)  # executable -> file that is installed as it is
 
     @property
     def libraries(self) -> list[Target]:
@@ -334,6 +335,22 @@ class BuildReader:
             name = given[given.index("OUTPUT_NAME") + 1 :][:1]
             for target in given[: given.index("PROPERTIES")]:
                 self.build.renamed[target] = "".join(name)
+
+    def _do_install(self, given: list[str], variables: dict[str, str]) -> None:
+        """Note the files that become executables of the package as they are: those in ``lib/<package>``."""
+        destination = given[given.index("DESTINATION") + 1 :][:1] if "DESTINATION" in given else []
+        if [each.rstrip("/") for each in destination] != [f"lib/{variables.get('PROJECT_NAME')}"]:
+            return
+        words = given[1 : given.index("DESTINATION")]
+        if given[0] == "PROGRAMS":
+            renamed = given[given.index("RENAME") + 1 :][:1] if "RENAME" in given else []
+            for word in words:
+                name = renamed[0] if renamed else os.path.basename(word)
+                self.build.scripts[name] = absolute(word, variables)
+        elif given[0] == "DIRECTORY" and "USE_SOURCE_PERMISSIONS" in given:
+            folders = [absolute(word, variables) for word in words if word.endswith("/")]
+            for file in (each for folder in folders for each in sorted(Path(folder).glob("*"))):
+                self.build.scripts[file.name] = str(file)
 
     def _do_rclcpp_components_register_node(self, given: list[str], variables: dict[str, str]) -> None:
         options = {w: given[i + 1] for i, w in enumerate(given[:-1]) if w in ("PLUGIN", "EXECUTABLE")}

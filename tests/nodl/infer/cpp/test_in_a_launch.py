@@ -158,7 +158,7 @@ def test_what_is_missing_says_where_was_looked(workspace: Path) -> None:
     (workspace / "src/demo/CMakeLists.txt").write_text("project(demo)\n")
     (workspace / "src/demo/src/filter.cpp").unlink()
     (problem,) = plan(workspace).problems
-    assert "builds no executable 'filter_node'" in str(problem)
+    assert "makes no executable 'filter_node'" in str(problem)
 
 
 def test_what_is_easiest_to_close_is_told_first(workspace: Path) -> None:

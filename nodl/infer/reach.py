@@ -1,4 +1,4 @@
-"""The sources of compiled nodes that are in reach of a launch: beside the install prefixes, and where the user points.
+"""The sources that are in reach of a launch: beside the install prefixes, and where the user points.
 
 A colcon workspace keeps ``src/`` and ``build/`` beside ``install/``; ``build/<package>/CMakeCache.txt`` names the
 package's folder wherever it lies. Reads files; each workspace is read once.
@@ -6,6 +6,7 @@ package's folder wherever it lies. Reads files; each workspace is read once.
 
 from __future__ import annotations
 
+import glob
 import os
 import re
 from collections.abc import Iterator, Sequence
@@ -15,6 +16,8 @@ from typing import TYPE_CHECKING
 
 from enclave_common.files import read_text
 from nodl.infer.cpp.entry import Answer
+from nodl.infer.packages import read_package
+from nodl.infer.program import Program, ProgramTarget
 
 if TYPE_CHECKING:
     from nodl.infer.cpp.reading.project import SourcePackage, Workspace
@@ -38,11 +41,33 @@ class SourcesInReach:
     def infer(
         self, package: str, executable: str | None, plugin: str | None, start: Start | None = None
     ) -> Answer:
-        """Infer the nodes of an executable or component; raises ``CppSupportMissing``."""
+        """Infer the nodes of a compiled executable or component; raises ``CppSupportMissing``."""
         found = self._workspace.packages[package] if self.hold(package) else None
         if found is None:
             return Answer((), f"the sources of package '{package}' are not in reach ({self._searched()})")
         return self._answering.of_program(found, executable, plugin, start)
+
+    def script(self, package: str, executable: str) -> ProgramTarget | None:
+        """Return what would be installed as ``executable``: an entry point's module, or a script; None if neither."""
+        if not self.hold(package):
+            return None
+        source = read_package(self._workspace.packages[package].folder)
+        if executable in source.scripts:
+            return ProgramTarget(source.scripts[executable])
+        entry = next((each for each in source.entry_points if each.executable == executable), None)
+        if entry is None:
+            return None
+        file = Program(_module_folders(source.folder)).find(entry.module, source.folder)
+        if file is None:
+            missing = f"the module {entry.module} of entry point {executable} was not found"
+            return ProgramTarget(os.path.join(source.folder, "setup.py"), missing=missing)
+        return ProgramTarget(file, entry.module, tuple(entry.function.split(".")))
+
+    @cached_property
+    def module_folders(self) -> list[str]:
+        """Return the folders in which the packages have their Python modules."""
+        packages = self._workspace.packages.values() if self._folders or self._workspaces else ()
+        return [folder for package in packages for folder in _module_folders(package.folder)]
 
     def infer_plugin(self, name: str, instance: str, start: Start | None = None) -> Answer:
         """Infer a plugin that a host loads as ``instance``, by the name of its class; raises ``CppSupportMissing``."""
@@ -88,6 +113,13 @@ class SourcesInReach:
             if places
             else "no workspace beside the prefixes; name one with --source"
         )
+
+
+def _module_folders(package: str) -> list[str]:
+    """Return the folders that hold a package's top-level modules: its own, and ``src`` if setup.py may say so."""
+    if not os.path.isfile(os.path.join(package, "setup.py")):
+        return [package] if glob.glob(os.path.join(glob.escape(package), "*", "__init__.py")) else []
+    return [package, os.path.join(package, "src")]
 
 
 def _built(folder: str) -> Iterator[SourcePackage]:
