@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from itertools import chain
 
+from nodl.infer.cpp.libraries import LIBRARY_CLASSES
 from nodl.infer.cpp.running.arithmetic import added
 from nodl.infer.cpp.running.assignments import assign, with_entry
 from nodl.infer.cpp.running.constructors import ORDERED, construct, copies, made
@@ -100,8 +101,8 @@ def _added(run: Machine, atom: object, name: str, site: CallSite) -> Value:
     kind, _ = declared_type(run, receiver, frame)
     inner = kind.arguments[0] if kind.arguments else None
     cls = run.held_class(inner, frame)
-    if name.startswith("emplace") and inner is not None and cls is not None:
-        is_copy = len(site.values) == 1 and copies(run, cls, site.values[0])
+    if name.startswith("emplace") and inner is not None and (cls is not None or inner.name in LIBRARY_CLASSES):
+        is_copy = len(site.values) == 1 and cls is not None and copies(run, cls, site.values[0])
         value = (
             copied(run, site.values[0], site.node, frame, cls)
             if is_copy

@@ -285,11 +285,12 @@ MADE_LATER = f"struct A {{ void go(rclcpp::Node * n, const char * t) {{ n->{PUB}
         'o_.emplace(); if (o_) { o_->go(this, "a"); }',
         'std::invoke(&A::go, a_, this, "a");',
         't_ = std::thread(&A::go, &a_, this, "a");',
+        'more_.emplace_back(&A::go, &a_, this, "a");',
     ],
 )
 def test_an_object_is_known_where_it_is_got(body: str, tmp_path: Path) -> None:
     members = """std::shared_ptr<A> s_ = std::make_shared<A>(); std::weak_ptr<A> w_ = s_; A a_; A * b_ = new A();
-A * get() { return &a_; } std::optional<A> o_; std::thread t_;"""
+A * get() { return &a_; } std::optional<A> o_; std::thread t_; std::vector<std::thread> more_;"""
     system = infer(tmp_path, in_class(body, members, before=f"{MADE_LATER}\n"))
     assert (names(system), gaps(system)) == (["a"], [])
 
