@@ -61,7 +61,7 @@ def _findings(contents: ReportContents) -> Iterator[str]:
         (
             diagnostic.severity if accepted is None else "accepted",
             code(diagnostic.code),
-            escaped(f"{diagnostic.file}:{diagnostic.line}" if diagnostic.file else ""),
+            escaped(diagnostic.place),
             escaped(diagnostic.text),
             escaped(diagnostic.remedy if accepted is None else f"accepted: {accepted}"),
         )

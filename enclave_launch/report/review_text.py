@@ -49,7 +49,7 @@ def findings_text(judged: Judged, *, verbose: bool = False) -> str:
         if diagnostic.code in _SUMMED_UP and accepted is None and not verbose:
             summed_up.append(f"{1 + len(others)} {diagnostic.code}")
             continue
-        place = f"{diagnostic.file}:{diagnostic.line}: " if diagnostic.file else ""
+        place = f"{diagnostic.place}: " if diagnostic.file else ""
         head = f"accepted ({accepted})" if accepted is not None else diagnostic.severity
         text = diagnostic.text
         if others:

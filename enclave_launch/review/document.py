@@ -62,6 +62,11 @@ class PlanFinding(NamedTuple):
     text: str
     remedy: str
 
+    @property
+    def place(self) -> str:
+        """Return ``file:line``, the file alone where the whole of it is meant, or nothing."""
+        return f"{self.file}:{self.line}" if self.file and self.line else self.file or ""
+
 
 _GAPS = frozenset({
     "no-manifest", "interface-unknown", "node-name-unknown", "parameters-unknown", "parameter-file-missing",

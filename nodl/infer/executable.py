@@ -53,13 +53,14 @@ def infer_executable(
     script = None
     try:
         path = executable_path(package, executable, prefixes)
-        what = f"{path} is a compiled program"
+        what, in_python = f"{path} is a compiled program", _is_python(path)
     except (PackageNotFoundError, ExecutableNotInstalledError, ValueError) as error:
         missing = isinstance(error, PackageNotFoundError)
         what = f"package '{package}' is not installed" if missing else str(error)
         script = sources.script(package, executable) if sources is not None else None
         path = script.file if script is not None else ""
-    if not _is_python(path):
+        in_python = script is not None and (script.module is not None or _is_python(path))
+    if not in_python:
         return _compiled(package, executable, None, sources, start_of, what)
     if compiled_only:
         return InferredExecutable((), f"{path} is a Python program")

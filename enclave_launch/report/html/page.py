@@ -244,7 +244,7 @@ def _finding(diagnostic: PlanFinding, accepted: str | None) -> str:
         (
             f'<strong class="{severity}">{severity}</strong>',
             f"<code>{text(diagnostic.code)}</code>",
-            text(f"{diagnostic.file}:{diagnostic.line}" if diagnostic.file else ""),
+            text(diagnostic.place),
             text(diagnostic.text),
             text(remedy),
         )

@@ -70,6 +70,12 @@ def test_an_entry_point_is_followed_into_the_sources(tmp_path: Path, entry: str,
     assert not other and "setup.py in" in other.why and "makes no executable 'arm'" in other.why
 
 
+def test_the_first_line_of_a_module_does_not_decide(tmp_path: Path) -> None:
+    robot = package(tmp_path / "robot", setup_py("'base = robot.base:main'"))
+    write(robot / "robot/base.py", "#!/user/bin/env3\n" + NODE.format(imports="", topic="'odom'"))
+    assert names(inferred(tmp_path)) == ["odom"]
+
+
 def test_an_entry_point_of_setup_cfg_counts_too(tmp_path: Path) -> None:
     robot = package(tmp_path / "robot", "from setuptools import setup\nsetup()\n")
     write(robot / "setup.cfg", "[options.entry_points]\nconsole_scripts =\n    base = robot.base:main\n")

@@ -16,6 +16,7 @@ from pathlib import Path
 
 from enclave_common.files import read_text
 from nodl.infer.cpp.reading.built import Definitions
+from nodl.package_xml import read_package_xml
 
 SOURCES = (".cpp", ".cc", ".cxx", ".c++", ".C")
 """The suffixes of files that a C++ compiler gets."""
@@ -79,7 +80,8 @@ def read_build(folder: str | None) -> Build:
     """Read the build of a package folder; an empty one without ``CMakeLists.txt``."""
     build = Build()
     if folder is not None:
-        BuildReader(build).read(folder, {})
+        name = read_package_xml(folder).name
+        BuildReader(build).read(folder, {"PROJECT_NAME": name, "CMAKE_PROJECT_NAME": name})
     return build
 
 
@@ -257,7 +259,8 @@ class BuildReader:
             self._note_doubt(f"{prefix}_{name}")
 
     def _do_project(self, given: list[str], variables: dict[str, str]) -> None:
-        variables["PROJECT_NAME"] = variables["CMAKE_PROJECT_NAME"] = given[0]
+        if not self.doubtful:  # else a macro made the name of package.xml, which is what ament demands
+            variables["PROJECT_NAME"] = variables["CMAKE_PROJECT_NAME"] = given[0]
 
     def _do_file(self, given: list[str], variables: dict[str, str]) -> None:
         if given[0] in ("GLOB", "GLOB_RECURSE") and len(given) > 2:

@@ -101,7 +101,11 @@ def _added(run: Machine, atom: object, name: str, site: CallSite) -> Value:
     kind, _ = declared_type(run, receiver, frame)
     inner = kind.arguments[0] if kind.arguments else None
     cls = run.held_class(inner, frame)
-    if name.startswith("emplace") and inner is not None and (cls is not None or inner.name in LIBRARY_CLASSES):
+    if (
+        name.startswith("emplace")
+        and inner is not None
+        and (cls is not None or inner.name in LIBRARY_CLASSES)
+    ):
         is_copy = len(site.values) == 1 and cls is not None and copies(run, cls, site.values[0])
         value = (
             copied(run, site.values[0], site.node, frame, cls)

@@ -8,6 +8,7 @@ import pytest
 
 from nodl.infer import infer_paths
 from nodl.infer.cpp.reading.cmake import read_build
+from nodl.package_xml import read_package_xml
 from tests.nodl.infer.cpp.workspace import HEAD, endpoints, gaps, in_class, infer, names, package
 
 pytest.importorskip("tree_sitter_cpp", reason="the extra cpp is not installed")
@@ -215,6 +216,15 @@ def test_a_module_of_cmake_is_read_where_it_is_included(include: str, tmp_path: 
     assert [(node.executable, str(e.name)) for node in system.nodes for e in node.endpoints] == [
         ("talker", "a")
     ]
+
+
+def test_a_project_named_by_a_macro_has_the_name_of_its_package(tmp_path: Path) -> None:
+    folder = package(tmp_path / "demo", {}, "")
+    target = "add_executable(${PROJECT_NAME}_node src/node.cpp)"
+    name = read_package_xml(folder).name
+    for project, made in (("${extracted} VERSION 1.0", name), ("other", "other")):
+        (folder / "CMakeLists.txt").write_text(f"project({project})\n{target}\n")
+        assert list(read_build(str(folder)).targets) == [f"{made}_node"]
 
 
 def test_a_folder_that_includes_itself_is_read_once(tmp_path: Path) -> None:
