@@ -31,7 +31,7 @@ from keystore.formats.subject import SubjectScheme
 from keystore.formats.validity import DEFAULT_LIFETIME
 from keystore.signing.authority import Authority, authority_of
 from keystore.signing.ca_access import CaAccess
-from keystore.signing.pkcs11_signer import open_signer
+from keystore.signing.token_key import open_key
 
 _OWN_ENTRIES = frozenset({
     layout.PUBLIC, layout.PRIVATE, layout.ENCLAVES, layout.STAGING, layout.LOCK, layout.SETTINGS, layout.ZENOH,
@@ -135,8 +135,8 @@ class KeystoreView:
                 "run this where the CA key is"
             )
         reference = safe_files.read_private(self.root, name)
-        signer = open_signer(reference, printable(self.root / name), access)
-        return authority_of(self.ca(role), signer, printable(self.root / layout.ca_cert(role)))
+        key = open_key(reference, printable(self.root / name), access)
+        return authority_of(self.ca(role), key, printable(self.root / layout.ca_cert(role)))
 
     @cached_property
     def has_crl(self) -> bool:

@@ -12,39 +12,86 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from datetime import datetime, timezone
+from functools import cached_property
 
 from cryptography import x509
 from cryptography.hazmat.primitives import hashes, serialization
-from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import ExtendedKeyUsageOID
 
 from keystore.errors import InvalidInputError, SigningUnavailableError
 from keystore.formats.certificate import CertificateFacts, read_der
 from keystore.formats.role import Role
 from keystore.formats.validity import Validity
-from keystore.signing.signer import FileSigner, PublicKey, Signer, builder_key, spki
+from keystore.signing.private_key import PrivateKey, PublicKey, spki
+from keystore.signing.token_key import builder_key
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class Authority:
-    """A CA that can sign: its certificate and the signer that holds the matching key."""
+    """A CA that can sign: its certificate and the matching key."""
 
     facts: CertificateFacts
-    signer: Signer = field(repr=False)
+    key: PrivateKey = field(repr=False)
 
     @property
     def validity(self) -> Validity:
         return self.facts.validity
 
-    def pem(self) -> bytes:
-        return self.facts.pem
+    @cached_property
+    def _key_id(self) -> x509.AuthorityKeyIdentifier:
+        """Take the CA's own SKI if it has one (SROS2's have none), as RFC 5280 section 4.2.1.1 asks."""
+        key_id = self.facts.extension(x509.SubjectKeyIdentifier)
+        if key_id is None:
+            return x509.AuthorityKeyIdentifier.from_issuer_public_key(self.key.public_key())
+        return x509.AuthorityKeyIdentifier.from_issuer_subject_key_identifier(key_id)
+
+    def issue(
+        self, common_name: str, key: PublicKey, validity: Validity, hosts: Sequence[str] = ()
+    ) -> CertificateFacts:
+        """Issue a certificate for an already valid common name; it does not outlive the CA.
+
+        CA:FALSE, digitalSignature, EKU serverAuth + clientAuth, SKI, AKI, random 159-bit serial. The EKU is what keeps
+        a leaf from signing S/MIME where both CAs are one (an extended SROS2 keystore).
+
+        With ``hosts`` (names and addresses): of a server that is found there, and of nothing else.
+        """
+        uses = [ExtendedKeyUsageOID.SERVER_AUTH, *([] if hosts else [ExtendedKeyUsageOID.CLIENT_AUTH])]
+        issuer = self.facts.certificate.subject
+        builder = (
+            _builder(_name(common_name), issuer, validity.within(self.validity), key)
+            .add_extension(x509.BasicConstraints(ca=False, path_length=None), critical=True)
+            .add_extension(_key_usage(None), critical=True)
+            .add_extension(x509.ExtendedKeyUsage(uses), critical=False)
+            .add_extension(x509.SubjectKeyIdentifier.from_public_key(key), critical=False)
+            .add_extension(self._key_id, critical=False)
+        )
+        if hosts:
+            builder = builder.add_extension(_alternative_names(hosts), critical=False)
+        return _signed(builder, self.key)
+
+    def revocation_list(
+        self, serials: dict[int, datetime], now: datetime, next_update: datetime, number: int
+    ) -> bytes:
+        """Sign a CRL of these serial numbers, each with its date of revocation; as PEM."""
+        builder = (
+            x509.CertificateRevocationListBuilder()
+            .issuer_name(self.facts.certificate.subject)
+            .last_update(now)
+            .next_update(next_update)
+            .add_extension(self._key_id, critical=False)
+            .add_extension(x509.CRLNumber(number), critical=False)
+        )
+        for serial, revoked_at in sorted(serials.items()):
+            entry = x509.RevokedCertificateBuilder().serial_number(serial).revocation_date(revoked_at).build()
+            builder = builder.add_revoked_certificate(entry)
+        return builder.sign(builder_key(self.key), hashes.SHA256()).public_bytes(serialization.Encoding.PEM)
 
 
-def authority_of(facts: CertificateFacts, signer: Signer, place: str) -> Authority:
-    """Join a certificate to its signer; raises SigningUnavailableError if the key is another one's."""
-    if spki(signer.public_key()) != facts.public_key:
+def authority_of(facts: CertificateFacts, key: PrivateKey, place: str) -> Authority:
+    """Join a certificate to its key; raises SigningUnavailableError if it is another one's."""
+    if spki(key.public_key()) != facts.public_key:
         raise SigningUnavailableError(f"{place} and the private key beside it do not belong together")
-    return Authority(facts, signer)
+    return Authority(facts, key)
 
 
 def default_ca_name(role: Role) -> str:
@@ -52,26 +99,21 @@ def default_ca_name(role: Role) -> str:
     return f"ROS {role.value.removesuffix('_ca')} CA {os.urandom(4).hex()}"
 
 
-def new_key() -> FileSigner:
-    """Make a private key, in memory; P-256, since Cyclone DDS takes no other elliptic curve."""
-    return FileSigner(ec.generate_private_key(ec.SECP256R1()))
-
-
-def self_signed_ca(role: Role, name: str, signer: Signer, validity: Validity) -> Authority:
-    """Make a CA certificate for the key of ``signer``: CA:TRUE, pathlen 0, key usage after the role.
+def self_signed_ca(role: Role, name: str, key: PrivateKey, validity: Validity) -> Authority:
+    """Make a CA certificate for ``key``: CA:TRUE, pathlen 0, key usage after the role.
 
     keyCertSign + cRLSign for identities; the permissions CA also needs digitalSignature, without which both
     implementations refuse its documents. Raises InvalidInputError for a name that is empty or over 64 bytes.
     """
     refuse_ca_name(name)
-    subject = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, name)])
+    subject, public = _name(name), key.public_key()
     builder = (
-        _builder(subject, subject, validity, signer.public_key())
+        _builder(subject, subject, validity, public)
         .add_extension(x509.BasicConstraints(ca=True, path_length=0), critical=True)
         .add_extension(_key_usage(role), critical=True)
-        .add_extension(x509.SubjectKeyIdentifier.from_public_key(signer.public_key()), critical=False)
+        .add_extension(x509.SubjectKeyIdentifier.from_public_key(public), critical=False)
     )
-    return Authority(read_der(_sign(builder, signer)), signer)
+    return Authority(_signed(builder, key), key)
 
 
 def refuse_ca_name(name: str) -> None:
@@ -90,65 +132,6 @@ def _key_usage(role: Role | None) -> x509.KeyUsage:
     )  # fmt: skip
 
 
-class IdentityIssuer:
-    """The identity CA at work: prepared once, then one certificate per enclave.
-
-    Profile: CA:FALSE, digitalSignature, EKU serverAuth + clientAuth, SKI, AKI, random 159-bit serial. The EKU
-    is what keeps a leaf from signing S/MIME where both CAs are one (an extended SROS2 keystore).
-    """
-
-    def __init__(self, authority: Authority):
-        ca = authority.facts.certificate
-        self._authority = authority
-        self._issuer = ca.subject
-        self._constraints = x509.BasicConstraints(ca=False, path_length=None)
-        self._usage = _key_usage(None)
-        server, client = ExtendedKeyUsageOID.SERVER_AUTH, ExtendedKeyUsageOID.CLIENT_AUTH
-        self._extended, self._server = (
-            x509.ExtendedKeyUsage([server, client]),
-            x509.ExtendedKeyUsage([server]),
-        )
-        self._authority_key = _authority_key_id(ca, authority.signer)
-
-    def issue(
-        self, common_name: str, key: PublicKey, validity: Validity, hosts: Sequence[str] = ()
-    ) -> CertificateFacts:
-        """Issue a certificate for an already valid common name; it does not outlive the CA.
-
-        With ``hosts`` (names and addresses): of a server that is found there, and of nothing else.
-        """
-        name = x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, common_name)])
-        builder = (
-            _builder(name, self._issuer, validity.within(self._authority.validity), key)
-            .add_extension(self._constraints, critical=True)
-            .add_extension(self._usage, critical=True)
-            .add_extension(self._server if hosts else self._extended, critical=False)
-            .add_extension(x509.SubjectKeyIdentifier.from_public_key(key), critical=False)
-            .add_extension(self._authority_key, critical=False)
-        )
-        if hosts:
-            builder = builder.add_extension(_alternative_names(hosts), critical=False)
-        return read_der(_sign(builder, self._authority.signer))
-
-    def revocation_list(
-        self, serials: dict[int, datetime], now: datetime, next_update: datetime, number: int
-    ) -> bytes:
-        """Signs a CRL of these serial numbers, each with its date of revocation; as PEM."""
-        builder = (
-            x509.CertificateRevocationListBuilder()
-            .issuer_name(self._issuer)
-            .last_update(now)
-            .next_update(next_update)
-            .add_extension(self._authority_key, critical=False)
-            .add_extension(x509.CRLNumber(number), critical=False)
-        )
-        for serial, revoked_at in sorted(serials.items()):
-            entry = x509.RevokedCertificateBuilder().serial_number(serial).revocation_date(revoked_at).build()
-            builder = builder.add_revoked_certificate(entry)
-        crl = builder.sign(builder_key(self._authority.signer), hashes.SHA256())
-        return crl.public_bytes(serialization.Encoding.PEM)
-
-
 def _alternative_names(hosts: Sequence[str]) -> x509.SubjectAlternativeName:
     names: list[x509.GeneralName] = []
     for host in hosts:
@@ -159,13 +142,8 @@ def _alternative_names(hosts: Sequence[str]) -> x509.SubjectAlternativeName:
     return x509.SubjectAlternativeName(names)
 
 
-def _authority_key_id(ca: x509.Certificate, signer: Signer) -> x509.AuthorityKeyIdentifier:
-    """Take the CA's own SKI if it has one (SROS2's have none), as RFC 5280 section 4.2.1.1 asks."""
-    try:
-        key_id = ca.extensions.get_extension_for_class(x509.SubjectKeyIdentifier).value
-    except x509.ExtensionNotFound:
-        return x509.AuthorityKeyIdentifier.from_issuer_public_key(signer.public_key())
-    return x509.AuthorityKeyIdentifier.from_issuer_subject_key_identifier(key_id)
+def _name(common_name: str) -> x509.Name:
+    return x509.Name([x509.NameAttribute(x509.NameOID.COMMON_NAME, common_name)])
 
 
 def _builder(
@@ -182,8 +160,9 @@ def _builder(
     )
 
 
-def _sign(builder: x509.CertificateBuilder, signer: Signer) -> bytes:
-    return builder.sign(builder_key(signer), hashes.SHA256()).public_bytes(serialization.Encoding.DER)
+def _signed(builder: x509.CertificateBuilder, key: PrivateKey) -> CertificateFacts:
+    made = builder.sign(builder_key(key), hashes.SHA256())
+    return read_der(made.public_bytes(serialization.Encoding.DER))
 
 
 def check_can_serve(facts: CertificateFacts, role: Role, now: datetime, place: str) -> None:

@@ -14,7 +14,7 @@ from cryptography.hazmat.primitives.serialization import load_der_public_key
 
 from keystore.errors import SigningUnavailableError
 from keystore.formats.certificate import CertificateFacts
-from keystore.signing.signer import FileSigner, key_pem, load_private_key, spki
+from keystore.signing.private_key import key_pem, load_private_key, spki
 
 CYCLONE_KINDS = ("P-256", "RSA-2048")
 """The keys that Cyclone DDS takes; Fast DDS takes any."""
@@ -68,7 +68,7 @@ def fingerprint(der_bytes: bytes) -> str:
 def is_our_form(pem: bytes) -> bool:
     """Returns whether a ``key.pem`` is exactly a private key as it is written here."""
     try:
-        return key_pem(FileSigner(load_private_key(pem, None, "the key"))) == pem
+        return key_pem(load_private_key(pem, None, "the key")) == pem
     except SigningUnavailableError:
         return False
 

@@ -27,7 +27,7 @@ from keystore.errors import DamagedKeystoreError, InvalidInputError
 from keystore.formats.certificate import NOT_OUR_FORM, CertificateFacts
 from keystore.signing.authority import Authority
 from keystore.signing.public_key import signature_is_valid
-from keystore.signing.signer import builder_key
+from keystore.signing.token_key import builder_key
 
 _TEXT_HEADER = b"Content-Type: text/plain\r\n\r\n"
 _FRAME = (
@@ -64,7 +64,7 @@ def sign_document(document: bytes, ca: Authority) -> bytes:
     """
     content = _content(document)
     builder = pkcs7.PKCS7SignatureBuilder().set_data(content)
-    builder = builder.add_signer(ca.facts.certificate, builder_key(ca.signer), hashes.SHA256())
+    builder = builder.add_signer(ca.facts.certificate, builder_key(ca.key), hashes.SHA256())
     return _framed(content, builder.sign(Encoding.DER, list(_OPTIONS)))
 
 

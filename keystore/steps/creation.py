@@ -26,9 +26,9 @@ from keystore.formats.validity import DEFAULT_LIFETIME, Validity, utc_now
 from keystore.signing import authority
 from keystore.signing.authority import Authority, check_can_serve
 from keystore.signing.ca_access import Secret
-from keystore.signing.pkcs11_signer import open_signer
+from keystore.signing.private_key import PrivateKey, key_pem, new_key
 from keystore.signing.public_key import CYCLONE_KINDS, key_kind
-from keystore.signing.signer import Signer, key_pem
+from keystore.signing.token_key import open_key
 from keystore.steps.governance import write_governance
 from keystore.steps.incoming_ca import install_incoming, put_incoming
 from keystore.steps.opening import ChangeOptions, opened_for_change
@@ -157,7 +157,7 @@ def _add_ca(opened: Store, role: Role, options: CreateOptions) -> tuple[str, lis
     else:
         made, key = _present_key_ca(view, role, options) or new_ca(role, options)
         verb, warnings = "created", []
-    put_incoming(opened, role, made.pem(), key)
+    put_incoming(opened, role, made.facts.pem, key)
     install_incoming(opened)
     if (kind := key_kind(made.facts.public_key)) not in CYCLONE_KINDS:
         warnings.append(
@@ -193,8 +193,8 @@ def _refuse_foreign_enclaves(view: KeystoreView, role: Role) -> None:
 
 def new_ca(role: Role, options: CreateOptions) -> tuple[Authority, bytes]:
     """Make a CA and its key file."""
-    signer = authority.new_key()
-    return _self_signed(role, options, signer), key_pem(signer, _passphrase(options))
+    key = new_key()
+    return _self_signed(role, options, key), key_pem(key, _passphrase(options))
 
 
 def _present_key_ca(view: KeystoreView, role: Role, options: CreateOptions) -> tuple[Authority, bytes] | None:
@@ -203,14 +203,14 @@ def _present_key_ca(view: KeystoreView, role: Role, options: CreateOptions) -> t
     if present is None:
         return None
     reference = safe_files.read_private(view.root, present)
-    signer = open_signer(reference, printable(view.root / present), options.access)
-    return _self_signed(role, options, signer), reference
+    key = open_key(reference, printable(view.root / present), options.access)
+    return _self_signed(role, options, key), reference
 
 
-def _self_signed(role: Role, options: CreateOptions, signer: Signer) -> Authority:
+def _self_signed(role: Role, options: CreateOptions, key: PrivateKey) -> Authority:
     validity = Validity.starting(options.now or utc_now(), options.ca_lifetime)
     name = options.names.get(role) or authority.default_ca_name(role)
-    return authority.self_signed_ca(role, name, signer, validity)
+    return authority.self_signed_ca(role, name, key, validity)
 
 
 def _passphrase(options: CreateOptions) -> Secret | None:
@@ -219,10 +219,10 @@ def _passphrase(options: CreateOptions) -> Secret | None:
     return options.access.passphrase if options.encrypt_ca_keys else None
 
 
-def _import_ca(role: Role, options: CreateOptions, key: Path) -> tuple[Authority, bytes]:
-    place, reference = options.imported[role].certificate, read_given(key)
-    signer = open_signer(reference, printable(key), options.access)
-    bound = authority.authority_of(_given(place), signer, printable(place))
+def _import_ca(role: Role, options: CreateOptions, file: Path) -> tuple[Authority, bytes]:
+    place, reference = options.imported[role].certificate, read_given(file)
+    key = open_key(reference, printable(file), options.access)
+    bound = authority.authority_of(_given(place), key, printable(place))
     check_can_serve(bound.facts, role, options.now or utc_now(), printable(place))
     return bound, reference
 

@@ -20,7 +20,6 @@ from keystore.errors import DamagedKeystoreError, InvalidInputError
 from keystore.formats.register import IssuedCertificate, Register
 from keystore.formats.role import Role
 from keystore.formats.validity import BACKDATE, later
-from keystore.signing.authority import IdentityIssuer
 from keystore.signing.ca_access import CaAccess
 from keystore.signing.public_key import fingerprint
 
@@ -61,7 +60,7 @@ def publish_crl(opened: Store, register: Register, access: CaAccess, now: dateti
     issuer = view.authority(Role.IDENTITY, access)
     end = min(now + CRL_LIFETIME, issuer.validity.not_after)
     revoked = register.revoked(fingerprint(issuer.facts.der))
-    crl = IdentityIssuer(issuer).revocation_list(revoked, now - BACKDATE, end, register.crl_number)
+    crl = issuer.revocation_list(revoked, now - BACKDATE, end, register.crl_number)
     with opened.batch() as batch:
         batch.record(register)
         batch.file(layout.CRL_UNLINKED, b"", PRIVATE_MODE)

@@ -30,9 +30,9 @@ from keystore.formats.role import Role
 from keystore.formats.subject import names_enclave, subject_name
 from keystore.formats.validity import BACKDATE, Validity
 from keystore.signing import smime
-from keystore.signing.identity import public_half, request_key
+from keystore.signing.certificate_request import public_half, request_key
+from keystore.signing.private_key import spki
 from keystore.signing.public_key import fingerprint, is_our_form, issued_by, key_matches
-from keystore.signing.signer import spki
 
 PermissionsSource = Callable[[str, Validity], "bytes | None"]
 """(subject name, validity of the certificate) -> the document it should have; None: keep what it has."""

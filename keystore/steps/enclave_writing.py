@@ -25,8 +25,9 @@ from keystore.formats.subject import (
     subject_name,
 )
 from keystore.formats.validity import Validity, iso
-from keystore.signing.authority import Authority, IdentityIssuer
-from keystore.signing.identity import Identity, new_identity, public_half
+from keystore.signing.authority import Authority
+from keystore.signing.certificate_request import public_half
+from keystore.signing.private_key import PublicKey, key_pem, new_key
 from keystore.signing.records import certificate_record, permissions_record
 from keystore.signing.smime import sign_document
 from keystore.steps.crl import can_revoke, revocable
@@ -54,10 +55,6 @@ class EnclaveWriter:
     @property
     def _register(self) -> Register:
         return self._opened.register
-
-    @cached_property
-    def _issuer(self) -> IdentityIssuer:
-        return IdentityIssuer(self._identity_ca)
 
     @cached_property
     def _identity_ca(self) -> Authority:
@@ -184,17 +181,19 @@ class EnclaveWriter:
     ) -> CertificateFacts:
         if state.reissue is Reissue.NOTHING and state.facts is not None:
             return state.facts
-        made = self._issue(state, self._subject(state.enclave, new_generation), actions)
-        if made.key is not None:
-            entries[layout.KEY] = Content(made.key, store.PRIVATE_MODE)
-        entries[layout.CERT] = Content(made.cert)
+        name = self._subject(state.enclave, new_generation)
+        key = self._public_key(state, entries, actions)
+        facts = self._identity_ca.issue(name, key, self._validity(state.enclave))
+        entries[layout.CERT] = Content(facts.pem)
         lifetime = self._lifetime(state.enclave)
-        record = certificate_record(state.enclave, made.facts, self._identity_ca.facts, lifetime)
-        self._issued.append(record)
-        self._revoke_longer(state, made.facts.validity)
-        return made.facts
+        self._issued.append(certificate_record(state.enclave, facts, self._identity_ca.facts, lifetime))
+        self._revoke_longer(state, facts.validity)
+        return facts
 
-    def _issue(self, state: EnclaveState, cn: str, actions: list[str]) -> Identity:
+    def _public_key(
+        self, state: EnclaveState, entries: dict[str, Content | Link], actions: list[str]
+    ) -> PublicKey:
+        """Return the key to certify: a new one, which is added to ``entries``, or the one that is there."""
         made_on_host = self._view.has_request(state.enclave)
         if state.reissue is Reissue.KEY_PAIR and made_on_host:
             raise InvalidInputError(
@@ -204,13 +203,15 @@ class EnclaveWriter:
         if state.reissue is Reissue.KEY_PAIR:
             known = state.facts is not None or bool(self._register.of_enclave(state.enclave))
             actions.append("key and certificate" if known and state.reasons != (NEW,) else "created")
-            return new_identity(self._issuer, cn, self._validity(state.enclave))
+            key = new_key()
+            entries[layout.KEY] = Content(key_pem(key), store.PRIVATE_MODE)
+            return key.public_key()
         directory = layout.enclave_directory(state.enclave)
         relative = layout.request(state.enclave) if made_on_host else f"{directory}/{layout.KEY}"
-        key = safe_files.read_private(self._view.root, relative)
         actions.append("certificate")
-        public = public_half(key, printable(self._view.root / relative))
-        return Identity(self._issuer.issue(cn, public, self._validity(state.enclave)))
+        return public_half(
+            safe_files.read_private(self._view.root, relative), printable(self._view.root / relative)
+        )
 
     def _subject(self, enclave: str, new_generation: bool) -> str:
         """Return the subject it has; another one for a new generation, or after a change of the scheme."""

@@ -34,12 +34,11 @@ from keystore.formats.bundle import BundledEnclave
 from keystore.formats.certificate import read_certificate
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.subject import common_name
-from keystore.signing.authority import new_key
 from keystore.signing.ca_access import CaAccess
-from keystore.signing.identity import new_request, request_key
-from keystore.signing.pkcs11_signer import open_signer
+from keystore.signing.certificate_request import new_request, request_key
+from keystore.signing.private_key import PrivateKey, key_pem, load_private_key, new_key, spki
 from keystore.signing.public_key import fingerprint
-from keystore.signing.signer import FileSigner, Signer, key_pem, load_private_key, spki
+from keystore.signing.token_key import open_key
 
 _BLOCK = re.compile(
     rb"^enclave: ([^\n]{1,300})\n(-----BEGIN CERTIFICATE REQUEST-----\n.*?\n-----END CERTIFICATE REQUEST-----\n)",
@@ -96,27 +95,27 @@ def request(
 def _request(pending: Path, enclave: str, options: RequestOptions) -> Request:
     place = pending / layout.flat_name(enclave)
     if not place.is_dir():
-        key, signer = _new_key(options)
-        pem = new_request(common_name(enclave), signer)
+        file, key = _new_key(options)
+        pem = new_request(common_name(enclave), key)
         aside = pending / f".{place.name}"
         shutil.rmtree(aside, ignore_errors=True)
         with storage_errors("writing the request"):
             os.mkdir(aside, 0o700)
-            write_new(aside / key.name, key.data, store.PRIVATE_MODE)
+            write_new(aside / file.name, file.data, store.PRIVATE_MODE)
             write_new(aside / layout.REQUEST, pem, store.PUBLIC_MODE)
             os.rename(aside, place)
     pem = safe_files.read(place, layout.REQUEST)
     return Request(enclave, fingerprint(request_key(pem, f"the request of {enclave}").spki), pem)
 
 
-def _new_key(options: RequestOptions) -> tuple[HostKey, Signer]:
+def _new_key(options: RequestOptions) -> tuple[HostKey, PrivateKey]:
     if options.token is None:
         made = new_key()
         return HostKey(layout.KEY, key_pem(made)), made
     reference = f"{options.token}\n".encode()
     if not reference.startswith(b"pkcs11:") or len(reference.split()) != 1:
         raise InvalidInputError("a token's key is named by a pkcs11: URI without blanks (RFC 7512)")
-    return HostKey(layout.KEY_URI, reference), open_signer(reference, "the token", options.access)
+    return HostKey(layout.KEY_URI, reference), open_key(reference, "the token", options.access)
 
 
 def _make_private(folder: Path) -> None:
@@ -184,7 +183,7 @@ def _belongs(name: str, data: bytes, public: Path, wanted: BundledEnclave) -> bo
     """Return the public key: of a key in a file from itself, of one in a token from the request or certificate."""
     if name == layout.KEY:
         try:
-            key = FileSigner(load_private_key(data, None, name)).public_key()
+            key = load_private_key(data, None, name).public_key()
         except SigningUnavailableError:
             return False
         return fingerprint(spki(key)) == wanted.key

@@ -12,7 +12,7 @@ from keystore.errors import DamagedKeystoreError, printable
 from keystore.formats.certificate import read_certificates
 from keystore.formats.register import AuthorityState
 from keystore.formats.role import Role
-from keystore.signing.pkcs11_signer import is_token_uri
+from keystore.signing.token_key import is_token_uri
 
 
 def put_incoming(opened: Store, role: Role, cert: bytes, key: bytes) -> None:

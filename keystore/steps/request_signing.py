@@ -16,7 +16,7 @@ from keystore.formats.role import Role
 from keystore.formats.subject import common_name, names_enclave, subject_name
 from keystore.formats.validity import utc_now
 from keystore.signing.authority import Authority
-from keystore.signing.identity import request_key
+from keystore.signing.certificate_request import request_key
 from keystore.signing.public_key import fingerprint, issued_by
 from keystore.signing.records import certificate_record, permissions_record
 from keystore.signing.smime import sign_document

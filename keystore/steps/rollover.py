@@ -109,7 +109,7 @@ def _start(opened: Store, role: Role, creation: CreateOptions) -> str:
         made, key = new_ca(role, creation)
         opened.ensure_directory(layout.PRIVATE)
         opened.ensure_directory(layout.NEXT)
-        pair = {layout.KEY: Content(key, store.PRIVATE_MODE), layout.CERT: Content(made.pem())}
+        pair = {layout.KEY: Content(key, store.PRIVATE_MODE), layout.CERT: Content(made.facts.pem)}
         with opened.batch() as batch:
             batch.record(opened.register.with_authority(role, made.facts.der, AuthorityState.WAITING))
             batch.directory(_waiting(role), pair)
@@ -252,7 +252,7 @@ def separate_permissions_ca(
     """Give a keystore with a single CA its own permissions CA; ``bring_about`` signs all again."""
     retire(opened, Role.PERMISSIONS)
     made, key = new_ca(Role.PERMISSIONS, _creation(options, now, encrypt))
-    put_incoming(opened, Role.PERMISSIONS, made.pem(), key)
+    put_incoming(opened, Role.PERMISSIONS, made.facts.pem, key)
     install_incoming(opened)
     _retire_for_good(opened, Role.PERMISSIONS)
 

@@ -23,11 +23,10 @@ from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.register import UNKNOWN, IssuedCertificate
 from keystore.formats.role import Role
 from keystore.formats.validity import Validity, later, utc_now
-from keystore.signing.authority import IdentityIssuer, new_key
 from keystore.signing.ca_access import CaAccess
-from keystore.signing.identity import public_half
+from keystore.signing.certificate_request import public_half
+from keystore.signing.private_key import key_pem, new_key
 from keystore.signing.records import certificate_record
-from keystore.signing.signer import key_pem
 from keystore.steps.opening import opened_for_change
 from keystore.steps.options import ProvisionOptions, Signing
 from keystore.zenoh.configuration import ROUTER_NAME, RouterAddress
@@ -206,7 +205,7 @@ def _issue(
     fresh = None if key is not None else new_key()
     public = fresh.public_key() if fresh is not None else public_half(key or b"", layout.ZENOH_ROUTER_KEY)
     validity = Validity.starting(now, view.settings.lifetime)
-    facts = IdentityIssuer(authority).issue(ROUTER_NAME, public, validity, address.hosts)
+    facts = authority.issue(ROUTER_NAME, public, validity, address.hosts)
     files = {layout.ZENOH_ROUTER_KEY: key_pem(fresh)} if fresh is not None else {}
     record = certificate_record(UNKNOWN, facts, authority.facts)._replace(replaced=True)
     return record, {**files, layout.ZENOH_ROUTER_CERT: facts.pem}

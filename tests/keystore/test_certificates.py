@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 from cryptography import x509
-from cryptography.hazmat.primitives import serialization
 from cryptography.hazmat.primitives.asymmetric import ec, rsa
+from cryptography.hazmat.primitives.serialization import load_der_public_key
 from hypothesis import example, given
 from hypothesis import strategies as st
 
@@ -16,17 +16,17 @@ from keystore import DamagedKeystoreError, InvalidInputError, Role, SigningUnava
 from keystore.disk.crl_file import is_crl
 from keystore.formats import certificate
 from keystore.signing import authority
-from keystore.signing.authority import Authority, IdentityIssuer
-from keystore.signing.identity import new_identity, new_request, request_key
+from keystore.signing.authority import Authority
+from keystore.signing.certificate_request import new_request, request_key
+from keystore.signing.private_key import new_key, spki
 from keystore.signing.public_key import issued_by
-from keystore.signing.signer import spki
 from tests.keystore.kit import DAY, NOW, openssl
 
 VALIDITY = Validity.starting(NOW, 90 * DAY)
 
 
 def ca(role: Role) -> Authority:
-    return authority.self_signed_ca(role, authority.default_ca_name(role), authority.new_key(), VALIDITY)
+    return authority.self_signed_ca(role, authority.default_ca_name(role), new_key(), VALIDITY)
 
 
 @pytest.fixture(scope="module")
@@ -35,9 +35,9 @@ def identity_ca() -> Authority:
 
 
 def test_openssl_accepts_an_enclave_below_its_ca(identity_ca: Authority, tmp_path: Path) -> None:
-    made = new_identity(IdentityIssuer(identity_ca), "ros.a.b", VALIDITY)
-    (tmp_path / "ca.pem").write_bytes(identity_ca.pem())
-    (tmp_path / "cert.pem").write_bytes(made.cert)
+    made = identity_ca.issue("ros.a.b", new_key().public_key(), VALIDITY)
+    (tmp_path / "ca.pem").write_bytes(identity_ca.facts.pem)
+    (tmp_path / "cert.pem").write_bytes(made.pem)
     at = str(int(NOW.timestamp()))
     openssl("verify", "-x509_strict", "-attime", at, "-CAfile", tmp_path / "ca.pem", tmp_path / "cert.pem")
     assert (
@@ -46,8 +46,8 @@ def test_openssl_accepts_an_enclave_below_its_ca(identity_ca: Authority, tmp_pat
 
 
 def test_the_profile_of_an_enclave(identity_ca: Authority) -> None:
-    made = new_identity(IdentityIssuer(identity_ca), "ros.a", VALIDITY)
-    cert = x509.load_pem_x509_certificate(made.cert)
+    made = identity_ca.issue("ros.a", new_key().public_key(), VALIDITY)
+    cert = x509.load_pem_x509_certificate(made.pem)
     usage = cert.extensions.get_extension_for_class(x509.KeyUsage)
     assert usage.critical and usage.value.digital_signature and not usage.value.key_cert_sign
     constraints = cert.extensions.get_extension_for_class(x509.BasicConstraints)
@@ -56,8 +56,8 @@ def test_the_profile_of_an_enclave(identity_ca: Authority) -> None:
     assert [usage.dotted_string for usage in extended] == ["1.3.6.1.5.5.7.3.1", "1.3.6.1.5.5.7.3.2"]
     assert cert.extensions.get_extension_for_class(x509.AuthorityKeyIdentifier)
     assert cert.serial_number.bit_length() > 100
-    key = serialization.load_pem_private_key(made.key or b"", None)
-    assert isinstance(key, ec.EllipticCurvePrivateKey) and key.curve.name == "secp256r1"
+    key = load_der_public_key(made.public_key)
+    assert isinstance(key, ec.EllipticCurvePublicKey) and key.curve.name == "secp256r1"
 
 
 @pytest.mark.parametrize(("role", "documents"), [(Role.IDENTITY, False), (Role.PERMISSIONS, True)])
@@ -73,23 +73,25 @@ def test_cas_have_names_of_their_own() -> None:
     assert ca(Role.IDENTITY).facts.subject != ca(Role.IDENTITY).facts.subject
     for name in ("", "a" * 65, "a,b", "a/b", "a=b", 'a"b', "a\\b"):
         with pytest.raises(InvalidInputError):
-            authority.self_signed_ca(Role.IDENTITY, name, authority.new_key(), VALIDITY)
+            authority.self_signed_ca(Role.IDENTITY, name, new_key(), VALIDITY)
 
 
 def test_an_enclave_never_outlives_its_ca(identity_ca: Authority) -> None:
-    made = new_identity(IdentityIssuer(identity_ca), "ros.a", Validity.starting(NOW, 900 * DAY))
-    assert made.facts.validity == VALIDITY
+    made = identity_ca.issue("ros.a", new_key().public_key(), Validity.starting(NOW, 900 * DAY))
+    assert made.validity == VALIDITY
 
 
 def test_a_ca_and_another_ones_key_are_told_apart(identity_ca: Authority) -> None:
     with pytest.raises(SigningUnavailableError, match="do not belong together"):
-        authority.authority_of(identity_ca.facts, ca(Role.IDENTITY).signer, "ca.pem")
+        authority.authority_of(identity_ca.facts, ca(Role.IDENTITY).key, "ca.pem")
 
 
 def test_facts_agree_with_cryptography(identity_ca: Authority) -> None:
-    made = new_identity(IdentityIssuer(identity_ca), "ros.a", VALIDITY)
-    cert = x509.load_pem_x509_certificate(made.cert)
-    facts = certificate.given_certificates(b"text before the block\n" + made.cert + identity_ca.pem(), "x")[0]
+    made = identity_ca.issue("ros.a", new_key().public_key(), VALIDITY)
+    cert = x509.load_pem_x509_certificate(made.pem)
+    facts = certificate.given_certificates(
+        b"text before the block\n" + made.pem + identity_ca.facts.pem, "x"
+    )[0]
     assert facts.serial == cert.serial_number
     assert facts.common_name == "ros.a" and facts.name_parts == 1
     assert facts.subject == cert.subject.public_bytes() and facts.issuer == cert.issuer.public_bytes()
@@ -130,13 +132,13 @@ def test_damaged_certificates_are_read_or_refused(position: int, damage: bytes) 
 
 
 def test_a_request_and_a_crl_of_a_version_that_x509_does_not_have_are_refused() -> None:
-    request = new_request("ros.a", authority.new_key())
+    request = new_request("ros.a", new_key())
     assert request_key(request, "it").common_name == "ros.a"
     # cryptography 3.4, of Ubuntu 22.04, reads it: there its signature is what is wrong.
     refused = "it is not a certificate request|it is not signed by the key that it is for"
     with pytest.raises(DamagedKeystoreError, match=refused):
         request_key(with_version(request, b"\x00", b"\x07"), "it")
-    crl = IdentityIssuer(_SAMPLE).revocation_list({}, NOW, NOW + DAY, 1)
+    crl = _SAMPLE.revocation_list({}, NOW, NOW + DAY, 1)
     assert is_crl(crl) and not is_crl(with_version(crl, b"\x01", b"\x07"))
 
 

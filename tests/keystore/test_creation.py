@@ -31,7 +31,7 @@ from keystore import (
 from keystore.disk.view import KeystoreView
 from keystore.signing import authority
 from keystore.signing.authority import Authority
-from keystore.signing.signer import FileSigner, key_pem
+from keystore.signing.private_key import key_pem, new_key
 from tests.keystore.kit import DAY, NOW, actions, created, mode, openssl, options, policy, snapshot
 
 SENTENCE = b"correct horse battery staple"
@@ -94,12 +94,12 @@ def test_domains_and_governance(tmp_path: Path) -> None:
 
 
 def made_ca(role: Role, directory: Path, **kind: object) -> tuple[Authority, ImportedCa]:
-    signer = authority.new_key()
+    private = new_key()
     validity = Validity.starting(NOW, 9000 * DAY)
-    made = authority.self_signed_ca(role, f"imported {role.value}", signer, validity)
+    made = authority.self_signed_ca(role, f"imported {role.value}", private, validity)
     cert, key = directory / f"{role.value}.crt", directory / f"{role.value}.key"
-    cert.write_bytes(made.pem())
-    key.write_bytes(key_pem(signer))
+    cert.write_bytes(made.facts.pem)
+    key.write_bytes(key_pem(private))
     return made, ImportedCa(cert, key)
 
 
@@ -189,14 +189,13 @@ def test_passphrases_from_descriptor_and_environment(monkeypatch: pytest.MonkeyP
 
 
 def test_no_key_material_in_representations(monkeypatch: pytest.MonkeyPatch) -> None:
-    signer = authority.new_key()
+    key = new_key()
     secret = Secret(variable="X")
     monkeypatch.setenv("X", SENTENCE.decode())
     assert secret.value() == SENTENCE
-    made = authority.self_signed_ca(Role.IDENTITY, "x", signer, Validity.starting(NOW, DAY))
-    shown = repr((signer, made, secret, CaAccess(passphrase=secret)))
+    made = authority.self_signed_ca(Role.IDENTITY, "x", key, Validity.starting(NOW, DAY))
+    shown = repr((key, made, secret, CaAccess(passphrase=secret)))
     assert SENTENCE.decode() not in shown and "PRIVATE" not in shown and "$X" in shown
-    assert isinstance(made.signer, FileSigner)
 
 
 def test_a_key_without_certificate_is_kept(tmp_path: Path) -> None:

@@ -39,8 +39,8 @@ from keystore.disk.view import KeystoreView
 from keystore.formats.certificate import read_certificate, read_der
 from keystore.formats.validity import utc_now
 from keystore.signing import smime
-from keystore.signing.authority import Authority, IdentityIssuer
-from keystore.signing.identity import public_half
+from keystore.signing.authority import Authority
+from keystore.signing.certificate_request import public_half
 from keystore.signing.public_key import fingerprint
 from keystore.signing.smime import sign_document
 from keystore.zenoh.writing import write_zenoh
@@ -167,10 +167,10 @@ def issued(root: Path, **changes: object) -> None:
     """Another certificate for the key of /a, by our own CA, which promises longer than it lives itself."""
     ca = authority(root, Role.IDENTITY)
     if "validity" in changes:
-        ca = PromisingAuthority(ca.facts, ca.signer)
+        ca = PromisingAuthority(ca.facts, ca.key)
     public = public_half((root / "enclaves/a/key.pem").read_bytes(), "key")
     validity = Validity.starting(utc_now(), 100 * YEAR if "validity" in changes else YEAR)
-    made = IdentityIssuer(ca).issue("ros.a", public, validity, changes.get("hosts", ()))  # type: ignore[arg-type]
+    made = ca.issue("ros.a", public, validity, changes.get("hosts", ()))  # type: ignore[arg-type]
     (root / "enclaves/a/cert.pem").write_bytes(made.pem)
 
 

@@ -34,7 +34,7 @@ from keystore import (
 )
 from keystore.formats.validity import utc_now
 from keystore.signing import authority
-from keystore.signing.pkcs11_signer import Pkcs11Signer, parse_uri
+from keystore.signing.token_key import open_key, parse_uri
 from tests.keystore.kit import DAY, created, filled, openssl, options, policy
 
 MODULES = ("/usr/lib/softhsm/libsofthsm2.so", "/usr/lib/x86_64-linux-gnu/softhsm/libsofthsm2.so")
@@ -87,11 +87,11 @@ def uri(role: Role) -> str:
 def root(token: Mapping[str, str], tmp_path: Path) -> Path:
     imported = {}
     for role in Role:
-        signer = Pkcs11Signer.open(uri(role), Secret(file=Path(token["pin"])), token)
+        key = open_key(uri(role).encode(), "the token", access(token))
         made = authority.self_signed_ca(
-            role, f"token {role.value}", signer, Validity.starting(utc_now(), 90 * DAY)
+            role, f"token {role.value}", key, Validity.starting(utc_now(), 90 * DAY)
         )
-        (tmp_path / f"{role.value}.pem").write_bytes(made.pem())
+        (tmp_path / f"{role.value}.pem").write_bytes(made.facts.pem)
         (tmp_path / f"{role.value}.uri").write_text(uri(role) + "\n")
         imported[role] = ImportedCa(tmp_path / f"{role.value}.pem", tmp_path / f"{role.value}.uri")
     return created(tmp_path / "ks", imported=imported, access=access(token))

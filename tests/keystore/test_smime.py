@@ -15,9 +15,8 @@ from hypothesis import strategies as st
 from keystore import DamagedKeystoreError, InvalidInputError, Role, Validity
 from keystore.formats import certificate
 from keystore.signing import authority, smime
-from keystore.signing.authority import Authority, IdentityIssuer
-from keystore.signing.identity import new_identity
-from keystore.signing.signer import FileSigner, key_pem, load_private_key
+from keystore.signing.authority import Authority
+from keystore.signing.private_key import key_pem, new_key
 from tests.keystore.kit import DAY, NOW, openssl
 
 VALIDITY = Validity.starting(NOW, 90 * DAY)
@@ -27,7 +26,7 @@ AT = str(int(NOW.timestamp()))
 
 def new_ca() -> Authority:
     name = authority.default_ca_name(Role.PERMISSIONS)
-    return authority.self_signed_ca(Role.PERMISSIONS, name, authority.new_key(), VALIDITY)
+    return authority.self_signed_ca(Role.PERMISSIONS, name, new_key(), VALIDITY)
 
 
 CA, OTHER = new_ca(), new_ca()
@@ -46,7 +45,7 @@ def check(p7s: bytes, by: Authority = CA, *, foreign: bool = False) -> bytes:
 
 
 def test_openssl_verifies_what_we_sign(tmp_path: Path) -> None:
-    (tmp_path / "ca.pem").write_bytes(CA.pem())
+    (tmp_path / "ca.pem").write_bytes(CA.facts.pem)
     (tmp_path / "x.p7s").write_bytes(sign(DOCUMENT))
     openssl(
         "smime", "-verify", "-text", "-attime", AT, "-CAfile", tmp_path / "ca.pem", "-in", tmp_path / "x.p7s",
@@ -58,10 +57,8 @@ def test_openssl_verifies_what_we_sign(tmp_path: Path) -> None:
 @pytest.mark.parametrize("extra", [(), ("-nodetach",), ("-md", "sha512")])
 def test_openssl_signs_what_we_read(tmp_path: Path, extra: tuple[str, ...]) -> None:
     """Detached with SHA-256 is taken over; other forms are refused, not misread. As it stands none is ours."""
-    signer = CA.signer
-    assert isinstance(signer, FileSigner)
-    (tmp_path / "ca.pem").write_bytes(CA.pem())
-    (tmp_path / "key.pem").write_bytes(key_pem(signer))
+    (tmp_path / "ca.pem").write_bytes(CA.facts.pem)
+    (tmp_path / "key.pem").write_bytes(key_pem(CA.key))
     (tmp_path / "x.xml").write_bytes(DOCUMENT)
     openssl(
         "smime", "-sign", "-text", *extra, "-signer", tmp_path / "ca.pem", "-inkey", tmp_path / "key.pem",
@@ -80,12 +77,10 @@ def test_openssl_signs_what_we_read(tmp_path: Path, extra: tuple[str, ...]) -> N
 @pytest.mark.parametrize("line_ends", [b"\r\n", b"\n"])
 def test_what_sros2_signs_is_read(line_ends: bytes) -> None:
     """sros2 calls cryptography's builder with exactly these options."""
-    signer = CA.signer
-    assert isinstance(signer, FileSigner) and isinstance(signer.private_key, ec.EllipticCurvePrivateKey)
     cert = x509.load_der_x509_certificate(CA.facts.der)
     options = [pkcs7.PKCS7Options.Text, pkcs7.PKCS7Options.DetachedSignature]
     builder = pkcs7.PKCS7SignatureBuilder().set_data(DOCUMENT)
-    made = builder.add_signer(cert, signer.private_key, hashes.SHA256()).sign(Encoding.SMIME, options)
+    made = builder.add_signer(cert, CA.key, hashes.SHA256()).sign(Encoding.SMIME, options)
     made = made.replace(b"\r\n", b"\n").replace(b"\n", line_ends)
     assert check(made, foreign=True) == DOCUMENT
     with pytest.raises(DamagedKeystoreError, match="not in the form"):
@@ -131,10 +126,8 @@ def test_another_ca_is_refused() -> None:
 
 def test_a_certificate_below_the_ca_is_refused() -> None:
     """CVE-2023-24010 and -24011: it chains to the CA, and that is not enough."""
-    made = new_identity(IdentityIssuer(CA), "ros.a", VALIDITY)
-    enclave = Authority(
-        certificate.read_certificate(made.cert), FileSigner(load_private_key(made.key or b"", None, "key"))
-    )
+    key = new_key()
+    enclave = Authority(CA.issue("ros.a", key.public_key(), VALIDITY), key)
     with pytest.raises(DamagedKeystoreError, match="not the permissions CA"):
         check(sign(DOCUMENT, enclave))
 
@@ -145,7 +138,7 @@ def forger_of(ca: Authority) -> Authority:
     copied = x509.CertificateBuilder(real.issuer, real.subject, key.public_key(), real.serial_number)
     copied = copied.not_valid_before(NOW).not_valid_after(NOW + 90 * DAY)
     made = copied.sign(key, hashes.SHA256())
-    return Authority(certificate.read_der(made.public_bytes(Encoding.DER)), FileSigner(key))
+    return Authority(certificate.read_der(made.public_bytes(Encoding.DER)), key)
 
 
 def test_a_forger_with_the_cas_name_and_serial_is_refused() -> None:

@@ -27,11 +27,9 @@ from keystore.disk.view import KeystoreView
 from keystore.formats.validity import utc_now
 from keystore.signing.authority import (
     Authority,
-    IdentityIssuer,
-    new_key,
     self_signed_ca,
 )
-from keystore.signing.signer import key_pem
+from keystore.signing.private_key import key_pem, new_key
 from tests.zenoh import kit
 from tests.zenoh.conftest import Grants, System, keystore_of, policy_of
 from tests.zenoh.kit import Heard, opens, passes, topic
@@ -58,7 +56,7 @@ def identity(
     span = validity or Validity.starting(utc_now(), LIFE)
     folder.mkdir(exist_ok=True)
     cert, key = folder / "cert.pem", folder / "key.pem"
-    cert.write_bytes(IdentityIssuer(ca).issue(name, signer.public_key(), span, hosts).pem)
+    cert.write_bytes(ca.issue(name, signer.public_key(), span, hosts).pem)
     key.write_bytes(key_pem(signer))
     return {
         "connect_certificate": str(cert), "connect_private_key": str(key),

@@ -32,9 +32,9 @@ from enclave_launch.verb.secure_plan.plans import is_saved_plan, read_document
 from keystore.errors import InvalidInputError
 from keystore.formats.validity import iso, parse_time, utc_now
 from keystore.signing.ca_access import CaAccess, Secret
-from keystore.signing.pkcs11_signer import open_signer
+from keystore.signing.private_key import PrivateKey, signature, spki
 from keystore.signing.public_key import fingerprint
-from keystore.signing.signer import Signer, spki
+from keystore.signing.token_key import open_key
 from keystore.steps.inventory import governance_facts, inventory
 from keystore.verification import verify
 
@@ -160,8 +160,8 @@ def _signed(said: bytes, options: argparse.Namespace) -> dict[str, bytes]:
         reference = read_bytes(options.sign_key)
     access = CaAccess(passphrase=secret(options.passphrase_env), pin=secret(options.pin_env))
     with keystore_errors():
-        signer = open_signer(reference, str(options.sign_key), access)
-        return {SIGNED: envelope_text(envelope(said, PAYLOAD_TYPE, signer)).encode()}
+        key = open_key(reference, str(options.sign_key), access)
+        return {SIGNED: envelope_text(envelope(said, PAYLOAD_TYPE, key)).encode()}
 
 
 def _write(folder: Path, files: Mapping[str, bytes]) -> None:
@@ -171,16 +171,16 @@ def _write(folder: Path, files: Mapping[str, bytes]) -> None:
             write_bytes(folder / name, data)
 
 
-def envelope(payload: bytes, payload_type: str, signer: Signer) -> dict[str, Any]:
+def envelope(payload: bytes, payload_type: str, key: PrivateKey) -> dict[str, Any]:
     """Make a DSSE envelope (secure-systems-lab/dsse, protocol.md 1.0.2) with one signature over type and content.
 
     ``keyid`` is the SHA-256 of the public key in DER, in hex.
 
-    Raises ``SigningUnavailableError`` as ``signer``.
+    Raises ``SigningUnavailableError`` if a token refuses.
     """
-    signature = signer.sign(signed_bytes(payload, payload_type))
-    key = {"keyid": fingerprint(spki(signer.public_key())), "sig": base64.b64encode(signature).decode()}
-    return {"payload": base64.b64encode(payload).decode(), "payloadType": payload_type, "signatures": [key]}
+    signed = base64.b64encode(signature(key, signed_bytes(payload, payload_type))).decode()
+    entry = {"keyid": fingerprint(spki(key.public_key())), "sig": signed}
+    return {"payload": base64.b64encode(payload).decode(), "payloadType": payload_type, "signatures": [entry]}
 
 
 def signed_bytes(payload: bytes, payload_type: str) -> bytes:

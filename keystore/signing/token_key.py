@@ -10,18 +10,22 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 from urllib.parse import unquote
 
+import cryptography
+from cryptography.hazmat.primitives import hashes
 from cryptography.hazmat.primitives.asymmetric import ec, rsa
-from cryptography.hazmat.primitives.asymmetric.utils import encode_dss_signature
+from cryptography.hazmat.primitives.asymmetric.utils import Prehashed, encode_dss_signature
 from cryptography.hazmat.primitives.serialization import load_der_public_key
 
 from keystore.errors import InvalidInputError, SigningUnavailableError
 from keystore.signing.ca_access import CaAccess, Secret
-from keystore.signing.signer import FileSigner, PublicKey, Signer, load_private_key
+from keystore.signing.private_key import PrivateKey, PublicKey, load_private_key
 
 MODULE_VARIABLE = "PKCS11_MODULE_PATH"
+TOKENS_SINCE = 41
+"""The release of ``cryptography`` from which on its builders sign with a key that is not its own."""
 
 
 def parse_uri(uri: str) -> dict[str, str]:
@@ -44,49 +48,95 @@ def parse_uri(uri: str) -> dict[str, str]:
     return attributes
 
 
-class Pkcs11Signer:
-    """One private key of a token, over a session that stays open as long as this object."""
+class _TokenKey:
+    """A key of a token in the shape of a ``cryptography`` private key, over a session that stays open as long as it.
 
-    __slots__ = ("_key", "_public")
+    Its builders ask it for ``sign`` and ``public_key``; everything else refuses: there is no key material here.
+    """
 
     def __init__(self, key: Any, public: PublicKey):
         self._key = key
         self._public = public
 
-    @classmethod
-    def open(cls, uri: str, pin: Secret | None, environment: Mapping[str, str]) -> Pkcs11Signer:
-        """Open the token; raises SigningUnavailableError if module, token, PIN or key is missing."""
-        attributes = parse_uri(uri)
-        try:
-            import pkcs11
-            import pkcs11.exceptions
-        except ImportError:
-            raise SigningUnavailableError(
-                "a key in a PKCS#11 token needs python-pkcs11: pip install python-pkcs11"
-            ) from None
-        try:
-            key, public = _find(pkcs11, attributes, _module(attributes, environment), _pin(attributes, pin))
-        except pkcs11.exceptions.PKCS11Error as error:
-            raise SigningUnavailableError(f"the PKCS#11 token refused: {type(error).__name__}") from None
-        except RuntimeError:
-            raise SigningUnavailableError("the PKCS#11 module cannot be loaded; check module-path") from None
-        return cls(key, public)
-
-    def public_key(self) -> PublicKey:
+    def public_key(self) -> Any:
         return self._public
 
-    def sign(self, data: bytes) -> bytes:
+    @property
+    def key_size(self) -> int:
+        return self._public.key_size
+
+    def sign(self, data: Any, *parameters: Any) -> bytes:
         import pkcs11
         import pkcs11.exceptions
 
+        if not any(isinstance(getattr(part, "algorithm", part), hashes.SHA256) for part in parameters):
+            raise SigningUnavailableError("a token signs with SHA-256 only")
+        if any(isinstance(part, Prehashed) for part in parameters):
+            raise SigningUnavailableError("a token is given data, not digests")
         try:
             if self._key.key_type == pkcs11.KeyType.RSA:
-                return bytes(self._key.sign(data, mechanism=pkcs11.Mechanism.SHA256_RSA_PKCS))
-            return _sign_ecdsa(pkcs11, self._key, data)
+                return bytes(self._key.sign(bytes(data), mechanism=pkcs11.Mechanism.SHA256_RSA_PKCS))
+            return _sign_ecdsa(pkcs11, self._key, bytes(data))
         except pkcs11.exceptions.PKCS11Error as error:
             raise SigningUnavailableError(
                 f"the PKCS#11 token refused to sign: {type(error).__name__}"
             ) from None
+
+    def _refuse(self, *_arguments: Any, **_named: Any) -> NoReturn:
+        raise SigningUnavailableError("a key in a token can sign, nothing else")
+
+    # ``signer``: of cryptography before 37
+    exchange = decrypt = private_numbers = private_bytes = signer = _refuse
+
+    def __copy__(self) -> Any:
+        return self
+
+    def __deepcopy__(self, _memo: dict[int, Any]) -> Any:
+        return self
+
+
+class _EcTokenKey(_TokenKey, ec.EllipticCurvePrivateKey):
+    @property
+    def curve(self) -> ec.EllipticCurve:
+        key: ec.EllipticCurvePublicKey = self.public_key()
+        return key.curve
+
+
+class _RsaTokenKey(_TokenKey, rsa.RSAPrivateKey):
+    pass
+
+
+def builder_key(key: PrivateKey) -> PrivateKey:
+    """Return ``key``, for the builders of ``cryptography`` to sign with.
+
+    Raises SigningUnavailableError for a token's if ``cryptography`` is too old.
+    """
+    if isinstance(key, _TokenKey) and int(cryptography.__version__.split(".")[0]) < TOKENS_SINCE:
+        raise SigningUnavailableError(
+            f"a CA key in a token needs cryptography {TOKENS_SINCE} or newer, this is {cryptography.__version__}: "
+            f"pip install 'cryptography>={TOKENS_SINCE}'"
+        )
+    return key
+
+
+def _open_token(uri: str, pin: Secret | None, environment: Mapping[str, str]) -> PrivateKey:
+    """Find the key in its token; raises SigningUnavailableError if module, token, PIN or key is missing."""
+    attributes = parse_uri(uri)
+    try:
+        import pkcs11
+        import pkcs11.exceptions
+    except ImportError:
+        raise SigningUnavailableError(
+            "a key in a PKCS#11 token needs python-pkcs11: pip install python-pkcs11"
+        ) from None
+    try:
+        key, public = _find(pkcs11, attributes, _module(attributes, environment), _pin(attributes, pin))
+    except pkcs11.exceptions.PKCS11Error as error:
+        raise SigningUnavailableError(f"the PKCS#11 token refused: {type(error).__name__}") from None
+    except RuntimeError:
+        raise SigningUnavailableError("the PKCS#11 module cannot be loaded; check module-path") from None
+    is_ec = isinstance(public, ec.EllipticCurvePublicKey)
+    return _EcTokenKey(key, public) if is_ec else _RsaTokenKey(key, public)
 
 
 def _sign_ecdsa(pkcs11: Any, key: Any, data: bytes) -> bytes:
@@ -164,10 +214,8 @@ def is_token_uri(reference: bytes) -> bool:
     return reference.lstrip().startswith(b"pkcs11:")
 
 
-def open_signer(reference: bytes, place: str, access: CaAccess) -> Signer:
-    """Open the signer behind a key file of ``private/``: PEM, or the ``pkcs11:`` URI of a ``.p11`` file."""
+def open_key(reference: bytes, place: str, access: CaAccess) -> PrivateKey:
+    """Open the key of a key file of ``private/``: PEM, or the ``pkcs11:`` URI of a ``.p11`` file."""
     if is_token_uri(reference):
-        return Pkcs11Signer.open(
-            reference.split()[0].decode("ascii", "replace"), access.pin, access.environment
-        )
-    return FileSigner(load_private_key(reference, access.passphrase, place))
+        return _open_token(reference.split()[0].decode("ascii", "replace"), access.pin, access.environment)
+    return load_private_key(reference, access.passphrase, place)
