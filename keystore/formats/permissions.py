@@ -27,10 +27,6 @@ from keystore.formats.permissions_patterns import can_meet, covers, has_wildcard
 from keystore.formats.policy import EnclavePolicy, PolicyError, Qualifier
 from keystore.formats.validity import Validity
 
-# rmw implementations without the DDS topic that carries the ROS graph. Every other one cannot even
-# create its context when the topic is not permitted, so in doubt it is.
-RMW_WITHOUT_DISCOVERY_TOPIC = frozenset({"rmw_zenoh_cpp"})
-
 _HEAD = (
     '<?xml version="1.0" encoding="UTF-8"?>\n'
     '<dds xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" xsi:noNamespaceSchemaLocation='
@@ -64,14 +60,14 @@ class DdsRules(NamedTuple):
 
 
 def permissions_document(
-    subject: str, policy: EnclavePolicy, *, validity: Validity, domains: Domains, rmw: str | None = None
+    subject: str, policy: EnclavePolicy, *, validity: Validity, domains: Domains
 ) -> bytes:
     """Render the permissions document (UTF-8, LF) for the certificate with this ``subject`` (``CN=/talker``).
 
     ``validity`` is the certificate's. Raises ``PolicyError`` for a name that no ROS node can have and for a wildcard
     outside the subset that all DDS implementations read alike.
     """
-    rules = dds_rules(policy, rmw=rmw)
+    rules = dds_rules(policy)
     domain_set = domains.xml()
     parts = [
         _HEAD,
@@ -87,7 +83,7 @@ def permissions_document(
     return "".join(parts).encode()
 
 
-def dds_rules(policy: EnclavePolicy, *, rmw: str | None = None) -> DdsRules:
+def dds_rules(policy: EnclavePolicy) -> DdsRules:
     """Join all profiles of the enclave to one set of DDS rules; DENY of any beats ALLOW of any."""
     allowed: tuple[set[str], set[str]] = (set(), set())
     denied: tuple[set[str], set[str]] = (set(), set())
@@ -99,10 +95,10 @@ def dds_rules(policy: EnclavePolicy, *, rmw: str | None = None) -> DdsRules:
                 add_dds_topics(operation, full_name(expression, profile), publish, subscribe)
     except PolicyError as error:
         raise PolicyError(f"enclave {printable(policy.path)}: {error}") from None
-    if rmw not in RMW_WITHOUT_DISCOVERY_TOPIC:
-        if policy.publishes_discovery:
-            allowed[0].add(DISCOVERY_TOPIC)
-        allowed[1].add(DISCOVERY_TOPIC)
+    # Without it an rmw cannot even create its context; Zenoh, which has none, gets no rule from it.
+    if policy.publishes_discovery:
+        allowed[0].add(DISCOVERY_TOPIC)
+    allowed[1].add(DISCOVERY_TOPIC)
     if not denied[0] and not denied[1]:
         return DdsRules(TopicSets(), TopicSets(), _sorted(allowed))
     return _resolve_denials(allowed, denied)

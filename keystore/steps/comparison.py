@@ -1,4 +1,6 @@
-"""A keystore held against what is wanted of it: a whole launch, or one enclave before a process. Reads only."""
+"""What is wanted of a keystore, and the keystore held against it: for a launch, or for one enclave before a process.
+
+Reads only."""
 
 from __future__ import annotations
 
@@ -6,18 +8,22 @@ import os
 from collections.abc import Iterable, Iterator, Mapping
 from datetime import datetime, timedelta
 from pathlib import Path
+from typing import NamedTuple
 
 from keystore.disk import layout
 from keystore.disk.crl_file import crl_problem, crl_validity
 from keystore.disk.deployed import deployment_problem, refuse_changed_deployment
 from keystore.disk.register_file import needs_register, read_register, refuse_foreign_authorities
 from keystore.disk.safe_files import resolve_root
-from keystore.disk.signed_documents import governance_stands
+from keystore.disk.signed_documents import governance_domains, governance_stands
 from keystore.disk.view import KeystoreView
 from keystore.errors import NotAKeystoreError, SigningUnavailableError, printable
+from keystore.formats.domains import Domains
+from keystore.formats.permissions import permissions_document
 from keystore.formats.policy import EnclavePolicy
 from keystore.formats.register import Register
 from keystore.formats.role import Role
+from keystore.formats.shares import Share
 from keystore.formats.validity import Validity, iso, later, utc_now
 from keystore.steps.enclave_state import (
     OTHER_PERMISSIONS,
@@ -28,8 +34,43 @@ from keystore.steps.enclave_state import (
     inspect,
 )
 from keystore.steps.options import EnclaveReport, ProvisionOptions, ProvisionReport
-from keystore.steps.sharing import shares_in_use
-from keystore.steps.wanted import WantedEnclave, wanted_enclave, with_domains
+from keystore.steps.sharing import EnclaveShare, shares_in_use
+
+
+class WantedEnclave(NamedTuple):
+    """The permissions that one enclave should have, and the least that must be issued again of its identity."""
+
+    permissions: PermissionsSource
+    reissue: Reissue = Reissue.NOTHING
+    share: EnclaveShare | None = None
+    """Where ``permissions`` are those of several launches."""
+    ends_by: datetime | None = None
+    """The requested end of its certificate; one that expires later is issued again."""
+
+
+def with_domains(root: Path, options: ProvisionOptions) -> ProvisionOptions:
+    """Return the same options with the domains decided."""
+    if options.domains is not None:
+        return options
+    view = KeystoreView(root)
+    return options._replace(domains=governance_domains(view) if view.is_complete else Domains.single(0))
+
+
+def permissions_source(policy: EnclavePolicy, options: ProvisionOptions) -> PermissionsSource:
+    """Return what makes the document of exactly this policy."""
+    domains = options.domains_of(policy.path)
+    return lambda subject, validity: permissions_document(subject, policy, validity=validity, domains=domains)
+
+
+def wanted_enclave(root: Path, policy: EnclavePolicy, options: ProvisionOptions) -> WantedEnclave:
+    """Return the enclave with exactly this policy; of a launch, its share beside those of others."""
+    ends_by = options.requested_end()
+    if options.launch is None:
+        return WantedEnclave(permissions_source(policy, options), ends_by=ends_by)
+    domains, types = options.domains_of(policy.path), options.types.get(policy.path, ())
+    mine = Share(options.launch.owner, domains, policy.profiles, types)
+    share = EnclaveShare(root, policy.path, mine.owner, mine, options.launch)
+    return WantedEnclave(share.document, share=share, ends_by=ends_by)
 
 
 def compare(

@@ -258,7 +258,7 @@ class EnclaveWriter:
         name = facts.common_name or ""
         subject = subject_name(name)
         document = source(subject, facts.validity) or previous_permissions(
-            self._view, self._register, enclave, subject, facts.validity, self._options.rmw
+            self._view, self._register, enclave, subject, facts.validity
         )
         signed = sign_document(document, self._permissions_ca)
         self._signed.append(permissions_record(enclave, name, document))

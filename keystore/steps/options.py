@@ -13,7 +13,7 @@ from keystore.disk.share_files import LaunchHold
 from keystore.formats.domains import Domains
 from keystore.formats.policy import EnclavePolicy
 from keystore.formats.subject import Half, SubjectScheme
-from keystore.formats.validity import DEFAULT_LIFETIME, Validity
+from keystore.formats.validity import DEFAULT_LIFETIME, Validity, later, utc_now
 from keystore.signing.ca_access import CaAccess
 
 Progress = Callable[[int, int], None]
@@ -46,7 +46,6 @@ class ProvisionOptions(NamedTuple):
     valid_until: datetime | None = None
     renew_within: timedelta = timedelta(0)
     subjects: SubjectScheme | None = None
-    rmw: str | None = None
     allow_subject_overlap: bool = False
     access: CaAccess = CaAccess()
     lock_timeout: float = DEFAULT_TIMEOUT
@@ -66,6 +65,16 @@ class ProvisionOptions(NamedTuple):
     """Where signing is done by a process of its own; it has the ``access``, and everything that was requested."""
     guid_halves: Mapping[str, Half] = MappingProxyType({})
     """Where the participants of enclaves without a certificate yet should sort; their subjects are chosen so."""
+
+    def domains_of(self, enclave: str) -> Domains:
+        """Return the domains that the permissions of one enclave are for."""
+        return self.enclave_domains.get(enclave) or self.domains or Domains.single(0)
+
+    def requested_end(self) -> datetime | None:
+        """Return when new certificates are to expire, if the caller said so."""
+        if self.valid_until is not None or self.lifetime is None:
+            return self.valid_until
+        return later(self.now or utc_now(), self.lifetime)
 
 
 class EnclaveReport(NamedTuple):

@@ -40,7 +40,7 @@ def what_is_taken_away(
         present = safe_files.read_if_there(view.root, _place(enclave))
         if present is not None:
             return ()  # it keeps what it has
-        probe = _nothing(view, enclave, f"CN={last.subject}", view.ca(Role.IDENTITY).validity, None)
+        probe = _nothing(view, enclave, f"CN={last.subject}", view.ca(Role.IDENTITY).validity)
     (new,) = parse_permissions(probe)
     if rules_digest(new) == last.rules:
         return ()
@@ -48,7 +48,7 @@ def what_is_taken_away(
 
 
 def previous_permissions(
-    view: KeystoreView, register: Register, enclave: str, subject: str, validity: Validity, rmw: str | None
+    view: KeystoreView, register: Register, enclave: str, subject: str, validity: Validity
 ) -> bytes:
     """Return what the enclave was granted before, under its new subject and dates; without a past, nothing.
 
@@ -56,7 +56,7 @@ def previous_permissions(
     """
     place, last = _place(enclave), register.permissions(enclave)
     if safe_files.read_if_there(view.root, place) is None:
-        return _nothing(view, enclave, subject, validity, rmw)
+        return _nothing(view, enclave, subject, validity)
     try:
         document = _document(view, enclave, last)
         mine = _grant(document, enclave)
@@ -102,11 +102,9 @@ def _grant(document: bytes, enclave: str) -> Grant | None:
     )
 
 
-def _nothing(view: KeystoreView, enclave: str, subject: str, validity: Validity, rmw: str | None) -> bytes:
+def _nothing(view: KeystoreView, enclave: str, subject: str, validity: Validity) -> bytes:
     nothing = EnclavePolicy(enclave, ())
-    return permissions_document(
-        subject, nothing, validity=validity, domains=governance_domains(view), rmw=rmw
-    )
+    return permissions_document(subject, nothing, validity=validity, domains=governance_domains(view))
 
 
 def _place(enclave: str) -> str:

@@ -31,7 +31,16 @@ from keystore.formats.policy import EnclavePolicy, Operation, Policy, Profile, Q
 from keystore.formats.role import Role
 from keystore.formats.subject import SubjectScheme
 from keystore.formats.validity import DEFAULT_LIFETIME, Validity, utc_now
-from keystore.steps.comparison import as_found, compare, inspect_wanted, refuse_without_keys
+from keystore.steps.comparison import (
+    WantedEnclave,
+    as_found,
+    compare,
+    inspect_wanted,
+    permissions_source,
+    refuse_without_keys,
+    wanted_enclave,
+    with_domains,
+)
 from keystore.steps.creation import CreateOptions, complete
 from keystore.steps.crl import publish_crl, restore_crl
 from keystore.steps.enclave_state import EnclaveState, PermissionsSource
@@ -40,13 +49,6 @@ from keystore.steps.governance import renew_governance
 from keystore.steps.opening import opened_for_change
 from keystore.steps.options import EnclaveReport, Progress, ProvisionOptions, ProvisionReport
 from keystore.steps.sharing import given_up, left_over, refuse_running, shares_in_use
-from keystore.steps.wanted import (
-    WantedEnclave,
-    permissions_source,
-    requested_end,
-    wanted_enclave,
-    with_domains,
-)
 from keystore.verification.files import check_parents
 from keystore.verification.governance import weaknesses
 
@@ -134,7 +136,7 @@ def create_enclaves(
     chosen = with_domains(root, _lasting_as_requested(options or ProvisionOptions()))
     ordered = sorted({validate_enclave_name(name) for name in names})
     wanted = {
-        name: WantedEnclave(_allow_all(name, chosen) if allow_all else keep, ends_by=requested_end(chosen))
+        name: WantedEnclave(_allow_all(name, chosen) if allow_all else keep, ends_by=chosen.requested_end())
         for name in ordered
     }
     return bring_about(root, wanted, chosen)
@@ -167,7 +169,7 @@ def apply_policy(
 
 def _lasting_as_requested(options: ProvisionOptions) -> ProvisionOptions:
     """Give a requested life to existing enclaves too: what expires an hour sooner or later is issued again."""
-    end = requested_end(options)
+    end = options.requested_end()
     within = options.renew_within if end is None else end - (options.now or utc_now()) - timedelta(hours=1)
     return options._replace(create=False, renew_within=max(options.renew_within, within))
 

@@ -28,6 +28,7 @@ from keystore.formats.subject import SubjectScheme, scheme_of
 from keystore.formats.tool_needs import is_tool_enclave
 from keystore.formats.validity import iso, utc_now
 from keystore.steps import rollover
+from keystore.steps.comparison import WantedEnclave, with_domains
 from keystore.steps.crl import restore_crl
 from keystore.steps.enclave_state import Reissue
 from keystore.steps.governance import mirror_governance
@@ -36,7 +37,6 @@ from keystore.steps.opening import opened_for_change
 from keystore.steps.options import ProvisionOptions, ProvisionReport
 from keystore.steps.provisioning import bring_about, keep
 from keystore.steps.removal import revoke_replaced
-from keystore.steps.wanted import WantedEnclave, with_domains
 
 DEFAULT_WITHIN = timedelta(days=30)
 

@@ -123,7 +123,7 @@ def _accept(
     both.
     """
     name = facts.common_name or ""
-    document = previous_permissions(view, register, one.enclave, subject_name(name), facts.validity, None)
+    document = previous_permissions(view, register, one.enclave, subject_name(name), facts.validity)
     entries: dict[str, Content | Link] = {
         layout.CERT: Content(facts.pem),
         layout.PERMISSIONS_XML: Content(document),

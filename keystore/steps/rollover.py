@@ -35,13 +35,13 @@ from keystore.signing import smime
 from keystore.signing.ca_access import CaAccess
 from keystore.signing.public_key import fingerprint, issued_by
 from keystore.signing.smime import sign_document
+from keystore.steps.comparison import WantedEnclave, with_domains
 from keystore.steps.creation import CreateOptions, new_ca
 from keystore.steps.crl import drop_crl
 from keystore.steps.incoming_ca import install_incoming, put_incoming
 from keystore.steps.opening import opened_for_change
 from keystore.steps.options import ProvisionOptions, ProvisionReport
 from keystore.steps.provisioning import bring_about, keep
-from keystore.steps.wanted import WantedEnclave, with_domains
 
 
 class Step(str, Enum):

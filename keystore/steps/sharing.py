@@ -38,14 +38,13 @@ class EnclaveShare:
     enclave: str
     owner: str
     mine: Share | None
-    rmw: str | None = None
     hold: LaunchHold | None = None
 
     def document(self, subject: str, validity: Validity) -> bytes:
         """Unite the permissions of all shares; raises InvalidInputError if they cannot be united."""
         domains = united_domains(self.shares) if self.shares else governance_domains(KeystoreView(self.root))
         policy = united(self.enclave, self.shares)
-        return permissions_document(subject, policy, validity=validity, domains=domains, rmw=self.rmw)
+        return permissions_document(subject, policy, validity=validity, domains=domains)
 
     @cached_property
     def present(self) -> tuple[Share, ...]:

@@ -89,8 +89,8 @@ class SigningProcess:
 
 
 def _policy_text(one: EnclavePolicy, options: ProvisionOptions) -> str:
-    domains = options.enclave_domains.get(one.path) or options.domains or Domains.single(0)
-    return shares_json([Share(_OWNER, domains, one.profiles, options.types.get(one.path, ()))]).decode()
+    types = options.types.get(one.path, ())
+    return shares_json([Share(_OWNER, options.domains_of(one.path), one.profiles, types)]).decode()
 
 
 def _decided(options: ProvisionOptions) -> dict[str, Any]:

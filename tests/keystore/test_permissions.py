@@ -147,12 +147,6 @@ def test_an_empty_profile_may_join_and_nothing_else() -> None:
     ]
 
 
-def test_discovery_topic_by_rmw() -> None:
-    for rmw in (None, "rmw_cyclonedds_cpp", "rmw_fastrtps_cpp", "rmw_connextdds", "rmw_of_tomorrow"):
-        assert dds_rules(enclave(), rmw=rmw).allow.publish == ("ros_discovery_info",)
-    assert not dds_rules(enclave(), rmw="rmw_zenoh_cpp").allow
-
-
 def test_several_profiles_become_one_grant() -> None:
     policy = EnclavePolicy(
         "/e", (Profile("/", "a", (allow("publish", "x"),)), Profile("/", "b", (allow("publish", "y"),)))
