@@ -90,9 +90,14 @@ def enclave_directory(enclave: str) -> str:
     return "/".join((ENCLAVES, *segments(validate_enclave_name(enclave))))
 
 
+def enclave_file(enclave: str, name: str) -> str:
+    """Return the path of the file ``name`` of ``enclave``."""
+    return f"{enclave_directory(enclave)}/{name}"
+
+
 def zenoh_session(enclave: str) -> str:
     """Return the path of what ``ZENOH_SESSION_CONFIG_URI`` names for processes of ``enclave``."""
-    return f"{enclave_directory(enclave)}/{ENCLAVE_ZENOH}"
+    return enclave_file(enclave, ENCLAVE_ZENOH)
 
 
 def shares(enclave: str) -> str:
@@ -150,7 +155,7 @@ def link_source(name: str) -> str:
 def source_of(enclave: str, name: str) -> str:
     """Return the keystore file behind the file ``name`` of ``enclave``, which may be a link."""
     if name in (KEY, KEY_URI, CERT, PERMISSIONS):
-        return f"{enclave_directory(enclave)}/{name}"
+        return enclave_file(enclave, name)
     return link_source(name)
 
 
@@ -172,5 +177,5 @@ def bundle_files(enclaves: Iterable[tuple[str, bool]], *, crl: bool, handover: b
     names |= {name for name, is_there in ((CRL, crl), (HANDOVER, handover)) if is_there}
     for enclave, has_key in enclaves:
         own = (CERT, PERMISSIONS, *([KEY] if has_key else []))
-        names |= {f"{enclave_directory(enclave)}/{name}" for name in own}
+        names |= {enclave_file(enclave, name) for name in own}
     return names

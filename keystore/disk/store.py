@@ -331,7 +331,7 @@ def refresh_copies(opened: Store) -> None:
     """Copy trust anchors and the governance again after a change, on a file system without links."""
     view = KeystoreView(opened.root)
     stale = [
-        (f"{layout.enclave_directory(enclave)}/{name}", target, layout.link_source(name))
+        (layout.enclave_file(enclave, name), target, layout.link_source(name))
         for enclave in view.enclaves()
         for name, target in layout.enclave_links(enclave).items()
     ]

@@ -6,6 +6,7 @@ import json
 import os
 import shlex
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from fnmatch import fnmatchcase
@@ -155,11 +156,23 @@ class KeystoreView:
         """Return whether the enclave's key was made on its host: here is only the request that was signed."""
         return os.path.lexists(self.root / layout.request(enclave))
 
+    def certificate(self, enclave: str) -> CertificateFacts | None:
+        """Return the certificate that an enclave has; None without one. Raises DamagedKeystoreError."""
+        pem = self.enclave_file(enclave, layout.CERT)
+        if pem is None:
+            return None
+        return read_certificate(pem, printable(layout.enclave_file(enclave, layout.CERT)))
+
+    def readable_certificate(self, enclave: str) -> CertificateFacts | None:
+        """Return the certificate that an enclave has; None also for one that cannot be read."""
+        with suppress(DamagedKeystoreError):
+            return self.certificate(enclave)
+        return None
+
     def common_name(self, enclave: str) -> str | None:
-        """Return the common name of the certificate that an enclave has; None without one."""
-        relative = f"{layout.enclave_directory(enclave)}/{layout.CERT}"
-        pem = safe_files.read_if_there(self.root, relative)
-        return read_certificate(pem, printable(relative)).common_name if pem else None
+        """Return the common name of the certificate that an enclave has; None without one, or for an empty file."""
+        facts = self.certificate(enclave) if self.enclave_file(enclave, layout.CERT) else None
+        return facts.common_name if facts is not None else None
 
     def require_enclaves(self, names: Iterable[str]) -> None:
         """Raise InvalidInputError if one of these enclaves does not exist."""
@@ -183,7 +196,7 @@ class KeystoreView:
 
     def enclave_file(self, enclave: str, name: str) -> bytes | None:
         """Return a public file of an enclave; None if it has none."""
-        return safe_files.read_if_there(self.root, f"{layout.enclave_directory(enclave)}/{name}")
+        return safe_files.read_if_there(self.root, layout.enclave_file(enclave, name))
 
     def enclaves(self) -> list[str]:
         """Return the names of all enclaves (directories with a key or a certificate), sorted; follows no links."""

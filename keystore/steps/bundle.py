@@ -72,11 +72,10 @@ def _refuse_without_key(view: KeystoreView, names: list[str]) -> None:
 def refuse_unfit(view: KeystoreView, names: list[str], now: datetime, accept_exposures: bool) -> None:
     """Refuse what ``verify`` finds wrong with these enclaves or the keystore: it would travel with the bundle."""
     for name in names:
-        directory = layout.enclave_directory(name)
         for file in layout.RUNTIME_FILES:
             if file == layout.KEY and view.has_request(name):
                 continue  # made on its host, and only there
-            if safe_files.read_if_there(view.root, f"{directory}/{file}") is None:
+            if view.enclave_file(name, file) is None:
                 raise DamagedKeystoreError(
                     f"enclave {name} is incomplete ({file}); secure-keystore renew completes it"
                 )
@@ -124,7 +123,7 @@ def _public_files(
 ) -> Iterator[tuple[str, Content | Link]]:
     for name, link in store.enclave_links(enclave, crl=view.has_crl).items():
         file = link if public is PublicFiles.LINK else Content(safe_files.read(view.root, link.source))
-        yield f"{layout.enclave_directory(enclave)}/{name}", file
+        yield layout.enclave_file(enclave, name), file
 
 
 def _write(target: Path, files: Mapping[str, Content | Link]) -> None:

@@ -77,7 +77,7 @@ def link_crl(opened: Store, names: Iterable[str]) -> None:
     """Give each enclave its ``crl.pem``; copies of it are refreshed."""
     with opened.batch() as batch:
         for name in names:
-            target = f"{layout.enclave_directory(name)}/{layout.ENCLAVE_CRL}"
+            target = layout.enclave_file(name, layout.ENCLAVE_CRL)
             if safe_files.link_target(opened.root, target) != layout.crl_link(name):
                 batch.link(target, Link(layout.crl_link(name), layout.CRL))
 
@@ -110,7 +110,7 @@ def restore_crl(
 def drop_crl(opened: Store) -> None:
     """Remove the CRL after a change of the identity CA: what the old one revoked is not trusted any more."""
     for name in KeystoreView(opened.root).enclaves():
-        opened.remove(f"{layout.enclave_directory(name)}/{layout.ENCLAVE_CRL}")
+        opened.remove(layout.enclave_file(name, layout.ENCLAVE_CRL))
     opened.remove(layout.CRL)
     with opened.batch() as batch:
         batch.record(replace(opened.register, crl_published=False))

@@ -23,7 +23,7 @@ from keystore.errors import (
     UnsafeKeystoreError,
     printable,
 )
-from keystore.formats.certificate import CertificateFacts, read_certificate
+from keystore.formats.certificate import CertificateFacts
 from keystore.formats.permissions_document import grant_for, taken_away
 from keystore.formats.register import Register
 from keystore.formats.role import Role
@@ -124,7 +124,7 @@ def beyond_and_missing(
         return (), ()
     subject, place = subject_name(state.facts.common_name), layout.PERMISSIONS
     try:
-        signed = safe_files.read(view.root, f"{layout.enclave_directory(state.enclave)}/{layout.PERMISSIONS}")
+        signed = safe_files.read(view.root, layout.enclave_file(state.enclave, layout.PERMISSIONS))
         present = grant_for(smime.read(signed, place).document, subject, place)
         document = wanted(subject, state.facts.validity)
         requested = grant_for(document, subject, place) if document is not None else None
@@ -173,8 +173,8 @@ class _Found(NamedTuple):
 
 def _identity(enclave: _Enclave) -> _Found:
     mode = _key_mode(enclave)
-    key, cert = enclave.read(layout.KEY), enclave.read(layout.CERT)
-    facts = _facts(cert)
+    key, facts = enclave.read(layout.KEY), enclave.view.readable_certificate(enclave.name)
+    has_cert = facts is not None or enclave.read(layout.CERT) is not None
     request = (
         safe_files.read_if_there(enclave.view.root, layout.request(enclave.name)) if key is None else None
     )
@@ -182,17 +182,17 @@ def _identity(enclave: _Enclave) -> _Found:
         # The key is on its host; ``private/`` holds the request that was accepted, so it may be certified again.
         public = request_key(request, f"the request of {enclave.name}").spki
         matches = facts is not None and facts.public_key == public
-        problem = _certificate_problem(enclave, facts, matches) if cert is not None else "no certificate"
+        problem = _certificate_problem(enclave, facts, matches) if has_cert else "no certificate"
         return _Found(Reissue.CERTIFICATE if problem else Reissue.NOTHING, facts, problem)
     if key is None:
-        return _Found(Reissue.KEY_PAIR, facts, "no private key" if cert is not None else NEW)
+        return _Found(Reissue.KEY_PAIR, facts, "no private key" if has_cert else NEW)
     if mode & 0o077:
         return _Found(Reissue.KEY_PAIR, facts, f"others could read its private key (mode {mode:04o})", True)
     if not is_our_form(key):
         why = "its private key is not in the form that is written here"
         return _Found(Reissue.KEY_PAIR, facts, why, enclave.register is not None)
     matches = facts is not None and key_matches(key, facts)
-    problem = _certificate_problem(enclave, facts, matches) if cert is not None else "no certificate"
+    problem = _certificate_problem(enclave, facts, matches) if has_cert else "no certificate"
     if problem is None:
         return _Found(Reissue.NOTHING, facts)
     if enclave.register is not None and not _key_is_ours(enclave, enclave.register, key):
@@ -211,13 +211,6 @@ def _key_mode(enclave: _Enclave) -> int:
     if problem := safe_files.private_problem(path, info):
         raise UnsafeKeystoreError(problem)
     return stat.S_IMODE(info.st_mode)
-
-
-def _facts(cert: bytes | None) -> CertificateFacts | None:
-    try:
-        return read_certificate(cert) if cert is not None else None
-    except DamagedKeystoreError:
-        return None
 
 
 def _certificate_problem(enclave: _Enclave, facts: CertificateFacts | None, matches_key: bool) -> str | None:

@@ -206,8 +206,8 @@ class EnclaveWriter:
             key = new_key()
             entries[layout.KEY] = Content(key_pem(key), store.PRIVATE_MODE)
             return key.public_key()
-        directory = layout.enclave_directory(state.enclave)
-        relative = layout.request(state.enclave) if made_on_host else f"{directory}/{layout.KEY}"
+        key_file = layout.enclave_file(state.enclave, layout.KEY)
+        relative = layout.request(state.enclave) if made_on_host else key_file
         actions.append("certificate")
         return public_half(
             safe_files.read_private(self._view.root, relative), printable(self._view.root / relative)

@@ -8,11 +8,10 @@ from enum import Enum
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from keystore.disk import layout, safe_files
+from keystore.disk import layout
 from keystore.disk.signed_documents import signed_governance
 from keystore.disk.view import KeystoreView, keystore_at
-from keystore.errors import printable
-from keystore.formats.certificate import CertificateFacts, read_certificate
+from keystore.formats.certificate import CertificateFacts
 from keystore.formats.domains import Domains
 from keystore.formats.governance import DomainRule, TopicRule, parse_governance
 from keystore.formats.permissions_document import parse_permissions
@@ -69,11 +68,10 @@ def _place(file: str | None) -> str:
 
 def _enclaves(view: KeystoreView) -> Iterator[KeyEntry]:
     for enclave in view.enclaves():
-        relative = f"{layout.enclave_directory(enclave)}/{layout.CERT}"
-        pem = safe_files.read_if_there(view.root, relative)
-        if pem is not None:
+        facts = view.certificate(enclave)
+        if facts is not None:
             where = "on its host" if view.has_request(enclave) else "file of the enclave"
-            yield _entry("enclave", enclave, read_certificate(pem, printable(relative)), where)
+            yield _entry("enclave", enclave, facts, where)
 
 
 def _entry(use: str, name: str, facts: CertificateFacts, private_key: str) -> KeyEntry:
@@ -146,9 +144,9 @@ def granted(keystore: Path | str) -> dict[str, Granted]:
     view = keystore_at(keystore)
     found = {}
     for enclave in view.enclaves():
-        place = f"{layout.enclave_directory(enclave)}/{layout.PERMISSIONS}"
-        signed = safe_files.read_if_there(view.root, place)
+        signed = view.enclave_file(enclave, layout.PERMISSIONS)
         if signed is not None:
+            place = layout.enclave_file(enclave, layout.PERMISSIONS)
             found[enclave] = _granted(smime.read(signed, place).document, place)
     return found
 

@@ -157,9 +157,7 @@ def _documents(view: KeystoreView, register: Register) -> Iterator[SignedPermiss
     for one in register.certificates.values():
         if one.in_force:
             with suppress(KeystoreError):  # not signed by us, or not for this subject: it counts for nothing
-                document = trusted_document(
-                    view, f"{layout.enclave_directory(one.enclave)}/{layout.PERMISSIONS}"
-                )
+                document = trusted_document(view, layout.enclave_file(one.enclave, layout.PERMISSIONS))
                 yield permissions_record(one.enclave, one.subject, document)
 
 

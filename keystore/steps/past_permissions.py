@@ -6,7 +6,7 @@ too; to sign it again, or to compare with it, would give back what was taken awa
 
 from __future__ import annotations
 
-from keystore.disk import layout, safe_files
+from keystore.disk import layout
 from keystore.disk.signed_documents import governance_domains, trusted_document
 from keystore.disk.view import KeystoreView
 from keystore.errors import DamagedKeystoreError, KeystoreError, printable
@@ -37,7 +37,7 @@ def what_is_taken_away(
     grant = _granted_last(view, last)
     probe = wanted(f"CN={last.subject}", view.ca(Role.IDENTITY).validity)
     if probe is None:
-        present = safe_files.read_if_there(view.root, _place(enclave))
+        present = view.enclave_file(enclave, layout.PERMISSIONS)
         if present is not None:
             return ()  # it keeps what it has
         probe = _nothing(view, enclave, f"CN={last.subject}", view.ca(Role.IDENTITY).validity)
@@ -54,8 +54,8 @@ def previous_permissions(
 
     Raises DamagedKeystoreError for a document that is not the one signed last for this enclave.
     """
-    place, last = _place(enclave), register.permissions(enclave)
-    if safe_files.read_if_there(view.root, place) is None:
+    place, last = layout.enclave_file(enclave, layout.PERMISSIONS), register.permissions(enclave)
+    if view.enclave_file(enclave, layout.PERMISSIONS) is None:
         return _nothing(view, enclave, subject, validity)
     try:
         document = _document(view, enclave, last)
@@ -76,7 +76,7 @@ def _document(view: KeystoreView, enclave: str, last: SignedPermissions | None) 
     twin = view.enclave_file(enclave, layout.PERMISSIONS_XML)
     if last is not None and twin is not None and fingerprint(twin) == last.document:
         return twin
-    return trusted_document(view, _place(enclave))
+    return trusted_document(view, layout.enclave_file(enclave, layout.PERMISSIONS))
 
 
 def _granted_last(view: KeystoreView, last: SignedPermissions) -> Grant | None:
@@ -105,7 +105,3 @@ def _grant(document: bytes, enclave: str) -> Grant | None:
 def _nothing(view: KeystoreView, enclave: str, subject: str, validity: Validity) -> bytes:
     nothing = EnclavePolicy(enclave, ())
     return permissions_document(subject, nothing, validity=validity, domains=governance_domains(view))
-
-
-def _place(enclave: str) -> str:
-    return f"{layout.enclave_directory(enclave)}/{layout.PERMISSIONS}"

@@ -20,7 +20,7 @@ from keystore.disk.register_file import describe, read_register
 from keystore.disk.store import Store, refresh_copies
 from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import DamagedKeystoreError, InvalidInputError, printable
-from keystore.formats.certificate import CertificateFacts, read_certificate, read_der
+from keystore.formats.certificate import read_der
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.register import AuthorityState
 from keystore.formats.role import Role
@@ -151,7 +151,7 @@ def _wanted(view: KeystoreView, name: str, named: list[str] | None, options: Ren
 
 def _is_exposed(view: KeystoreView, name: str, options: RenewOptions) -> bool:
     """Return whether a certificate could sign documents, or has a subject that another enclave's permissions match."""
-    facts = _facts(view, name)
+    facts = view.readable_certificate(name)
     if facts is None:
         return False
     scheme = options.provisioning.subjects or view.settings.subjects
@@ -159,14 +159,6 @@ def _is_exposed(view: KeystoreView, name: str, options: RenewOptions) -> bool:
         scheme is SubjectScheme.EXACT and scheme_of(facts.common_name or "/") is SubjectScheme.COMPATIBLE
     )
     return facts.can_sign_mail or borrows
-
-
-def _facts(view: KeystoreView, name: str) -> CertificateFacts | None:
-    pem = view.enclave_file(name, layout.CERT)
-    try:
-        return read_certificate(pem) if pem else None
-    except DamagedKeystoreError:
-        return None
 
 
 def _repair_keystore(opened: Store, options: RenewOptions, now: datetime) -> list[str]:

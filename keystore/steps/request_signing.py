@@ -52,7 +52,7 @@ def sign_requests(
             for one in fresh:
                 batch.file(layout.request(one.enclave), one.pem, PRIVATE_MODE)
         for one in listed:
-            opened.remove(f"{layout.enclave_directory(one.enclave)}/{layout.KEY}")
+            opened.remove(layout.enclave_file(one.enclave, layout.KEY))
     names = [one.enclave for one in fresh]
     return renew(root, names, options=RenewOptions(revoke_old=revoke_old, provisioning=chosen))
 
@@ -85,7 +85,7 @@ def accept_certificates(
                 register = _accept(batch, view, register, signer, one, facts)
             batch.record(register.without_ended(now))
         for one, _ in found:
-            opened.remove(f"{layout.enclave_directory(one.enclave)}/{layout.KEY}")
+            opened.remove(layout.enclave_file(one.enclave, layout.KEY))
     return tuple(one.enclave for one, _ in found)
 
 

@@ -234,10 +234,10 @@ def _refuse_to_strand(opened: Store, roles: Collection[Role]) -> None:
 
 
 def _hangs_on_old_ca(view: KeystoreView, enclave: str, roles: Collection[Role]) -> bool:
-    pem = view.enclave_file(enclave, layout.CERT)
     signed = view.enclave_file(enclave, layout.PERMISSIONS)
     with suppress(DamagedKeystoreError):
-        if Role.IDENTITY in roles and pem and not issued_by(read_certificate(pem), view.ca(Role.IDENTITY)):
+        facts = view.certificate(enclave)
+        if Role.IDENTITY in roles and facts and not issued_by(facts, view.ca(Role.IDENTITY)):
             return True
         if Role.PERMISSIONS in roles and signed:
             return not smime.read(signed, layout.enclave_directory(enclave)).embeds(

@@ -9,11 +9,9 @@ from datetime import datetime, timedelta
 from pathlib import Path
 from typing import NamedTuple
 
-from keystore.disk import layout, safe_files
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.view import keystore_at
 from keystore.errors import InvalidInputError, printable
-from keystore.formats.certificate import read_certificate
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.policy import EnclavePolicy, Policy
 from keystore.formats.subject import Half, guid_prefix
@@ -60,9 +58,8 @@ def create_tool_enclave(
     given = options or ProvisionOptions()
     if given.lifetime is None and given.valid_until is None:
         given = given._replace(lifetime=DEFAULT_LIFETIME)
-    if (
-        not kind.node
-    ):  # of two implementations the one with the smaller GUID begins, which Cyclone DDS must be
+    if not kind.node:
+        # Of two implementations the one with the smaller GUID begins, which Cyclone DDS must be.
         given = given._replace(guid_halves={enclave: Half.LOW})
     policy = tool_policy(kind, chosen, enclave)
     report = apply_policy(keystore, Policy((policy,)), options=given)
@@ -75,7 +72,7 @@ def create_tool_enclave(
     return ToolEnclave(
         enclave,
         policy,
-        _end(root, enclave),
+        report.validities[enclave].not_after,
         environment,
         f"{words} {example}" if kind.node else example,
         f"secure-keystore remove {shlex.quote(str(root))} {enclave}",
@@ -102,11 +99,6 @@ def tool_environment(root: Path | str, enclave: str) -> dict[str, str]:
         "ROS_SECURITY_KEYSTORE": os.path.abspath(root),
         "ROS_SECURITY_ENCLAVE_OVERRIDE": enclave,
     }
-
-
-def _end(root: Path, enclave: str) -> datetime:
-    relative = f"{layout.enclave_directory(enclave)}/{layout.CERT}"
-    return read_certificate(safe_files.read(root, relative), printable(relative)).validity.not_after
 
 
 def enclaves_by_guid(keystore: Path | str) -> dict[int, str]:

@@ -77,7 +77,7 @@ def check_domains(root: Path, governance: Governance, granted: dict[str, Domains
     for enclave, domains in granted.items():
         if missing := _without(domains, governance.domains()):
             yield Finding(
-                Severity.ERROR, "domain-not-governed", f"{layout.enclave_directory(enclave)}/{layout.PERMISSIONS}",
+                Severity.ERROR, "domain-not-governed", layout.enclave_file(enclave, layout.PERMISSIONS),
                 f"permissions for domains {missing}, which the governance does not list: Cyclone DDS refuses the "
                 "participant there, Fast DDS each endpoint",
                 repair.run(root, "renew", enclave, note="or add the domains to the governance"),

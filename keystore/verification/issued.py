@@ -103,7 +103,7 @@ def check_certificate_issued(
     """Finds a certificate that the register does not know for ``enclave``, or that was replaced since."""
     if register is None:
         return
-    place = f"{layout.enclave_directory(enclave)}/{layout.CERT}"
+    place = layout.enclave_file(enclave, layout.CERT)
     again = repair.run(view.root, "renew", enclave, "--new-keys", "--revoke-old")
     known, held = register.certificates.get(facts.serial), register.in_force(enclave)
     if known is None or known.enclave != enclave or known.key != fingerprint(facts.public_key):
@@ -131,6 +131,6 @@ def check_permissions_issued(
         "an earlier document that has been put back" if earlier else "a document that is not in the register"
     )
     yield Finding(
-        Severity.ERROR, "permissions-not-last", f"{layout.enclave_directory(enclave)}/{layout.PERMISSIONS}",
+        Severity.ERROR, "permissions-not-last", layout.enclave_file(enclave, layout.PERMISSIONS),
         f"{what}: it may permit what was removed since", repair.grant_again(view.root, enclave),
     )  # fmt: skip

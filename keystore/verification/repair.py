@@ -22,10 +22,9 @@ def run_on(root: Path, command: str, relative: str, note: str = "") -> str:
 
 def grant_again(root: Path, enclave: str) -> str:
     """Advise to start from nothing: what an enclave may do is unknown without trustworthy permissions."""
-    document = f"{layout.enclave_directory(enclave)}/{layout.PERMISSIONS}"
-    renew = run(
-        root, "renew", enclave, note="grants nothing until secure-keystore apply-policy, or the next launch"
-    )
+    document = layout.enclave_file(enclave, layout.PERMISSIONS)
+    note = "grants nothing until secure-keystore apply-policy, or the next launch"
+    renew = run(root, "renew", enclave, note=note)
     return f"{run_on(root, 'rm -f', document)} && {renew}"
 
 

@@ -147,11 +147,9 @@ def _subject(
     view: KeystoreView, register: Register | None, revoked: frozenset[int], enclave: str
 ) -> tuple[Subject, tuple[str, ...]]:
     """Return the enclave with its rules and gaps; raises a KeystoreError if it must not be served."""
-    directory = layout.enclave_directory(enclave)
-    pem = safe_files.read(view.root, f"{directory}/{layout.CERT}")
-    facts = read_certificate(pem, printable(view.root / directory / layout.CERT))
+    cert, place = (layout.enclave_file(enclave, name) for name in (layout.CERT, layout.PERMISSIONS))
+    facts = read_certificate(safe_files.read(view.root, cert), printable(view.root / cert))
     name = _common_name(register, revoked, enclave, facts)
-    place = f"{directory}/{layout.PERMISSIONS}"
     document = trusted_document(view, place)
     last = register.permissions(enclave) if register is not None else None
     if last is not None and last.document != hashlib.sha256(document).hexdigest():

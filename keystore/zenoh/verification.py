@@ -66,6 +66,6 @@ def _sessions(view: KeystoreView, address: RouterAddress) -> Iterator[Finding]:
         pem = view.enclave_file(enclave, layout.CERT)
         if pem is not None and read_certificate(pem, enclave).names_hosts:
             yield Finding(
-                Severity.EXPOSURE, "zenoh-impostor", f"{layout.enclave_directory(enclave)}/{layout.CERT}",
+                Severity.EXPOSURE, "zenoh-impostor", layout.enclave_file(enclave, layout.CERT),
                 "names hosts, so that its holder could play the router there", repair.run(view.root, "renew", enclave),
             )  # fmt: skip
