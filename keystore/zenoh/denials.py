@@ -24,7 +24,7 @@ from keystore.formats.policy_xml import policy_xml
 from keystore.zenoh.configuration import RouterAddress
 from keystore.zenoh.files import present_address, router_file
 from keystore.zenoh.grants import PLAIN_USES, Use
-from keystore.zenoh.rules import GRAPH_KINDS
+from keystore.zenoh.rules import GRAPH_KINDS, TABLE
 
 RUST_LOG = "zenoh=info,zenoh::net::routing::interceptor=trace"
 """What a router has to be started with."""
@@ -274,29 +274,16 @@ _DOMAIN = re.compile(r"(?:[0-9]{1,10}|\*{1,2})\Z")
 _ACTION_SERVICE = re.compile(r"(/.+)/_action/(?:send_goal|get_result|cancel_goal)\Z")
 _ACTION_TOPIC = re.compile(r"(/.+)/_action/(?:feedback|status)\Z")
 _OPERATIONS = {use: operation for operation, use in PLAIN_USES.items()}
-_USES = {
-    ("ingress", "put"): Use.PUBLISH,
-    ("ingress", "delete"): Use.PUBLISH,
-    ("ingress", "declare_subscriber"): Use.SUBSCRIBE,
-    ("ingress", "query"): Use.CALL,
-    ("ingress", "declare_queryable"): Use.SERVE,
-    ("egress", "put"): Use.SUBSCRIBE,
-    ("egress", "delete"): Use.SUBSCRIBE,
-    ("egress", "declare_subscriber"): Use.PUBLISH,
-    ("egress", "query"): Use.SERVE,
-    ("egress", "declare_queryable"): Use.CALL,
-}
-_REPLIES = {"ingress": (Use.SERVE, Use.PUBLISH), "egress": (Use.CALL, Use.SUBSCRIBE)}
-"""Of a service, and of the history of a topic."""
-_HISTORY = {
-    **dict.fromkeys((("ingress", one) for one in ("put", "declare_queryable")), Use.PUBLISH),
-    **dict.fromkeys((("egress", one) for one in ("query", "declare_subscriber")), Use.PUBLISH),
-    **dict.fromkeys((("egress", one) for one in ("put", "declare_queryable")), Use.SUBSCRIBE),
-    **dict.fromkeys(
-        (("ingress", one) for one in ("query", "declare_subscriber", "declare_liveliness_subscriber")),
-        Use.SUBSCRIBE,
-    ),
-}
+_SENT: dict[tuple[str, str], tuple[Use, ...]] = {}
+"""The uses that a message on a key of messages, requests and replies is of, by flow and kind of message."""
+_HISTORY: dict[tuple[str, str], Use] = {("egress", "declare_queryable"): Use.SUBSCRIBE}
+"""The same on the keys of a topic's history."""
+for _row in TABLE:
+    for _message in _row.messages:
+        if _row.below is str:
+            _SENT[_row.flow, _message] = (*_SENT.get((_row.flow, _message), ()), _row.use)
+        else:
+            _HISTORY[_row.flow, _message] = _row.use
 
 
 class Meaning(NamedTuple):
@@ -342,10 +329,10 @@ def meaning(flow: str, message: str, key: str) -> Meaning | None:
         sent = "sub" if history.startswith("sub") else "pub"
         token = Use.PUBLISH if (sent == "pub") is (flow == "ingress") else Use.SUBSCRIBE
         use = token if message == "liveliness_token" else _HISTORY.get((flow, message))
-    elif message == "reply":
-        use = _REPLIES[flow][not _is_service(ros_type)]
     else:
-        use = _USES.get((flow, message))
+        uses = _SENT.get((flow, "put" if message == "delete" else message), ())
+        of_service = [one for one in uses if (one in (Use.CALL, Use.SERVE)) is _is_service(ros_type)]
+        use = next(iter(of_service if len(uses) > 1 else uses), None)
     return None if use is None else Meaning(use, name, ros_type, chunks[0])
 
 

@@ -45,7 +45,7 @@ class _Row(NamedTuple):
     below: Callable[[str], str] = str
 
 
-_TABLE = (
+TABLE = (
     # ``reply``: the history of a transient local publisher comes back on the key of its messages. Its heartbeats, by
     # which a subscription finds out that it missed the last message, are sent only to a subscriber of them.
     _Row("publish", Use.PUBLISH, "ingress", ("put", "reply")),
@@ -79,7 +79,7 @@ def access_rules(enclave: str, grants: Grants, domains: Domains) -> tuple[Access
         )
         for use in Use
     }
-    rows = ((row, tuple(map(row.below, keys[row.use]))) for row in _TABLE)
+    rows = ((row, tuple(map(row.below, keys[row.use]))) for row in TABLE)
     found = [AccessRule(row.name, row.flow, row.messages, below) for row, below in rows if below]
     return (*found, *_graph(enclave, grants, chunks))
 

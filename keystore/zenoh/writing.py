@@ -74,11 +74,14 @@ def write_zenoh(
     view.require_enclaves(requested)
     names = sorted({*requested, *view.zenoh_enclaves()})
     address = RouterAddress.parse(router) if router is not None else present_address(view) or RouterAddress()
-    if (found := _as_wanted(view, names, address, chosen)) is not None:
-        return ZenohReport(view.root, address, (), found.served, found.gaps, restart=False)
     now = chosen.now or utc_now()
+    due = later(now, chosen.renew_within)
+    found = _pending(view, names, address, due)
+    if not found.sessions and not found.is_router_stale:
+        return ZenohReport(view.root, address, (), found.router.served, found.router.gaps, restart=False)
     with opened_for_change(view.root, now, chosen) as opened:
-        return _write(opened, names, address, chosen, now)
+        found = _pending(KeystoreView(opened.root), names, address, due)
+        return _write(opened, found, address, chosen.access, now)
 
 
 def matching_enclaves(keystore: Path | str, patterns: Sequence[str] | None) -> list[str]:
@@ -147,52 +150,43 @@ RESTART = (
 )
 
 
-def _as_wanted(
-    view: KeystoreView, names: list[str], address: RouterAddress, options: ProvisionOptions
-) -> RouterFile | None:
-    """Return what the router serves, if nothing is to be written. Evaluated before each secured launch."""
-    if _stale_sessions(view, names, address):
-        return None
-    if _serves_no_router(view):
-        return RouterFile(b"", (), ())
-    now = options.now or utc_now()
-    wanted = router_file(view, names, address)
-    if safe_files.read_if_there(view.root, layout.ZENOH_ROUTER) != wanted.content:
-        return None
-    return wanted if identity_problem(view, later(now, options.renew_within)) is None else None
+class _Pending(NamedTuple):
+    """What is to be written: session files, by path, and the router's, which are left alone on other hosts."""
+
+    sessions: dict[str, bytes]
+    router: RouterFile
+    is_router_stale: bool
 
 
-def _stale_sessions(view: KeystoreView, names: list[str], address: RouterAddress) -> dict[str, bytes]:
+def _pending(view: KeystoreView, names: list[str], address: RouterAddress, due: datetime) -> _Pending:
+    """Compare with what is there. Evaluated before each secured launch."""
     wanted = {layout.zenoh_session(name): session_content(view, name, address) for name in names}
-    return {
+    stale = {
         file: content
         for file, content in wanted.items()
         if safe_files.read_if_there(view.root, file) != content
     }
-
-
-def _serves_no_router(view: KeystoreView) -> bool:
-    return not (view.root / layout.PRIVATE).is_dir()
+    if not (view.root / layout.PRIVATE).is_dir():
+        return _Pending(stale, RouterFile(b"", (), ()), False)
+    router = router_file(view, names, address)
+    changed = safe_files.read_if_there(view.root, layout.ZENOH_ROUTER) != router.content
+    return _Pending(stale, router, changed or identity_problem(view, due) is not None)
 
 
 def _write(
-    opened: Store, names: list[str], address: RouterAddress, options: ProvisionOptions, now: datetime
+    opened: Store, found: _Pending, address: RouterAddress, access: CaAccess, now: datetime
 ) -> ZenohReport:
     view = KeystoreView(opened.root)
-    files = _stale_sessions(view, names, address)
-    wanted, restart = RouterFile(b"", (), ()), False
+    files = dict(found.sessions)
     with opened.batch() as batch:
-        if not _serves_no_router(view):
-            wanted = router_file(view, names, address)
-            changed = safe_files.read_if_there(view.root, layout.ZENOH_ROUTER) != wanted.content
-            if changed or identity_problem(view, later(now, options.renew_within)) is not None:
-                restart = view.has_zenoh_router
-                record, issued = _issue(view, address, options.access, now)
-                batch.record(opened.register.with_certificates([record]))
-                files |= {**issued, layout.ZENOH_ROUTER: wanted.content}
+        if found.is_router_stale:
+            record, issued = _issue(view, address, access, now)
+            batch.record(opened.register.with_certificates([record]))
+            files |= {**issued, layout.ZENOH_ROUTER: found.router.content}
         for file, content in files.items():
             batch.file(file, content, PRIVATE_MODE if file == layout.ZENOH_ROUTER_KEY else PUBLIC_MODE)
-    return ZenohReport(view.root, address, tuple(files), wanted.served, wanted.gaps, restart)
+        restart = found.is_router_stale and view.has_zenoh_router
+    return ZenohReport(view.root, address, tuple(files), found.router.served, found.router.gaps, restart)
 
 
 def _issue(
