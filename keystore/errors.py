@@ -19,7 +19,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from os import PathLike
 
 from enclave_common.terminal import quoted
 
@@ -97,6 +96,5 @@ def storage_errors(doing: str) -> Iterator[None]:
         raise StorageError.of(error, doing) from None
 
 
-def printable(text: str | PathLike[str]) -> str:
-    """Quote ``text`` for a terminal: names from outside may hold escape sequences."""
-    return quoted(text)
+printable = quoted
+"""Of names from outside, which may hold escape sequences."""

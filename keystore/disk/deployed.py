@@ -8,9 +8,18 @@ from keystore.disk import layout, safe_files
 from keystore.disk.view import KeystoreView
 from keystore.errors import DamagedKeystoreError, KeystoreError, printable
 from keystore.formats.bundle import Manifest, parse_manifest
+from keystore.formats.certificate import CertificateFacts
 from keystore.formats.role import Role
 from keystore.signing import smime
 from keystore.signing.public_key import fingerprint
+
+
+def read_manifest(signed: bytes, place: str, signers: Iterable[CertificateFacts] | None = None) -> Manifest:
+    """Read a manifest, which one of ``signers`` signed, if they are given. Raises DamagedKeystoreError."""
+    document = smime.read(signed, place)
+    if signers is not None:
+        smime.check(document, list(signers), place)
+    return parse_manifest(document.document, place)
 
 
 def deployed_manifest(view: KeystoreView) -> Manifest | None:
@@ -18,10 +27,7 @@ def deployed_manifest(view: KeystoreView) -> Manifest | None:
     signed = safe_files.read_if_there(view.root, layout.BUNDLE)
     if signed is None:
         return None
-    place = printable(view.root / layout.BUNDLE)
-    document = smime.read(signed, place)
-    smime.check(document, view.ca_bundle(Role.PERMISSIONS), place)
-    return parse_manifest(document.document, place)
+    return read_manifest(signed, printable(view.root / layout.BUNDLE), view.ca_bundle(Role.PERMISSIONS))
 
 
 def differing_files(

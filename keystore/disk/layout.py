@@ -15,7 +15,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from functools import cache
 
-from keystore.formats.enclave_name import segments, validate_enclave_name
+from keystore.formats.enclave_name import flat_name, segments, validate_enclave_name
 from keystore.formats.role import Role
 
 PUBLIC, PRIVATE, ENCLAVES = "public", "private", "enclaves"
@@ -108,11 +108,6 @@ def shares(enclave: str) -> str:
 def request(enclave: str) -> str:
     """Return the path of the certificate signing request of ``enclave``, for an identity CA elsewhere."""
     return f"{REQUESTS}/{flat_name(enclave)}.csr"
-
-
-def flat_name(enclave: str) -> str:
-    """Return ``e.front.camera``; ``.`` cannot occur in a name."""
-    return "e" + "".join(f".{part}" for part in segments(validate_enclave_name(enclave)))
 
 
 def enclave_links(enclave: str, *, crl: bool = False) -> dict[str, str]:

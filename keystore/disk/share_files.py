@@ -12,6 +12,7 @@ from pathlib import Path
 
 from keystore.disk import layout, safe_files
 from keystore.errors import UnsafeKeystoreError, printable
+from keystore.formats.enclave_name import from_flat_name
 from keystore.formats.shares import Share, parse_shares
 
 
@@ -33,8 +34,9 @@ def enclaves_with_shares(root: Path) -> Iterator[str]:
     except (FileNotFoundError, NotADirectoryError, PermissionError):
         return
     for name in sorted(names):
-        if name.startswith("e") and name.endswith(".json"):
-            yield name[1:-5].replace(".", "/") or "/"
+        enclave = from_flat_name(name.removesuffix(".json"))
+        if name.endswith(".json") and enclave is not None:
+            yield enclave
 
 
 class LaunchHold:

@@ -123,12 +123,12 @@ def parse_manifest(text: bytes, place: str) -> Manifest:
         raise DamagedKeystoreError(f"{place} is not the manifest of a bundle") from None
 
 
-_ROLES = {"identity": Role.IDENTITY, "permissions": Role.PERMISSIONS}
+_ROLES = {role.use: role for role in Role}
 
 
 def pin(role: Role, digest: str) -> str:
     """Return which CA may do what: ``identity=SHA256`` or ``permissions=SHA256``."""
-    return f"{role.value.removesuffix('_ca')}={digest}"
+    return f"{role.use}={digest}"
 
 
 def pins_of(named: Iterable[str]) -> dict[Role, frozenset[str]]:
@@ -146,7 +146,7 @@ def pins_of(named: Iterable[str]) -> dict[Role, frozenset[str]]:
                 "secure-keystore export prints it"
             )
         found[_ROLES[role]].add(digest.replace(":", "").lower())
-    if missing := [role.value.removesuffix("_ca") for role in Role if not found[role]]:
+    if missing := [role.use for role in Role if not found[role]]:
         raise InvalidInputError(f"no CA is named for {missing[0]}: --require-ca {missing[0]}=SHA256")
     return {role: frozenset(listed) for role, listed in found.items()}
 

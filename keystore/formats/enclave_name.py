@@ -74,6 +74,11 @@ def _prefixes(name: str) -> Iterable[str]:
     return ("/" + "/".join(parts[:count]) for count in range(1, len(parts) + 1))
 
 
+def flat_name(enclave: str) -> str:
+    """Return ``e.front.camera``; ``.`` cannot occur in a name."""
+    return ".".join(("e", *segments(validate_enclave_name(enclave))))
+
+
 def from_flat_name(name: str) -> str | None:
     """Return the enclave that ``e.front.camera`` stands for, None if it is not such a name."""
     first, *parts = name.split(".")

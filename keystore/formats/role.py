@@ -12,6 +12,11 @@ class Role(str, Enum):
     PERMISSIONS = "permissions_ca"
 
     @property
+    def use(self) -> str:
+        """Return what it certifies: ``identity`` or ``permissions``."""
+        return self.value.removesuffix("_ca")
+
+    @property
     def label(self) -> str:
         """Return the words for a message: ``identity CA``."""
-        return self.value.replace("_ca", " CA")
+        return f"{self.use} CA"

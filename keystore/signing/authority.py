@@ -96,7 +96,7 @@ def authority_of(facts: CertificateFacts, key: PrivateKey, place: str) -> Author
 
 def default_ca_name(role: Role) -> str:
     """Return a common name that no other CA has, so that documents of two CAs are never confused."""
-    return f"ROS {role.value.removesuffix('_ca')} CA {os.urandom(4).hex()}"
+    return f"ROS {role.use} CA {os.urandom(4).hex()}"
 
 
 def self_signed_ca(role: Role, name: str, key: PrivateKey, validity: Validity) -> Authority:

@@ -8,25 +8,23 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import NamedTuple
 
 from keystore.disk import layout, safe_files
 from keystore.disk.archive import read_bundle
-from keystore.disk.deployed import find_differences
+from keystore.disk.deployed import find_differences, read_manifest
 from keystore.disk.register_file import read_register
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.signed_documents import own_permissions_cas
 from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import InvalidInputError, KeystoreError, printable, storage_errors
-from keystore.formats.bundle import Manifest, parse_manifest
+from keystore.formats.bundle import Manifest
 from keystore.formats.certificate import CertificateFacts
 from keystore.formats.register import Register
 from keystore.formats.role import Role
 from keystore.formats.validity import later, utc_now
-from keystore.signing import smime
 from keystore.signing.public_key import fingerprint
 from keystore.steps.host_bundles import SUFFIX, last_signed
 
@@ -53,8 +51,7 @@ class FleetReport(NamedTuple):
         return not self.unreadable and not any(one.found for one in self.hosts)
 
 
-@dataclass(frozen=True, slots=True)
-class Reference:
+class Reference(NamedTuple):
     """What the CA's own keystore knows."""
 
     authorities: frozenset[str]
@@ -125,10 +122,7 @@ def _manifest(place: Path, reference: Reference | None) -> Manifest:
         if place.is_file()
         else safe_files.read(place, layout.BUNDLE)
     )
-    document = smime.read(signed, printable(place))
-    if reference is not None:
-        smime.check(document, list(reference.signers), printable(place))
-    return parse_manifest(document.document, printable(place))
+    return read_manifest(signed, printable(place), reference.signers if reference is not None else None)
 
 
 def _judge(
@@ -139,7 +133,7 @@ def _judge(
     now: datetime,
     limit: datetime,
 ) -> HostStatus:
-    found = [*_ends(manifest, now, limit), *_changed(place)]
+    found = [*_ends(manifest, now, limit), *_changed(place, manifest)]
     if reference is not None:
         found += _against(manifest, reference)
     elif manifest.crl_number < newest_crl:
@@ -157,11 +151,10 @@ def _ends(manifest: Manifest, now: datetime, limit: datetime) -> Iterator[str]:
         yield "a CA or the CRL " + ("has expired" if manifest.ends < now else "expires soon")
 
 
-def _changed(place: Path) -> Iterator[str]:
+def _changed(place: Path, manifest: Manifest) -> Iterator[str]:
     if place.is_file():
         content = read_bundle(place)
-        manifest = smime.read(content[layout.BUNDLE], printable(place)).document
-        for name, digest in parse_manifest(manifest, printable(place)).files.items():
+        for name, digest in manifest.files.items():
             if name not in content or fingerprint(content[name]) != digest:
                 yield f"{name} is missing in the bundle, or is not the file that was signed"
         return

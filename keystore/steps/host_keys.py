@@ -32,7 +32,7 @@ from keystore.errors import (
 )
 from keystore.formats.bundle import BundledEnclave
 from keystore.formats.certificate import read_certificate
-from keystore.formats.enclave_name import validate_enclave_name
+from keystore.formats.enclave_name import flat_name, validate_enclave_name
 from keystore.formats.subject import common_name
 from keystore.signing.ca_access import CaAccess
 from keystore.signing.certificate_request import new_request, request_key
@@ -93,7 +93,7 @@ def request(
 
 
 def _request(pending: Path, enclave: str, options: RequestOptions) -> Request:
-    place = pending / layout.flat_name(enclave)
+    place = pending / flat_name(enclave)
     if not place.is_dir():
         file, key = _new_key(options)
         pem = new_request(common_name(enclave), key)
@@ -166,7 +166,7 @@ def find_key(versions: Versions, wanted: BundledEnclave) -> HostKey:
 
 
 def _candidates(versions: Versions, enclave: str) -> Iterator[tuple[Path, Path]]:
-    waiting = versions.pending / layout.flat_name(enclave)
+    waiting = versions.pending / flat_name(enclave)
     yield waiting, waiting / layout.REQUEST
     if versions.current is not None:
         present = versions.current / layout.enclave_directory(enclave)
@@ -199,6 +199,6 @@ def _belongs(name: str, data: bytes, public: Path, wanted: BundledEnclave) -> bo
 def forget_pending(versions: Versions, used: Mapping[str, HostKey]) -> None:
     """Delete the waiting copies of keys that a bundle put in force."""
     for enclave, key in used.items():
-        place = versions.pending / layout.flat_name(enclave)
+        place = versions.pending / flat_name(enclave)
         if place.is_dir() and _private(place, key.name) == key.data:
             shutil.rmtree(place)

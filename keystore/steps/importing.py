@@ -25,7 +25,7 @@ from keystore.disk.container_copies import (
     differing_copies,
     give_to,
 )
-from keystore.disk.deployed import differing_files
+from keystore.disk.deployed import differing_files, read_manifest
 from keystore.disk.store import Content, Link
 from keystore.disk.versions import Versions
 from keystore.disk.view import KeystoreView
@@ -140,8 +140,7 @@ def _present(version: Path | None) -> Manifest | None:
     """Return the manifest in force. Its signature was checked when it was imported; ``verify`` checks it again."""
     if version is None:
         return None
-    place = printable(version / layout.BUNDLE)
-    return parse_manifest(smime.read(safe_files.read(version, layout.BUNDLE), place).document, place)
+    return read_manifest(safe_files.read(version, layout.BUNDLE), printable(version / layout.BUNDLE))
 
 
 def _checked(

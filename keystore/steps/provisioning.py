@@ -9,7 +9,6 @@ from __future__ import annotations
 import os
 import shlex
 from collections.abc import Iterable, Iterator, Mapping
-from contextlib import contextmanager
 from dataclasses import replace
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -207,7 +206,9 @@ def reconcile(
     # An impossible validity is refused before a keystore is made for it.
     lifetime = DEFAULT_LIFETIME if options.lifetime is None else options.lifetime
     Validity.starting(now, lifetime, until=options.valid_until)
-    with _locked(root, options, now) as opened:
+    if options.create:
+        store.create_root(root)
+    with opened_for_change(root, now, options) as opened:
         done, warnings = _complete_keystore(opened, options, now)
         done = [*opened.notes, *done]
         view = KeystoreView(root)
@@ -244,14 +245,6 @@ def _record_shares(opened: Store, wanted: Mapping[str, WantedEnclave]) -> None:
         for one in wanted.values():
             if one.share is not None and not one.share.is_recorded():
                 one.share.record(opened, batch)
-
-
-@contextmanager
-def _locked(root: Path, options: ProvisionOptions, now: datetime) -> Iterator[Store]:
-    if options.create:
-        store.create_root(root)
-    with opened_for_change(root, now, options) as opened:
-        yield opened
 
 
 def _complete_keystore(

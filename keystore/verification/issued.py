@@ -52,7 +52,7 @@ def check_anchors(
             "enclaves that Fast DDS lets in", repair.run(view.root, "renew", note="once it is known who put it there"),
         )  # fmt: skip
     for role in Role:
-        prefix = role.value.removesuffix("_ca") + "="
+        prefix = f"{role.use}="
         wanted = fingerprints(one.removeprefix(prefix) for one in required)
         bundle = view.ca_bundle(role)
         for ca in bundle:
