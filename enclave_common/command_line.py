@@ -11,7 +11,7 @@ import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from importlib import import_module
 from pathlib import Path
-from typing import Any, NamedTuple, NoReturn, Protocol
+from typing import Any, NoReturn, Protocol
 
 from enclave_common import VERSION
 from enclave_common.dependencies import missing_dependency
@@ -84,22 +84,6 @@ def add_options(group: OptionGroup, options: Iterable[Option]) -> list[argparse.
     return added
 
 
-class VerbHead(NamedTuple):
-    """The docstring of a verb's module as its help: ``help`` for the list of verbs; ``epilog`` has examples and exit
-    status."""
-
-    help: str
-    description: str
-    epilog: str | None
-
-
-def verb_head(docstring: str | None) -> VerbHead:
-    """Split the docstring of a verb's module, whose first line is a sentence."""
-    text = (docstring or "").strip()
-    description, mark, status = text.partition("exit status")
-    return VerbHead(text.partition("\n")[0], description.rstrip(), f"{mark}{status}" if mark else None)
-
-
 def filled(text: str, indent: int = 0) -> str:
     """Fill the paragraphs of ``text`` to the terminal's width; those with an indented line (examples, tables) stay."""
     width = max(shutil.get_terminal_size().columns - 2, 20) - indent  # argparse's own measure
@@ -140,8 +124,15 @@ class CommandParser(argparse.ArgumentParser):
         ).add_parser
 
     def add_verb(self, name: str, docstring: str | None, **settings: Any) -> CommandParser:
-        """Add the parser of a verb, described by the docstring of its module."""
-        self.verbs[name] = self._add_parser(name, **{**verb_head(docstring)._asdict(), **settings})
+        """Add the parser of a verb, described by the docstring of its module: its first line in the list of verbs."""
+        text = (docstring or "").strip()
+        description, mark, status = text.partition("exit status")
+        head = {
+            "help": text.partition("\n")[0],
+            "description": description.rstrip(),
+            "epilog": f"{mark}{status}" if mark else None,
+        }
+        self.verbs[name] = self._add_parser(name, **{**head, **settings})
         return self.verbs[name]
 
     def add_verb_modules(self, package: str, names: Iterable[str]) -> Iterator[tuple[CommandParser, Any]]:

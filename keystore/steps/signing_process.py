@@ -13,7 +13,6 @@ import json
 import os
 import signal
 import socket
-import struct
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -34,7 +33,8 @@ from keystore.signing.ca_access import Secret
 from keystore.steps.options import EnclaveReport, ProvisionOptions, ProvisionReport
 from keystore.steps.provisioning import provision
 
-_HEAD = struct.Struct("!Q")
+_MARK = b"#"
+"""Before each line of JSON: the byte that a descriptor comes with."""
 _PR_SET_DUMPABLE = 4
 _OWNER = "the launch"
 
@@ -215,25 +215,18 @@ def _error(name: str, message: str, domains: str) -> KeystoreError:
 
 
 def _send(channel: socket.socket, content: Any, descriptor: int | None) -> None:
-    data = json.dumps(content).encode()
-    socket.send_fds(channel, [_HEAD.pack(len(data))], [] if descriptor is None else [descriptor])
-    channel.sendall(data)
+    socket.send_fds(channel, [_MARK], [] if descriptor is None else [descriptor])
+    channel.sendall(json.dumps(content).encode() + b"\n")
 
 
 def _receive(channel: socket.socket) -> tuple[Any, int | None]:
     """Read one message and the descriptor that came with it; raises EOFError when the other end is gone."""
-    head, descriptors, _, _ = socket.recv_fds(channel, _HEAD.size, 1)
-    if len(head) < _HEAD.size:
+    mark, descriptors, _, _ = socket.recv_fds(channel, len(_MARK), 1)
+    with channel.makefile("rb") as stream:  # the other end waits for the answer: nothing follows the line
+        line = stream.readline() if mark else b""
+    if not line.endswith(b"\n"):
         raise EOFError
-    (left,) = _HEAD.unpack(head)
-    pieces = []
-    while left:
-        piece = channel.recv(min(left, 1 << 20))
-        if not piece:
-            raise EOFError
-        pieces.append(piece)
-        left -= len(piece)
-    return json.loads(b"".join(pieces)), descriptors[0] if descriptors else None
+    return json.loads(line), descriptors[0] if descriptors else None
 
 
 def _forget_variable(name: str) -> None:

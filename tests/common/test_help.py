@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from enclave_common.command_line import CommandParser, Option, parsers, verb_head
+from enclave_common.command_line import CommandParser, Option, parsers
 from enclave_launch.verb import options as secure_launch
 from enclave_launch.verb import secure_plan
 from keystore import verb as secure_keystore
@@ -59,11 +59,11 @@ def test_options_that_are_not_folded_are_described(verb: CommandParser) -> None:
 
 
 def test_examples_keep_their_lines_and_paragraphs_are_filled() -> None:
-    head = verb_head(
-        "Do it.\n\nOne\nparagraph.\n\n  tool a   first\n  tool b   second\n\nexit status: 0 good\n"
-    )
-    assert head.help == "Do it."
-    shown = CommandParser(prog="tool", description=head.description, epilog=head.epilog).format_help()
+    tool = CommandParser(prog="tool")
+    tool.add_verbs()
+    text = "Do it.\n\nOne\nparagraph.\n\n  tool a   first\n  tool b   second\n\nexit status: 0 good\n"
+    shown = tool.add_verb("do", text).format_help()
+    assert "    do        Do it.\n" in tool.format_help()
     assert "\nOne paragraph.\n\n  tool a   first\n  tool b   second\n" in shown
     assert shown.endswith("\n\nexit status: 0 good\n")
 
