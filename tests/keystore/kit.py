@@ -9,6 +9,8 @@ from collections.abc import Iterable
 from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
+from cryptography import x509
+
 from keystore import (
     CreateOptions,
     EnclavePolicy,
@@ -20,7 +22,13 @@ from keystore import (
     Rule,
     create_keystore,
     provision,
+    verify,
 )
+from keystore.disk import layout
+from keystore.disk.signed_documents import trusted_document
+from keystore.disk.view import KeystoreView
+from keystore.formats.certificate import CertificateFacts, read_certificate
+from keystore.formats.permissions_document import parse_permissions
 
 NOW = datetime(2031, 5, 1, 12, tzinfo=timezone.utc)
 DAY = timedelta(days=1)
@@ -78,6 +86,26 @@ def snapshot(root: Path) -> dict[str, tuple[int, int, bytes | str]]:
 def contents(root: Path) -> dict[str, bytes | str]:
     """A snapshot without times and modes, and without directories."""
     return {name: content for name, (mode, _, content) in snapshot(root).items() if not stat.S_ISDIR(mode)}
+
+
+def codes(root: Path, **more: object) -> set[str]:
+    """Codes of the errors and exposures that ``verify`` finds."""
+    return {finding.code for finding in verify(root, **more).findings if finding.severity.fails}  # type: ignore[arg-type]
+
+
+def certificate_of(root: Path, name: str) -> CertificateFacts:
+    return read_certificate((root / layout.enclave_file(name, layout.CERT)).read_bytes())
+
+
+def granted(root: Path, name: str) -> set[str]:
+    """The DDS topics that an enclave may publish, by what is signed."""
+    document = trusted_document(KeystoreView(root), layout.enclave_file(name, layout.PERMISSIONS))
+    (grant,) = parse_permissions(document)
+    return {topic for rule in grant.rules for topic in rule.publish}
+
+
+def crl_of(root: Path) -> x509.CertificateRevocationList:
+    return x509.load_pem_x509_crl((root / layout.CRL).read_bytes())
 
 
 def mode(path: Path) -> int:

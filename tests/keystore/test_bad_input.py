@@ -26,7 +26,6 @@ from tests.keystore.kit import NOW, created, filled, mode, options, policy
 
 ARGUMENTS = {
     "ends at once": ["create-enclave", "KS", "/n", "--valid-for=0d"],
-    "ended": ["create-enclave", "KS", "/n", "--valid-for=2020-01-01"],
     "negative": ["create-enclave", "KS", "/n", "--valid-for=-1d"],
     "before the first year": ["create-enclave", "KS", "/n", "--valid-for=0001-01-01T00:00:00+14:00"],
     "after the last year": ["create-enclave", "KS", "/n", "--valid-for=9999-12-31T23:59:59-23:59"],
@@ -36,11 +35,9 @@ ARGUMENTS = {
     "name of the CA too long": ["create", "NEW", "--identity-ca-name", "é" * 33],
     "name of the CA not text": ["create", "NEW", "--identity-ca-name", "\udc80"],
     "name of the CA blank": ["create", "NEW", "--identity-ca-name", " "],
-    "domain of nobody": ["create", "NEW", "--domain-id", "231"],
     "domain in other digits": ["create", "NEW", "--domain-id", "٣"],
     "descriptor of nothing": ["create", "NEW", "--encrypt-ca-keys", "--passphrase-fd", "99999999999"],
     "variable of nothing": ["create", "NEW", "--encrypt-ca-keys", "--passphrase-env", "A=B"],
-    "no passphrase": ["create", "NEW", "--encrypt-ca-keys"],
     "no path": ["list", "a\0b"],
     "path too long": ["create", "x" * 300],
     "not a keystore": ["verify", "."],
@@ -50,8 +47,6 @@ ARGUMENTS = {
     "bundle in the keystore": ["export", "KS", "-o", "KS/enclaves/out", "--enclave", "/a"],
     "policy is a folder": ["apply-policy", "KS", "."],
     "governance is a folder": ["governance", "KS", "."],
-    "switch without start": ["renew", "KS", "--ca", "switch"],
-    "enclave beside --ca": ["renew", "KS", "/a", "--ca", "start"],
 }
 
 

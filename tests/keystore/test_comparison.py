@@ -189,11 +189,6 @@ class TestWhatAStartFinds:
         assert any("register made from" in text for text in report.created)
         assert not again(root).changed
 
-    def test_a_crl_that_has_ended_is_published_again(self, root: Path) -> None:
-        assert not again(root, now=later(utc_now(), 300 * DAY)).created
-        report = again(root, now=later(utc_now(), 400 * DAY))
-        assert any("CRL published again" in text for text in report.created)
-
     def test_a_keystore_is_made_only_where_that_was_allowed(self, tmp_path: Path) -> None:
         with pytest.raises(NotAKeystoreError, match="is not a complete keystore"):
             again(tmp_path / "ks", create=False)
@@ -284,11 +279,6 @@ class TestALifeThatWasAskedFor:
         assert kit.actions(create_enclaves(root, ["/a"], options=asked(10))) == {}, "seconds do not count"
         longer = create_enclaves(root, ["/a"], options=asked(12))
         assert longer.enclaves[0].reasons == ("the certificate expires soon",)
-
-    def test_is_not_asked_of_an_enclave_by_whoever_does_not_care(self, root: Path) -> None:
-        create_enclaves(root, ["/a"], options=kit.options(lifetime=10 * DAY))
-        assert kit.actions(create_enclaves(root, ["/a"], options=kit.options())) == {}
-        assert kit.actions(again(root)) == {}
 
 
 def test_a_bundle_that_grants_more_than_ours_is_taken_as_a_union_and_one_that_lacks_something_is_not(

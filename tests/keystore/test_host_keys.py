@@ -30,10 +30,9 @@ from keystore import (
 )
 from keystore.disk import layout
 from keystore.disk.archive import read_archive
-from keystore.formats.certificate import read_certificate
 from keystore.steps.host_keys import parse_requests, requests_text
 from keystore.verb import main
-from tests.keystore.kit import actions, filled, mode, openssl, options, policy
+from tests.keystore.kit import actions, certificate_of, filled, mode, openssl, options, policy
 
 NAMES = ("/arm", "/arm/hand")
 SIGNING = options()
@@ -206,7 +205,7 @@ def test_openssls_own_request_does_as_well(ca: Path, tmp_path: Path) -> None:
     openssl("genpkey", "-algorithm", "RSA", "-pkeyopt", "rsa_keygen_bits:2048", "-out", key)
     openssl("req", "-new", "-key", key, "-subj", "/CN=ros.base", "-out", csr)
     sign_requests(ca, parse_requests(b"enclave: /base\n" + csr.read_bytes(), "requests"), options=SIGNING)
-    assert read_certificate((ca / "enclaves/base/cert.pem").read_bytes()).common_name == "ros.base"
+    assert certificate_of(ca, "/base").common_name == "ros.base"
     assert verify(ca).is_good
     assert actions(provision(ca, [policy("/base")], options=options())) == {}
 

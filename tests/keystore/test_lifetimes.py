@@ -11,7 +11,6 @@ from keystore import Policy, apply_policy, create_enclaves, export, provision
 from keystore.disk import layout
 from keystore.formats.certificate import read_certificate
 from keystore.formats.permissions_document import parse_permissions
-from keystore.steps.comparison import differences
 from keystore.verb import main
 from tests.keystore.kit import DAY, NOW, actions, filled, options, policy, snapshot
 
@@ -48,11 +47,6 @@ def test_without_a_life_asked_for_nothing_is_issued_anew(root: Path) -> None:
     assert not create_enclaves(root, ["/a"], options=options(now=NOW)).changed
 
 
-def test_create_enclave_does_the_same(root: Path) -> None:
-    create_enclaves(root, ["/a"], options=options(now=NOW, lifetime=10 * DAY))
-    assert left(root) == 10 * DAY
-
-
 def test_a_ca_that_ends_sooner_is_not_asked_again_and_again(tmp_path: Path) -> None:
     root = filled(tmp_path / "ks", ["/a"], now=NOW)
     chosen = options(now=NOW, lifetime=9999 * DAY)
@@ -68,12 +62,6 @@ def test_short_lives_are_renewed_when_two_thirds_are_over(root: Path) -> None:
 
     assert "old certificate revoked" in start(0)["/a"], "it had a hundred days"
     assert [bool(start(day)) for day in (1, 10, 19, 21, 22, 40)] == [False, False, False, True, False, False]
-
-
-def test_what_a_start_would_renew_is_good_for_the_processes_of_one_that_runs(root: Path) -> None:
-    chosen = options(now=NOW + 95 * DAY, renew_within=10 * DAY)
-    assert differences(root, policy("/a"), options=chosen) == ()
-    assert differences(root, policy("/a"), options=chosen._replace(now=NOW + 101 * DAY)) != ()
 
 
 def test_create_enclave_takes_a_domain(tmp_path: Path) -> None:

@@ -32,7 +32,6 @@ from keystore import (
     renew,
     roll_over,
     set_governance,
-    verify,
 )
 from keystore.disk import layout
 from keystore.disk.register_file import read_register
@@ -47,13 +46,20 @@ from keystore.formats.register import (
     register_json,
 )
 from keystore.formats.subject import common_name, generation_of, names_enclave
-from tests.keystore.kit import DAY, NOW, actions, filled, options, policy, snapshot
+from tests.keystore.kit import (
+    DAY,
+    NOW,
+    actions,
+    certificate_of,
+    codes,
+    crl_of,
+    filled,
+    options,
+    policy,
+    snapshot,
+)
 
 QUICK = RemoveOptions(durable=False)
-
-
-def codes(root: Path) -> set[str]:
-    return {finding.code for finding in verify(root).findings if finding.severity.fails}
 
 
 def register(root: Path) -> Register:
@@ -62,25 +68,17 @@ def register(root: Path) -> Register:
     return found
 
 
-def crl(root: Path) -> x509.CertificateRevocationList:
-    return x509.load_pem_x509_crl((root / "public/crl.pem").read_bytes())
-
-
 def number(root: Path) -> int:
-    found: int = crl(root).extensions.get_extension_for_class(x509.CRLNumber).value.crl_number
+    found: int = crl_of(root).extensions.get_extension_for_class(x509.CRLNumber).value.crl_number
     return found
 
 
-def serial(root: Path, name: str) -> int:
-    return read_certificate((root / layout.enclave_directory(name) / "cert.pem").read_bytes()).serial
-
-
 def common_name_of(root: Path, name: str) -> str | None:
-    return read_certificate((root / layout.enclave_directory(name) / "cert.pem").read_bytes()).common_name
+    return certificate_of(root, name).common_name
 
 
 def is_revoked(root: Path, number: int) -> bool:
-    return crl(root).get_revoked_certificate_by_serial_number(number) is not None
+    return crl_of(root).get_revoked_certificate_by_serial_number(number) is not None
 
 
 def grant(root: Path, name: str) -> Grant:
@@ -93,7 +91,7 @@ class TestTheRecord:
         root = filled(tmp_path / "ks")
         found = register(root)
         assert {one.enclave: one.serial for one in found.certificates.values()} == {
-            name: serial(root, name) for name in ("/a", "/b")
+            name: certificate_of(root, name).serial for name in ("/a", "/b")
         }
         assert {one.enclave for one in found.documents} == {"/a", "/b"}
         assert {(role, state) for (role, _), state in found.authorities.items()} == {
@@ -170,7 +168,7 @@ class TestRevocations:
         shutil.copy(old, root / "public/crl.pem")
         report = provision(root, [policy("/a")], options=options())
         assert report.created == ("CRL published again: the CRL is not the one published last",)
-        assert len(crl(root)) == 2 and number(root) > last
+        assert len(crl_of(root)) == 2 and number(root) > last
 
     def test_a_lost_crl_is_published_again(self, tmp_path: Path) -> None:
         root, _ = self.removed(tmp_path)
@@ -179,13 +177,13 @@ class TestRevocations:
         assert provision(root, [policy("/a")], options=options()).created == (
             "CRL published again: the CRL is missing",
         )
-        assert len(crl(root)) == 2 and (root / "enclaves/a/crl.pem").is_symlink()
+        assert len(crl_of(root)) == 2 and (root / "enclaves/a/crl.pem").is_symlink()
 
     def test_the_next_removal_does_not_lose_the_earlier_ones(self, tmp_path: Path) -> None:
         root, old = self.removed(tmp_path)
         shutil.copy(old, root / "public/crl.pem")
         assert remove(root, ["/a"], options=QUICK).revoked == 3
-        assert len(crl(root)) == 3
+        assert len(crl_of(root)) == 3
 
     def test_the_crl_published_last_stays(self, tmp_path: Path) -> None:
         root, _ = self.removed(tmp_path)
@@ -197,14 +195,14 @@ class TestRevocations:
         """private/ restored, public/ not: the CRL, signed here, knows more than the register."""
         root = filled(tmp_path / "ks", ["/a", "/b", "/c"])
         shutil.copytree(root / "private", tmp_path / "backup")
-        gone = serial(root, "/b")
+        gone = certificate_of(root, "/b").serial
         remove(root, ["/b"], options=QUICK)
         shutil.rmtree(root / "private")
         shutil.copytree(tmp_path / "backup", root / "private")
         report = provision(root, [policy("/a")], options=options())
         assert report.created == ("the CRL is newer than the register: what it revokes was recorded",)
         remove(root, ["/c"], options=QUICK)
-        assert is_revoked(root, gone) and len(crl(root)) == 2
+        assert is_revoked(root, gone) and len(crl_of(root)) == 2
 
     def test_a_crl_that_nobody_published_is_left_for_a_person(self, tmp_path: Path) -> None:
         _, old = self.removed(tmp_path)
@@ -215,14 +213,14 @@ class TestRevocations:
 
     def test_what_was_replaced_before_the_removal_is_revoked_too(self, tmp_path: Path) -> None:
         root = filled(tmp_path / "ks")
-        first = serial(root, "/b")
+        first = certificate_of(root, "/b").serial
         renew(root, ["/b"], options=RenewOptions(provisioning=options()))
         remove(root, ["/b"], options=QUICK)
         assert is_revoked(root, first)
 
     def test_an_enclave_whose_files_are_lost_is_revoked_all_the_same(self, tmp_path: Path) -> None:
         root = filled(tmp_path / "ks")
-        lost = serial(root, "/b")
+        lost = certificate_of(root, "/b").serial
         shutil.rmtree(root / "enclaves/b")
         assert remove(root, ["/b"], options=QUICK).revoked == 1
         assert is_revoked(root, lost) and codes(root) == set()
@@ -276,10 +274,10 @@ class TestRightsThatAreTakenAway:
         root = self.reduced(tmp_path)
         shutil.rmtree(root / "enclaves/a")
         shutil.copytree(tmp_path / "before", root / "enclaves/a", symlinks=True)
-        old = serial(root, "/a")
+        old = certificate_of(root, "/a").serial
         report = provision(root, [policy("/a")], options=options())
         assert "the certificate is revoked" in str(report.enclaves[0].reasons)
-        assert serial(root, "/a") != old and is_revoked(root, old) and codes(root) == set()
+        assert certificate_of(root, "/a").serial != old and is_revoked(root, old) and codes(root) == set()
 
     def test_a_removed_enclave_that_comes_back_is_not_what_it_was(self, tmp_path: Path) -> None:
         root = filled(tmp_path / "ks")
@@ -312,7 +310,7 @@ class TestRightsThatAreTakenAway:
 
     def test_a_shorter_life_ends_the_longer_certificate(self, tmp_path: Path) -> None:
         root = filled(tmp_path / "ks", ["/a"])
-        long = serial(root, "/a")
+        long = certificate_of(root, "/a").serial
         renew(root, ["/a"], options=RenewOptions(provisioning=options(lifetime=30 * DAY)))
         assert is_revoked(root, long)
 
@@ -320,7 +318,7 @@ class TestRightsThatAreTakenAway:
 class TestIncidents:
     def test_a_foreign_key_is_never_certified(self, tmp_path: Path) -> None:
         root, other = filled(tmp_path / "ks", ["/a"]), filled(tmp_path / "other", ["/a"])
-        old = serial(root, "/a")
+        old = certificate_of(root, "/a").serial
         shutil.copy(other / "enclaves/a/key.pem", root / "enclaves/a/key.pem")
         report = provision(root, [policy("/a")], options=options())
         assert "was not issued here" in report.enclaves[0].reasons[0]
@@ -352,7 +350,7 @@ class TestIncidents:
 
     def test_renewal_revokes_what_others_could_read(self, tmp_path: Path) -> None:
         root = filled(tmp_path / "ks", ["/a"])
-        old = serial(root, "/a")
+        old = certificate_of(root, "/a").serial
         (root / "enclaves/a/key.pem").chmod(0o640)
         renew(root, ["/a"], options=RenewOptions(new_keys=True, provisioning=options()))
         assert is_revoked(root, old) and codes(root) == set()
@@ -466,7 +464,7 @@ class TestTakingOver:
 
     def test_revocations_are_kept(self, tmp_path: Path) -> None:
         root = filled(tmp_path / "ks", ["/a", "/c"])
-        gone = serial(root, "/c")
+        gone = certificate_of(root, "/c").serial
         remove(root, ["/c"], options=QUICK)
         last = number(root)
         self.without_register(root)

@@ -26,28 +26,24 @@ from keystore import (
     verify,
 )
 from keystore.disk import layout
-from keystore.disk.signed_documents import trusted_document
 from keystore.disk.view import KeystoreView
 from keystore.formats.certificate import read_certificates
-from keystore.formats.permissions_document import parse_permissions
 from tests.dds import sros2_style
 from tests.keystore.kit import (
     ARTICLE,
     DAY,
     NOW,
     actions,
+    codes,
     contents,
     filled,
+    granted,
     mode,
     openssl,
     options,
     policy,
     snapshot,
 )
-
-
-def codes(root: Path, **more: object) -> set[str]:
-    return {finding.code for finding in verify(root, **more).findings if finding.severity.fails}  # type: ignore[arg-type]
 
 
 def renewing(**changes: object) -> RenewOptions:
@@ -65,12 +61,6 @@ def sros2(tmp_path: Path) -> Path:
     finally:
         os.umask(before)
     return tmp_path / "sros2"
-
-
-def granted(root: Path, name: str) -> set[str]:
-    document = trusted_document(KeystoreView(root), f"{layout.enclave_directory(name)}/permissions.p7s")
-    (grant,) = parse_permissions(document)
-    return {topic for rule in grant.rules for topic in rule.publish}
 
 
 def test_an_sros2_keystore_is_reported_as_exposed(sros2: Path) -> None:

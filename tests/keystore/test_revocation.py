@@ -19,19 +19,25 @@ from keystore import (
     remove,
     renew,
     status,
-    verify,
 )
 from keystore.disk import layout
 from keystore.disk.crl_file import crl_validity
 from keystore.disk.view import KeystoreView
 from keystore.formats.certificate import read_certificate
-from tests.keystore.kit import DAY, NOW, filled, openssl, options, policy, snapshot
+from tests.keystore.kit import (
+    DAY,
+    NOW,
+    certificate_of,
+    codes,
+    crl_of,
+    filled,
+    openssl,
+    options,
+    policy,
+    snapshot,
+)
 
 NAMES = ("/", "/a", "/a/b", "/c")
-
-
-def codes(root: Path, **more: object) -> set[str]:
-    return {finding.code for finding in verify(root, **more).findings if finding.severity.fails}  # type: ignore[arg-type]
 
 
 @pytest.fixture
@@ -43,17 +49,13 @@ def quick(**changes: object) -> RemoveOptions:
     return RemoveOptions(**{"durable": False, **changes})  # type: ignore[arg-type]
 
 
-def crl(root: Path) -> x509.CertificateRevocationList:
-    return x509.load_pem_x509_crl((root / "public/crl.pem").read_bytes())
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_the_enclave_is_gone_and_those_around_it_stay(root: Path, name: str) -> None:
-    serial = read_certificate((root / layout.enclave_directory(name) / "cert.pem").read_bytes()).serial
+    serial = certificate_of(root, name).serial
     report = remove(root, [name], options=quick())
     assert report.removed == (name,) and report.revoked == 1
     assert list_enclaves(root) == [other for other in NAMES if other != name]
-    assert crl(root).get_revoked_certificate_by_serial_number(serial) is not None
+    assert crl_of(root).get_revoked_certificate_by_serial_number(serial) is not None
     assert codes(root) == set()
 
 
@@ -87,19 +89,19 @@ def test_what_an_enclave_had_before_is_revoked_with_it(root: Path, tmp_path: Pat
         renew(root, ["/c"], options=RenewOptions(provisioning=options()))
     assert not (root / "public/crl.pem").exists()
     assert remove(root, ["/c"], options=quick()).revoked == 3
-    assert crl(root).get_revoked_certificate_by_serial_number(
+    assert crl_of(root).get_revoked_certificate_by_serial_number(
         read_certificate((tmp_path / "first.pem").read_bytes()).serial
     )
     assert codes(root) == set()
 
 
 def test_a_key_that_was_copied_is_replaced_and_its_certificate_revoked(root: Path) -> None:
-    stolen = read_certificate((root / "enclaves/c/cert.pem").read_bytes()).serial
+    stolen = certificate_of(root, "/c").serial
     for _ in range(2):
         renew(root, ["/c"], options=RenewOptions(new_keys=True, revoke_old=True, provisioning=options()))
-    revoked = {entry.serial_number for entry in crl(root)}
+    revoked = {entry.serial_number for entry in crl_of(root)}
     assert stolen in revoked and len(revoked) == 2
-    assert read_certificate((root / "enclaves/c/cert.pem").read_bytes()).serial not in revoked
+    assert certificate_of(root, "/c").serial not in revoked
     assert codes(root) == set()
 
 
@@ -108,7 +110,7 @@ def test_the_number_of_a_crl_only_grows(root: Path) -> None:
     numbers = []
     for name, moment in (("/c", NOW), ("/a/b", NOW - DAY), ("/a", NOW - DAY)):
         remove(root, [name], options=quick(now=moment))
-        numbers.append(crl(root).extensions.get_extension_for_class(x509.CRLNumber).value.crl_number)
+        numbers.append(crl_of(root).extensions.get_extension_for_class(x509.CRLNumber).value.crl_number)
     assert numbers == sorted(set(numbers))
 
 
@@ -116,18 +118,19 @@ def test_a_launch_renews_a_crl_that_has_ended(root: Path) -> None:
     remove(root, ["/c"], options=quick(now=NOW - 300 * DAY))
     later = NOW + 100 * DAY
     wished = [policy("/a")]
+    assert not provision(root, wished, options=options(now=NOW)).created
     assert provision(root, wished, options=options(now=later)).created == (
         "CRL published again: the CRL has expired",
     )
     assert not provision(root, wished, options=options(now=later)).changed
-    assert len(crl(root)) == 1
+    assert len(crl_of(root)) == 1
     assert codes(root, now=later) == set()
 
 
 def test_revocations_add_up(root: Path) -> None:
     remove(root, ["/c"], options=quick(now=NOW))
     assert remove(root, ["/a", "/a/b"], options=quick(now=NOW + DAY)).revoked == 3
-    assert len(crl(root)) == 3
+    assert len(crl_of(root)) == 3
     assert list_enclaves(root) == ["/"]
     assert not (root / "enclaves/a").exists(), "empty directories go too"
 
@@ -161,7 +164,7 @@ def test_the_crl_is_renewed_before_it_ends(tmp_path: Path) -> None:
     assert "crl-expired" in codes(root, now=NOW + 400 * DAY)
     renew(root, options=RenewOptions(provisioning=options(now=late)))
     assert crl_validity(KeystoreView(root)).not_after == late + 365 * DAY
-    assert len(crl(root)) == 1
+    assert len(crl_of(root)) == 1
     assert codes(root, now=NOW + 400 * DAY) == set()
 
 

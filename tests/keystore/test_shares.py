@@ -32,12 +32,11 @@ from keystore import (
 )
 from keystore.disk import layout
 from keystore.disk.share_files import is_running, read_shares
-from keystore.formats.certificate import read_certificate
 from keystore.formats.permissions_document import parse_permissions
 from keystore.steps.comparison import differences
 from keystore.steps.sharing import shared_enclaves
 from keystore.verb import main
-from tests.keystore.kit import actions, filled, options, policy, snapshot
+from tests.keystore.kit import actions, certificate_of, codes, filled, options, policy, snapshot
 
 BRINGUP, NAVIGATION = "/ws/bringup.launch.xml", "/ws/navigation.launch.py"
 
@@ -71,14 +70,6 @@ def granted(root: Path, name: str = "/") -> set[str]:
     return {topic for rule in grant.rules for topic in rule.publish} - {"ros_discovery_info"}
 
 
-def serial(root: Path, name: str = "/") -> int:
-    return read_certificate((root / layout.enclave_directory(name) / "cert.pem").read_bytes()).serial
-
-
-def codes(root: Path) -> set[str]:
-    return {finding.code for finding in verify(root).findings if finding.severity.fails}
-
-
 def test_another_launch_adds_its_share(root: Path) -> None:
     start(root, BRINGUP, policy("/", "/odom"))
     report = start(root, NAVIGATION, policy("/", "/plan"))
@@ -100,10 +91,10 @@ def test_the_same_launch_again_changes_nothing(root: Path) -> None:
 def test_the_same_launch_with_less_replaces_its_own_share_only(root: Path) -> None:
     start(root, BRINGUP, policy("/", "/odom", "/secret"))
     start(root, NAVIGATION, policy("/", "/plan"))
-    old = serial(root)
+    old = certificate_of(root, "/").serial
     report = start(root, BRINGUP, policy("/", "/odom"))
     assert granted(root) == {"rt/odom", "rt/plan"}
-    assert "old certificate revoked" in actions(report)["/"] and serial(root) != old
+    assert "old certificate revoked" in actions(report)["/"] and certificate_of(root, "/").serial != old
 
 
 def test_enclaves_of_ones_own_stay_apart(root: Path) -> None:

@@ -22,11 +22,10 @@ from keystore import (
     roll_over,
 )
 from keystore.disk import layout
-from keystore.formats.certificate import read_certificate
 from keystore.formats.validity import utc_now
 from keystore.steps import opening, provisioning, renewal, tool_enclaves
 from keystore.verb import main
-from tests.keystore.kit import DAY, contents, filled, options, policy
+from tests.keystore.kit import DAY, certificate_of, contents, filled, options, policy
 
 
 def renewing(**changes: object) -> RenewOptions:
@@ -34,7 +33,7 @@ def renewing(**changes: object) -> RenewOptions:
 
 
 def remaining(root: Path, enclave: str, now: datetime | None = None) -> timedelta:
-    facts = read_certificate((root / layout.enclave_directory(enclave) / layout.CERT).read_bytes())
+    facts = certificate_of(root, enclave)
     return facts.validity.not_after - (now or utc_now())
 
 
@@ -71,10 +70,7 @@ def test_each_new_expiry_is_told_and_what_of_the_old_stays_valid(
     assert main(["renew", str(root), "/a"]) == 0
     printed = capsys.readouterr()
     (line,) = [line for line in printed.out.splitlines() if line.startswith("/a: ")]
-    assert (
-        f"valid until {read_certificate((root / 'enclaves/a/cert.pem').read_bytes()).validity.not_after:%Y-%m-%d}"
-        in line
-    )
+    assert f"valid until {certificate_of(root, '/a').validity.not_after:%Y-%m-%d}" in line
     assert "earlier certificate of /a" in printed.err and "--revoke-old" in printed.err
     assert main(["renew", str(root), "/a", "--revoke-old"]) == 0
     assert "earlier certificate" not in capsys.readouterr().err
@@ -132,3 +128,15 @@ def test_a_clock_near_it_is_not(root: Path, monkeypatch: pytest.MonkeyPatch) -> 
         for module in (renewal, provisioning):
             monkeypatch.setattr(module, "utc_now", lambda moved=shift: utc_now() + moved)
         assert renew(root, ["/a"], options=renewing()).changed
+
+
+@pytest.mark.parametrize(("ahead", "anew"), [(timedelta(days=30), True), (timedelta(0), False)])
+def test_what_was_issued_by_a_clock_ahead_is_issued_again(
+    ahead: timedelta, anew: bool, tmp_path: Path
+) -> None:
+    """A robot without a battery for its clock may come up weeks ahead; DDS would then refuse until they have passed."""
+    root = filled(tmp_path / "ks", ["/a"])
+    filled(root, ["/b"], now=utc_now() + ahead)
+    before = (root / "enclaves/b/cert.pem").read_bytes()
+    filled(root, ["/a", "/b"])
+    assert ((root / "enclaves/b/cert.pem").read_bytes() != before) is anew
