@@ -42,8 +42,10 @@ class Unit(NamedTuple):
         return self.node is not None
 
     def is_called(self, name: str) -> bool:
-        """Return True if ``name`` is the unit, its node or its enclave."""
-        return name in (self.name, self.name.removesuffix(".service"), self.node, self.enclave)
+        """Return True if ``name`` is the unit, its target, its node or its enclave."""
+        files = (self.name, self.target)
+        stems = (self.name.removesuffix(".service"), self.target.removesuffix(".target"))
+        return name in (*files, *stems, self.node, self.enclave)
 
 
 def parse_unit(name: str, text: str) -> Unit | None:

@@ -69,17 +69,13 @@ def publish_crl(opened: Store, register: Register, access: CaAccess, now: dateti
 
 
 def _link_all(opened: Store) -> None:
-    link_crl(opened, KeystoreView(opened.root).enclaves())
-    opened.remove(layout.CRL_UNLINKED)
-
-
-def link_crl(opened: Store, names: Iterable[str]) -> None:
     """Give each enclave its ``crl.pem``; copies of it are refreshed."""
     with opened.batch() as batch:
-        for name in names:
+        for name in KeystoreView(opened.root).enclaves():
             target = layout.enclave_file(name, layout.ENCLAVE_CRL)
             if safe_files.link_target(opened.root, target) != layout.crl_link(name):
                 batch.link(target, Link(layout.crl_link(name), layout.CRL))
+    opened.remove(layout.CRL_UNLINKED)
 
 
 def restore_crl(

@@ -72,18 +72,12 @@ def chosen_units(units: Sequence[Unit], names: Iterable[str]) -> list[Unit]:
     processes = in_restart_order(units)
     wanted = list(names)
     for name in wanted:
-        if not any(unit.is_called(name) or name in _target_names(unit) for unit in processes):
+        if not any(unit.is_called(name) for unit in processes):
             known = ", ".join(unit.name.removesuffix(".service") for unit in processes) or "none"
             raise InvalidInputError(
                 f"no installed unit, node or enclave is called {printable(name)}; there are {known}"
             )
-    if not wanted:
-        return processes
-    return [
-        unit
-        for unit in processes
-        if any(unit.is_called(name) or name in _target_names(unit) for name in wanted)
-    ]
+    return [unit for unit in processes if not wanted or any(map(unit.is_called, wanted))]
 
 
 def install(folder: Path, options: UnitOptions | None = None) -> Installed:
@@ -200,10 +194,6 @@ def differences(units: Iterable[Unit], manifest: Manifest) -> Iterator[str]:
     for enclave in manifest.names if processes else ():
         if enclave not in served:
             yield f"no unit of this host runs enclave {enclave}"
-
-
-def _target_names(unit: Unit) -> tuple[str, str]:
-    return unit.target, unit.target.removesuffix(".target")
 
 
 def _generated(folder: Path) -> Iterator[tuple[Unit, str]]:

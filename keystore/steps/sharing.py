@@ -56,7 +56,7 @@ class EnclaveShare:
         others = tuple(share for share in self.present if share.owner != self.owner)
         if self.mine is None:
             return others
-        before = next((share for share in self.present if share.owner == self.owner), None)
+        before = _own(self.present, self.owner)
         mine = Share(self.owner, self.mine.domains, merged_profiles(self.mine.profiles), self.mine.types)
         if before is not None and _loses(before, mine) and self._is_in_use(others):
             profiles = merged_profiles((*before.profiles, *mine.profiles))
@@ -83,10 +83,14 @@ class EnclaveShare:
 
     def retained(self) -> tuple[str, ...]:
         """Return, for a person, what stays of our own share though it is not requested any more."""
-        mine = next((share for share in self.shares if share.owner == self.owner), None)
+        mine = _own(self.shares, self.owner)
         if mine is None or self.mine is None or is_part_of(mine.profiles, self.mine.profiles):
             return ()
         return tuple(sorted(_words(mine.profiles) - _words(self.mine.profiles)))
+
+
+def _own(shares: Iterable[Share], owner: str) -> Share | None:
+    return next((share for share in shares if share.owner == owner), None)
 
 
 def _loses(before: Share, mine: Share) -> bool:
@@ -162,7 +166,7 @@ def given_up(root: Path, owner: str) -> list[EnclaveShare]:
     mine = [
         EnclaveShare(root, enclave, owner, None)
         for enclave in enclaves_with_shares(root)
-        if any(share.owner == owner for share in read_shares(root, enclave))
+        if _own(read_shares(root, enclave), owner)
     ]
     if not mine:
         raise InvalidInputError(
@@ -178,7 +182,7 @@ def left_over(root: Path, owner: str, enclaves: Iterable[str]) -> list[str]:
     return [
         name
         for name in enclaves_with_shares(root)
-        if name not in present and any(share.owner == owner for share in read_shares(root, name))
+        if name not in present and _own(read_shares(root, name), owner)
     ]
 
 

@@ -215,12 +215,9 @@ def _stray(root: Path, relative: str, why: str) -> Finding:
 
 def _holds_key(path: Path) -> bool:
     try:
-        return holds_private_key(read_bytes(path, _MAX_STRAY))
+        return holds_private_key(read_bytes(path, _MAX_BYTES))
     except OSError:
         return False
-
-
-_MAX_STRAY = 64_000_000  # bytes
 
 
 def check_parents(root: Path) -> Iterator[Finding]:
@@ -326,14 +323,19 @@ def _decoded(data: bytes) -> Iterator[bytes]:
 
 
 def _new_key(root: Path, relative: str) -> str:
-    if not relative.startswith(layout.ENCLAVES + "/"):
-        return repair.BACKUP
-    enclave = relative.removeprefix(layout.ENCLAVES).rpartition("/")[0] or "/"
-    return repair.run(root, "renew", enclave, "--new-keys", "--revoke-old")
+    enclave = _enclave_of(relative)
+    return repair.run(root, "renew", enclave, "--new-keys", "--revoke-old") if enclave else repair.BACKUP
 
 
 def _written_again(root: Path, relative: str) -> str:
-    if not relative.startswith(layout.ENCLAVES + "/") or relative == layout.GOVERNANCE:
+    enclave = _enclave_of(relative)
+    if not enclave or relative == layout.GOVERNANCE:
         return repair.run(root, "renew", note="writes it again")
-    enclave = relative.removeprefix(layout.ENCLAVES).rpartition("/")[0] or "/"
     return repair.run(root, "renew", enclave)
+
+
+def _enclave_of(relative: str) -> str:
+    """Return the enclave in whose directory a file is, "" for none."""
+    if not relative.startswith(layout.ENCLAVES + "/"):
+        return ""
+    return relative.removeprefix(layout.ENCLAVES).rpartition("/")[0] or "/"
