@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import io
 import os
 import shutil
-import tarfile
 from collections.abc import Callable, Mapping
 from pathlib import Path
 
@@ -13,7 +11,6 @@ import pytest
 
 from keystore import (
     BundleOptions,
-    DamagedKeystoreError,
     HostBundle,
     ImportOptions,
     ImportReport,
@@ -108,14 +105,6 @@ def test_an_imported_keystore_is_good_and_stands_alone(ca: Path, tmp_path: Path)
     assert not (place / "private").exists()
     for name in layout.RUNTIME_FILES:
         assert (place / "enclaves/base/camera" / name).is_file()
-
-
-def test_importing_the_same_bundle_again_changes_nothing(ca: Path, tmp_path: Path) -> None:
-    bundle = exported(ca, tmp_path / "out")
-    first_import(tmp_path / "ks", bundle)
-    before = os.readlink(tmp_path / "ks")
-    assert import_bundle(tmp_path / "ks", bundle.path).restart is Restart.NOBODY
-    assert os.readlink(tmp_path / "ks") == before
 
 
 def test_a_newer_bundle_replaces_the_one_before_and_its_keys(ca: Path, tmp_path: Path) -> None:
@@ -248,22 +237,6 @@ def test_a_bundle_that_is_cut_off_anywhere_is_refused(ca: Path, host: Path, tmp_
     for length in [0, 1, 511, 512, 513, *range(1000, end, max(1, end // 12)), end - 1]:
         (tmp_path / "cut").write_bytes(whole[:length])
         refused(host, tmp_path / "cut", KeystoreError, "cut off|lacks|has no bundle.p7s|copy it again")
-
-
-def test_an_archive_with_links_or_a_file_twice_is_refused(ca: Path, host: Path, tmp_path: Path) -> None:
-    files = read_archive(newer(ca, tmp_path).read_bytes(), "bundle")
-    for kind in (tarfile.SYMTYPE, tarfile.LNKTYPE, tarfile.FIFOTYPE, tarfile.REGTYPE):
-        buffer = io.BytesIO()
-        with tarfile.open(fileobj=buffer, mode="w") as archive:
-            for name, data in files.items():
-                entry = tarfile.TarInfo(name)
-                entry.size = len(data)
-                archive.addfile(entry, io.BytesIO(data))
-            strange = tarfile.TarInfo("enclaves/base/key.pem")
-            strange.type, strange.linkname = kind, "/etc/shadow"
-            archive.addfile(strange)
-        (tmp_path / "strange").write_bytes(buffer.getvalue())
-        refused(host, tmp_path / "strange", DamagedKeystoreError, "not a plain file of its own")
 
 
 def test_a_keystore_that_was_not_imported_is_never_replaced(ca: Path, tmp_path: Path) -> None:

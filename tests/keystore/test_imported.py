@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import os
 import tarfile
 import tracemalloc
 from collections.abc import Callable
@@ -103,7 +104,8 @@ def test_what_was_imported_is_good_and_the_same_bundle_changes_nothing(
     host: Path, bundle: HostBundle
 ) -> None:
     assert verify(host).is_good and fleet_status([host]).is_good
-    assert import_bundle(host, bundle.path).restart is Restart.NOBODY
+    version = os.readlink(host)
+    assert import_bundle(host, bundle.path).restart is Restart.NOBODY and os.readlink(host) == version
     assert differences(host, policy("/a"), options=options()) == ()
 
 

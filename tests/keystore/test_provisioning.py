@@ -147,13 +147,6 @@ def test_only_what_differs_is_signed_again(tmp_path: Path) -> None:
     }  # fmt: skip
 
 
-def test_taking_a_topic_away_takes_its_permission_away(tmp_path: Path) -> None:
-    root = filled(tmp_path / "ks", ["/a"])
-    provision(root, [policy("/a", "/x", "/y")], options=options())
-    provision(root, [policy("/a", "/y")], options=options())
-    assert granted(root, "/a") == {"rt/y", "ros_discovery_info"}
-
-
 @pytest.mark.parametrize(
     ("lost", "repaired"),
     [

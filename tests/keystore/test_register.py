@@ -185,12 +185,6 @@ class TestRevocations:
         assert remove(root, ["/a"], options=QUICK).revoked == 3
         assert len(crl_of(root)) == 3
 
-    def test_the_crl_published_last_stays(self, tmp_path: Path) -> None:
-        root, _ = self.removed(tmp_path)
-        before = snapshot(root)
-        assert not provision(root, [policy("/a")], options=options()).changed
-        assert snapshot(root) == before
-
     def test_a_register_from_a_backup_does_not_bring_anybody_back(self, tmp_path: Path) -> None:
         """private/ restored, public/ not: the CRL, signed here, knows more than the register."""
         root = filled(tmp_path / "ks", ["/a", "/b", "/c"])
@@ -210,13 +204,6 @@ class TestRevocations:
         shutil.copy(old, other / "public/crl.pem")
         with pytest.raises(DamagedKeystoreError, match="was not published by this keystore"):
             provision(other, [policy("/a")], options=options())
-
-    def test_what_was_replaced_before_the_removal_is_revoked_too(self, tmp_path: Path) -> None:
-        root = filled(tmp_path / "ks")
-        first = certificate_of(root, "/b").serial
-        renew(root, ["/b"], options=RenewOptions(provisioning=options()))
-        remove(root, ["/b"], options=QUICK)
-        assert is_revoked(root, first)
 
     def test_an_enclave_whose_files_are_lost_is_revoked_all_the_same(self, tmp_path: Path) -> None:
         root = filled(tmp_path / "ks")
@@ -249,11 +236,6 @@ class TestRightsThatAreTakenAway:
         report = provision(root, [policy("/a", "/other")], options=options())
         assert actions(report) == {"/a": ("certificate", "permissions", "old certificate revoked")}
         assert any("deploy crl.pem to every host" in warning for warning in report.warnings)
-
-    def test_more_rights_need_no_new_certificate(self, tmp_path: Path) -> None:
-        root = filled(tmp_path / "ks", ["/a"])
-        report = provision(root, [policy("/a", "/chatter", "/more")], options=options())
-        assert actions(report) == {"/a": ("permissions",)} and not (root / "public/crl.pem").exists()
 
     def test_a_second_run_changes_nothing(self, tmp_path: Path) -> None:
         root = self.reduced(tmp_path)
@@ -340,13 +322,6 @@ class TestIncidents:
         shutil.copy(other / "enclaves/a/key.pem", root / "enclaves/a/key.pem")
         provision(root, [policy("/a")], options=options(now=NOW + 11 * DAY))
         assert (root / "enclaves/a/key.pem").read_bytes() != (other / "enclaves/a/key.pem").read_bytes()
-
-    def test_ones_own_key_keeps_its_place_when_the_certificate_is_lost(self, tmp_path: Path) -> None:
-        root = filled(tmp_path / "ks", ["/a"])
-        key = (root / "enclaves/a/key.pem").read_bytes()
-        (root / "enclaves/a/cert.pem").unlink()
-        provision(root, [policy("/a")], options=options())
-        assert (root / "enclaves/a/key.pem").read_bytes() == key
 
     def test_renewal_revokes_what_others_could_read(self, tmp_path: Path) -> None:
         root = filled(tmp_path / "ks", ["/a"])
