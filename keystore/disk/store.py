@@ -145,7 +145,7 @@ class Store:
         if len(directories) > _SYNC_EACH and _sync_file_system(self.root):
             return
         for directory in sorted(directories):
-            _fsync_path(self.root / directory)
+            sync_path(self.root / directory)
 
 
 class Batch:
@@ -206,15 +206,7 @@ class Batch:
             if _try_link(entry.target, place):
                 return
             entry = Content(safe_files.read(self._store.root, entry.source))
-        flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC
-        descriptor = os.open(place, flags, entry.mode)
-        try:
-            os.fchmod(descriptor, entry.mode)
-            view = memoryview(entry.data)
-            while view:
-                view = view[os.write(descriptor, view) :]
-        finally:
-            os.close(descriptor)
+        write_new(place, entry.data, entry.mode)
         self._written.append(place)
 
     def commit(self) -> None:
@@ -235,7 +227,7 @@ class Batch:
         if len(self._written) > _SYNC_EACH and _sync_file_system(Path(self._staging)):
             return
         for path in (*self._written, *self._staged_directories):
-            _fsync_path(path)
+            sync_path(path)
 
     def discard(self) -> None:
         """Remove what was not renamed away."""
@@ -300,8 +292,20 @@ def _try_link(target: str, place: str) -> bool:
     return True
 
 
-def _fsync_path(path: Path | str) -> None:
-    descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC)
+def write_new(path: Path | str, data: bytes, mode: int, *, durable: bool = False) -> None:
+    """Write a new file, private from its first byte, with exactly this mode; synced to disk if ``durable``."""
+    descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, mode)
+    with os.fdopen(descriptor, "wb") as stream:
+        os.fchmod(descriptor, mode)
+        stream.write(data)
+        if durable:
+            stream.flush()
+            os.fsync(descriptor)
+
+
+def sync_path(path: Path | str) -> None:
+    """Make a file, or the names in a directory, durable."""
+    descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW)
     try:
         os.fsync(descriptor)
     except OSError as error:

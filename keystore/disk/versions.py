@@ -19,7 +19,7 @@ from pathlib import Path
 
 from keystore.disk import layout, lock, safe_files
 from keystore.disk.archive import parents
-from keystore.disk.store import Content, Link, create_root
+from keystore.disk.store import Content, Link, create_root, sync_path, write_new
 from keystore.errors import NotAKeystoreError, printable, storage_errors
 
 PENDING = "pending"
@@ -80,9 +80,9 @@ class Versions:
                 name = f"{number}.{repeat}"
             os.rename(self.folder / _STAGING, self.folder / name)
             os.symlink(f"{self.folder.name}/{name}", link)
-            _sync(self.folder)
+            sync_path(self.folder)
             os.rename(link, self.root)
-            _sync(self.root.parent)
+            sync_path(self.root.parent)
             self._clear()
 
     def discard(self) -> None:
@@ -129,17 +129,6 @@ def write_tree(root: Path, entries: Mapping[str, Content | Link], *, durable: bo
             write_new(root / relative, entry.data, entry.mode, durable=durable)
 
 
-def write_new(path: Path, data: bytes, mode: int, *, durable: bool = False) -> None:
-    """Write a new file, private from its first byte, with exactly this mode; synced to disk if ``durable``."""
-    descriptor = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_NOFOLLOW | os.O_CLOEXEC, mode)
-    with os.fdopen(descriptor, "wb") as stream:
-        os.fchmod(descriptor, mode)
-        stream.write(data)
-        if durable:
-            stream.flush()
-            os.fsync(descriptor)
-
-
 @contextmanager
 def written_aside(target: Path) -> Iterator[Path]:
     """Yield a name beside ``target``; what is made there takes its place at the end, whole or not at all."""
@@ -169,13 +158,5 @@ def _sync_tree(root: Path) -> None:
     for folder, _, files in os.walk(root):
         for name in files:
             if not os.path.islink(os.path.join(folder, name)):
-                _sync(Path(folder, name))
-        _sync(Path(folder))
-
-
-def _sync(path: Path) -> None:
-    descriptor = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
+                sync_path(Path(folder, name))
+        sync_path(Path(folder))

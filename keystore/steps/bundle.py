@@ -12,8 +12,8 @@ from pathlib import Path
 
 from keystore.disk import layout, safe_files, store
 from keystore.disk.archive import archive_bytes
-from keystore.disk.store import Content, Link
-from keystore.disk.versions import write_new, write_tree, written_aside
+from keystore.disk.store import Content, Link, write_new
+from keystore.disk.versions import write_tree, written_aside
 from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import DamagedKeystoreError, InvalidInputError, printable, storage_errors
 from keystore.formats.validity import utc_now

@@ -15,8 +15,8 @@ from keystore.disk import layout, safe_files, store
 from keystore.disk.archive import archive_bytes
 from keystore.disk.crl_file import crl_number, crl_validity
 from keystore.disk.register_file import read_register
-from keystore.disk.store import Content, Store
-from keystore.disk.versions import write_new, written_aside
+from keystore.disk.store import Content, Store, write_new
+from keystore.disk.versions import written_aside
 from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import InvalidInputError, printable, storage_errors
 from keystore.formats.bundle import BundledEnclave, Manifest, manifest_json, parse_manifest, pin

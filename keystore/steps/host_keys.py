@@ -20,7 +20,8 @@ from typing import NamedTuple
 
 from enclave_common.dependencies import require
 from keystore.disk import layout, lock, safe_files, store
-from keystore.disk.versions import Versions, write_new
+from keystore.disk.store import write_new
+from keystore.disk.versions import Versions
 from keystore.errors import (
     DamagedKeystoreError,
     InvalidInputError,

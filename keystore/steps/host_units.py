@@ -12,8 +12,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 from enclave_common.terminal import printable as printable_line
+from keystore.disk.store import write_new
 from keystore.disk.units import Unit, in_restart_order, parse_unit
-from keystore.disk.versions import write_new, written_aside
+from keystore.disk.versions import written_aside
 from keystore.errors import InvalidInputError, StorageError, printable, storage_errors
 from keystore.formats.bundle import Manifest
 

@@ -29,8 +29,8 @@ from keystore import (
     roll_over,
 )
 from keystore.disk import layout, store
-from keystore.disk.store import Content, Link, Store
-from keystore.disk.versions import Versions, make_directories, write_new
+from keystore.disk.store import Content, Link, Store, write_new
+from keystore.disk.versions import Versions, make_directories
 from keystore.formats.register import Register
 from tests.keystore import kit
 

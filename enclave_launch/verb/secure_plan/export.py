@@ -40,8 +40,8 @@ from enclave_launch.review.document import plan_from_document
 from enclave_launch.review.information_flow import flow_graph
 from enclave_launch.verb.secure_plan.hosts import HOSTS, hosts_of
 from enclave_launch.verb.secure_plan.plans import read_plan
+from keystore.disk.store import write_new
 from keystore.disk.units import MARK
-from keystore.disk.versions import write_new
 
 ENGINES = ("systemd", "compose", "kubernetes")
 
