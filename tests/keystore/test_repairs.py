@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-from keystore import Finding, KeystoreError, RemoveOptions, remove, verify
+from keystore import Finding, KeystoreError, RemoveOptions, Severity, remove, verify
 from keystore.verb import main
 from tests.dds import sros2_style
 from tests.keystore import test_verification as damages
@@ -113,29 +113,38 @@ def stray_characters(root: Path) -> None:
     document.write_bytes(head + b"base64\r\n" + tail.replace(b"A", b"A\x96", 1))
 
 
+# The code of the finding, and the place of an error.
 PLANTED: dict[str, tuple[str, Plant]] = {
-    "lost key": ("missing", lose("enclaves/a/key.pem")),
+    "lost key": ("missing enclaves/a/key.pem", lose("enclaves/a/key.pem")),
     "lost certificate": ("missing", lose("enclaves/a/cert.pem")),
-    "lost permissions": ("missing", lose("enclaves/a/permissions.p7s")),
+    "lost permissions": ("missing enclaves/a/permissions.p7s", lose("enclaves/a/permissions.p7s")),
     "lost governance link": ("missing", lose("enclaves/a/governance.p7s")),
     "lost CA link": ("missing", lose("enclaves/a/identity_ca.cert.pem")),
     "lost key and certificate": ("incomplete", lose("enclaves/b/key.pem", "enclaves/b/cert.pem")),
-    "certificate garbled": ("certificate", write("enclaves/a/cert.pem")),
+    "certificate garbled": ("certificate enclaves/a/cert.pem", write("enclaves/a/cert.pem")),
     "key garbled": ("key", write("enclaves/a/key.pem")),
     "private half garbled": ("key", private_half),
     "certificate of no known curve": ("certificate", der_changed("enclaves/a/cert.pem", CURVE, b"\0" * len(CURVE))),
     "signature with stray characters": ("permissions", stray_characters),
-    "permissions garbled": ("permissions", write("enclaves/a/permissions.p7s")),
-    "permissions.xml garbled": ("twin-differs", write("enclaves/a/permissions.xml")),
-    "another's certificate": ("wrong-subject", damages.swap_certificates),
-    "another CA's certificate": ("wrong-ca", damages.foreign_certificate),
+    "permissions garbled": ("permissions enclaves/a/permissions.p7s", write("enclaves/a/permissions.p7s")),
+    "permissions.xml garbled": ("twin-differs enclaves/a/permissions.xml", write("enclaves/a/permissions.xml")),
+    "another's certificate": ("wrong-subject enclaves/a/cert.pem", damages.swap_certificates),
+    "another CA's certificate": ("wrong-ca enclaves/a/cert.pem", damages.foreign_certificate),
     "the CA's certificate": ("wrong-subject", copy("public/identity_ca.cert.pem", "enclaves/a/cert.pem")),
-    "another's key pair": ("serial-reused", damages.twice_the_same_serial),
-    "another's permissions": ("wrong-grant", copy("enclaves/b/permissions.p7s", "enclaves/a/permissions.p7s")),
-    "signed by an enclave": ("permissions", damages.by_an_enclave),
-    "expired permissions": ("permissions-expired", damages.permissions_of_the_past),
-    "impossible dates": ("permissions-dates", lambda root: damages.resign(root, b"<not_after>20", b"<not_after>19")),
-    "empty topic": ("permissions", lambda root: damages.resign(root, b"<topic>rt/chatter", b"<topic/><topic>x")),
+    "another's key pair": ("serial-reused enclaves/b/cert.pem", damages.twice_the_same_serial),
+    "another's permissions": (
+        "wrong-grant enclaves/a/permissions.p7s", copy("enclaves/b/permissions.p7s", "enclaves/a/permissions.p7s"),
+    ),
+    "signed by an enclave": ("permissions enclaves/a/permissions.p7s", damages.by_an_enclave),
+    "expired permissions": ("permissions-expired enclaves/a/permissions.p7s", damages.permissions_of_the_past),
+    "impossible dates": (
+        "permissions-dates enclaves/a/permissions.p7s",
+        lambda root: damages.resign(root, b"<not_after>20", b"<not_after>19"),
+    ),
+    "empty topic": (
+        "permissions enclaves/a/permissions.p7s",
+        lambda root: damages.resign(root, b"<topic>rt/chatter", b"<topic/><topic>x"),
+    ),
     "two grants": (
         "several-grants",
         lambda root: damages.resign(root, b"</grant>\n", b"</grant>\n" + damages.second_grant()),
@@ -146,12 +155,14 @@ PLANTED: dict[str, tuple[str, Plant]] = {
     "settings garbled": ("settings", write("secure-keystore.json")),
     "settings too deep": ("settings", write("secure-keystore.json", b"[" * 100_000)),
     "settings open": ("writable-by-others", mode("secure-keystore.json", 0o666)),
-    "CA key open to the group": ("unsafe-owner", mode("private/identity_ca.key.pem", 0o660)),
+    "CA key open to the group": (
+        "unsafe-owner private/identity_ca.key.pem", mode("private/identity_ca.key.pem", 0o660),
+    ),
     "private open to the group": ("unsafe-owner", mode("private", 0o770)),
-    "private readable": ("readable-by-others", mode("private", 0o755)),
-    "key readable": ("readable-by-others", mode("enclaves/a/key.pem", 0o644)),
+    "private readable": ("readable-by-others private", mode("private", 0o755)),
+    "key readable": ("readable-by-others enclaves/a/key.pem", mode("enclaves/a/key.pem", 0o644)),
     "key open": ("unsafe-owner", mode("enclaves/a/key.pem", 0o666)),
-    "certificate open": ("writable-by-others", mode("enclaves/a/cert.pem", 0o666)),
+    "certificate open": ("writable-by-others enclaves/a/cert.pem", mode("enclaves/a/cert.pem", 0o666)),
     "enclave open": ("writable-by-others", mode("enclaves/a", 0o777)),
     "enclaves open": ("writable-by-others", mode("enclaves", 0o777)),
     "public open": ("writable-by-others", mode("public", 0o777)),
@@ -176,7 +187,10 @@ PLANTED: dict[str, tuple[str, Plant]] = {
     "only the case differs": ("case-collision", lambda root: (root / "enclaves/B").mkdir()),
     "interrupted": ("interrupted", lambda root: (root / ".staging").mkdir()),
     "interrupted CA": ("interrupted", lambda root: (root / "private/incoming").mkdir()),
-    "dangling CRL": ("dangling-link", lambda root: (root / "enclaves/a/crl.pem").symlink_to("../../public/crl.pem")),
+    "dangling CRL": (
+        "dangling-link enclaves/a/crl.pem",
+        lambda root: (root / "enclaves/a/crl.pem").symlink_to("../../public/crl.pem"),
+    ),
     "lock is a directory": ("not-a-file", instead(".lock", os.mkdir)),
 }  # fmt: skip
 WITH_CRL: dict[str, tuple[str, Plant]] = {
@@ -217,10 +231,14 @@ def faults(root: Path) -> list[Finding]:
     ]
 
 
-def check(root: Path, code: str, plant: Plant) -> None:
+def check(root: Path, expected: str, plant: Plant) -> None:
     plant(root)
     found = faults(root)
+    code, _, place = expected.partition(" ")
     assert code in {finding.code for finding in found}, found
+    assert not place or (code, place, Severity.ERROR) in [
+        (one.code, one.place, one.severity) for one in found
+    ]
     typed: set[str] = set()
     while found:
         line = next((finding.repair for finding in found if finding.repair not in typed), None)
