@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -275,20 +274,6 @@ def test_a_keystore_of_today_has_no_shares_and_the_first_start_makes_one(root: P
     assert list_shares(root) == ()
     report = start(root, BRINGUP, policy("/"))
     assert actions(report) == {} and [one.owner for one in list_shares(root)] == [BRINGUP]
-
-
-def test_a_bundle_takes_the_union_and_says_so(root: Path, tmp_path: Path) -> None:
-    """Without private/ nobody can tell whose share is whose."""
-    start(root, BRINGUP, policy("/", "/odom"))
-    start(root, NAVIGATION, policy("/", "/plan"))
-    shutil.rmtree(root / "private")
-    report = start(root, "/elsewhere/navigation.launch.py", policy("/", "/plan"))
-    assert (
-        not report.changed
-        and "may do more in this bundle than this launch needs (publish rt/odom)" in str(report.warnings)
-    )
-    with pytest.raises(Exception, match=r"has no CA keys(?s:.)*lacks publish rt/goal"):
-        start(root, NAVIGATION, policy("/", "/plan", "/goal"))
 
 
 def test_a_hold_counts_for_its_own_launch(root: Path) -> None:
