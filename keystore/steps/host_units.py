@@ -54,7 +54,6 @@ class Installed(NamedTuple):
 class Restarted(NamedTuple):
     """How far a restart came. ``failed``: why it stopped at the first of ``left``; None if it did not."""
 
-    done: tuple[str, ...]
     left: tuple[str, ...] = ()
     failed: str | None = None
 
@@ -158,16 +157,16 @@ def restart(
     """
     chosen = options or UnitOptions()
     names = [unit.name for unit in units]
-    done: list[str] = []
+    left = list(names)
     for group in [names] if together else [[name] for name in names]:
         problem = _restart(group, chosen)
         for name in group:
             problem = problem or _watch(name, chosen.settle if name == group[0] else 0)
             if problem is not None:
-                return Restarted(tuple(done), tuple(names[len(done) :]), problem)
-            done.append(name)
+                return Restarted(tuple(left), problem)
+            left.remove(name)
             report(name)
-    return Restarted(tuple(done))
+    return Restarted()
 
 
 def unit_problems(units: Iterable[Unit]) -> Iterator[tuple[Unit, str | None]]:

@@ -127,17 +127,8 @@ def _plain(value: Any) -> Any:
     return value
 
 
-class Granted(NamedTuple):
-    """The permissions of one enclave. ``allowed`` and ``denied``: rules with final names, sorted; ``topics``: DDS
-    topics that no ROS rule explains."""
-
-    allowed: tuple[Rule, ...]
-    denied: tuple[Rule, ...]
-    topics: tuple[str, ...]
-
-
-def granted(keystore: Path | str) -> dict[str, Granted]:
-    """Map enclaves to what their permissions say; an enclave without permissions is left out.
+def granted(keystore: Path | str) -> dict[str, frozenset[Rule]]:
+    """Map enclaves to the rules that their permissions allow, with final names; one without permissions is left out.
 
     Raises ``NotAKeystoreError``, ``DamagedKeystoreError``, and ``InvalidInputError`` for files that cannot be read.
     """
@@ -147,16 +138,7 @@ def granted(keystore: Path | str) -> dict[str, Granted]:
         signed = view.enclave_file(enclave, layout.PERMISSIONS)
         if signed is not None:
             place = layout.enclave_file(enclave, layout.PERMISSIONS)
-            found[enclave] = _granted(smime.read(signed, place).document, place)
+            grants = parse_permissions(smime.read(signed, place).document, place)
+            rules = (rule for grant in grants for rule in grant.ros_rules[0])
+            found[enclave] = frozenset(rule for rule in rules if rule.qualifier is Qualifier.ALLOW)
     return found
-
-
-def _granted(document: bytes, place: str) -> Granted:
-    rules: set[Rule] = set()
-    topics: set[str] = set()
-    for grant in parse_permissions(document, place):
-        explained, rest = grant.ros_rules
-        rules.update(explained)
-        topics.update(rest)
-    allowed = sorted(rule for rule in rules if rule.qualifier is Qualifier.ALLOW)
-    return Granted(tuple(allowed), tuple(sorted(rules.difference(allowed))), tuple(sorted(topics)))

@@ -23,7 +23,7 @@ DEFAULT_MARGIN = "30d"
 def signed_grants(keystore: Path | str) -> Mapping[str, frozenset[GrantedName]]:
     """Map each enclave to what its signed permissions allow."""
     with keystore_errors():
-        return {enclave: grants_of_rules(found.allowed) for enclave, found in granted(keystore).items()}
+        return {enclave: grants_of_rules(rules) for enclave, rules in granted(keystore).items()}
 
 
 def on_zenoh(keystore: Path | str) -> frozenset[str]:
