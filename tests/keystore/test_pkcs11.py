@@ -9,6 +9,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
+from cryptography.hazmat.primitives import hashes
+from cryptography.hazmat.primitives.asymmetric import ec
 
 from keystore import (
     CaAccess,
@@ -34,6 +36,7 @@ from keystore import (
 )
 from keystore.formats.validity import utc_now
 from keystore.signing import authority
+from keystore.signing.private_key import signature
 from keystore.signing.token_key import open_key, parse_uri
 from tests.keystore.kit import DAY, created, filled, openssl, options, policy
 
@@ -150,6 +153,14 @@ def test_without_pin_or_module_the_message_says_so(
         with pytest.raises(SigningUnavailableError, match=message) as caught:
             provision(root, [policy("/a")], options=options(access=wrong))
         assert PIN not in str(caught.value)
+
+
+def test_what_is_no_certificate_is_signed_by_the_token_too(token: Mapping[str, str]) -> None:
+    """As the evidence of a product is."""
+    key = open_key(uri(Role.IDENTITY).encode(), "the token", access(token))
+    public = key.public_key()
+    assert isinstance(public, ec.EllipticCurvePublicKey)
+    public.verify(signature(key, b"what was decided"), b"what was decided", ec.ECDSA(hashes.SHA256()))
 
 
 def test_an_unchanged_launch_needs_no_token(root: Path, token: Mapping[str, str]) -> None:
