@@ -236,8 +236,8 @@ def _refuse_to_strand(opened: Store, roles: Collection[Role]) -> None:
 def _hangs_on_old_ca(view: KeystoreView, enclave: str, roles: Collection[Role]) -> bool:
     signed = view.enclave_file(enclave, layout.PERMISSIONS)
     with suppress(DamagedKeystoreError):
-        facts = view.certificate(enclave)
-        if Role.IDENTITY in roles and facts and not issued_by(facts, view.ca(Role.IDENTITY)):
+        facts = view.certificate(enclave) if Role.IDENTITY in roles else None
+        if facts is not None and not issued_by(facts, view.ca(Role.IDENTITY)):
             return True
         if Role.PERMISSIONS in roles and signed:
             return not smime.read(signed, layout.enclave_directory(enclave)).embeds(
