@@ -220,11 +220,10 @@ def _members(run: Machine, value: Value) -> Iterator[tuple[Obj, str]]:
 def _never_set(run: Machine, names: frozenset[str]) -> Iterator[Cell]:
     """Yield members, static members and globals of these names that nothing has set or read yet."""
     static = run.names.static_members
+    objects = list(run.objects.values())
+    of_class = {cls: run.names.members(cls) & names for cls in {obj.cls for obj in objects}}
     cells: list[Cell] = [
-        (obj, name)
-        for obj in list(run.objects.values())
-        for name in run.names.members(obj.cls) & names
-        if obj.cls not in static.get(name, ())
+        (obj, name) for obj in objects for name in of_class[obj.cls] if obj.cls not in static.get(name, ())
     ]
     for name in names:
         cells += [(cls, name) for cls in static.get(name, ())]
