@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
@@ -30,22 +29,11 @@ CONDITIONS: dict[str, Callable[..., bool]] = {
     "only if not starting": lambda text, *heads: not text.startswith(heads),
     "only if ending": lambda text, *tails: text.endswith(tails),
     "only if not ending": lambda text, *tails: not text.endswith(tails),
-    "only if either": lambda text, *sides: any(_holds_all(text, side) for side in sides),
-    "only if neither": lambda text, *sides: not any(_holds_all(text, side) for side in sides),
 }
 """Edits that keep a name where they hold and drop it elsewhere."""
 
 ONLY_IF_UNSET: Edit = ("only if unset", ())
 """The same for a parameter that launch does not set: the name is made of what the code takes then."""
-
-
-def either_of(*sides: Iterable[Edit]) -> Edit:
-    """Return the condition that holds where all conditions of one of ``sides`` do."""
-    return "only if either", tuple(json.dumps(list(side)) for side in sides)
-
-
-def _holds_all(text: str, side: str) -> bool:
-    return all(CONDITIONS[edit](text, *given) for edit, given in json.loads(side))
 
 
 PARAMETER_REFERENCE = re.compile(r"\$\(param ([^ ()$]+)(?: ([^ ()$]*))?\)")
