@@ -20,13 +20,6 @@ def _named(case: Case) -> str:
     return f"{case.group}: {case.name}"
 
 
-@pytest.fixture(scope="session")
-def prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("prefix")
-    case_files.install_packages(folder)
-    return folder
-
-
 @pytest.mark.filterwarnings("ignore::UserWarning")
 @pytest.mark.parametrize("distro", DISTROS)
 @pytest.mark.parametrize("case", CASES, ids=_named)

@@ -30,13 +30,6 @@ PYTHON = [
 ]
 
 
-@pytest.fixture(scope="module")
-def prefix(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("prefix")
-    case_files.install_packages(folder)
-    return folder
-
-
 def visited(main: Path, case: Case, user_code_results: RecordedResults) -> tuple[Evaluation, str]:
     host = PlanHost(HostOptions("rolling", anonymous_seed=1), user_code_results=user_code_results)
     try:
