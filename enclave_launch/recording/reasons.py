@@ -101,10 +101,6 @@ NOT_AS_PLANNED = Cause(
     "compare ROS_DOMAIN_ID with the domain that was provisioned; secure-keystore verify; " + _PROVISION,
     "",
 )
-_COMPILED, _COMPILED_AT_LAST = (
-    tuple((re.compile(pattern), what, remedy) for pattern, what, remedy in causes)
-    for causes in (_CAUSES, _AT_LAST)
-)
 HARMLESS = re.compile(r"Remote secure participant .* not allowed")
 """Printed while a peer is met before it is authenticated; ends with the handshake."""
 
@@ -112,13 +108,13 @@ HARMLESS = re.compile(r"Remote secure participant .* not allowed")
 def cause_of(texts: Iterable[str]) -> Cause | None:
     """Return the first cause that one of ``texts`` names."""
     said = tuple(texts)
-    return _first_cause(said, _COMPILED) or _first_cause(said, _COMPILED_AT_LAST)
+    return _first_cause(said, _CAUSES) or _first_cause(said, _AT_LAST)
 
 
-def _first_cause(texts: Iterable[str], causes: Iterable[tuple[re.Pattern[str], str, str]]) -> Cause | None:
+def _first_cause(texts: Iterable[str], causes: Iterable[tuple[str, str, str]]) -> Cause | None:
     for text in texts:
         for pattern, what, remedy in causes:
-            match = pattern.search(text)
+            match = re.search(pattern, text)
             if match is not None and not HARMLESS.search(text):
                 return Cause(what.format(*match.groups()), remedy.format(*match.groups()), match[0])
     return None

@@ -269,16 +269,13 @@ def with_readings(nodes: Sequence[RequestedNode]) -> list[RequestedNode]:
     return [
         node._replace(
             endpoints=tuple(
-                _read_as(endpoint, _left(readings, node, places))
+                endpoint._replace(name=likeliest, readings=tuple(others))
                 for endpoint, readings in zip(node.endpoints, of_node, strict=True)
+                for likeliest, *others in [_left(readings, node, places)]
             )
         )
         for node, of_node in zip(nodes, found, strict=True)
     ]
-
-
-def _read_as(endpoint: RequestedEndpoint, readings: Sequence[str]) -> RequestedEndpoint:
-    return endpoint._replace(name=readings[0], readings=tuple(readings[1:]))
 
 
 def _readings(endpoint: RequestedEndpoint, node: RequestedNode) -> tuple[str, ...]:

@@ -49,7 +49,7 @@ def run(options: argparse.Namespace) -> int:
     if options.format == "json":
         sys.stdout.write(json_text(hosts_document(placement, graph), indent=2) + "\n")
     else:
-        sys.stdout.write(hosts_text(placement, graph))
+        sys.stdout.writelines(f"{line}\n" for line in _lines(placement, graph))
     return 1 if placement.nowhere or placement.shared else 0
 
 
@@ -59,11 +59,6 @@ def hosts_of(file: Path | None) -> Hosts:
         return Hosts()
     with translated(InvalidInputError, UsageError):
         return load_hosts(file)
-
-
-def hosts_text(placement: Placement, graph: FlowGraph) -> str:
-    """Format a placement for a terminal."""
-    return "\n".join(_lines(placement, graph)) + "\n"
 
 
 def _lines(placement: Placement, graph: FlowGraph) -> Iterator[str]:

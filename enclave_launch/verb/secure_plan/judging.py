@@ -105,15 +105,6 @@ class Expectations(NamedTuple):
         return next((accepted.why for accepted in self.accept if accepted.covers(diagnostic)), None)
 
 
-class Broken(NamedTuple):
-    """A rule that the plan breaks: the shortest way on which it does. Without steps both ends are one enclave."""
-
-    rule: Never
-    source: str
-    target: str
-    steps: tuple[FlowStep, ...]
-
-
 def read_expectations(content: Any, place: str) -> Expectations:
     """Read a parsed YAML document (docs/secure-plan.md); raises ``UsageError`` if it is not such a file."""
     if not isinstance(content, Mapping) or content.keys() - {"never", "accept"}:
@@ -132,38 +123,30 @@ def read_expectations(content: Any, place: str) -> Expectations:
 
 
 def rule_findings(document: DryRun, rules: Iterable[Never]) -> list[PlanFinding]:
-    """Return an error for each forbidden flow and a warning for each rule that names nothing in this plan."""
-    broken, idle = broken_rules(plan_from_document(document), rules)
-    forbidden = [finding("flow-forbidden", found.source, _broken_text(found)) for found in broken]
-    return [diagnostic._replace(severity="error") for diagnostic in forbidden] + [
-        finding("rule-idle", rule.source, f"no {rule.source} or no {rule.target} in this plan")
-        for rule in idle
-    ]
-
-
-def _broken_text(found: Broken) -> str:
-    rule = found.rule
-    ways = "; ".join(f"{step.source} -> {step.target} by {step.hops[0]}" for step in found.steps)
-    how = ways or f"both are in enclave {found.source}"
-    return f"{rule.source} must never reach {rule.target}{f' ({rule.why})' if rule.why else ''}: {how}"
-
-
-def broken_rules(plan: PlanDocument, rules: Iterable[Never]) -> tuple[list[Broken], list[Never]]:
-    """Return rules that the plan breaks, each with one shortest way, and rules that name nothing in the plan."""
+    """Return an error for each forbidden flow, with one shortest way, then a warning for each rule that names nothing
+    in this plan."""
+    plan = plan_from_document(document)
     graph = flow_graph(plan)
     broken, idle = [], []
     for rule in rules:
         sources, targets = _enclaves_named(plan, rule.source), _enclaves_receiving(plan, rule.target)
         if not sources or not targets:
-            idle.append(rule)
+            idle.append(
+                finding("rule-idle", rule.source, f"no {rule.source} or no {rule.target} in this plan")
+            )
             continue
         ways = [_way(graph, source, target) for source in sources for target in targets]
-        shortest = min(
-            (way for way in ways if way is not None), key=lambda way: (len(way[2]), way), default=None
-        )
-        if shortest is not None:
-            broken.append(Broken(rule, *shortest))
-    return broken, idle
+        possible = [way for way in ways if way is not None]
+        if possible:
+            source, _, steps = min(possible, key=lambda way: (len(way[2]), way))
+            broken.append(finding("flow-forbidden", source, _broken_text(rule, source, steps)))
+    return [*(diagnostic._replace(severity="error") for diagnostic in broken), *idle]
+
+
+def _broken_text(rule: Never, source: str, steps: Iterable[FlowStep]) -> str:
+    ways = "; ".join(f"{step.source} -> {step.target} by {step.hops[0]}" for step in steps)
+    how = ways or f"both are in enclave {source}"
+    return f"{rule.source} must never reach {rule.target}{f' ({rule.why})' if rule.why else ''}: {how}"
 
 
 def _way(graph: Any, source: str, target: str) -> tuple[str, str, tuple[FlowStep, ...]] | None:
