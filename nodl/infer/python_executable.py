@@ -53,9 +53,8 @@ def infer_script(
     start: Start | None,
 ) -> tuple[tuple[NodeInterface, ...], str, bool]:
     """Return the nodes of a program that is not installed, as ``infer_python``; ``folders`` hold further modules."""
-    program = _Finder(prefixes).program
-    for folder in (program.top_folder(target.file), *folders):
-        program.add_root(folder)
+    installed = _Finder(prefixes).program
+    program = Program([installed.top_folder(target.file), *installed.roots, *folders])
     return _inferred(program, target, target.file, key, start)
 
 

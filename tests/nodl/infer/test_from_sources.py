@@ -141,3 +141,15 @@ def test_what_is_installed_comes_before_the_sources(tmp_path: Path) -> None:
     assert names(infer_executable("robot", "base", prefixes=[str(prefix)], sources=sources)) == ["old"]
     installed.unlink()
     assert names(infer_executable("robot", "base", prefixes=[str(prefix)], sources=sources)) == ["new"]
+
+
+def test_the_modules_of_the_package_itself_are_those_of_its_sources(tmp_path: Path) -> None:
+    robot = package(tmp_path / "src/robot", setup_py("'base = robot.base:main'"))
+    write(robot / "robot/base.py", NODE.format(imports="from robot.names import ODOM", topic="ODOM"))
+    write(robot / "robot/names.py", "ODOM = 'new'\n")
+    prefix = tmp_path / "install"
+    site = prefix / "lib/python3.11/site-packages/robot"
+    write(site / "__init__.py", "")
+    write(site / "names.py", "ODOM = 'of the last build'\n")
+    sources = SourcesInReach([str(prefix)], [])
+    assert names(infer_executable("robot", "base", prefixes=[str(prefix)], sources=sources)) == ["new"]
