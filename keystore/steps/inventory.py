@@ -14,8 +14,8 @@ from keystore.disk.view import KeystoreView, keystore_at
 from keystore.formats.certificate import CertificateFacts
 from keystore.formats.domains import Domains
 from keystore.formats.governance import DomainRule, TopicRule, parse_governance
-from keystore.formats.permissions_document import parse_permissions
-from keystore.formats.policy import Qualifier, Rule
+from keystore.formats.permissions_document import Grant, parse_permissions
+from keystore.formats.policy import Operation, Qualifier, Rule
 from keystore.formats.role import Role
 from keystore.formats.validity import iso
 from keystore.signing import smime
@@ -130,6 +130,8 @@ def _plain(value: Any) -> Any:
 def granted(keystore: Path | str) -> dict[str, frozenset[Rule]]:
     """Map enclaves to the rules that their permissions allow, with final names; one without permissions is left out.
 
+    What they deny is not taken off. No ROS rule explains a name without a slash before it: it is a topic of DDS.
+
     Raises ``NotAKeystoreError``, ``DamagedKeystoreError``, and ``InvalidInputError`` for files that cannot be read.
     """
     view = keystore_at(keystore)
@@ -139,6 +141,21 @@ def granted(keystore: Path | str) -> dict[str, frozenset[Rule]]:
         if signed is not None:
             place = layout.enclave_file(enclave, layout.PERMISSIONS)
             grants = parse_permissions(smime.read(signed, place).document, place)
-            rules = (rule for grant in grants for rule in grant.ros_rules[0])
-            found[enclave] = frozenset(rule for rule in rules if rule.qualifier is Qualifier.ALLOW)
+            found[enclave] = frozenset(rule for grant in grants for rule in _allowed(grant))
     return found
+
+
+def _allowed(grant: Grant) -> Iterator[Rule]:
+    """Yield what a grant allows: DDS topics that are none of ROS by their own names, a default of ALLOW as ``*``."""
+    rules, others = grant.ros_rules
+    yield from (rule for rule in rules if rule.qualifier is Qualifier.ALLOW)
+    for rule in grant.rules:
+        if rule.qualifier is Qualifier.ALLOW:
+            yield from (_topic(Operation.PUBLISH, topic) for topic in rule.publish if topic in others)
+            yield from (_topic(Operation.SUBSCRIBE, topic) for topic in rule.subscribe if topic in others)
+    if grant.default is Qualifier.ALLOW:
+        yield from (_topic(Operation.PUBLISH, "*"), _topic(Operation.SUBSCRIBE, "*"))
+
+
+def _topic(operation: Operation, name: str) -> Rule:
+    return Rule(operation, Qualifier.ALLOW, name)

@@ -13,7 +13,11 @@ from enclave_launch.review.document import GrantedName
 from enclave_launch.review.signed import as_signed
 from enclave_launch.verb.secure_plan import main
 from keystore import ProvisionOptions
+from keystore.disk.view import keystore_at
+from keystore.formats.role import Role
 from keystore.formats.validity import utc_now
+from keystore.signing import smime
+from keystore.signing.ca_access import CaAccess
 
 PREFIX = Path(__file__).parent.parent.parent / "fixtures" / "demo_ws"
 LAUNCH = PREFIX / "share" / "demo_nodes" / "launch"
@@ -70,6 +74,37 @@ def test_a_plan_that_asks_for_more_or_for_less(
     assert not any(
         code.startswith("keystore") for code, _ in found(capsys, *launch, "--keystore", str(keystore))
     )
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "shown"),
+    [
+        ("<default>DENY</default>", "<default>ALLOW</default>", ["publish *", "subscribe *"]),
+        ("<topic>rt/conversation</topic>", "<topic>*</topic>", ["publish *"]),
+        (
+            "<topic>rt/conversation</topic>",
+            "<topic>rt/conversation</topic><topic>telemetry</topic>",
+            ["publish telemetry"],
+        ),
+    ],
+)
+def test_what_is_granted_outside_of_ros_names_is_shown(
+    before: str, after: str, shown: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Another tool may have signed it with the same CA."""
+    name = "talker_listener_remap.launch.xml"
+    keystore = make(tmp_path / "ks", name)
+    place = keystore / "enclaves/speaker/permissions.p7s"
+    document = smime.read(place.read_bytes(), str(place)).document
+    changed = document.replace(before.encode(), after.encode())
+    assert changed != document
+    place.write_bytes(
+        smime.sign_document(changed, keystore_at(keystore).authority(Role.PERMISSIONS, CaAccess()))
+    )
+    assert ("keystore-grants-more", "/speaker") in found(capsys, *words(name), "--keystore", str(keystore))
+    main(["diff", str(keystore), *words(name)])
+    out = capsys.readouterr().out
+    assert [line.removeprefix("-").strip() for line in out.splitlines() if line.startswith("-   ")] == shown
 
 
 def test_an_enclave_that_the_keystore_lacks(keystore: Path, capsys: pytest.CaptureFixture[str]) -> None:
