@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from enclave_launch.diagnostics import Code, Diagnostic
+from enclave_launch.diagnostics.evaluation import parameter_file_missing
 from enclave_launch.source_location import SourceLocation
 
 
@@ -23,3 +24,12 @@ def test_codes_are_stable_words_each_with_one_meaning() -> None:
 def test_a_place_is_read_as_it_is_written() -> None:
     for place in (SourceLocation("a:b.xml", 7), SourceLocation("a.xml"), SourceLocation("demo 1")):
         assert SourceLocation.read(str(place)) == place
+
+
+def test_the_path_of_a_parameter_file_is_shown_and_a_whole_urdf_in_its_place_by_its_beginning() -> None:
+    path = "/opt/" + "a" * 300 + "/parameters.yaml"
+    assert path in parameter_file_missing(path).text
+    urdf = "<robot>" + "<link/>" * 1000 + "</robot>"
+    text = parameter_file_missing(urdf).text
+    assert "<robot><link/>" in text and text.endswith(" ...") and len(text) < 600
+    assert parameter_file_missing(urdf).subject == urdf

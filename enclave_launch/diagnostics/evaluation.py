@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from textwrap import shorten
 
 from enclave_common.terminal import quoted
 from enclave_common.words import did_you_mean
 from enclave_launch.diagnostics import Code, Diagnostic
 from enclave_launch.source_location import SourceLocation
 
-_LONGEST_PATH = 200
+_LONGEST_PATH = 500  # characters
 
 
 def argument_unknown(name: str, alike: str) -> Diagnostic:
@@ -84,8 +83,8 @@ def package_not_installed(package: str, placeholder: str) -> Diagnostic:
 
 
 def parameter_file_missing(path: str) -> Diagnostic:
-    """Warn; a ``path`` that is a whole URDF, by mistake, is shortened in the text."""
-    named = path if len(path) <= _LONGEST_PATH else shorten(path, _LONGEST_PATH)
+    """Warn. The message has the beginning of a long ``path``, which may be a whole URDF by mistake."""
+    named = path if len(path) <= _LONGEST_PATH else f"{path[:_LONGEST_PATH]} ..."
     return Diagnostic(Code.PARAMETER_FILE_MISSING, path, f"Parameter file path is not a file: {named}")
 
 
