@@ -149,10 +149,15 @@ def test_the_other_end_of_rviz_and_of_a_default_of_the_library_is_optional() -> 
     document = "/opt/nodl/library/documents/slam_toolbox/sync.nodl.yaml:12"
     assert code("rviz2/rviz2", "view.rviz:12") == code("slam_toolbox/sync", document) == "other-end-optional"
     assert code("slam_toolbox/sync", document, remapped_by=["scan:=x"]) == "no-publisher"
-    assert code("slam_toolbox/sync", document, note="parameter scan_topic, set by launch") == "no-publisher"
-    assert (
-        code("slam_toolbox/sync", document, note="parameter scan_topic, its default") == "other-end-optional"
-    )
+    default = "parameter scan_topic, its default; plugin slam of class slam::Slam"
+    assert code("slam_toolbox/sync", document, note=default) == "other-end-optional"
+    for given in (
+        "parameter scan_topic, set by launch",
+        "argument 1 of the command line",
+        "parameter scan_topic",
+    ):
+        assert code("slam_toolbox/sync", document, note=given) == "no-publisher"
+        assert code("slam_toolbox/sync", document, note=f"{default}; {given}") == "no-publisher"
     assert code("demo/node", "node.cpp:12") == "no-publisher"
 
 

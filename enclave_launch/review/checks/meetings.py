@@ -86,14 +86,17 @@ def _is_optional(user: _User) -> bool:
     """Return True for rviz2, which shows what there is, and for a name that a node of the library has by default: it
     has inputs for every robot."""
     interface = user.interface
-    by_default = (
-        _LIBRARY in interface.place and not interface.remapped_by and _BY_LAUNCH not in interface.note
-    )
+    by_default = _LIBRARY in interface.place and not interface.remapped_by and _is_by_default(interface.note)
     return user.program == "rviz2/rviz2" or by_default
 
 
+def _is_by_default(note: str) -> bool:
+    """Return True if all that ``note`` says of a name is a default, or the plugin whose name it is."""
+    parts = filter(None, note.split("; "))
+    return all(part.endswith(", its default") or part.startswith("plugin ") for part in parts)
+
+
 _LIBRARY = "/nodl/library/documents/"
-_BY_LAUNCH = "set by launch"
 _TRANSFORMS = {"tf": "tf_static", "tf_static": "tf"}
 
 
