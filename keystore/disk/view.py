@@ -171,8 +171,9 @@ class KeystoreView:
 
     def common_name(self, enclave: str) -> str | None:
         """Return the common name of the certificate that an enclave has; None without one, or for an empty file."""
-        facts = self.certificate(enclave) if self.enclave_file(enclave, layout.CERT) else None
-        return facts.common_name if facts is not None else None
+        pem = self.enclave_file(enclave, layout.CERT)
+        place = printable(layout.enclave_file(enclave, layout.CERT))
+        return read_certificate(pem, place).common_name if pem else None
 
     def require_enclaves(self, names: Iterable[str]) -> None:
         """Raise InvalidInputError if one of these enclaves does not exist."""

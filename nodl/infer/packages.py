@@ -10,7 +10,6 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from functools import lru_cache
 from pathlib import Path
-from types import MappingProxyType
 from typing import NamedTuple
 
 from enclave_common.files import text_or_nothing
@@ -29,12 +28,11 @@ class EntryPoint(NamedTuple):
 
 
 class Package(NamedTuple):
-    """A source package: the folder with ``package.xml``. ``scripts``: executable -> file, as CMake installs it."""
+    """A source package: the folder with ``package.xml``."""
 
     name: str
     folder: str
     entry_points: tuple[EntryPoint, ...] = ()
-    scripts: Mapping[str, str] = MappingProxyType({})
     dependencies: frozenset[str] = frozenset()
 
     def entry_points_of(self, module: str) -> list[EntryPoint]:
@@ -58,7 +56,13 @@ def read_package(folder: str) -> Package:
     manifest = read_package_xml(base)
     texts = (*_literal_texts(base / "setup.py"), *text_or_nothing(base / "setup.cfg").splitlines())
     entries = tuple(EntryPoint(*match.groups()) for match in map(_ENTRY.match, texts) if match)
-    return Package(manifest.name or base.name, folder, entries, read_build(folder).scripts, manifest.depends)
+    return Package(manifest.name or base.name, folder, entries, manifest.depends)
+
+
+@lru_cache(maxsize=512)
+def scripts_of(folder: str) -> Mapping[str, str]:
+    """Return the file behind each executable of a package that CMake installs as it is."""
+    return read_build(folder).scripts
 
 
 def _literal_texts(path: Path) -> Iterator[str]:

@@ -51,10 +51,11 @@ class SourcesInReach:
         """Return what would be installed as ``executable``: an entry point's module, or a script; None if neither."""
         if not self.hold(package):
             return None
-        source = read_package(self._workspace.packages[package].folder)
-        if executable in source.scripts:
-            return ProgramTarget(source.scripts[executable])
-        entry = next((each for each in source.entry_points if each.executable == executable), None)
+        source = self._workspace.packages[package]
+        if executable in source.build.scripts:
+            return ProgramTarget(source.build.scripts[executable])
+        entries = read_package(source.folder).entry_points
+        entry = next((each for each in entries if each.executable == executable), None)
         if entry is None:
             return None
         file = Program(_module_folders(source.folder)).find(entry.module, source.folder)
@@ -66,7 +67,7 @@ class SourcesInReach:
     @cached_property
     def module_folders(self) -> list[str]:
         """Return the folders in which the packages have their Python modules."""
-        packages = self._workspace.packages.values() if self._folders or self._workspaces else ()
+        packages = self._workspace.packages.values()
         return [folder for package in packages for folder in _module_folders(package.folder)]
 
     def infer_plugin(self, name: str, instance: str, start: Start | None = None) -> Answer:

@@ -12,7 +12,7 @@ from typing import NamedTuple, TypeVar
 from nodl.infer.analysis import analyse_rest, failure, start, without_collector
 from nodl.infer.interpreter.run import Run
 from nodl.infer.net import may_make_interfaces, unsettled_places
-from nodl.infer.packages import EntryPoint, Package, find_package
+from nodl.infer.packages import EntryPoint, Package, find_package, scripts_of
 from nodl.infer.program import Program
 from nodl.infer.results import interfaces_of
 from nodl.infer.start import LaunchKey
@@ -106,7 +106,7 @@ def _runs(program: Program, file: str) -> Iterator[tuple[Run, LaunchKey]]:
 def _executable(entries: list[EntryPoint], file: str, package: Package | None) -> str | None:
     if entries:
         return entries[0].executable
-    scripts = package.scripts if package is not None else {}
+    scripts = scripts_of(package.folder) if package is not None else {}
     return next((name for name, script in scripts.items() if script == file), None)
 
 
