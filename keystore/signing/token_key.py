@@ -49,9 +49,10 @@ def parse_uri(uri: str) -> dict[str, str]:
 
 
 class _TokenKey:
-    """A key of a token in the shape of a ``cryptography`` private key, over a session that stays open as long as it.
+    """Sign with a key in a token through the interface of a ``cryptography`` private key.
 
-    Its builders ask it for ``sign`` and ``public_key``; everything else refuses: there is no key material here.
+    The session with the token stays open as long as this object. The key itself stays in the token: ``sign`` and
+    ``public_key`` work, everything else raises SigningUnavailableError.
     """
 
     def __init__(self, key: Any, public: PublicKey):

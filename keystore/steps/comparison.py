@@ -1,6 +1,4 @@
-"""What is wanted of a keystore, and the keystore held against it: for a launch, or for one enclave before a process.
-
-Reads only."""
+"""Compare a keystore with what a launch requires, or one enclave with what a process requires. Writes nothing."""
 
 from __future__ import annotations
 
@@ -43,7 +41,7 @@ class WantedEnclave(NamedTuple):
     permissions: PermissionsSource
     reissue: Reissue = Reissue.NOTHING
     share: EnclaveShare | None = None
-    """Where ``permissions`` are those of several launches."""
+    """Set if ``permissions`` are those of several launches together."""
     ends_by: datetime | None = None
     """The requested end of its certificate; one that expires later is issued again."""
 

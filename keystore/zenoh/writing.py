@@ -151,7 +151,13 @@ RESTART = (
 
 
 class _Pending(NamedTuple):
-    """What is to be written: session files, by path, and the router's, which are left alone on other hosts."""
+    """The files for Zenoh that must be written.
+
+    Attributes:
+        sessions: Session files, path -> content.
+        router: What the router should serve; nothing on a host that has no keys of the CAs.
+        is_router_stale: Whether the router's file or certificate must be written.
+    """
 
     sessions: dict[str, bytes]
     router: RouterFile

@@ -6,7 +6,7 @@ Found by asking for each code of ``keystore/verification`` which test would miss
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from datetime import timedelta
 from pathlib import Path
 
@@ -163,21 +163,19 @@ class PromisingAuthority(Authority):
     validity = Validity.starting(utc_now(), 200 * YEAR)
 
 
-def issued(root: Path, **changes: object) -> None:
-    """Another certificate for the key of /a, by our own CA, which promises longer than it lives itself."""
+def issued(root: Path, *, lifetime: timedelta = YEAR, hosts: Sequence[str] = ()) -> None:
+    """Issue another certificate for the key of /a by our own CA, even one that outlives the CA."""
     ca = authority(root, Role.IDENTITY)
-    if "validity" in changes:
-        ca = PromisingAuthority(ca.facts, ca.key)
     public = public_half((root / "enclaves/a/key.pem").read_bytes(), "key")
-    validity = Validity.starting(utc_now(), 100 * YEAR if "validity" in changes else YEAR)
-    made = ca.issue("ros.a", public, validity, changes.get("hosts", ()))  # type: ignore[arg-type]
+    validity = Validity.starting(utc_now(), lifetime)
+    made = PromisingAuthority(ca.facts, ca.key).issue("ros.a", public, validity, hosts)
     (root / "enclaves/a/cert.pem").write_bytes(made.pem)
 
 
 def test_a_certificate_that_outlives_its_ca(root: Path) -> None:
     issued(root)
     assert found(root, "outlives-ca") == []
-    issued(root, validity=Validity.starting(utc_now(), 200 * YEAR))
+    issued(root, lifetime=100 * YEAR)
     assert of_enclave_without_repair(root, "outlives-ca") is Severity.WARNING
 
 

@@ -130,13 +130,13 @@ def test_a_clock_near_it_is_not(root: Path, monkeypatch: pytest.MonkeyPatch) -> 
         assert renew(root, ["/a"], options=renewing()).changed
 
 
-@pytest.mark.parametrize(("ahead", "anew"), [(timedelta(days=30), True), (timedelta(0), False)])
+@pytest.mark.parametrize(("ahead", "renewed"), [(timedelta(days=30), True), (timedelta(0), False)])
 def test_what_was_issued_by_a_clock_ahead_is_issued_again(
-    ahead: timedelta, anew: bool, tmp_path: Path
+    ahead: timedelta, renewed: bool, tmp_path: Path
 ) -> None:
-    """A robot without a battery for its clock may come up weeks ahead; DDS would then refuse until they have passed."""
+    """The clock of a robot without a battery may be weeks ahead. DDS refuses such a certificate until its start."""
     root = filled(tmp_path / "ks", ["/a"])
     filled(root, ["/b"], now=utc_now() + ahead)
     before = (root / "enclaves/b/cert.pem").read_bytes()
     filled(root, ["/a", "/b"])
-    assert ((root / "enclaves/b/cert.pem").read_bytes() != before) is anew
+    assert ((root / "enclaves/b/cert.pem").read_bytes() != before) is renewed

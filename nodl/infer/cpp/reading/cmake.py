@@ -1,7 +1,8 @@
-"""What a ``CMakeLists.txt`` builds: targets with sources, definitions and links, registered components, plugins.
+"""Read from ``CMakeLists.txt`` what a package builds and installs.
 
-Also which scripts it installs as executables. Reads files below the package; runs nothing. Conditions are not decided,
-except tests (left out): both sides count, and what only one of them defines is open.
+These are targets with sources, definitions and links, registered components, plugin descriptions, and scripts. Reads
+files below the package; runs nothing. Conditions are not decided, except tests (left out): both sides count, and what
+only one of them defines is open.
 """
 
 from __future__ import annotations
