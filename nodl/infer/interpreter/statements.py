@@ -158,7 +158,10 @@ def _jump(run: Run, node: ast.Break | ast.Continue, frame: Frame) -> bool:
 
 
 def _match(run: Run, node: ast.Match, frame: Frame) -> bool:
-    """Run any of the cases, or none unless the last one takes everything; which one is not followed."""
+    """Run the cases as the tests that they are; if they take the subject apart, any of them, or none."""
+    tests = _as_tests(node)
+    if tests is not None:
+        return run.execute(tests, frame)
     subject = run.evaluate(node.subject, frame)
     if not any(isinstance(atom, (Unknown, External)) for atom in subject):
         run.gap(node, frame, "which case of this match statement is taken is not followed")
@@ -166,6 +169,44 @@ def _match(run: Run, node: ast.Match, frame: Frame) -> bool:
     everything = isinstance(last.pattern, ast.MatchAs) and last.pattern.pattern is None and last.guard is None
     sides = [partial(_case, run, case, subject, frame) for case in node.cases]
     return run.state.branches(sides if everything else [*sides, lambda: True])
+
+
+@cache
+def _as_tests(node: ast.Match) -> list[ast.stmt] | None:
+    """Return ``if``, ``elif`` and ``else`` that do the same; None if a pattern is more than constants and names.
+
+    The subject is read by each test, or once before them if a guard may change it.
+    """
+    subject, before = node.subject, list[ast.stmt]()
+    guards = [case.guard for case in node.cases if case.guard is not None]
+    calls = any(isinstance(part, ast.Call | ast.NamedExpr) for guard in guards for part in ast.walk(guard))
+    if calls or not isinstance(subject, ast.Name | ast.Attribute):
+        before = [ast.Assign([ast.Name("the subject", ast.Store())], subject)]
+        subject = ast.Name("the subject", ast.Load())
+    rest: list[ast.stmt] = []
+    for case in reversed(node.cases):
+        test = _as_test(subject, case.pattern)
+        if test is None:
+            return None
+        if case.guard is not None:
+            test = ast.BoolOp(ast.And(), [test, case.guard])
+        rest = [ast.copy_location(ast.If(test, case.body, rest), case.pattern)]
+    return [ast.fix_missing_locations(ast.copy_location(each, node)) for each in (*before, *rest)]
+
+
+def _as_test(subject: ast.expr, pattern: ast.pattern) -> ast.expr | None:
+    match pattern:
+        case ast.MatchValue(value):
+            return ast.Compare(subject, [ast.Eq()], [value])
+        case ast.MatchSingleton(constant):
+            return ast.Compare(subject, [ast.Is()], [ast.Constant(constant)])
+        case ast.MatchAs(None, None):
+            return ast.Constant(True)
+        case ast.MatchOr(patterns):
+            tests = [_as_test(subject, each) for each in patterns]
+            known = [each for each in tests if each is not None]
+            return ast.BoolOp(ast.Or(), known) if len(known) == len(tests) else None
+    return None
 
 
 def _case(run: Run, case: ast.match_case, subject: Value, frame: Frame) -> bool:

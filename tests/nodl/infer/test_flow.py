@@ -124,8 +124,30 @@ CASES: dict[str, tuple[str, list[str]]] = {
     "walrus": ("if (x := 'a'):\n    self.P(x)", ["a"]),
     "match": ("match sys.argv[1]:\n    case 'x':\n        self.P('a')\n    case _:\n        self.P('b')", ["a", "b"]),
     "match of what is known": (
-        "x = 2\nmatch x:\n    case 1: self.P('a')\n    case 2 | 3: self.P('b')\n    case _: self.P('c')",
-        ["a", "b", "c"],
+        "x = 2\nmatch x:\n    case 1: self.P('a')\n    case 2 | 3: self.P('b')\n    case _: self.P('c')", ["b"],
+    ),
+    "match of what one of two is": (
+        "x = 2 if sys.argv[1:] else 1\nmatch x:\n    case 1: y = 'a'\n    case 2: y = 'b'\n    case _: y = 'c'\n"
+        "self.P(y)", ["a", "b"],
+    ),
+    "match of None and members": (
+        "from enum import Enum\nclass F(Enum):\n    A = 1\n    B = 2\n"
+        "x = F.B\nmatch x:\n    case None: self.P('a')\n    case F.A: self.P('b')\n    case F.B: self.P('c')", ["c"],
+    ),
+    "match with guards": (
+        "x = 2\ny = 'z'\nmatch x:\n    case 2 if y == 'a': self.P('a')\n    case _ if y == 'z': self.P('b')\n"
+        "    case 2: self.P('c')", ["b"],
+    ),
+    "match that takes a list apart": (
+        "x = ['a', 'b']\nmatch x:\n    case [y]: self.P('c')\n    case [y, z]: self.P(z)", ["?", "c"],
+    ),
+    "match with a guard that may change it": (
+        "def f():\n    self.x = 2\n    return sys.argv[1:]\nself.x = 1\n"
+        "match self.x:\n    case 1 if f(): self.P('a')\n    case 1: self.P('b')\n    case 2: self.P('c')", ["a", "b"],
+    ),
+    "match of what a call gives, which is called once": (
+        "def f():\n    self.P('a')\n    return self.x\nself.x = 'b'\n"
+        "match f():\n    case 'c': self.P('c')\n    case 'b': self.P('b')", ["a", "b"],
     ),
     "partial": ("import functools\nf = functools.partial(self.P, 'a')\nf()", ["a"]),
     "path join": ("import os\nself.P(os.path.join('a', 'b'))", ["a/b"]),

@@ -362,6 +362,11 @@ class Decided(Node):
             self.set_parameters([Parameter("mode", value="manual")])
         if self.get_parameter("mode").value == "manual":
             self.publish("manual")
+        match self.declare_parameter("gait", "stand").value:
+            case "walk" | "trot":
+                self.publish("steps")
+            case "wheel":
+                self.publish("wheels")
 
     def publish(self, topic):
         self.create_publisher(String, topic, 10)
@@ -382,6 +387,8 @@ rclpy.spin(Decided())
         ({"listen": "false"}, {"/r1/arm/joint_1", "/r1/arm/joint_2", "/r2/inbox", "/r1/polled"}),
         ({"mode": "manual"}, {"/r1/arm/joint_1", "/r1/arm/joint_2", "/r2/inbox", "/r1/manual"}),
         ({"mode": "auto"}, {"/r1/arm/joint_1", "/r1/arm/joint_2", "/r2/inbox", "/r1/manual"}),
+        ({"gait": "trot"}, {"/r1/arm/joint_1", "/r1/arm/joint_2", "/r2/inbox", "/r1/steps"}),
+        ({"gait": "wheel"}, {"/r1/arm/joint_1", "/r1/arm/joint_2", "/r2/inbox", "/r1/wheels"}),
     ],
 )
 def test_parameters_of_the_launch_decide_what_a_program_makes(
