@@ -20,7 +20,7 @@ from nodl.node_interface import Gap, NodeInterface
 from nodl.source_ref import SourceRef
 
 Found = TypeVar("Found")
-CPP_SUFFIXES = (".cpp", ".cc", ".cxx", ".hpp", ".hh", ".hxx", ".h")
+CPP_SUFFIXES = (".cpp", ".cc", ".cxx", ".cu", ".hpp", ".hh", ".hxx", ".h", ".cuh")
 _SKIPPED_FOLDERS = frozenset(
     {"build", "install", "log", "node_modules", "venv", "site-packages", "__pycache__"}
 )

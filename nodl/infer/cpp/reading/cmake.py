@@ -24,9 +24,9 @@ SOURCES = (".cpp", ".cc", ".cxx", ".c++", ".C")
 _SOURCE_SUFFIXES = (*SOURCES, ".cu")
 _EXECUTABLES = frozenset({
     "add_executable", "ament_auto_add_executable", "rclcpp_add_executable", "qt5_add_executable", "qt6_add_executable",
-    "qt_add_executable",
+    "qt_add_executable", "cuda_add_executable",
 })  # fmt: skip
-_LIBRARIES = frozenset({"add_library", "ament_auto_add_library"})
+_LIBRARIES = frozenset({"add_library", "ament_auto_add_library", "cuda_add_library"})
 _GLOB_OPTIONS = frozenset({"CONFIGURE_DEPENDS", "RELATIVE", "LIST_DIRECTORIES", "true", "false"})
 _LIBRARY_WORDS = frozenset({
     "SHARED", "STATIC", "MODULE", "OBJECT", "INTERFACE", "EXCLUDE_FROM_ALL", "IMPORTED", "ALIAS", "GLOBAL", "UNKNOWN",

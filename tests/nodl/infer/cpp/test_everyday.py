@@ -578,6 +578,19 @@ def test_kernels_of_cuda_are_read_as_cpp(tmp_path: Path) -> None:
     assert any("constructor of Engine is not in reach" in why for why in gaps(without))
 
 
+def test_a_program_may_be_built_by_the_commands_of_cuda(tmp_path: Path) -> None:
+    source = "#include <thrust/device_vector.h>\n" + in_class(
+        f'thrust::device_vector<float> d(8); thrust::sort(d.begin(), d.end()); {PUB}("a", 1);'
+    )
+    cmake = "cuda_add_executable(node src/main.cu)"
+    system = infer_paths([package(tmp_path / "demo", {"src/main.cu": source}, cmake)])
+    assert (names(system), gaps(system)) == (["a"], [])
+    assert [(node.package, node.executable) for node in system.nodes] == [("demo", "node")]
+    other = source.replace("thrust/device_vector.h", "acme/all.h").replace("thrust::", "acme::")
+    system = infer_paths([package(tmp_path / "other", {"src/main.cu": other}, cmake)])
+    assert any("acme::device_vector" in why for why in gaps(system))
+
+
 def test_what_another_middleware_subscribes_is_none_of_ros(tmp_path: Path) -> None:
     body = f'{PUB}("a", 1); lcm_.subscribe("b", 1, this);'
     assert not gaps(infer(tmp_path, in_class(body, "lcm::LCM lcm_;", "#include <lcm/lcm-cpp.hpp>\n")))
