@@ -184,8 +184,11 @@ def conditions_of(run: Run, test: ast.expr, holds: bool, frame: Frame) -> tuple[
         if isinstance(test.op, ast.And) == holds or len(parts) == 1:
             return tuple(each for part in parts for each in conditions_of(run, part, holds, frame))
     condition = condition_of(run, test, frame)
-    found = condition if holds else opposite(condition)
-    return () if found is None or is_one_of_several(found.asked) else (found,)
+    return _certain(condition if holds else opposite(condition))
+
+
+def _certain(condition: Guard | None) -> tuple[Guard, ...]:
+    return () if condition is None or is_one_of_several(condition.asked) else (condition,)
 
 
 def under(run: Run, conditions: tuple[Guard, ...], action: Callable[[], T]) -> T:
@@ -204,7 +207,10 @@ def sides_of(
 
     What is made where a launch decides in a way that no condition says is a gap, until a launch decides.
     """
-    held = {holds: conditions_of(run, test, holds, frame) for holds in (True, False)}
+    condition = condition_of(run, test, frame)
+    held = {True: _certain(condition), False: _certain(opposite(condition))}
+    if condition is None and isinstance(test, ast.BoolOp | ast.UnaryOp):
+        held = {holds: conditions_of(run, test, holds, frame) for holds in (True, False)}
     read = [] if all(held.values()) else [*filter(is_of_launch, _read_in(run, test, frame))]
     asks = not all(map(_is_only_if_set, read))  # the names that such a text makes say so themselves
     run.asks_launch = run.asks_launch or bool(read)
@@ -217,7 +223,6 @@ def sides_of(
             run.gap(test, frame, "what is made under this test depends on a launch")
         return outcome
 
-    condition = condition_of(run, test, frame)
     joined = partial(either, run, condition) if condition or asks else None
     return joined, [partial(side, True), partial(side, False)]
 
@@ -235,9 +240,14 @@ def reads_one_of_several(run: Run, test: ast.expr, frame: Frame) -> bool:
 
 
 def _read_in(run: Run, test: ast.expr, frame: Frame) -> Iterator[object]:
-    for part in ast.walk(test):
-        if isinstance(part, ast.Name | ast.Attribute | ast.Call) and _may_ask(part):
-            yield from _answer(run, part, frame)
+    for part in _parts_that_may_ask(test):
+        yield from _answer(run, part, frame)
+
+
+@functools.lru_cache(maxsize=8192)
+def _parts_that_may_ask(test: ast.expr) -> tuple[ast.expr, ...]:
+    parts = (part for part in ast.walk(test) if isinstance(part, ast.Name | ast.Attribute | ast.Call))
+    return tuple(part for part in parts if _may_ask(part))
 
 
 def is_of_launch(atom: object) -> bool:
