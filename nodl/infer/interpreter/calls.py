@@ -174,9 +174,9 @@ def bind(run: Run, function: FunctionValue, call: Call) -> LocalCells:
     if parameters.vararg:
         rest = tuple(given.positional[len(names) :])
         items = Items(None, join(given.more, Items(rest).any_element())) if given.more else Items(rest)
-        cells[parameters.vararg.arg] = run.sequence(parameters.vararg, "tuple", items)
+        cells[parameters.vararg.arg] = run.sequence(call.node, "tuple", items, "positional arguments")
     if parameters.kwarg:
-        cells[parameters.kwarg.arg] = _keywords(run, parameters.kwarg, given, used)
+        cells[parameters.kwarg.arg] = _keywords(run, call.node, given, used)
     return cells
 
 
@@ -189,7 +189,7 @@ def _named(name: str, given: Arguments, default: Value | None, more: Value) -> V
 
 
 def _keywords(run: Run, node: ast.AST, given: Arguments, used: set[str]) -> Value:
-    obj = run.allocate(node, "dict", Dictionary)
+    obj = run.allocate(node, "keyword arguments", Dictionary)
     for name, value in given.keywords.items():
         if name not in used:
             run.state.store(obj, Key(name), value)

@@ -472,6 +472,8 @@ def _compare_atoms(op: ast.cmpop, left: object, right: object) -> bool | None:
             isinstance(left.cls, ClassValue) and is_enumeration(left.cls) and "__eq__" not in left.cls.cells
         )
         return (left is right) is same if members else None
+    if isinstance(left, ClassValue) and isinstance(right, ClassValue) and not left.summary:
+        return (left is right) is same
     if left is None or right is None:
         other = right if left is None else left
         own = isinstance(other, Instance) and isinstance(op, (ast.Eq, ast.NotEq))

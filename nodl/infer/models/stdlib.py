@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import os.path
 from collections.abc import Callable
 from functools import partial
@@ -238,7 +239,20 @@ def _getattr(run: Run, call: Call) -> Value:
         is_node = any(atom in run.findings.node_of for atom in owner)
         found = join(found, unknown(OF_A_NODE if is_node else "an attribute whose name is made at run time"))
     default = call.args.at(2)
-    return found if default is None else join(found, default)
+    certain = default is None or all(_has_attribute(atom, name) for atom in owner for name in names)
+    return found if certain else join(found, default or BOTTOM)
+
+
+def _has_attribute(atom: object, name: object) -> bool:
+    """Return True if an object certainly has the attribute: a field that is set, or a method of its class."""
+    if not isinstance(atom, Instance) or not isinstance(atom.cls, ClassValue):
+        return False
+    held = atom.cells.get(name)
+    if held and ABSENT[0] not in held and not atom.summary:
+        return True
+    body = [statement for cls in program_classes(atom.cls) for statement in cls.node.body]
+    methods = (each for each in body if isinstance(each, ast.FunctionDef | ast.AsyncFunctionDef))
+    return any(method.name == name for method in methods)
 
 
 def _setattr(run: Run, call: Call) -> Value:

@@ -227,6 +227,27 @@ OUTSIDE: dict[str, tuple[str, str, str, list[str]]] = {
         "", "if sys.argv[1]:\n    self.topic = 'b'\nself.P(self.topic)", "topic = 'a'", ["a", "b"],
     ),
     "property": ("", "self.P(self.topic)", "@property\ndef topic(self):\n    return 'a'", ["a"]),
+    "getattr of a method, and of none": (
+        "", "for x in ('a', 'b'):\n    getattr(self, 'make_' + x, self.P)(x)",
+        "def make_a(self, x):\n    self.P('made')", ["b", "made"],
+    ),
+    "getattr of a method that some classes have": (
+        "", "getattr(self, 'make', lambda: self.P('b'))()",
+        "if sys.argv[1:]:\n    def make(self):\n        self.P('a')", ["a", "b"],
+    ),
+    "getattr of a field": (
+        "", "self.x = 'a'\nif sys.argv[1:]:\n    self.y = 'c'\n"
+        "self.P(getattr(self, 'x', 'b'))\nself.P(getattr(self, 'y', 'd'))", "", ["a", "c", "d"],
+    ),
+    "keyword arguments of two calls": (
+        "", "self.f(x='a')\nself.f(x='b', y='c')\nself.f()",
+        "def f(self, **k):\n    if k:\n        k['x'] = k['x'] + k.pop('y', '')\n    self.P(k.get('x', 'd'))",
+        ["a", "bc", "d"],
+    ),
+    "which class it is": (
+        "class A:\n    T = 'a'\nclass B:\n    T = 'b'",
+        "x = A\nx = B if x is A else A\nself.P(x.T)\nself.P(x.T if x != B else 'c')", "", ["b", "c"],
+    ),
     "static method": ("", "self.P(self.f('a'))", "@staticmethod\ndef f(x):\n    return x + '/b'", ["a/b"]),
     "class method": ("", "self.P(self.f())", "@classmethod\ndef f(cls):\n    return cls.T\nT = 'a'", ["a"]),
     "dataclass": (
