@@ -67,12 +67,21 @@ Piece = str | Input | NodePart | Hole
 
 
 class Text:
-    """Made by ``make_text`` only, so that equal texts are one object and compare at once."""
+    """A text with something else in it than one literal; equal whatever the reasons of its holes."""
 
-    __slots__ = ("pieces",)
+    __slots__ = ("_hash", "pieces")
 
     def __init__(self, pieces: tuple[Piece, ...]) -> None:
         self.pieces = pieces
+        self._hash = hash(pieces)
+
+    def __eq__(self, other: object) -> bool:
+        return self is other or (
+            type(other) is Text and self._hash == other._hash and self.pieces == other.pieces
+        )
+
+    def __hash__(self) -> int:
+        return self._hash
 
     def __repr__(self) -> str:
         return f"Text({self.pieces!r})"
@@ -83,16 +92,6 @@ class Text:
 
 
 TextAtom = str | Text
-
-_texts: dict[tuple[Piece, ...], Text] = {}
-
-
-def make_text(pieces: tuple[Piece, ...]) -> Text:
-    """Return the one ``Text`` of these pieces (which are not empty, and not a single literal)."""
-    text = _texts.get(pieces)
-    if text is None:
-        text = _texts[pieces] = Text(pieces)
-    return text
 
 
 def text_of(pieces: Iterable[Piece]) -> TextAtom:
@@ -121,7 +120,7 @@ def text_of(pieces: Iterable[Piece]) -> TextAtom:
         return merged[0]
     if len(merged) > MAX_PARTS:
         merged = [merged[0], Hole("a very long text"), merged[-1]]
-    return make_text(tuple(merged))
+    return Text(tuple(merged))
 
 
 def is_one_of_several(piece: Input) -> bool:
@@ -149,7 +148,7 @@ def concatenate(left: TextAtom, right: TextAtom) -> TextAtom:
     )
     if melts or _is_long(left) or _is_long(right):
         return text_of((*head, *tail))
-    return make_text((*head, *tail))
+    return Text((*head, *tail))
 
 
 def _is_long(text: TextAtom) -> bool:
@@ -247,4 +246,4 @@ def input_of(text: object) -> Input | None:
 
 def with_edit(piece: Input, method: str, arguments: tuple[str, ...]) -> Text:
     """Return the input after one more edit."""
-    return make_text((piece._replace(edits=(*piece.edits, (method, arguments))),))
+    return Text((piece._replace(edits=(*piece.edits, (method, arguments))),))

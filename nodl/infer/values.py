@@ -330,7 +330,7 @@ class Frame:
             frame = frame.closure
 
 
-# Equal only to themselves, or strings: ``in`` then says the same as comparing one by one, and faster.
+# Equal only to their own kind: ``in`` then says the same as comparing one by one, and faster.
 _COMPARED_IN_C = frozenset({
     str, Text, External, Instance, Sequence, Dictionary, FunctionValue, ClassValue, ModuleValue,
 })  # fmt: skip

@@ -24,7 +24,6 @@ from nodl.infer.text import (
     constant_text,
     input_of,
     is_one_of_several,
-    make_text,
     pieces_of,
 )
 from nodl.infer.values import (
@@ -419,7 +418,7 @@ def narrowed(run: Run, test: ast.expr, outcome: bool, frame: Frame) -> None:
 
 def only_if(condition: Guard, text: TextAtom) -> Text:
     """Return ``text`` if the condition holds, and nothing otherwise."""
-    return make_text((condition.piece, *(pieces_of(text) if text else ())))
+    return Text((condition.piece, *(pieces_of(text) if text else ())))
 
 
 def compare(run: Run, node: ast.Compare, frame: Frame) -> Value:

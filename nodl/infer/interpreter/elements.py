@@ -9,7 +9,7 @@ from functools import partial
 from nodl.infer.interpreter.conditions import is_of_launch
 from nodl.infer.interpreter.define import enumeration_members, is_constant, is_enumeration, setter_of
 from nodl.infer.interpreter.run import Arguments, Run
-from nodl.infer.text import Input, Text, constant_text, input_of, make_text
+from nodl.infer.text import Input, Text, constant_text, input_of
 from nodl.infer.values import (
     ABSENT,
     ANY,
@@ -72,7 +72,7 @@ def _element(run: Run, atom: object, key: Value, node: ast.Subscript, frame: Fra
         piece = atom.pieces[0]
         index = key[0] if len(key) == 1 else None
         if len(atom.pieces) == 1 and isinstance(piece, Input) and piece.item is None and type(index) is int:
-            return (make_text((Input(piece.name, piece.owner, index, piece.edits),)),)
+            return (Text((Input(piece.name, piece.owner, index, piece.edits),)),)
         return unknown("a part of a text that is not known")
     if isinstance(atom, ClassValue):
         return ANY if is_enumeration(atom) else (atom,)  # Generic[T]
@@ -146,7 +146,7 @@ def _part(value: Value, index: int) -> Value:
     if asked is None or not asked.edits or asked.edits[-1][0] != "split":
         return value
     part = ("part", (str(index), *asked.edits[-1][1]))
-    return (make_text((asked._replace(edits=(*asked.edits[:-1], part)),)),)
+    return (Text((asked._replace(edits=(*asked.edits[:-1], part)),)),)
 
 
 def _sliced(run: Run, sequence: Sequence, bounds: slice | None, node: ast.AST) -> Value:
@@ -193,7 +193,7 @@ def _input_items(text: Text) -> Value:
     """Return each element of a parameter that holds a list."""
     piece = text.pieces[0]
     if len(text.pieces) == 1 and isinstance(piece, Input) and piece.item is None and not piece.edits:
-        return (make_text((Input(piece.name, piece.owner, "each"),)),)
+        return (Text((Input(piece.name, piece.owner, "each"),)),)
     return unknown("the characters of a text that is not known")
 
 

@@ -34,7 +34,6 @@ from nodl.infer.text import (
     TextAtom,
     concatenate,
     concatenations,
-    make_text,
 )
 from nodl.infer.values import (
     ANY,
@@ -146,7 +145,7 @@ def _text_side(value: Value) -> list[TextAtom]:
         if isinstance(atom, (str, Text)):
             found.append(atom)
         elif isinstance(atom, Unknown):
-            found.append(make_text((Hole(atom.why),)))
+            found.append(Text((Hole(atom.why),)))
     return found or as_texts(value)
 
 

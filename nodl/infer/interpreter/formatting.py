@@ -10,7 +10,7 @@ from collections.abc import Sequence as Sequences
 from contextlib import suppress
 
 from nodl.infer.interpreter.run import Arguments, Run
-from nodl.infer.text import Hole, Text, TextAtom, common_text, concatenations, make_text
+from nodl.infer.text import Hole, Text, TextAtom, common_text, concatenations
 from nodl.infer.values import (
     ANY,
     BOTTOM,
@@ -28,7 +28,7 @@ from nodl.infer.values import (
 
 
 def _hole(why: str) -> Text:
-    return make_text((Hole(why),))
+    return Text((Hole(why),))
 
 
 def as_texts(value: Value) -> list[TextAtom]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from nodl.infer.interpreter.run import Arguments, Call, Run
-from nodl.infer.text import Input, Text, input_of, make_text
+from nodl.infer.text import Input, Text, input_of
 from nodl.infer.values import (
     ANY,
     BOOLEAN,
@@ -104,12 +104,12 @@ def _parsed(run: Run, name: str, call: Call) -> Value:
         default = sole(given.get("default", (not there,)))
         run.options.declare(name, (default,))
         flag = Input(name, run.options, None, (("given", (str(there), str(default))),))
-        return (make_text((flag,)),) if isinstance(default, bool) else BOOLEAN
+        return (Text((flag,)),) if isinstance(default, bool) else BOOLEAN
     kept = all(isinstance(atom, External) and atom.path in _KEEP_TEXT for atom in given.get("type", BOTTOM))
     run.asks_launch = run.asks_launch or not kept
     if action != "store" or nargs not in (None, "?") or not kept:
         return unknown(f"what is made of the command line option {name}")
-    return (make_text((Input(name, run.options),)),)
+    return (Text((Input(name, run.options),)),)
 
 
 def _settled(run: Run, name: str, call: Call) -> Value:

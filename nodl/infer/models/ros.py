@@ -35,7 +35,6 @@ from nodl.infer.text import (
     concatenate,
     constant_text,
     is_of_inputs,
-    make_text,
     pieces_of,
     with_edit,
 )
@@ -253,7 +252,7 @@ def add_endpoint(
     conditions = [guard.piece for guard in run.guards if guard.asked.owner in (record, run.options)]
     if conditions and isinstance(name, (str, Text)):
         pieces = pieces_of(name)
-        name = make_text((*(each for each in conditions if each not in pieces), *(pieces if name else ())))
+        name = Text((*(each for each in conditions if each not in pieces), *(pieces if name else ())))
     known = len(record.endpoints)
     record.add_endpoint(kind, name, type_name, call.source, qos)
     run.findings.made += len(record.endpoints) - known
@@ -343,7 +342,7 @@ def _own_name(what: str) -> NodeMethod:
             or launched.namespace is None
             or record.namespaces != NONE
         ):
-            return (make_text((NodePart(what),)),)
+            return (Text((NodePart(what),)),)
         full = f"{launched.namespace.rstrip('/')}/{launched.name}"
         return ({"name": launched.name, "namespace": launched.namespace}.get(what, full),)
 
@@ -428,7 +427,7 @@ def _inputs(run: Run, record: NodeRecord, names: list[str], call: Call) -> Value
                 only_if(unset, each) for each in declared if isinstance(each, Text) and is_of_inputs(each)
             ]
             only_set = others or (run.without_value and not declared)
-            text = with_edit(asked, "only if set", ()) if only_set else make_text((asked,))
+            text = with_edit(asked, "only if set", ()) if only_set else Text((asked,))
             result = join(result, (text, *others))
     return result
 
@@ -510,7 +509,7 @@ def _get_parameters_by_prefix(run: Run, record: NodeRecord, call: Call) -> Value
     for prefix in constant_strings(call.args.at(0, "prefix") or ANY):
         start = f"{prefix}." if prefix else ""
         everything = Input(f"{start}**", record)
-        value = parameter_object(run, call, ANY, (make_text((everything,)),), f"below {prefix}")
+        value = parameter_object(run, call, ANY, (Text((everything,)),), f"below {prefix}")
         keys: Value = (with_edit(everything, "key", (start,)),)
         run.state.store(found, OTHER, join(found.cells.get(OTHER, BOTTOM), value))
         run.state.store(found, OTHER_KEYS, join(found.cells.get(OTHER_KEYS, BOTTOM), keys))

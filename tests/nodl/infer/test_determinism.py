@@ -13,6 +13,7 @@ import pytest
 
 from nodl.infer import InferredSystem, infer_paths
 from nodl.infer.report.written import expand, to_json
+from nodl.name_template import UnknownPart
 
 # Each level of calls doubles the work: without a budget this would take minutes.
 _ENDLESS = "\n".join(
@@ -121,6 +122,24 @@ def _in_fresh_process(folder: Path, seed: str) -> bytes:
     command = [sys.executable, "-c", _SECURE_NODL, "infer", str(folder), "--format", "json"]
     environment = {**os.environ, "PYTHONHASHSEED": seed}
     return subprocess.run(command, env=environment, check=True, capture_output=True).stdout
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("input()", "text that the user types"),
+        ("','.join(open('f'))", "joined texts"),
+        ("open('f').read()", "a result of builtins"),
+    ],
+)
+def test_the_reason_of_a_gap_is_of_its_own_program(tmp_path: Path, text: str, why: str) -> None:
+    """Also after other programs with a gap in a name of the same form."""
+    program = tmp_path / "program.py"
+    before = "import rclpy\nnode = rclpy.create_node('n')\n"
+    program.write_text(f"{before}node.create_publisher(object, 'a/' + {text}, 1)\n")
+    (node,) = infer_paths([program]).nodes
+    (part,) = [part for part in node.endpoints[0].name.parts if isinstance(part, UnknownPart)]
+    assert part.why == why
 
 
 def test_a_huge_literal_costs_little_and_is_said(tmp_path: Path) -> None:
