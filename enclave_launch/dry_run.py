@@ -150,7 +150,8 @@ class Node(_Strict, frozen=True):
 
 
 class Diagnostic(_Strict, frozen=True):
-    """One thing a person should know; ``code`` is stable (``enclave_launch.diagnostics.Code``)."""
+    """One thing a person should know, of planning or a check; ``code`` is stable (``enclave_launch.diagnostics.Code``,
+    ``review.checks.rules``)."""
 
     severity: Literal["error", "warning"] = _described("error: --secure refuses to start")
     code: str
@@ -159,6 +160,11 @@ class Diagnostic(_Strict, frozen=True):
     line: int
     text: str
     remedy: str = _described("what to do next, empty when nothing needs doing")
+
+    @property
+    def place(self) -> str:
+        """Return ``file:line``, the file alone where the whole of it is meant, or nothing."""
+        return f"{self.file}:{self.line}" if self.file and self.line else self.file or ""
 
 
 class DryRun(_Strict, frozen=True):

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 
 from enclave_common.words import counted, some_of
-from enclave_launch.review.document import OPERATIONS, GrantedName, PlanDocument, PlanFinding
+from enclave_launch.dry_run import Diagnostic
+from enclave_launch.review.document import OPERATIONS, GrantedName, PlanDocument
 from enclave_launch.review.information_flow import FlowGraph, FlowStep, opened_by_sharing, reached_from
 from enclave_launch.review.similarity import Merge, Split
 from nodl.ament_index import MISSING_PREFIX
 
-Judged = Sequence[tuple[PlanFinding, "str | None"]]
+Judged = Sequence[tuple[Diagnostic, "str | None"]]
 
 
 def plan_text(plan: PlanDocument) -> str:
@@ -62,7 +63,7 @@ def findings_text(judged: Judged, *, verbose: bool = False) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _kind_of_absent(finding: PlanFinding) -> str:
+def _kind_of_absent(finding: Diagnostic) -> str:
     """Return what the finding reports to be absent from this machine; empty if it is about the launch itself."""
     if finding.code == "parameter-file-missing" and not finding.subject.startswith(f"{MISSING_PREFIX}/"):
         return ""
@@ -71,7 +72,7 @@ def _kind_of_absent(finding: PlanFinding) -> str:
     return _ABSENT.get(finding.code, "")
 
 
-def _absent_text(findings: Sequence[PlanFinding]) -> Iterator[str]:
+def _absent_text(findings: Sequence[Diagnostic]) -> Iterator[str]:
     """Yield the paragraph about all that this machine lacks of a launch."""
     subjects: dict[str, dict[str, None]] = {}
     for finding in findings:
@@ -107,8 +108,8 @@ _SUMMED_UP = frozenset({
 """Codes of which a plan has many that are as they are meant to be, or that follow from a finding that is printed."""
 
 
-def _folded(ordered: Judged, verbose: bool) -> Iterator[tuple[PlanFinding, str | None, list[PlanFinding]]]:
-    groups: dict[object, list[tuple[PlanFinding, str | None]]] = {}
+def _folded(ordered: Judged, verbose: bool) -> Iterator[tuple[Diagnostic, str | None, list[Diagnostic]]]:
+    groups: dict[object, list[tuple[Diagnostic, str | None]]] = {}
     for number, (diagnostic, accepted) in enumerate(ordered):
         alone = verbose or accepted is not None or diagnostic.code not in _FOLDED
         key = number if alone else (diagnostic.severity, diagnostic.code)
@@ -128,7 +129,7 @@ def findings_document(judged: Judged) -> dict[str, object]:
     """Return the findings for JSON, each with the reason why it was accepted, or None."""
     return {
         "version": 1,
-        "findings": [{**diagnostic._asdict(), "accepted": accepted} for diagnostic, accepted in judged],
+        "findings": [{**dict(diagnostic), "accepted": accepted} for diagnostic, accepted in judged],
     }
 
 

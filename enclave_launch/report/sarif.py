@@ -7,13 +7,13 @@ import os
 from collections.abc import Iterable, Mapping
 from urllib.parse import quote
 
-from enclave_launch.review.document import PlanFinding
+from enclave_launch.dry_run import Diagnostic
 
 SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 
 
 def sarif_document(
-    findings: Iterable[tuple[PlanFinding, str | None]], rules: Mapping[str, str], version: str, root: str
+    findings: Iterable[tuple[Diagnostic, str | None]], rules: Mapping[str, str], version: str, root: str
 ) -> dict[str, object]:
     """Return findings, each with the reason why it was accepted, as a SARIF log; paths below ``root`` are relative."""
     results = [_result(diagnostic, accepted, root) for diagnostic, accepted in findings]
@@ -28,7 +28,7 @@ def sarif_document(
     return {"$schema": SCHEMA, "version": "2.1.0", "runs": [run]}
 
 
-def _result(diagnostic: PlanFinding, accepted: str | None, root: str) -> dict[str, object]:
+def _result(diagnostic: Diagnostic, accepted: str | None, root: str) -> dict[str, object]:
     text = f"{diagnostic.text}: {diagnostic.remedy}" if diagnostic.remedy else diagnostic.text
     result: dict[str, object] = {
         "ruleId": diagnostic.code,
@@ -43,7 +43,7 @@ def _result(diagnostic: PlanFinding, accepted: str | None, root: str) -> dict[st
     return result
 
 
-def _fingerprint(diagnostic: PlanFinding, root: str) -> str:
+def _fingerprint(diagnostic: Diagnostic, root: str) -> str:
     """Return an identifier that is stable while a finding's line moves: code hosts match findings of two runs by it."""
     file = os.path.relpath(diagnostic.file, root) if diagnostic.file else ""
     return hashlib.sha256(

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Literal, NamedTuple
 
 from enclave_launch.admission.middleware import ZENOH
-from enclave_launch.dry_run import Component, DryRun, Interface, Node, Operation, Process
+from enclave_launch.dry_run import Component, Diagnostic, DryRun, Interface, Node, Operation, Process
 from enclave_launch.policy.derivation import LIST_NAMES
 from enclave_launch.process import UNSPECIFIED_NODE_NAMESPACE
 
@@ -51,23 +51,6 @@ class NodeView(NamedTuple):
         return self.own | self.built_in
 
 
-class PlanFinding(NamedTuple):
-    """A problem or warning of the plan."""
-
-    severity: Literal["error", "warning"]
-    code: str
-    subject: str
-    file: str | None
-    line: int
-    text: str
-    remedy: str
-
-    @property
-    def place(self) -> str:
-        """Return ``file:line``, the file alone where the whole of it is meant, or nothing."""
-        return f"{self.file}:{self.line}" if self.file and self.line else self.file or ""
-
-
 _GAPS = frozenset({
     "no-manifest", "interface-unknown", "node-name-unknown", "parameters-unknown", "parameter-file-missing",
     "include-left-out", "not-foreseeable", "container-elsewhere",
@@ -80,7 +63,7 @@ class PlanDocument(NamedTuple):
 
     enclaves: Mapping[str, frozenset[GrantedName]]
     nodes: tuple[NodeView, ...]
-    diagnostics: tuple[PlanFinding, ...]
+    diagnostics: tuple[Diagnostic, ...]
     on_zenoh: frozenset[str] = frozenset()
 
     @property
@@ -117,7 +100,7 @@ def plan_from_document(document: DryRun) -> PlanDocument:
             for path, enclave in document.enclaves.items()
         },
         tuple(_nodes(document)),
-        tuple(PlanFinding(**dict(diagnostic)) for diagnostic in document.diagnostics),
+        tuple(document.diagnostics),
         frozenset(
             process.enclave
             for process in document.processes

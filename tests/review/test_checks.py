@@ -7,8 +7,9 @@ from typing import Any
 import pytest
 
 from enclave_launch import DryRun, UsageError
+from enclave_launch.dry_run import Diagnostic
 from enclave_launch.review.checks import RULES, check_plan
-from enclave_launch.review.document import PlanFinding
+from enclave_launch.review.checks.rules import finding
 from enclave_launch.verb.secure_plan.judging import read_expectations, rule_findings
 from tests.review.conftest import ROBOT, Asked, document, process
 
@@ -17,7 +18,7 @@ def two(one: Asked, other: Asked) -> dict[str, Any]:
     return document({"/one": {"/n1": one}, "/two": {"/n2": other}})
 
 
-def checks(checked: dict[str, Any]) -> list[PlanFinding]:
+def checks(checked: dict[str, Any]) -> list[Diagnostic]:
     return check_plan(DryRun(**checked))
 
 
@@ -238,10 +239,9 @@ def test_an_accepted_finding_is_the_one_that_was_named() -> None:
     accept = read_expectations(
         {"accept": [{"code": "wildcard", "subject": "/x*", "why": "driver"}]}, "r.yaml"
     )
-    told = PlanFinding("warning", "wildcard", "/x*", None, 0, "", "")
-    assert accept.reason_to_accept(told) == "driver"
-    assert accept.reason_to_accept(told._replace(subject="/y*")) is None
-    assert accept.reason_to_accept(told._replace(code="no-server")) is None
+    assert accept.reason_to_accept(finding("wildcard", "/x*", "")) == "driver"
+    assert accept.reason_to_accept(finding("wildcard", "/y*", "")) is None
+    assert accept.reason_to_accept(finding("no-server", "/x*", "")) is None
 
 
 @pytest.mark.parametrize(

@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from enclave_launch import DryRun, ResolveOptions, resolve
+from enclave_launch.dry_run import Diagnostic
 from enclave_launch.report.plan_json import plan_document
 from enclave_launch.review.checks import check_plan
-from enclave_launch.review.document import PlanFinding
 
 MANIFEST = """\
 nodl_version: 2
@@ -22,7 +22,7 @@ subscriptions:
   - {{name: {subscribes}, type: std_msgs/msg/String, qos: {{history: KEEP_LAST, depth: 1, {asks}}}}}
 """
 RELIABLE, BEST_EFFORT = "reliability: RELIABLE", "reliability: BEST_EFFORT"
-Check = Callable[..., list[PlanFinding]]
+Check = Callable[..., list[Diagnostic]]
 
 
 @pytest.fixture
@@ -43,7 +43,7 @@ def check(tmp_path: Path) -> Check:
         parameters: str = "",
         all_parameters: str = "false",
         **given: str,
-    ) -> list[PlanFinding]:
+    ) -> list[Diagnostic]:
         manifests = []
         for name, publishes, subscribes in (("one", "x", "y"), ("two", "y", "x")):
             program = bin_folder / name
@@ -79,7 +79,7 @@ def _node_scope() -> Any:
     return EnclaveScope.NODE
 
 
-def codes(found: list[PlanFinding]) -> set[str]:
+def codes(found: list[Diagnostic]) -> set[str]:
     return {told.code for told in found}
 
 

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Literal
 
+from enclave_launch.dry_run import Diagnostic
 from enclave_launch.report.review_text import findings_text
 from enclave_launch.review.checks.rules import MEANINGS
-from enclave_launch.review.document import PlanFinding
 
 
-def told(code: str, subject: str, severity: str = "warning") -> tuple[PlanFinding, str | None]:
-    return PlanFinding(severity, code, subject, None, 0, f"{subject} is odd", "mend it"), None  # type: ignore[arg-type]
+def told(
+    code: str, subject: str, severity: Literal["error", "warning"] = "warning"
+) -> tuple[Diagnostic, str | None]:
+    text = f"{subject} is odd"
+    return Diagnostic(
+        severity=severity, code=code, subject=subject, file=None, line=0, text=text, remedy="mend it"
+    ), None
 
 
 def test_findings_of_one_kind_are_one_paragraph() -> None:

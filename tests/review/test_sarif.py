@@ -14,9 +14,10 @@ from jsonschema import Draft4Validator
 
 from enclave_common.terminal import json_text
 from enclave_launch import DryRun
+from enclave_launch.dry_run import Diagnostic
 from enclave_launch.report.sarif import sarif_document
 from enclave_launch.review.checks import RULES, check_plan
-from enclave_launch.review.document import PlanFinding
+from enclave_launch.review.checks.rules import finding
 from tests.report.conftest import hostile, robot
 
 SCHEMA = Path(__file__).parent / "sarif" / "sarif-2.1.0-rtm.5.json"
@@ -24,7 +25,7 @@ VALIDATOR = Draft4Validator(json.loads(SCHEMA.read_text(encoding="utf-8")))
 ROOT = "/work/my robot"
 
 
-def errors(findings: list[tuple[PlanFinding, str | None]]) -> list[str]:
+def errors(findings: list[tuple[Diagnostic, str | None]]) -> list[str]:
     document = json.loads(json_text(sarif_document(findings, RULES, "0.1.0", ROOT)))
     return [f"{list(error.absolute_path)}: {error.message}" for error in VALIDATOR.iter_errors(document)]
 
@@ -38,7 +39,7 @@ def test_findings_of_plans_are_valid(plan: DryRun) -> None:
 
 text = st.text(max_size=20)
 told = st.builds(
-    PlanFinding,
+    Diagnostic,
     severity=st.sampled_from(["error", "warning"]),
     code=st.sampled_from(sorted(RULES)),
     subject=text,
@@ -53,7 +54,7 @@ told = st.builds(
 
 
 @given(st.lists(st.tuples(told, st.none() | text), max_size=4))
-def test_any_finding_is_valid(findings: list[tuple[PlanFinding, str | None]]) -> None:
+def test_any_finding_is_valid(findings: list[tuple[Diagnostic, str | None]]) -> None:
     assert errors(findings) == []
 
 
@@ -65,9 +66,11 @@ def test_the_schema_refuses_what_is_not_sarif() -> None:
 
 
 def test_a_finding_keeps_its_fingerprint_when_its_line_moves() -> None:
-    one = PlanFinding("warning", "no-publisher", "/x", f"{ROOT}/a.xml", 3, "text", "")
+    def at(line: int, subject: str = "/x") -> Diagnostic:
+        return finding("no-publisher", subject, "text", (f"{ROOT}/a.xml", line))
+
     prints = [
         sarif_document([(each, None)], RULES, "0.1.0", ROOT)["runs"][0]["results"][0]["partialFingerprints"]  # type: ignore[index]
-        for each in (one, one._replace(line=9), one._replace(subject="/y"))
+        for each in (at(3), at(9), at(3, "/y"))
     ]
     assert prints[0] == prints[1] != prints[2]

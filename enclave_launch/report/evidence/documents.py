@@ -92,9 +92,7 @@ def _or_not_given(found: Any, name: str, why: str) -> dict[str, Any]:
 
 def _accepted(contents: ReportContents) -> dict[str, Any]:
     accepted = [
-        {**diagnostic._asdict(), "reason": reason}
-        for diagnostic, reason in contents.judged
-        if reason is not None
+        {**dict(diagnostic), "reason": reason} for diagnostic, reason in contents.judged if reason is not None
     ]
     return {"version": 1, "accepted": accepted}
 

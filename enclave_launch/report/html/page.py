@@ -15,11 +15,11 @@ from typing import Any
 from enclave_common.terminal import json_text, printable
 from enclave_common.words import counted
 from enclave_launch import __version__
+from enclave_launch.dry_run import Diagnostic
 from enclave_launch.report.contents import Influence, ReportContents, in_one_sentence
 from enclave_launch.report.graph import OUTWARD, ChannelUse, EnclaveGraph, evidence_text
 from enclave_launch.report.review_text import step_text
 from enclave_launch.review.checks.keystore import Ending
-from enclave_launch.review.document import PlanFinding
 
 ASSETS = Path(__file__).parent / "assets"
 _SOURCE_MAP = re.compile(r"^//# sourceMappingURL=.*$", re.MULTILINE)
@@ -237,7 +237,7 @@ def _findings(contents: ReportContents) -> str:
     )
 
 
-def _finding(diagnostic: PlanFinding, accepted: str | None) -> str:
+def _finding(diagnostic: Diagnostic, accepted: str | None) -> str:
     severity = diagnostic.severity if accepted is None else "accepted"
     remedy = diagnostic.remedy if accepted is None else f"accepted: {accepted}"
     return row(

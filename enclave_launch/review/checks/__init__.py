@@ -17,24 +17,17 @@ from collections import Counter
 from collections.abc import Iterator
 
 from enclave_common.words import some_of
-from enclave_launch.dry_run import Component, DryRun, Process
+from enclave_launch.dry_run import Component, Diagnostic, DryRun, Process
 from enclave_launch.review.checks import meetings
 from enclave_launch.review.checks.rules import MEANINGS, RULES, finding
-from enclave_launch.review.document import (
-    GrantedName,
-    PlanDocument,
-    PlanFinding,
-    fqn_of,
-    plan_from_document,
-    program_of,
-)
+from enclave_launch.review.document import GrantedName, PlanDocument, fqn_of, plan_from_document, program_of
 from enclave_launch.review.similarity import splits
 from keystore.formats.permissions_patterns import has_wildcard
 
 __all__ = ["MEANINGS", "RULES", "check_plan"]
 
 
-def check_plan(document: DryRun) -> list[PlanFinding]:
+def check_plan(document: DryRun) -> list[Diagnostic]:
     """Return all findings of a dry run: those of planning first, then those of each check, sorted."""
     plan = plan_from_document(document)
     own = (
@@ -44,21 +37,21 @@ def check_plan(document: DryRun) -> list[PlanFinding]:
     )
     return [
         *plan.diagnostics,
-        *sorted(own, key=lambda diagnostic: diagnostic._replace(file=diagnostic.file or "")[:5]),
+        *sorted(own, key=lambda each: (each.code, each.subject, each.file or "", each.line)),
     ]
 
 
 _NAMED = 3  # permissions that a node gains, by name; the rest is counted
 
 
-def names_twice(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
+def names_twice(plan: PlanDocument, document: DryRun) -> Iterator[Diagnostic]:
     """Yield nodes with the same fully qualified name, which ROS cannot distinguish."""
     for name, count in sorted(Counter(node.fqn for node in plan.nodes).items()):
         if count > 1:
             yield finding("node-name-twice", name, f"{count} nodes are called {name}")
 
 
-def wildcards(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
+def wildcards(plan: PlanDocument, document: DryRun) -> Iterator[Diagnostic]:
     """Yield permissions whose name is a pattern.
 
     Left out are those that planning reported already, and those of names that a program makes up at each start.
@@ -70,7 +63,7 @@ def wildcards(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
                 yield finding("wildcard", grant.name, f"enclave {enclave} may {grant}")
 
 
-def shared(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
+def shared(plan: PlanDocument, document: DryRun) -> Iterator[Diagnostic]:
     """Find enclaves in which nodes gain permissions of others."""
     for split in splits(plan):
         gains = "; ".join(f"{node} gains {some_of(grants, _NAMED)}" for node, grants in split.saved)
@@ -80,7 +73,7 @@ def shared(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
         )
 
 
-def unasked(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
+def unasked(plan: PlanDocument, document: DryRun) -> Iterator[Diagnostic]:
     """Yield permissions that no node of an enclave requests.
 
     Only of enclaves whose every program is known: a policy file may list what nothing else describes."""
@@ -111,7 +104,7 @@ _OF_EVERY_NODE = re.compile(
 """Parameters that client libraries declare themselves (rclcpp TimeSource, node_type_descriptions, qos_overriding)."""
 
 
-def remaps(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
+def remaps(plan: PlanDocument, document: DryRun) -> Iterator[Diagnostic]:
     """Yield remap rules that change no name.
 
     A rule is used if any node that gets it has a name that it changes. It may be used by a program that is not
@@ -157,7 +150,7 @@ def _not_wholly_known(document: DryRun) -> set[tuple[str, str | None]]:
     return doubtful | {_key(item) for item in document.launched} - described
 
 
-def parameters(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
+def parameters(plan: PlanDocument, document: DryRun) -> Iterator[Diagnostic]:
     """Yield parameters that no node of the program declares, if the description of each says what it declares."""
     declared: dict[tuple[str, str | None], list[list[str] | None]] = {}
     for node in document.nodes:
@@ -173,7 +166,7 @@ def parameters(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
                 yield _about(item, "parameter-unknown", text)
 
 
-def security_variables(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
+def security_variables(plan: PlanDocument, document: DryRun) -> Iterator[Diagnostic]:
     """Yield ``ROS_SECURITY_*`` variables that the launch file sets itself."""
     for process in document.processes:
         for name, value in sorted(process.environment.items()):
@@ -181,7 +174,7 @@ def security_variables(plan: PlanDocument, document: DryRun) -> Iterator[PlanFin
                 yield _about(process, "security-variable-set", f"the launch file sets {name}={value}")
 
 
-def secrets(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
+def secrets(plan: PlanDocument, document: DryRun) -> Iterator[Diagnostic]:
     """Find parameters with a text value whose name says that it is a secret; the value is not repeated."""
     for item in document.launched:
         for name, value in sorted(item.parameters.items()):
@@ -197,7 +190,7 @@ def _subject(item: Item) -> str:
     return fqn_of(item) or (item.executable if isinstance(item, Process) else "")
 
 
-def _about(item: Item, code: str, text: str) -> PlanFinding:
+def _about(item: Item, code: str, text: str) -> Diagnostic:
     return finding(code, _subject(item), text, (item.launch_file, item.line))
 
 

@@ -6,8 +6,9 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import NamedTuple
 
 from enclave_common.words import counted, some_of
+from enclave_launch.dry_run import Diagnostic
 from enclave_launch.review.checks.rules import finding
-from enclave_launch.review.document import GrantedName, PlanDocument, PlanFinding
+from enclave_launch.review.document import GrantedName, PlanDocument
 from enclave_launch.review.signed import as_signed
 from keystore.verification.finding import Finding
 
@@ -27,7 +28,7 @@ class Ending(NamedTuple):
 
 def against_keystore(
     plan: PlanDocument, signed: Mapping[str, frozenset[GrantedName]], endings: Iterable[Ending]
-) -> list[PlanFinding]:
+) -> list[Diagnostic]:
     """Compare the plan with a keystore.
 
     :param endings: what expires soon in the whole keystore; enclaves of other plans are ignored"""
@@ -37,7 +38,7 @@ def against_keystore(
 
 def against_router(
     plan: PlanDocument, served: Collection[str], findings: Iterable[Finding]
-) -> list[PlanFinding]:
+) -> list[Diagnostic]:
     """Compare the enclaves on Zenoh with the configuration of the keystore's router.
 
     :param served: the enclaves that the keystore has on Zenoh
@@ -48,16 +49,14 @@ def against_router(
         if enclave not in served
     ]
     for one in findings:
-        diagnostic = finding("keystore-zenoh", one.place, f"{one.place}: {one.message}")
-        found.append(
-            diagnostic._replace(remedy=one.repair, severity="error" if one.severity.fails else "warning")
-        )
+        text = f"{one.place}: {one.message}"
+        found.append(finding("keystore-zenoh", one.place, text, fails=one.severity.fails, remedy=one.repair))
     return found
 
 
 def _enclave(
     plan: PlanDocument, enclave: str, signed: Mapping[str, frozenset[GrantedName]]
-) -> Iterator[PlanFinding]:
+) -> Iterator[Diagnostic]:
     if enclave not in signed:
         yield finding("keystore-enclave-missing", enclave, _MISSING.format("keystore", enclave))
         return
@@ -71,7 +70,7 @@ def _enclave(
             yield finding(code, enclave, text)
 
 
-def _expiring(plan: PlanDocument, endings: Iterable[Ending]) -> Iterator[PlanFinding]:
+def _expiring(plan: PlanDocument, endings: Iterable[Ending]) -> Iterator[Diagnostic]:
     for one in endings:
         if one.enclave is None or one.enclave in plan.enclaves:
             over = one.days_left < 0
@@ -80,5 +79,4 @@ def _expiring(plan: PlanDocument, endings: Iterable[Ending]) -> Iterator[PlanFin
                 if over
                 else f"expires on {one.ends}, in {counted(one.days_left, 'day')}"
             )
-            diagnostic = finding("keystore-expires", one.enclave or one.subject, f"{one.subject} {when}")
-            yield diagnostic._replace(severity="error") if over else diagnostic
+            yield finding("keystore-expires", one.enclave or one.subject, f"{one.subject} {when}", fails=over)

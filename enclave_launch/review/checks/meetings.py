@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 from enclave_common.words import some_of
 from enclave_launch.diagnostics import Code
-from enclave_launch.dry_run import DryRun, Interface, Operation
+from enclave_launch.dry_run import Diagnostic, DryRun, Interface, Operation
 from enclave_launch.review.checks.rules import finding
-from enclave_launch.review.document import KIND_OF, GrantedName, PlanDocument, PlanFinding
+from enclave_launch.review.document import KIND_OF, GrantedName, PlanDocument
 from keystore.formats.permissions_patterns import can_meet, has_wildcard
 from nodl.graph.quality import INFINITE, Quality, unmet
 
@@ -39,7 +39,7 @@ class _User(NamedTuple):
 _Users = Mapping[tuple[str, str], list[_User]]
 
 
-def missing_ends(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
+def missing_ends(plan: PlanDocument, document: DryRun) -> Iterator[Diagnostic]:
     """Find ends that are missing, of what nodes request themselves; what runs outside this launch is not known here.
 
     If something of the launch itself is not known, the other end may be there: then one finding says so.
@@ -61,7 +61,7 @@ _WITHOUT_INTERFACES = (Code.EXECUTABLE_WITHOUT_ENCLAVE, Code.ENCLAVE_UNGRANTED)
 """Said of an ``executable``: a simulator, a player of a bag."""
 
 
-def _missing_ends(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
+def _missing_ends(plan: PlanDocument, document: DryRun) -> Iterator[Diagnostic]:
     requested, users = _requested_names(plan), _users(document)
     everywhere: dict[Operation, set[str]] = {}
     for grant in frozenset[GrantedName]().union(*plan.enclaves.values()):
@@ -113,7 +113,7 @@ def _lacks_transforms_only(topic: str, published: set[str]) -> bool:
     )
 
 
-def near_names(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
+def near_names(plan: PlanDocument, document: DryRun) -> Iterator[Diagnostic]:
     """Yield pairs of names with opposite ends that never meet and differ by a typing error."""
     requested, users = _requested_names(plan), _users(document)
     for here, there in _PAIRS:
@@ -158,7 +158,7 @@ def _one_edit(one: str, two: str) -> bool:
     return len(long) - len(short) <= 1
 
 
-def types(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
+def types(plan: PlanDocument, document: DryRun) -> Iterator[Diagnostic]:
     """Yield names with different interface types: those endpoints never match.
 
     Several types at one place of a program are alternatives (a table of types, a parameter that decides): such an
@@ -187,7 +187,7 @@ def _by_place(users: list[_User]) -> dict[tuple[str, str], list[_User]]:
     return found
 
 
-def qos(plan: PlanDocument, document: DryRun) -> Iterator[PlanFinding]:
+def qos(plan: PlanDocument, document: DryRun) -> Iterator[Diagnostic]:
     """Yield pairs of incompatible QoS, if both descriptions give theirs; what they leave open is not judged."""
     users = _users(document)
     for (operation, name), publishers in sorted(users.items(), key=lambda item: item[0]):

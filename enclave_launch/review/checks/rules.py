@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from enclave_launch.diagnostics import Code
-from enclave_launch.review.document import PlanFinding
+from enclave_launch.dry_run import Diagnostic
 
 _OTHER_END = "look for a typing error in the name, or accept it if the other end runs elsewhere"
 _PROVISION = "secure-launch --secure, or secure-keystore apply-policy, brings it to the plan"
@@ -58,6 +58,23 @@ MEANINGS: Mapping[str, str] = {**{code.value: code.meaning for code in Code}, **
 """Of every code that planning or a check can give."""
 
 
-def finding(code: str, subject: str, text: str, place: tuple[str | None, int] = (None, 0)) -> PlanFinding:
-    """Return a finding of a check, as a warning."""
-    return PlanFinding("warning", code, subject, *place, text, _TABLE[code][1])
+def finding(
+    code: str,
+    subject: str,
+    text: str,
+    place: tuple[str | None, int] = (None, 0),
+    *,
+    fails: bool = False,
+    remedy: str = "",
+) -> Diagnostic:
+    """Return a finding of a check, an error or a warning. ``remedy``: of a code that has none in the table."""
+    file, line = place
+    return Diagnostic(
+        severity="error" if fails else "warning",
+        code=code,
+        subject=subject,
+        file=file,
+        line=line,
+        text=text,
+        remedy=remedy or _TABLE[code][1],
+    )

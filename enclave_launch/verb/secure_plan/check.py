@@ -15,10 +15,10 @@ import sys
 from enclave_common.command_line import FLAG, PATH, one_of
 from enclave_common.terminal import json_text
 from enclave_launch import __version__
+from enclave_launch.dry_run import Diagnostic
 from enclave_launch.report.review_text import findings_document, findings_text
 from enclave_launch.report.sarif import sarif_document
 from enclave_launch.review.checks import MEANINGS
-from enclave_launch.review.document import PlanFinding
 from enclave_launch.verb.secure_plan.judging import EXPECT, WITHIN, judged
 from enclave_launch.verb.secure_plan.plans import read_plan
 
@@ -41,7 +41,7 @@ def run(options: argparse.Namespace) -> int:
     return 1 if any(options.strict or finding.severity == "error" for finding in open_ones) else 0
 
 
-def _text(found: list[tuple[PlanFinding, str | None]], form: str, verbose: bool) -> str:
+def _text(found: list[tuple[Diagnostic, str | None]], form: str, verbose: bool) -> str:
     if form == "sarif":
         return json_text(sarif_document(found, MEANINGS, __version__, os.getcwd()), indent=2) + "\n"
     if form == "json":

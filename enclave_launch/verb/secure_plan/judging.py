@@ -14,12 +14,12 @@ import yaml
 from enclave_common.command_line import PATH, Option
 from enclave_common.files import read_text
 from enclave_common.yaml_reader import load_yaml
-from enclave_launch.dry_run import DryRun
+from enclave_launch.dry_run import Diagnostic, DryRun
 from enclave_launch.errors import UsageError, translated
 from enclave_launch.review.checks import check_plan
 from enclave_launch.review.checks.keystore import against_keystore, against_router
 from enclave_launch.review.checks.rules import finding
-from enclave_launch.review.document import PlanDocument, PlanFinding, plan_from_document
+from enclave_launch.review.document import PlanDocument, plan_from_document
 from enclave_launch.review.information_flow import FlowStep, flow_graph, shortest_paths
 from enclave_launch.verb.secure_plan.keystores import (
     DEFAULT_MARGIN,
@@ -40,7 +40,7 @@ def judged(
     keystore: Path | str | None = None,
     within: str = DEFAULT_MARGIN,
     now: datetime | None = None,
-) -> list[tuple[PlanFinding, str | None]]:
+) -> list[tuple[Diagnostic, str | None]]:
     """Return findings of a dry run, of the rules in ``expect``, and of ``keystore``, if one is given.
 
     Raises ``UsageError`` for rules that are missing or not understood, ``ProvisionError`` for the keystore.
@@ -54,7 +54,7 @@ def judged(
 
 def _of_keystore(
     document: DryRun, keystore: Path | str, within: str, now: datetime | None
-) -> list[PlanFinding]:
+) -> list[Diagnostic]:
     plan = plan_from_document(document)
     found = against_keystore(plan, signed_grants(keystore), endings(keystore, within, now))
     if plan.on_zenoh:
@@ -90,7 +90,7 @@ class Accepted(NamedTuple):
     subject: str
     why: str
 
-    def covers(self, diagnostic: PlanFinding) -> bool:
+    def covers(self, diagnostic: Diagnostic) -> bool:
         return diagnostic.code == self.code and fnmatchcase(diagnostic.subject, self.subject)
 
 
@@ -100,7 +100,7 @@ class Expectations(NamedTuple):
     never: tuple[Never, ...] = ()
     accept: tuple[Accepted, ...] = ()
 
-    def reason_to_accept(self, diagnostic: PlanFinding) -> str | None:
+    def reason_to_accept(self, diagnostic: Diagnostic) -> str | None:
         """Return why a finding was accepted, None if it was not."""
         return next((accepted.why for accepted in self.accept if accepted.covers(diagnostic)), None)
 
@@ -122,7 +122,7 @@ def read_expectations(content: Any, place: str) -> Expectations:
     )
 
 
-def rule_findings(document: DryRun, rules: Iterable[Never]) -> list[PlanFinding]:
+def rule_findings(document: DryRun, rules: Iterable[Never]) -> list[Diagnostic]:
     """Return an error for each forbidden flow, with one shortest way, then a warning for each rule that names nothing
     in this plan."""
     plan = plan_from_document(document)
@@ -139,8 +139,8 @@ def rule_findings(document: DryRun, rules: Iterable[Never]) -> list[PlanFinding]
         possible = [way for way in ways if way is not None]
         if possible:
             source, _, steps = min(possible, key=lambda way: (len(way[2]), way))
-            broken.append(finding("flow-forbidden", source, _broken_text(rule, source, steps)))
-    return [*(diagnostic._replace(severity="error") for diagnostic in broken), *idle]
+            broken.append(finding("flow-forbidden", source, _broken_text(rule, source, steps), fails=True))
+    return [*broken, *idle]
 
 
 def _broken_text(rule: Never, source: str, steps: Iterable[FlowStep]) -> str:
