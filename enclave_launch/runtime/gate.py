@@ -55,31 +55,36 @@ class LateProcess(RuntimeFailure):
     """A process about to start is not what was planned: it needs permissions that nobody signed."""
 
 
-def identity(process: ResolvedProcess) -> tuple[object, ...]:
-    """Return what decides the permissions of a process: what a dry run and a live one have in common."""
-    return (
-        process.kind,
-        process.package,
-        process.executable,
-        process.fqn,
-        process.enclave,
-        parse_ros_arguments(process.cmd).remaps,
-        process.parameters.get("use_sim_time"),  # subscribes /clock
-        process.prefix,
-        *(process.final_environment.get(name) for name in ("RMW_IMPLEMENTATION", "ROS_DOMAIN_ID")),
-    )
+def permission_facts(item: ResolvedProcess | ResolvedComponent) -> Mapping[str, object]:
+    """Return what decides the permissions, which a dry run and a live one have in common, by its name in a refusal."""
+    if isinstance(item, ResolvedComponent):
+        return {
+            "container": item.container,
+            "package": item.package,
+            "plugin": item.plugin,
+            "node": item.fqn,
+            "remap rules": tuple(f"{rule.source}:={rule.target}" for rule in item.remaps),
+            "use_sim_time": item.parameters.get("use_sim_time"),
+        }
+    return {
+        "kind": item.kind,
+        "package": item.package,
+        "executable": item.executable,
+        "node": item.fqn,
+        "remap rules": parse_ros_arguments(item.cmd).remaps,
+        "enclave": item.enclave.attribute,
+        "enclave scope": item.enclave.scope,
+        "--enclave": item.enclave.argument,
+        "use_sim_time": item.parameters.get("use_sim_time"),  # subscribes /clock
+        "launch prefix": item.prefix,
+        "middleware": item.final_environment.get("RMW_IMPLEMENTATION"),
+        "domain": item.final_environment.get("ROS_DOMAIN_ID"),
+    }
 
 
-def component_identity(component: ResolvedComponent) -> tuple[object, ...]:
-    """Return what decides the permissions of a component, as ``identity`` does for a process."""
-    return (
-        component.container,
-        component.package,
-        component.plugin,
-        component.fqn,
-        tuple((rule.source, rule.target) for rule in component.remaps),
-        component.parameters.get("use_sim_time"),
-    )
+def identity(item: ResolvedProcess | ResolvedComponent) -> tuple[object, ...]:
+    """Return the values of ``permission_facts``, to look an item up."""
+    return tuple(permission_facts(item).values())
 
 
 class PlannedGate:
@@ -98,7 +103,7 @@ class PlannedGate:
         self._planned = tuple(processes)
         self._planned_components = tuple(components)
         self._processes = {identity(process) for process in self._planned}
-        self._components = {component_identity(component) for component in self._planned_components}
+        self._components = {identity(component) for component in self._planned_components}
         self._provider = provider
         self._allow_late = allow_late
         self._say_late = say_late
@@ -115,7 +120,7 @@ class PlannedGate:
         what = f"{named} at {process.location}"
         if not self._allow_late:
             remedy = "--allow-late provisions it when it appears"
-            raise _late(what, compared(process, self._planned), remedy)
+            raise _late(what, _compared(process, self._planned, (_same_program, _same_node)), remedy)
         self._say_late(f"{what} was not foreseen: provisioned now (--allow-late)")
         grant = self._provider.ensure_late(process)
         self._processes.add(identity(process))
@@ -124,9 +129,9 @@ class PlannedGate:
     def ensure_components(self, components: Sequence[ResolvedComponent]) -> None:
         """Refuse components that are not in the plan: a container reads its permissions once, at its start."""
         for component in components:
-            if component_identity(component) not in self._components:
+            if identity(component) not in self._components:
                 what = f"component {component.program} for {component.container} at {component.location}"
-                difference = compared_component(component, self._planned_components)
+                difference = _compared(component, self._planned_components, (_same_plugin,))
                 raise _late(what, difference, "its container has read its permissions already")
 
     def launcher(self) -> StartAdditions | None:
@@ -140,7 +145,6 @@ def _late(what: str, difference: str, remedy: str) -> LateProcess:
 
 
 Item = TypeVar("Item", ResolvedProcess, ResolvedComponent)
-_Facts = Mapping[str, object]
 
 _COMPUTED = (
     "the launch file gave something else when it was started: a time, a random value, a file or a program's answer "
@@ -151,32 +155,18 @@ _NOT_FORESEEN = (
 )
 
 
-def compared(process: ResolvedProcess, planned: Sequence[ResolvedProcess]) -> str:
-    """Describe how ``process`` differs from what was planned in its place."""
-    return _compared(process, planned, _process_facts, (_same_program, _same_node))
-
-
-def compared_component(component: ResolvedComponent, planned: Sequence[ResolvedComponent]) -> str:
-    """Describe how ``component`` differs from what was planned in its place."""
-    return _compared(component, planned, _component_facts, (_same_plugin,))
-
-
-def _compared(
-    item: Item,
-    planned: Sequence[Item],
-    facts: Callable[[Item], _Facts],
-    likenesses: Iterable[Callable[[Item, Item], bool]],
-) -> str:
-    came = facts(item)
+def _compared(item: Item, planned: Sequence[Item], likenesses: Iterable[Callable[[Item, Item], bool]]) -> str:
+    """Describe how ``item`` differs from what was planned in its place."""
     alike = next(
         (found for like in likenesses if (found := [other for other in planned if like(item, other)])), []
     )
     if not alike:
         return _NOT_FORESEEN
-    nearest = min(alike, key=lambda other: len(_different(came, facts(other))))
-    was = facts(nearest)
-    names = _different(came, was)
-    differing = "; ".join(f"planned {name} {_shown(was[name])}, came {_shown(came[name])}" for name in names)
+    nearest = min(alike, key=lambda other: len(_differences(item, other)))
+    differing = "; ".join(
+        f"planned {name} {_shown(was)}, came {_shown(came)}"
+        for name, was, came in _differences(item, nearest)
+    )
     return f"{differing} ({_why(nearest)})" if differing else _NOT_FORESEEN
 
 
@@ -186,36 +176,15 @@ def _why(planned: ResolvedProcess | ResolvedComponent) -> str:
     return f"it was planned for {planned.on_event}, and what an event brings is only known when it happens"
 
 
-def _different(came: _Facts, planned: _Facts) -> list[str]:
-    return [name for name, value in came.items() if planned[name] != value]
+def _differences(came: Item, planned: Item) -> list[tuple[str, object, object]]:
+    facts = permission_facts(came)
+    return [(name, was, facts[name]) for name, was in permission_facts(planned).items() if was != facts[name]]
 
 
 def _shown(value: object) -> str:
     if isinstance(value, tuple):
         return " ".join(map(str, value)) or "none"
     return "none" if value is None or value == "" else str(value)
-
-
-def _process_facts(process: ResolvedProcess) -> _Facts:
-    return {
-        "program": process.program,
-        "node": process.fqn,
-        "remap rules": parse_ros_arguments(process.cmd).remaps,
-        "enclave": process.enclave.attribute,
-        "enclave scope": process.enclave.scope,
-        "--enclave": process.enclave.argument,
-        "use_sim_time": process.parameters.get("use_sim_time"),
-    }
-
-
-def _component_facts(component: ResolvedComponent) -> _Facts:
-    return {
-        "container": component.container,
-        "plugin": component.program,
-        "node": component.fqn,
-        "remap rules": tuple(f"{rule.source}:={rule.target}" for rule in component.remaps),
-        "use_sim_time": component.parameters.get("use_sim_time"),
-    }
 
 
 def _same_program(process: ResolvedProcess, other: ResolvedProcess) -> bool:

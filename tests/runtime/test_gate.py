@@ -163,11 +163,19 @@ def test_the_place_is_told_as_written(tmp_path: Path) -> None:
         guard.ensure(TALKER._replace(fqn="/x", location=SourceLocation(str(tmp_path / "a.launch.py"))))
 
 
-def test_a_refusal_says_what_was_planned_what_came_and_why() -> None:
+@pytest.mark.parametrize(
+    ("beyond", "difference"),
+    [
+        ("another remap rule", "planned remap rules chatter:=news, came chatter:=secret"),
+        ("a prefix", "planned launch prefix none, came other-program"),
+        ("another domain", "planned domain none, came 7"),
+    ],
+)
+def test_a_refusal_says_what_was_planned_what_came_and_why(beyond: str, difference: str) -> None:
     guard, _, _ = gate()
     with pytest.raises(LateProcess) as refusal:
-        guard.ensure(BEYOND["another remap rule"])
-    assert "planned remap rules chatter:=news, came chatter:=secret" in str(refusal.value)
+        guard.ensure(BEYOND[beyond])
+    assert difference in str(refusal.value)
     assert "a time, a random value, a file or a program's answer that changed since" in str(refusal.value)
 
 
