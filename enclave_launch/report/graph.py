@@ -18,17 +18,6 @@ NO_ENCLAVE = ""
 """The group of programs that run without an enclave."""
 
 
-class UseReason(NamedTuple):
-    """The reason for a permission. ``place``: file and line of the description, or a row of a table."""
-
-    place: str
-    written: str
-    remapped_by: tuple[str, ...]
-    note: str
-    type: str
-    built_in: bool
-
-
 class NodeMember(NamedTuple):
     """A node in its enclave. ``known`` is false for a program whose interfaces nobody knows: what it may need is a gap.
 
@@ -60,13 +49,13 @@ class Channel(NamedTuple):
 
 class ChannelUse(NamedTuple):
     """The use of one channel by one member, both by number; ``member`` is ``None`` where only the enclave's policy
-    says so and no node of it requests it."""
+    says so and no node of it requests it; ``reasons``: the node's interfaces that need it."""
 
     member: int | None
     enclave: str
     channel: int
     operation: Operation
-    reasons: tuple[UseReason, ...]
+    reasons: tuple[Interface, ...]
 
     @property
     def built_in(self) -> bool:
@@ -96,7 +85,7 @@ _Key = tuple[str, "int | None", Operation, str]
 def plan_graph(document: DryRun, root: str = "") -> EnclaveGraph:
     """Build the graph of enclaves, members and channels of a dry run; ``root``: prefix to strip from paths."""
     members = tuple(sorted(_members(document, root)))
-    reasons: dict[_Key, list[UseReason]] = dict(_reasons(document, members, root))
+    reasons: dict[_Key, list[Interface]] = dict(_reasons(document, members, root))
     requested = {(enclave, operation, name) for enclave, _, operation, name in reasons}
     for enclave, lists in document.enclaves.items():
         for operation in OPERATIONS:
@@ -121,7 +110,7 @@ def _middlewares(document: DryRun, enclave: str) -> str:
     return " and ".join(sorted(found)) or "DDS"
 
 
-def _order(item: tuple[_Key, list[UseReason]]) -> tuple[str, int, int, str]:
+def _order(item: tuple[_Key, list[Interface]]) -> tuple[str, int, int, str]:
     enclave, member, operation, name = item[0]
     return enclave, -1 if member is None else member, OPERATIONS.index(operation), name
 
@@ -151,31 +140,25 @@ def _place(item: Process | Component, root: str) -> str:
 
 def _reasons(
     document: DryRun, members: tuple[NodeMember, ...], root: str
-) -> Iterator[tuple[_Key, list[UseReason]]]:
+) -> Iterator[tuple[_Key, list[Interface]]]:
     number_of = {
         (member.enclave, member.name): number for number, member in enumerate(members) if member.known
     }
     for node in document.nodes:
-        found: dict[_Key, list[UseReason]] = {}
+        found: dict[_Key, list[Interface]] = {}
         for item in node.interfaces:
             key = (node.enclave, number_of[node.enclave, node.fqn], item.operation, item.name)
             found.setdefault(key, []).append(_reason(item, root))
         yield from found.items()
 
 
-def _reason(item: Interface, root: str) -> UseReason:
+def _reason(item: Interface, root: str) -> Interface:
     rules = (rule.rpartition(" at ") for rule in item.remapped_by)
-    return UseReason(
-        short_path(item.place, root),
-        item.written,
-        tuple(f"{rule}{at}{short_path(origin, root)}" for rule, at, origin in rules),
-        item.note,
-        item.type,
-        item.built_in,
-    )
+    remapped_by = [f"{rule}{at}{short_path(origin, root)}" for rule, at, origin in rules]
+    return Interface(**{**dict(item), "place": short_path(item.place, root), "remapped_by": remapped_by})
 
 
-def _channels(reasons: Mapping[_Key, list[UseReason]]) -> tuple[Channel, ...]:
+def _channels(reasons: Mapping[_Key, list[Interface]]) -> tuple[Channel, ...]:
     types: dict[tuple[Kind, str], set[str]] = {}
     for (_, _, operation, name), why in reasons.items():
         types.setdefault((KIND_OF[operation], name), set()).update(
@@ -184,7 +167,7 @@ def _channels(reasons: Mapping[_Key, list[UseReason]]) -> tuple[Channel, ...]:
     return tuple(sorted(Channel(kind, name, tuple(sorted(found))) for (kind, name), found in types.items()))
 
 
-def evidence_text(reason: UseReason) -> str:
+def evidence_text(reason: Interface) -> str:
     """Format a reason as ``talker.nodl.xml:4; written chatter; remapped by chatter:=conversation at
     f.launch.xml:7``."""
     parts = [reason.place]
