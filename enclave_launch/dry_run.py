@@ -31,6 +31,18 @@ class _Strict(BaseModel, extra="forbid", frozen=True):
     """The base of all entries: an unknown key is an error."""
 
 
+class _Written(_Strict, frozen=True):
+    """The base of what an element of a launch file says."""
+
+    launch_file: str
+    line: int = _described("line of the element, 0 when not known")
+
+    @property
+    def place(self) -> str:
+        """Return ``file:line``, or the file alone if the line is not known."""
+        return f"{self.launch_file}:{self.line}" if self.line else self.launch_file
+
+
 class Respawn(_Strict, frozen=True):
     """The restart of a process that ended."""
 
@@ -38,26 +50,22 @@ class Respawn(_Strict, frozen=True):
     retries: int = _described("how often at most, -1 without a limit")
 
 
-class Reaction(_Strict, frozen=True):
+class Reaction(_Written, frozen=True):
     """An event handler or timer of the launch, whatever it starts."""
 
     what: str
-    launch_file: str
-    line: int
     ends_with: Optional[str] = _described(
         "the process at whose end it ends the launch, if that is all it does"
     )
 
 
-class LauncherCall(_Strict, frozen=True):
+class LauncherCall(_Written, frozen=True):
     """A service that the launcher's own node calls: to load a component, to change a state."""
 
     service: str
-    launch_file: str
-    line: int
 
 
-class Process(_Strict, frozen=True):
+class Process(_Written, frozen=True):
     """One process, in launch order."""
 
     package: Optional[str] = _described("null for executable actions and nodes given without a package")
@@ -74,8 +82,6 @@ class Process(_Strict, frozen=True):
     domain_id: int = _described("of its own environment")
     middleware: str = _described("the RMW implementation it would load")
     environment: dict[str, str] = _described("variables added or changed, values as the process sees them")
-    launch_file: str
-    line: int = _described("line of the element, 0 when not known")
     on_event: Optional[str] = _described("the event that would start it; null when the launch itself does")
     process: str = _described("the process name, NAME-N")
     kind: Literal["node", "lifecycle_node", "container", "executable"]
@@ -86,7 +92,7 @@ class Process(_Strict, frozen=True):
     parameter_files: dict[str, str] = _described("YAML that launch would write, by its placeholder in cmd")
 
 
-class Component(_Strict, frozen=True):
+class Component(_Written, frozen=True):
     """One composable node, in launch order."""
 
     container: str
@@ -97,8 +103,6 @@ class Component(_Strict, frozen=True):
     parameters: dict[str, JsonParameter]
     enclave: Optional[str] = _described("the container's; null when the container is not part of this launch")
     interfaces: Optional[str] = _described(_ORIGIN)
-    launch_file: str
-    line: int
     on_event: Optional[str] = Field(...)
 
 

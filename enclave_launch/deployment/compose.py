@@ -43,7 +43,7 @@ def _service(process: DeployedProcess, image: str, user: str, keystore: str) -> 
         "image": image,
         "command": [_literal(word) for word in process.words(_PARAMETERS)],
         "environment": {name: _literal(text) for name, text in variables.items()},
-        **({"working_dir": process.cwd} if process.cwd is not None else {}),
+        **({"working_dir": process.entry.cwd} if process.entry.cwd is not None else {}),
         "user": user,
         "read_only": True,
         "tmpfs": ["/tmp:size=64m,mode=1777"],
@@ -52,7 +52,7 @@ def _service(process: DeployedProcess, image: str, user: str, keystore: str) -> 
         "init": True,
         "stop_signal": "SIGINT",
         "stop_grace_period": "10s",
-        "restart": "always" if process.respawn is not None else "no",
+        "restart": "always" if process.entry.respawn is not None else "no",
     }
     if volumes := _volumes(process, keystore):
         service["volumes"] = volumes

@@ -41,12 +41,12 @@ def kubernetes_files(deployment: Deployment, *, image: str) -> dict[str, File]:
 
 def _objects(deployment: Deployment, image: str) -> Iterator[dict[str, Any]]:
     for process in deployment.processes:
-        if process.parameter_files:
+        if process.entry.parameter_files:
             yield _parameters(deployment, process)
         yield _deployment(deployment, process, image)
         if process.enclave is not None:
             yield _service(deployment, process)
-    for domain in sorted({one.domain for one in deployment.processes if one.enclave is not None}):
+    for domain in sorted({one.entry.domain_id for one in deployment.processes if one.enclave is not None}):
         yield _peers(deployment, domain)
         yield _network_policy(deployment, domain)
 
@@ -77,12 +77,12 @@ def _parameters(deployment: Deployment, process: DeployedProcess) -> dict[str, A
 
 def _parameters_name(process: DeployedProcess) -> str:
     """Return a name with the content's digest, so that new parameters replace the Pod."""
-    digest = hashlib.sha256("\0".join(process.parameter_files.values()).encode()).hexdigest()
+    digest = hashlib.sha256("\0".join(process.entry.parameter_files.values()).encode()).hexdigest()
     return f"{process.name}-{digest[:10]}"
 
 
 def _deployment(deployment: Deployment, process: DeployedProcess, image: str) -> dict[str, Any]:
-    domain = str(process.domain) if process.enclave is not None else "none"
+    domain = str(process.entry.domain_id) if process.enclave is not None else "none"
     made = _object(deployment, "Deployment", process.name, api="apps/v1", **{_DOMAIN: domain})
     labels = made["metadata"]["labels"]
     template = {"metadata": {"labels": labels}, "spec": _pod(deployment, process, image)}
@@ -124,13 +124,13 @@ def _container(deployment: Deployment, process: DeployedProcess, image: str) -> 
         {"name": name, "value": _literal(text)} for name, text in sorted(variables.items())
     ]
     if process.enclave is not None and _PEERS not in variables:
-        source = {"name": _peers_name(deployment, process.domain), "key": _PEERS}
+        source = {"name": _peers_name(deployment, process.entry.domain_id), "key": _PEERS}
         environment.append({"name": _PEERS, "valueFrom": {"configMapKeyRef": source}})
     return {
         "name": process.name,
         "image": image,
         "args": [_literal(word) for word in process.words(_PARAMETERS)],
-        **({"workingDir": process.cwd} if process.cwd is not None else {}),
+        **({"workingDir": process.entry.cwd} if process.entry.cwd is not None else {}),
         "env": environment,
         "securityContext": {
             "allowPrivilegeEscalation": False,
@@ -159,7 +159,7 @@ def _mounts(process: DeployedProcess) -> Iterator[dict[str, Any]]:
     if process.enclave is not None:
         place = f"{_KEYSTORE}/{layout.enclave_directory(process.enclave)}"
         yield {"name": "enclave", "mountPath": place, "readOnly": True}
-    if process.parameter_files:
+    if process.entry.parameter_files:
         yield {"name": "parameters", "mountPath": _PARAMETERS, "readOnly": True}
     yield {"name": "tmp", "mountPath": "/tmp"}
 
@@ -169,13 +169,13 @@ def _volumes(process: DeployedProcess) -> Iterator[dict[str, Any]]:
         # podman 4.3 reads "optional" whether it is there or not, and crashes.
         secret = {"secretName": secret_name(process.enclave), "defaultMode": 0o440, "optional": False}
         yield {"name": "enclave", "secret": secret}
-    if process.parameter_files:
+    if process.entry.parameter_files:
         yield {"name": "parameters", "configMap": {"name": _parameters_name(process)}}
     yield {"name": "tmp", "emptyDir": {"medium": "Memory", "sizeLimit": "64Mi"}}
 
 
 def _service(deployment: Deployment, process: DeployedProcess) -> dict[str, Any]:
-    port = _SPDP_PORT + _DOMAIN_GAIN * process.domain
+    port = _SPDP_PORT + _DOMAIN_GAIN * process.entry.domain_id
     spec = {
         "clusterIP": "None",
         "publishNotReadyAddresses": True,

@@ -49,7 +49,7 @@ def place(processes: Iterable[DeployedProcess], hosts: Hosts) -> Placement:
             if host is None:
                 nowhere.append(process)
             else:
-                refuse_host_name(host, process.place)
+                refuse_host_name(host, process.entry.place)
                 found.setdefault(host, []).append(process)
     if not found:
         return Placement({ONLY_HOST: tuple(listed)})
@@ -62,7 +62,7 @@ def _host_of(process: DeployedProcess, hosts: Hosts) -> str | None:
             return host
     if process.enclave is not None and (host := hosts.of_enclave(process.enclave)) is not None:
         return host
-    return process.machine
+    return process.entry.machine
 
 
 def flows_between_hosts(placement: Placement, graph: FlowGraph) -> Iterator[tuple[str, str, FlowStep]]:

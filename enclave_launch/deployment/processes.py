@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from enclave_launch.dry_run import DryRun, Process
-from enclave_launch.process import UNSPECIFIED_NODE_NAME, UNSPECIFIED_NODE_NAMESPACE, Respawn
+from enclave_launch.process import UNSPECIFIED_NODE_NAME, UNSPECIFIED_NODE_NAMESPACE
 from enclave_launch.security_environment import ENABLE, KEYSTORE, NO_KEYSTORE, OVERRIDE, STRATEGY
 from keystore.formats.hosts import Needs
 from nodl.ros_arguments import parse_ros_arguments, words_after_program
@@ -25,29 +25,29 @@ class DeployedProcess(NamedTuple):
 
     Attributes:
         name: Unique in the launch, a DNS label.
+        entry: The process as the dry run has it.
         fqn: The fully qualified name of its node, None for an executable.
         command: Includes ``--enclave`` if rcl reads it from there.
-        parameter_files: Placeholder in the command -> YAML.
-        place: file:line of its element.
+        environment: What the launch file sets, without the variables of SROS2.
         nodes: Its node and the components that are loaded into it.
     """
 
     name: str
-    process: str
+    entry: Process
     fqn: str | None
     command: tuple[str, ...]
-    shell: bool
-    cwd: str | None
     environment: Mapping[str, str]
-    enclave: str | None
-    domain: int
-    middleware: str
-    machine: str | None
-    respawn: Respawn | None
-    parameter_files: Mapping[str, str]
-    place: str
     nodes: tuple[str, ...] = ()
     needs: Needs = Needs()
+
+    @property
+    def enclave(self) -> str | None:
+        return self.entry.enclave
+
+    @property
+    def shown(self) -> str:
+        """Return the node's name, or that of the process where it has none."""
+        return self.fqn or self.entry.process
 
     def security(self, keystore: str) -> Mapping[str, str]:
         """Return the variables that rcl reads; always Enforce, whatever the plan was saved with."""
@@ -59,25 +59,25 @@ class DeployedProcess(NamedTuple):
     def variables(self, keystore: str) -> dict[str, str]:
         """Return the environment of the process apart from what the installation sets up, sorted."""
         found = {
-            "ROS_DOMAIN_ID": str(self.domain),
-            "RMW_IMPLEMENTATION": self.middleware,
+            "ROS_DOMAIN_ID": str(self.entry.domain_id),
+            "RMW_IMPLEMENTATION": self.entry.middleware,
             **self.environment,
             **self.security(keystore),
         }
-        if self.middleware.startswith("rmw_fastrtps"):
+        if self.entry.middleware.startswith("rmw_fastrtps"):
             # Each process has its own user or container: shared memory between them loses data without a word.
             found.setdefault("FASTDDS_BUILTIN_TRANSPORTS", "UDPv4")
         return dict(sorted(found.items()))
 
     def words(self, folder: str) -> tuple[str, ...]:
         """Return the command with its parameter files below ``folder``; a shell gets the words joined, as by launch."""
-        names = dict(zip(self.parameter_files, self.parameter_texts(), strict=True))
+        names = dict(zip(self.entry.parameter_files, self.parameter_texts(), strict=True))
         words = tuple(f"{folder}/{names[word]}" if word in names else word for word in self.command)
-        return ("/bin/sh", "-c", " ".join(words)) if self.shell else words
+        return ("/bin/sh", "-c", " ".join(words)) if self.entry.shell else words
 
     def parameter_texts(self) -> dict[str, str]:
         """Return file name -> content of each of ``parameter_files``, in their order."""
-        texts = self.parameter_files.values()
+        texts = self.entry.parameter_files.values()
         return {f"{self.name}-{number}.yaml": text for number, text in enumerate(texts, 1)}
 
 
@@ -102,19 +102,10 @@ def _process(entry: Process, name: str, nodes: Mapping[str, tuple[str, ...]]) ->
     environment = {key: text for key, text in entry.environment.items() if key not in _SECURITY}
     return DeployedProcess(
         name=name,
-        process=entry.process,
+        entry=entry,
         fqn=fqn,
         command=_secured(entry),
-        shell=entry.shell,
-        cwd=entry.cwd,
         environment=MappingProxyType(environment),
-        enclave=entry.enclave,
-        domain=entry.domain_id,
-        middleware=entry.middleware,
-        machine=entry.machine,
-        respawn=Respawn(**dict(entry.respawn)) if entry.respawn else None,
-        parameter_files=MappingProxyType(entry.parameter_files),
-        place=f"{entry.launch_file}:{entry.line}",
         nodes=(*([fqn] if fqn else ()), *nodes.get(fqn or "", ())),
     )
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 from enclave_launch.deployment.processes import DeployedProcess
 from enclave_launch.diagnostics import Code
-from enclave_launch.dry_run import Component, DryRun, LauncherCall, Process, Reaction
+from enclave_launch.dry_run import DryRun
 
 
 class Engine(str, Enum):
@@ -54,7 +54,9 @@ def unexpressed_needs(processes: Iterable[DeployedProcess], engine: Engine) -> t
         for one in processes
     ]
     return tuple(
-        Unexpressed(f"{one.process} needs {', '.join(what)}, which the cluster has to provide", one.place)
+        Unexpressed(
+            f"{one.entry.process} needs {', '.join(what)}, which the cluster has to provide", one.entry.place
+        )
         for one, what in wanted
         if what
     )
@@ -82,19 +84,19 @@ def differences(document: DryRun, engine: Engine) -> tuple[str, ...]:
 def _late_processes(document: DryRun) -> Iterator[Unexpressed]:
     for one in document.processes:
         if one.on_event is not None:
-            yield Unexpressed(f"{one.process} is started by an event ({one.on_event})", _place(one))
+            yield Unexpressed(f"{one.process} is started by an event ({one.on_event})", one.place)
 
 
 def _components(document: DryRun) -> Iterator[Unexpressed]:
     for one in document.components:
         what = f"component {one.fqn} is loaded into {one.container} by the launcher"
-        yield Unexpressed(what, _place(one))
+        yield Unexpressed(what, one.place)
 
 
 def _calls(document: DryRun) -> Iterator[Unexpressed]:
     for one in document.launcher_calls:
         if not one.service.endswith("/_container/load_node"):
-            yield Unexpressed(f"the launcher calls {one.service}", _place(one))
+            yield Unexpressed(f"the launcher calls {one.service}", one.place)
 
 
 def _reactions(document: DryRun, engine: Engine) -> Iterator[Unexpressed]:
@@ -104,14 +106,10 @@ def _reactions(document: DryRun, engine: Engine) -> Iterator[Unexpressed]:
         if one.ends_with and engine is Engine.SYSTEMD and one.ends_with not in respawned:
             continue
         what = f"{one.what}: the end of {one.ends_with} ends the launch" if one.ends_with else one.what
-        yield Unexpressed(what, _place(one))
+        yield Unexpressed(what, one.place)
 
 
 def _unforeseen(document: DryRun) -> Iterator[Unexpressed]:
     for one in document.diagnostics:
         if one.code == Code.NOT_FORESEEABLE.value:
-            yield Unexpressed(one.text, f"{one.file}:{one.line}")
-
-
-def _place(one: Process | Component | LauncherCall | Reaction) -> str:
-    return f"{one.launch_file}:{one.line}"
+            yield Unexpressed(one.text, one.place)

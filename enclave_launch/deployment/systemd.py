@@ -16,7 +16,7 @@ from collections.abc import Iterator, Mapping
 
 from enclave_launch.deployment.deployment import Deployment, File, one_line
 from enclave_launch.deployment.processes import DeployedProcess
-from enclave_launch.process import Respawn
+from enclave_launch.dry_run import Respawn
 from enclave_launch.security_environment import ENABLE, KEYSTORE, OVERRIDE, STRATEGY
 from keystore.disk import layout
 from keystore.disk.units import ENCLAVE_KEY, NO_CRL, NODE_KEY
@@ -77,7 +77,7 @@ def _target(deployment: Deployment) -> str:
 
     What ends the launch is bound: when it ends the target ends, and with it all that is part of it.
     """
-    bound = {one.name for one in deployment.processes if one.process in deployment.ends_launch}
+    bound = {one.name for one in deployment.processes if one.entry.process in deployment.ends_launch}
     lines = ["[Unit]", f"Description=ROS 2: {_specifiers(one_line(deployment.source))}"]
     for name in deployment.order:
         unit = f"{deployment.name}-{name}.service"
@@ -99,7 +99,7 @@ def _service(
         *_environment(deployment, process),
         *_credentials(process, keystore),
         *_start(deployment, process, keystore, parameters, setup),
-        *_restart(process.respawn),
+        *_restart(process.entry.respawn),
         "",
         *_HARDENING.splitlines(),
         *_home(process, setup),
@@ -110,11 +110,11 @@ def _service(
 
 
 def _unit_section(deployment: Deployment, process: DeployedProcess, keystore: str) -> Iterator[str]:
-    what = process.fqn or process.process
+    what = process.shown
     where = f"in enclave {process.enclave}" if process.enclave is not None else "without an enclave"
     yield "[Unit]"
     yield f"Description=ROS 2: {_specifiers(one_line(what))} {where}"
-    yield f"# {one_line(process.place.rpartition(':')[0])}"
+    yield f"# {one_line(process.entry.launch_file)}"
     yield f"{NODE_KEY}={one_line(what)}"
     if process.enclave is not None:
         yield f"{ENCLAVE_KEY}={process.enclave}"
@@ -160,11 +160,11 @@ def _start(
         yield "TimeoutStartSec=infinity"
         yield f"ExecStartPre=+/bin/sh -c {quoted(_wait_for_the_clock(cert))}"
         yield f"ExecStartPre=/bin/sh -c {quoted(_link_credentials(process.enclave, keystore))}"
-    if _retries(process.respawn) is not None:
+    if _retries(process.entry.respawn) is not None:
         show = f'systemctl show --property=NRestarts --value {unit} > "$RUNTIME_DIRECTORY/restarts"'
         yield f"ExecStartPre=+/bin/sh -c {quoted(f'umask 022; {show}')}"
-    if process.cwd is not None:
-        yield f"WorkingDirectory={_specifiers(one_line(process.cwd))}"
+    if process.entry.cwd is not None:
+        yield f"WorkingDirectory={_specifiers(one_line(process.entry.cwd))}"
     script = _script(process, setup)
     words = " ".join(map(quoted, process.words(parameters)))
     yield f"ExecStart=/bin/sh -c {quoted(script)} {process.name} {words}"
@@ -201,7 +201,7 @@ def _link_credentials(enclave: str, keystore: str) -> str:
 def _script(process: DeployedProcess, setup: tuple[str, ...]) -> str:
     """Return the script, security last: what sets up ROS cannot take it away."""
     parts = []
-    if (retries := _retries(process.respawn)) is not None:
+    if (retries := _retries(process.entry.respawn)) is not None:
         parts.append(
             f'{{ [ "$(cat "$RUNTIME_DIRECTORY/restarts")" -le {retries} ] || '
             f"{{ echo 'respawned {retries} times, as respawn_max_retries allows' >&2; exit {_NO_MORE_RETRIES}; }}; }}"
@@ -246,7 +246,7 @@ def home_paths(process: DeployedProcess, setup: tuple[str, ...]) -> tuple[str, .
         folder = posixpath.dirname(file)
         # With colcon's --symlink-install the files of install/ are links to src/ and build/ beside it.
         found.append(posixpath.dirname(folder) if posixpath.basename(folder) == "install" else folder)
-    found += [word.partition("/lib/")[0] for word in (*process.command, process.cwd or "")]
+    found += [word.partition("/lib/")[0] for word in (*process.command, process.entry.cwd or "")]
     below = sorted({one for one in found if f"{one}/".startswith(_HOMES) and one + "/" not in _HOMES})
     return tuple(one for one in below if not any(one.startswith(f"{other}/") for other in below))
 

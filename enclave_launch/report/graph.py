@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
 from enclave_launch.admission.middleware import ZENOH
-from enclave_launch.dry_run import Component, DryRun, Interface, Operation, Process
+from enclave_launch.dry_run import DryRun, Interface, Operation
 from enclave_launch.review.document import KIND_OF, OPERATIONS, Kind, fqn_of
 from keystore.formats.permissions_patterns import has_wildcard
 
@@ -121,7 +121,7 @@ def short_path(path: str, root: str) -> str:
 
 
 def _members(document: DryRun, root: str) -> Iterator[NodeMember]:
-    places = {fqn_of(item): _place(item, root) for item in document.launched if item.fqn}
+    places = {fqn_of(item): short_path(item.place, root) for item in document.launched if item.fqn}
     for node in document.nodes:
         yield NodeMember(node.fqn, node.enclave, node.program, places.get(node.fqn, ""))
     for path, enclave in document.enclaves.items():
@@ -130,12 +130,7 @@ def _members(document: DryRun, root: str) -> Iterator[NodeMember]:
     for process in document.processes:
         if process.enclave is None:
             name = process.fqn or process.executable
-            yield NodeMember(name, NO_ENCLAVE, "runs unsecured", _place(process, root), known=False)
-
-
-def _place(item: Process | Component, root: str) -> str:
-    file = short_path(item.launch_file, root)
-    return f"{file}:{item.line}" if item.line else file
+            yield NodeMember(name, NO_ENCLAVE, "runs unsecured", short_path(process.place, root), known=False)
 
 
 def _reasons(

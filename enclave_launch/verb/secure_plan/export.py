@@ -131,7 +131,7 @@ def _refuse_lost(lost: tuple[Unexpressed, ...], engine: Engine, accepted: bool) 
 
 def _refuse_nowhere(placement: Placement) -> None:
     if placement.nowhere:
-        listed = ", ".join(one.fqn or one.process for one in placement.nowhere)
+        listed = ", ".join(one.shown for one in placement.nowhere)
         raise UsageError(f"on no host: {listed}; name them in the hosts file")
     for enclave, hosts in placement.shared.items():
         print(
@@ -155,14 +155,12 @@ def _report(processes: list[DeployedProcess], engine: Engine, setup: list[str]) 
     for one in processes:
         if one.needs.devices and not one.needs.groups and engine is not Engine.KUBERNETES:
             warnings.append(
-                f"{one.fqn or one.process} may open {', '.join(one.needs.devices)} only if every user may: name the "
+                f"{one.shown} may open {', '.join(one.needs.devices)} only if every user may: name the "
                 "group of the device in the hosts file (needs: groups: [video])"
             )
         homes = home_paths(one, tuple(setup)) if engine is Engine.SYSTEMD else ()
         if homes:
-            warnings.append(
-                f"{one.fqn or one.process} reads below a home directory: {', '.join(homes)} is left readable"
-            )
+            warnings.append(f"{one.shown} reads below a home directory: {', '.join(homes)} is left readable")
     for text in warnings:
         print(f"secure-plan: warning: {message(text)}", file=sys.stderr)
 
@@ -187,8 +185,8 @@ def _deployment(
         processes=processes,
         order=tuple(one.name for one in in_restart_order(processes, graph)),
         members={
-            domain: tuple(sorted(one.name for one in secured if one.domain == domain))
-            for domain in {one.domain for one in secured}
+            domain: tuple(sorted(one.name for one in secured if one.entry.domain_id == domain))
+            for domain in {one.entry.domain_id for one in secured}
         },
         material=read_material(options.keystore, [one.enclave for one in secured if one.enclave is not None]),
         ends_launch=ends_launch(document),

@@ -66,7 +66,7 @@ def _lines(placement: Placement, graph: FlowGraph) -> Iterator[str]:
         yield f"host {host}"
         for one in processes:
             where = f"enclave {one.enclave}" if one.enclave is not None else "no enclave"
-            yield f"  {one.fqn or one.process}  ({where})"
+            yield f"  {one.shown}  ({where})"
     flows: dict[tuple[str, str], list[str]] = {}
     for source, target, step in flows_between_hosts(placement, graph):
         flows.setdefault((source, target), []).append(step_text(step))
@@ -78,7 +78,7 @@ def _lines(placement: Placement, graph: FlowGraph) -> Iterator[str]:
     for enclave, hosts in placement.shared.items():
         yield f"enclave {enclave} would have to live on {', '.join(hosts)}: one private key on several hosts"
     for one in placement.nowhere:
-        yield f"{one.place}: {one.fqn or one.process} is on no host"
+        yield f"{one.entry.place}: {one.shown} is on no host"
 
 
 def hosts_document(placement: Placement, graph: FlowGraph) -> dict[str, object]:
@@ -87,9 +87,9 @@ def hosts_document(placement: Placement, graph: FlowGraph) -> dict[str, object]:
         "version": 1,
         "hosts": {
             host: {
-                "processes": [one.process for one in processes],
+                "processes": [one.entry.process for one in processes],
                 "enclaves": sorted({one.enclave for one in processes if one.enclave is not None}),
-                "restart_order": [one.process for one in in_restart_order(processes, graph)],
+                "restart_order": [one.entry.process for one in in_restart_order(processes, graph)],
             }
             for host, processes in placement.hosts.items()
         },
@@ -98,7 +98,7 @@ def hosts_document(placement: Placement, graph: FlowGraph) -> dict[str, object]:
             for source, target, step in flows_between_hosts(placement, graph)
         ],
         "enclaves_on_several_hosts": {path: list(hosts) for path, hosts in placement.shared.items()},
-        "on_no_host": [one.process for one in placement.nowhere],
+        "on_no_host": [one.entry.process for one in placement.nowhere],
     }
 
 
