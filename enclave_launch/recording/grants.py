@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from itertools import takewhile
 from typing import NamedTuple
 
 from enclave_launch.plan import (
@@ -23,7 +22,7 @@ from keystore.formats.permissions_patterns import covers, has_wildcard
 from keystore.formats.policy import Operation, Qualifier, Rule
 from nodl.record.assembly import RecordedNode, RecordedProcess
 from nodl.record.lines import EndpointMade
-from nodl.record.requested import EndpointRole, RequestedEndpoint, requested_endpoint, role_of
+from nodl.record.requested import RequestedEndpoint, parts_of, requested_endpoint
 
 WORDS = {
     Operation.PUBLISH: "publish topic",
@@ -101,7 +100,7 @@ class PlannedGrants:
         if self.permits(need):
             return (need,)
         parts = tuple(
-            Need(need.enclave, need.node, OPERATIONS[part.kind], part.final) for part in _parts(node, line)
+            Need(need.enclave, need.node, OPERATIONS[part.kind], part.final) for part in parts_of(node, line)
         )
         return parts if all(map(self.permits, parts)) else ()
 
@@ -151,18 +150,6 @@ class PlannedGrants:
                 if same and any(each.fqn == node.fqn for each in item.nodes):
                     return item
         return self._processes.get(process.started.process) if process.started else None
-
-
-def _parts(node: RecordedNode, line: EndpointMade) -> list[EndpointMade]:
-    parts: list[EndpointMade] = []
-    if line.kind.family != "action":
-        return parts
-    for each in takewhile(lambda each: each is not line, node.endpoints):
-        if role_of(each) is EndpointRole.PART_OF_ACTION:
-            parts.append(each)
-        elif each.kind.family == "action":
-            parts.clear()
-    return parts
 
 
 def permits(rules: DdsRules, need: Need) -> bool:

@@ -168,13 +168,22 @@ def requested_endpoint(
     """Return ``endpoint`` of ``node`` as it comes in; None for a part of an action, or rcl's own call."""
     if role_of(endpoint) in (EndpointRole.PART_OF_ACTION, EndpointRole.REPEATED):
         return None
-    final = endpoint.final
-    if endpoint.kind.family == "action":
-        before = list(takewhile(lambda each: each is not endpoint, node.endpoints))
-        parts = [each for each in before if role_of(each) is EndpointRole.PART_OF_ACTION]
-        final = _action_name(parts, endpoint)
     rules = _rules(process.started, node.component) if process.started else None
-    return _own(endpoint, final, node.fqn or endpoint.fqn, rules, set())
+    return _own(endpoint, node, rules, set())
+
+
+def parts_of(node: RecordedNode, endpoint: EndpointMade) -> list[EndpointMade]:
+    """Return the parts of an action, which come before its own line; empty for what is no action."""
+    parts: list[EndpointMade] = []
+    if endpoint.kind.family != "action":
+        return parts
+    for each in takewhile(lambda each: each is not endpoint, node.endpoints):
+        role = role_of(each)
+        if role is EndpointRole.PART_OF_ACTION:
+            parts.append(each)
+        elif role is EndpointRole.OWN and each.kind.family == "action":
+            parts.clear()
+    return parts
 
 
 def all_requested(processes: Iterable[RecordedProcess]) -> list[RequestedNode]:
@@ -209,21 +218,16 @@ def _requested_endpoints(
         for endpoint, role in zip(node.endpoints, roles, strict=True)
         if role is EndpointRole.INTROSPECTION
     }
-    parts: list[EndpointMade] = []
     for endpoint, role in zip(node.endpoints, roles, strict=True):
-        if role is EndpointRole.PART_OF_ACTION:
-            parts.append(endpoint)
-        elif role is EndpointRole.OWN:
-            is_action = endpoint.kind.family == "action"
-            final = _action_name(parts, endpoint) if is_action else endpoint.final
-            yield _own(endpoint, final, node.fqn, rules, introspected)
-            parts = [] if is_action else parts
+        if role is EndpointRole.OWN:
+            yield _own(endpoint, node, rules, introspected)
 
 
 def _own(
-    endpoint: EndpointMade, final: str, fqn: str, rules: RemapRules | None, introspected: set[str]
+    endpoint: EndpointMade, node: RecordedNode, rules: RemapRules | None, introspected: set[str]
 ) -> RequestedEndpoint:
-    meant = meant_name(endpoint.kind, endpoint.written, final, fqn, rules)
+    final = _final_name(node, endpoint)
+    meant = meant_name(endpoint.kind, endpoint.written, final, node.fqn or endpoint.fqn, rules)
     return RequestedEndpoint(
         endpoint.kind,
         endpoint.written,
@@ -239,16 +243,16 @@ def _own(
     )
 
 
-def _action_name(parts: list[EndpointMade], action: EndpointMade) -> str:
-    """Return the name that the parts of an action have, which come before its own line.
+def _final_name(node: RecordedNode, endpoint: EndpointMade) -> str:
+    """Return the final name, of an action that of its parts.
 
     Only they have the name that it gets: rcl of jazzy and older does not remap actions, though it resolves their names
     as if it did.
     """
-    for part in reversed(parts):
-        if part.node == action.node and part.final.endswith(_FIRST_PART):
+    for part in reversed(parts_of(node, endpoint)):
+        if part.final.endswith(_FIRST_PART):
             return part.final.removesuffix(_FIRST_PART)
-    return action.final
+    return endpoint.final
 
 
 def _namespace(written: str) -> str:
