@@ -6,6 +6,7 @@ They stand between ``--ros-args`` and ``--`` (or the end); elsewhere ``a:=b`` is
 from __future__ import annotations
 
 from collections.abc import Container, Iterable, Iterator, Sequence
+from itertools import takewhile
 from typing import NamedTuple
 
 from enclave_common.shell_words import split_words
@@ -131,3 +132,29 @@ def split_options(
         else:
             others.append(word)
     return options, others
+
+
+def words_without_ros_arguments(words: Iterable[str]) -> list[str]:
+    """Return the words after the executable that are not rcl's."""
+    return [word for _, flag, word in flags(words) if not flag and not is_bare_rule(word)]
+
+
+def arguments_as_inputs(words: Sequence[str]) -> dict[str, str]:
+    """Return the words of a program, without ROS arguments, as its inputs: before any option by their place from
+    ``<1>``, and the values of options by their names.
+
+    The value of an option follows ``=`` or is the next word without a dash, else it is empty. Behind an option, which
+    may take the next word, a place means nothing.
+    """
+    leading = takewhile(lambda word: not is_option(word), words)
+    inputs = {f"<{place}>": word for place, word in enumerate(leading, 1)}
+    for word, following in zip(words, (*words[1:], ""), strict=False):
+        if is_option(word):
+            option, equals, value = word.partition("=")
+            inputs[option] = value if equals or is_option(following) else following
+    return inputs
+
+
+def is_option(word: str) -> bool:
+    """Return True for a word that begins with a dash and is more than that."""
+    return word.startswith("-") and word not in ("-", "--")

@@ -8,13 +8,12 @@ counts; if it is not known, the default in the source must not be believed.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import takewhile
 from types import MappingProxyType
 from typing import NamedTuple
 
 from enclave_launch.process import ResolvedProcess
 from nodl.name_template import NameTemplate, ParameterPart, Part, UnknownPart
-from nodl.ros_arguments import flags, is_bare_rule
+from nodl.ros_arguments import arguments_as_inputs, is_option, words_without_ros_arguments
 
 
 class ProgramInputs(NamedTuple):
@@ -57,28 +56,15 @@ def environment_inputs(process: ResolvedProcess) -> ProgramInputs:
 
 
 def program_inputs(process: ResolvedProcess) -> ProgramInputs:
-    """Return the inputs of ``process``.
-
-    The value of an option follows ``=`` or is the next word without a dash. The words before any option are also known
-    by their places (``<1>``, as learnt manifests have it)."""
-    values = dict(environment_inputs(process).values)
+    """Return the inputs of ``process``; words by their places are as learnt manifests have them."""
     words = own_words(process)
-    for word, following in zip(words, (*words[1:], ""), strict=False):
-        if _is_flag(word):
-            name, equals, value = word.partition("=")
-            values[name] = value if equals or _is_flag(following) else following
-    leading = [*takewhile(lambda word: not _is_flag(word), words)]  # behind an option places mean nothing
-    values.update((f"<{place}>", word) for place, word in enumerate(leading, 1))
+    options = [word for word in words if is_option(word)]
     return ProgramInputs(
-        values,
-        bare_words=any(not _is_flag(word) for word in words),
-        short_flags=any(_is_flag(word) and not word.startswith("--") for word in words),
-        all_leading=len(leading) == len(words),
+        {**environment_inputs(process).values, **arguments_as_inputs(words)},
+        bare_words=len(options) < len(words),
+        short_flags=any(not word.startswith("--") for word in options),
+        all_leading=not options,
     )
-
-
-def _is_flag(word: str) -> bool:
-    return word.startswith("-") and word not in ("-", "--")
 
 
 def _file_name(word: str) -> str:
@@ -89,5 +75,4 @@ def own_words(process: ResolvedProcess) -> Sequence[str]:
     """Return the words after the executable that are no ROS arguments."""
     program = _file_name(process.executable)
     start = next((i for i, word in enumerate(process.cmd) if _file_name(word) == program), 0)
-    given = flags(process.cmd[start + 1 :])
-    return [word for _, flag, word in given if not flag and not is_bare_rule(word)]
+    return words_without_ros_arguments(process.cmd[start + 1 :])

@@ -18,9 +18,9 @@ from nodl.names import split_fqn
 from nodl.node_interface import ClientLibrary, EndpointKind
 from nodl.record.learning import OBSERVED, Learnt, learn_from
 from nodl.record.lines import RecordedRun
-from nodl.record.origins import arguments_as_inputs
 from nodl.record.requested import RequestedEndpoint, RequestedNode
 from nodl.record.written import final_names, written_names
+from nodl.ros_arguments import arguments_as_inputs
 
 _WITHOUT_PROGRAM = "the program is not known: give the launch file, or observe on the machine that runs it"
 _ROS_TYPE_PARTS = 3

@@ -8,7 +8,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from nodl.remap import RemapRules, valid_rules
-from nodl.ros_arguments import PARAMETER, REMAP, flags
+from nodl.ros_arguments import ParameterRule, parse_ros_arguments, words_without_ros_arguments
 
 _IN_PREFIX = re.compile(r"(?:.*/)?lib/([^/]+)/([^/]+)\Z")  # an executable of an ament package
 _GENERATED_FILE = re.compile(r"<params:\d+>")
@@ -46,9 +46,17 @@ def start_of_command(command: Sequence[str]) -> StartedNode | None:
     programs = ((place, _IN_PREFIX.match(word)) for place, word in enumerate(command[:3], 1))
     for rest, match in programs:
         if match:
-            rules, parameters, arguments = _ros_words(command[rest:])
-            of_command = StartedNode(match[1], match[2], command=tuple(command))
-            return of_command._replace(rule_texts=rules, parameters=parameters, arguments=arguments)
+            words = command[rest:]
+            given = parse_ros_arguments(words)
+            rules = (each for each in given.parameters if isinstance(each, ParameterRule))
+            return StartedNode(
+                match[1],
+                match[2],
+                command=tuple(command),
+                rule_texts=given.remaps,
+                parameters={rule.name: rule.value for rule in rules},
+                arguments=tuple(words_without_ros_arguments(words)),
+            )
     return None
 
 
@@ -93,7 +101,7 @@ def _is_generated(planned: str, running: str) -> bool:
 def _of_process(fields: Mapping[str, Any]) -> StartedNode:
     command = tuple(map(str, fields["cmd"]))
     program = next((i for i, word in enumerate(command) if word.endswith(str(fields["executable"]))), 0)
-    rules, _, arguments = _ros_words(command[program + 1 :])
+    words = command[program + 1 :]
     fqn = str(fields["fqn"] or "").replace(_NO_NAMESPACE, "")
     return StartedNode(
         str(fields["package"] or ""),
@@ -101,9 +109,9 @@ def _of_process(fields: Mapping[str, Any]) -> StartedNode:
         fqn="" if _UNSPECIFIED in fqn else fqn,
         namespace=str(fields["namespace"] or "").replace(_NO_NAMESPACE, "") or "/",
         command=command,
-        rule_texts=rules,
+        rule_texts=parse_ros_arguments(words).remaps,
         parameters=dict(fields["parameters"]),
-        arguments=arguments,
+        arguments=tuple(words_without_ros_arguments(words)),
     )
 
 
@@ -122,12 +130,3 @@ def _of_component(fields: Mapping[str, Any]) -> StartedNode:
         rule_texts=tuple(rules),
         parameters=dict(fields["parameters"]),
     )
-
-
-def _ros_words(words: Sequence[str]) -> tuple[tuple[str, ...], dict[str, object], tuple[str, ...]]:
-    """Return rules, parameters and the words that are not ROS's, of what follows the program (rcl ``arguments.c``)."""
-    found = [(flag, word) for _, flag, word in flags(words) if word or not flag]
-    rules = tuple(word for flag, word in found if flag in REMAP)
-    given = (word.partition(":=") for flag, word in found if flag in PARAMETER)
-    others = tuple(word for flag, word in found if not flag)
-    return rules, {name: value for name, _, value in given}, others

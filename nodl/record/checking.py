@@ -12,9 +12,9 @@ from nodl.builtin_interfaces import LOGGER_SERVICES
 from nodl.name_template import NameTemplate
 from nodl.names import InvalidNameError, split_fqn
 from nodl.node_interface import RANDOM_ENDING, Endpoint, EndpointKind, NodeInterface
-from nodl.record.origins import arguments_as_inputs
 from nodl.record.requested import RequestedEndpoint, RequestedNode
 from nodl.remap import NodeNames
+from nodl.ros_arguments import arguments_as_inputs
 
 
 class Verdict(Enum):

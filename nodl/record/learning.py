@@ -15,8 +15,9 @@ from nodl.names import split_fqn
 from nodl.node_interface import ClientLibrary, EndpointKind
 from nodl.record.assembly import Record
 from nodl.record.lines import RecordedRun
-from nodl.record.origins import FIXED, MARKER, Name, NameOrigin, Observation, arguments_as_inputs, origins_of
+from nodl.record.origins import FIXED, MARKER, Name, NameOrigin, Observation, origins_of
 from nodl.record.requested import RequestedEndpoint, RequestedNode, all_requested
+from nodl.ros_arguments import arguments_as_inputs
 
 _NUMBERED = re.compile(r"(.+?)_((?:0x)?(?=[0-9a-f]*[0-9])[0-9a-f]{6,}|[0-9]{3,})\Z")
 _TF_LISTENER = "transform_listener_impl_*"

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from itertools import islice, takewhile
+from itertools import islice
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -97,20 +97,6 @@ class NameOrigin(NamedTuple):
 
 
 FIXED = NameOrigin()
-
-
-def arguments_as_inputs(words: Sequence[str]) -> dict[str, str]:
-    """Return the words of a command line by their place, from ``<1>``, and the values of options by their names.
-
-    Behind an option, which may take the next word, a place means nothing.
-    """
-    leading = takewhile(lambda word: not word.startswith("-"), words)
-    options = {f"<{index}>": word for index, word in enumerate(leading, 1)}
-    for word, following in zip(words, (*words[1:], "-"), strict=False):
-        option, equals, value = word.partition("=")
-        if option.startswith("-") and (equals or not following.startswith("-")):
-            options[option] = value if equals else following
-    return options
 
 
 def origins_of(observations: Sequence[Observation]) -> dict[Name, NameOrigin]:

@@ -15,10 +15,10 @@ from nodl.record.origins import (
     NameOrigin,
     Observation,
     Source,
-    arguments_as_inputs,
     candidates,
     origins_of,
 )
+from nodl.ros_arguments import arguments_as_inputs
 
 P, S = EndpointKind.PUBLISHER, EndpointKind.SUBSCRIPTION
 
@@ -201,7 +201,8 @@ def test_the_name_where_nothing_is_set_is_the_default() -> None:
 
 def test_words_of_a_command_line_count_by_their_place() -> None:
     assert candidates("out", arguments_as_inputs(["in", "out"])) == (Source("<2>"),)
-    assert arguments_as_inputs(["--rate", "5", "in", "-v", "--to=out"]) == {"--rate": "5", "--to": "out"}
+    words = ["--rate", "5", "in", "-v", "--to=out"]
+    assert arguments_as_inputs(words) == {"--rate": "5", "-v": "", "--to": "out"}
     assert arguments_as_inputs([]) == {}
     assert arguments_as_inputs(["in", "--rate", "5", "out"]) == {"<1>": "in", "--rate": "5"}
 
