@@ -42,33 +42,35 @@ Named = tuple[Operation, str]
 """One operation on a final name."""
 
 
-class Described(NamedTuple):
-    """A description of a program, applied to one start.
-
-    ``source``: the file that says it; ``names``: each with the place that says it; ``open``: what it leaves open;
-    ``used``: the plan grants what it says; ``doubt``: it was written for another version.
-    """
-
-    origin: InterfaceOrigin
-    source: str
-    names: Mapping[Named, str]
-    open: tuple[str, ...]
-    used: bool
-    doubt: str = ""
-
-    @property
-    def complete(self) -> bool:
-        return not self.open
-
-
 class Found(NamedTuple):
-    """The nodes of one executable or component. ``doubt``: what they were described for is another version;
-    ``descriptions``: all that were compared, if there are several."""
+    """The nodes of one executable or component under one start, as a source of knowledge has them. ``doubt``: what they
+    were described for is another version; ``descriptions``: all that were compared, if there are several."""
 
     interfaces: tuple[NodeInterface, ...]
     origin: InterfaceOrigin = InterfaceOrigin.PACKAGE
     doubt: str = ""
     descriptions: tuple[Described, ...] = ()
+
+    @property
+    def source(self) -> str:
+        """Return the place that describes the first of the nodes."""
+        return str(self.interfaces[0].source)
+
+
+class Described(NamedTuple):
+    """One of several descriptions of a program, applied to one start.
+
+    ``names``: each with the place that says it; ``open``: what it leaves open; ``used``: the plan grants what it says.
+    """
+
+    found: Found
+    names: Mapping[Named, str]
+    open: tuple[str, ...]
+    used: bool = False
+
+    @property
+    def complete(self) -> bool:
+        return not self.open
 
 
 class Missing(NamedTuple):

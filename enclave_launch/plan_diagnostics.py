@@ -105,23 +105,23 @@ def _differences(started: Iterable[PlannedProcess | PlannedComponent]) -> Iterat
 def _difference(program: str, item: PlannedProcess | PlannedComponent) -> Iterator[Diagnostic]:
     first = item.descriptions[0]
     granted = {named for each in item.descriptions if each.used for named in each.names}
-    others = [each for each in item.descriptions[1:] if not each.doubt]
+    others = [each for each in item.descriptions[1:] if not each.found.doubt]
     beyond = {named: place for each in others for named, place in each.names.items() if named not in granted}
-    if first.origin in (InterfaceOrigin.RECORDED, InterfaceOrigin.PACKAGE):
+    if first.found.origin in (InterfaceOrigin.RECORDED, InterfaceOrigin.PACKAGE):
         unknown = [text for each in others if not each.used for text in each.open]
-        if first.origin is InterfaceOrigin.PACKAGE and first.used and beyond:
-            yield manifest_lacks(program, first.source, _places(beyond), item.location)
-        elif first.origin is InterfaceOrigin.RECORDED and first.used and (beyond or unknown):
-            yield record_lacks(program, first.source, _places(beyond), unknown, item.location)
+        if first.found.origin is InterfaceOrigin.PACKAGE and first.used and beyond:
+            yield manifest_lacks(program, first.found.source, _places(beyond), item.location)
+        elif first.found.origin is InterfaceOrigin.RECORDED and first.used and (beyond or unknown):
+            yield record_lacks(program, first.found.source, _places(beyond), unknown, item.location)
         return
     library = item.descriptions[-1]
-    if library.doubt or not (first.used and library.complete):
+    if library.found.doubt or not (first.used and library.complete):
         return
     apart = {named: place for named, place in first.names.items() if named not in library.names}
     if first.complete:
         apart |= {named: place for named, place in library.names.items() if named not in first.names}
     if apart:
-        yield descriptions_differ(program, library.source, _places(apart), item.location)
+        yield descriptions_differ(program, library.found.source, _places(apart), item.location)
 
 
 def _places(names: Mapping[Named, str]) -> list[str]:

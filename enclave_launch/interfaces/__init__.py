@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from enclave_common.dependencies import installed
 from enclave_common.words import counted
 from enclave_launch.errors import ManifestError, translated
-from enclave_launch.interfaces.descriptions import ProgramDescription, ProgramStart, meeting
+from enclave_launch.interfaces.descriptions import ProgramStart, meeting
 from enclave_launch.interfaces.library_access import LibraryAccess
 from enclave_launch.interfaces.situation import StartedProgram
 from enclave_launch.options import ResolveOptions
@@ -58,7 +58,7 @@ class _Subject(NamedTuple):
 class _Known(NamedTuple):
     """The descriptions of a program; ``of_this_start``: another start of it needs another lookup."""
 
-    descriptions: tuple[ProgramDescription, ...]
+    descriptions: tuple[Found, ...]
     searched: tuple[str, ...] = ()
     of_this_start: bool = False
 
@@ -111,10 +111,10 @@ class InterfaceFinder:
 
     def _applied(
         self,
-        description: ProgramDescription,
+        description: Found,
         started: ResolvedProcess | ResolvedComponent,
         container: ResolvedProcess | None,
-    ) -> ProgramDescription:
+    ) -> Found:
         """Return the description under this start; one with a node of unknown name as it is, which the plan reports."""
         try:
             interfaces = self._library.complete(description.interfaces, started, container)
@@ -140,21 +140,21 @@ class InterfaceFinder:
                 )
                 found += [_of_manifest(installed)] if installed else []
         if not found and subject.package == CONTAINER_PACKAGE and subject.executable:
-            return _Known((ProgramDescription(InterfaceOrigin.PACKAGE, (_container(subject),)),))
+            return _Known((Found((_container(subject),)),))
         recorded = self._library.recorded(subject.package, name)
         if recorded:
             interfaces = tuple(hit.document.interface for hit in recorded)
             doubt = next((hit.doubt for hit in recorded if hit.doubt), "")
-            found.append(ProgramDescription(InterfaceOrigin.RECORDED, interfaces, doubt))
+            found.append(Found(interfaces, InterfaceOrigin.RECORDED, doubt))
         analysed = None
         by_hand = any(each.origin is InterfaceOrigin.PACKAGE for each in found)
         if not by_hand or (self._infers and self._sources.hold(subject.package)):
             analysed = self._inferred(subject, started, compiled_only=by_hand)
         if analysed:
-            found.append(ProgramDescription(InterfaceOrigin.ANALYSIS, analysed.interfaces))
+            found.append(Found(analysed.interfaces, InterfaceOrigin.ANALYSIS))
         hit = self._library.find(subject.package, name)
         if hit:
-            found.append(ProgramDescription(InterfaceOrigin.LIBRARY, (hit.document.interface,), hit.doubt))
+            found.append(Found((hit.document.interface,), InterfaceOrigin.LIBRARY, hit.doubt))
         searched = ["looked at " + _shortly(named.searched)]
         searched += [f"--nodl describes {', '.join(named.described)}"] if named.described else []
         searched += [analysed.why] if analysed is not None and analysed.why else []
@@ -208,12 +208,12 @@ def _shortly(places: Sequence[str]) -> str:
     return f"{', '.join(places[:_PLACES])} and {counted(len(places) - _PLACES, 'more place')}"
 
 
-def _of_manifest(manifest: Lookup) -> ProgramDescription:
+def _of_manifest(manifest: Lookup) -> Found:
     """Return the description; a manifest that was learnt says so itself, wherever it lies."""
     origin = InterfaceOrigin.NAMED if manifest.named else InterfaceOrigin.PACKAGE
     if any(each.runs for each in manifest.found):
         origin = InterfaceOrigin.RECORDED
-    return ProgramDescription(origin, manifest.found)
+    return Found(manifest.found, origin)
 
 
 def _executable_name(process: ResolvedProcess) -> str:

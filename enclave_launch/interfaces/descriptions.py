@@ -51,69 +51,31 @@ class ProgramStart(NamedTuple):
         return node_of_component(self.started, self.container, interface, "/")
 
 
-class ProgramDescription(NamedTuple):
-    """The nodes of a program as one source of knowledge has them under one start.
-
-    ``doubt``: it was written for another version.
-    """
-
-    origin: InterfaceOrigin
-    interfaces: tuple[NodeInterface, ...]
-    doubt: str = ""
-
-
-def meeting(
-    descriptions: Sequence[ProgramDescription], start: ProgramStart, *, also_unseen: bool = False
-) -> Found:
+def meeting(descriptions: Sequence[Found], start: ProgramStart, *, also_unseen: bool = False) -> Found:
     """Return what the plan takes from ``descriptions``, of which there is one at least, in the order of their origins.
 
     Raises ``LaunchFileError`` for a remap rule at which the process would end.
     """
     if len(descriptions) == 1:
-        only = descriptions[0]
-        return Found(only.interfaces, only.origin, only.doubt)
-    judged = [_Judged(each, *_names(each, start)) for each in descriptions]
+        return descriptions[0]
+    judged = [Described(each, *_names(each, start)) for each in descriptions]
     base, others = _chosen(judged, also_unseen)
-    interfaces = tuple(_decided(each, judged, start) for each in base.description.interfaces)
+    interfaces = tuple(_decided(each, judged, start) for each in base.found.interfaces)
     names = base.names
     for other in others:
-        added = tuple(_decided(each, judged, start) for each in other.description.interfaces)
+        added = tuple(_decided(each, judged, start) for each in other.found.interfaces)
         interfaces = _united(interfaces, added, names.keys(), start)
         names = {**other.names, **names}
     used = (base, *others)
-    return Found(
-        interfaces,
-        base.description.origin,
-        base.description.doubt,
-        tuple(
-            Described(
-                each.description.origin,
-                str(each.description.interfaces[0].source),
-                each.names,
-                each.open,
-                any(each is one for one in used),
-                each.description.doubt,
-            )
-            for each in judged
-        ),
-    )
+    described = (each._replace(used=any(each is one for one in used)) for each in judged)
+    return base.found._replace(interfaces=interfaces, descriptions=tuple(described))
 
 
-class _Judged(NamedTuple):
-    description: ProgramDescription
-    names: dict[Named, str]
-    open: tuple[str, ...]
-
-    @property
-    def complete(self) -> bool:
-        return not self.open
-
-
-def _chosen(judged: Sequence[_Judged], also_unseen: bool) -> tuple[_Judged, tuple[_Judged, ...]]:
+def _chosen(judged: Sequence[Described], also_unseen: bool) -> tuple[Described, tuple[Described, ...]]:
     """Return the description whose nodes the plan has, and those whose names are added to them."""
-    first, others = judged[0], tuple(each for each in judged[1:] if not each.description.doubt)
-    recorded = first.description.origin is InterfaceOrigin.RECORDED
-    if recorded or first.description.origin in _MANIFESTS:
+    first, others = judged[0], tuple(each for each in judged[1:] if not each.found.doubt)
+    recorded = first.found.origin is InterfaceOrigin.RECORDED
+    if recorded or first.found.origin in _MANIFESTS:
         if not first.complete:
             instead = next((each for each in judged[1:] if each.complete), None)
             return (instead, (first,)) if instead else (first, ())
@@ -123,7 +85,7 @@ def _chosen(judged: Sequence[_Judged], also_unseen: bool) -> tuple[_Judged, tupl
     return (first if first.complete or is_other_program else library), ()
 
 
-def _names(description: ProgramDescription, start: ProgramStart) -> tuple[dict[Named, str], tuple[str, ...]]:
+def _names(description: Found, start: ProgramStart) -> tuple[dict[Named, str], tuple[str, ...]]:
     """Return the final names with the places that say them, and what is left open."""
     names: dict[Named, str] = {}
     left: list[str] = []
@@ -148,7 +110,7 @@ def names_of(node: RunningNode, distro: str) -> tuple[dict[Named, str], tuple[st
     )
 
 
-def _decided(interface: NodeInterface, judged: Sequence[_Judged], start: ProgramStart) -> NodeInterface:
+def _decided(interface: NodeInterface, judged: Sequence[Described], start: ProgramStart) -> NodeInterface:
     """Return ``interface`` without the readings of recorded names that no complete description has.
 
     They stay if it has none of them: then it says nothing of this name.
@@ -158,9 +120,7 @@ def _decided(interface: NodeInterface, judged: Sequence[_Judged], start: Program
     complete = [
         each.names.keys()
         for each in judged
-        if each.complete
-        and not each.description.doubt
-        and each.description.origin is not InterfaceOrigin.RECORDED
+        if each.complete and not each.found.doubt and each.found.origin is not InterfaceOrigin.RECORDED
     ]
     endpoints = tuple(_with_readings_of(each, interface, complete, start) for each in interface.endpoints)
     return interface._replace(endpoints=endpoints)

@@ -59,9 +59,11 @@ class Remedies:
         if not described.descriptions:
             return ()
         first, *others = described.descriptions
-        if first.origin is not InterfaceOrigin.RECORDED or not (first.used and first.complete):
+        if first.found.origin is not InterfaceOrigin.RECORDED or not (first.used and first.complete):
             return ()
-        found = {named for each in others if not each.doubt for named in each.names} - first.names.keys()
+        found = {
+            named for each in others if not each.found.doubt for named in each.names
+        } - first.names.keys()
         if (need.operation, need.name) not in found:
             return ()
         return tuple(f"{operation.verb} {name}" for operation, name in sorted(found))

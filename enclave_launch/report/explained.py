@@ -40,15 +40,15 @@ def _descriptions(item: PlannedProcess | PlannedComponent, name: str | None) -> 
         return
     yield f"  what describes {label(item)}:"
     for described in item.descriptions:
-        doubt = f", {described.doubt}" if described.doubt else ""
+        doubt = f", {described.found.doubt}" if described.found.doubt else ""
         is_open = "" if described.complete else ", which leaves something open"
         use = "used" if described.used else "not used"
-        yield f"    {described.origin} ({described.source}{is_open}{doubt}): {use}"
+        yield f"    {described.found.origin} ({described.found.source}{is_open}{doubt}): {use}"
     for named in shown:
         having = [each for each in item.descriptions if named in each.names]
         granted = "" if any(each.used for each in having) else ", not granted"
         operation, final = named
-        yield f"    {operation.verb} {final}: {', '.join(str(each.origin) for each in having)}{granted}"
+        yield f"    {operation.verb} {final}: {', '.join(str(each.found.origin) for each in having)}{granted}"
 
 
 def explainable(plan: LaunchPlan) -> set[str]:

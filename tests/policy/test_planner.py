@@ -124,7 +124,7 @@ def test_what_is_unknown_of_a_process_is_part_of_the_plan(plan: Plan) -> None:
 
 def test_where_interfaces_come_from_and_what_is_doubted_goes_along(plan: Plan) -> None:
     names = {(Operation.PUBLISH, "/chatter"): "here:1"}
-    described = Described(InterfaceOrigin.LIBRARY, "a document", names, (), used=True)
+    described = Described(Found((TALKER,), InterfaceOrigin.LIBRARY), names, (), used=True)
     found = Found((TALKER,), InterfaceOrigin.LIBRARY, "made for 1.0", (described,))
     made = plan(BOX.format("box", "", COMPONENT.format("c")) + NODE.format(""), {
         "talker": found, "pk::Talker": found,
