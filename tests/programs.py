@@ -1,12 +1,15 @@
-"""Programs that tests write, in a repository whose path may have a blank in it."""
+"""Programs and packages that tests write, in a repository whose path may have a blank in it."""
 
 from __future__ import annotations
 
 import shlex
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 
 PYTHON = shlex.quote(sys.executable)
+COMPILED = b"\x7fELF\x02\x01\x01"
+"""What a compiled program begins with."""
 
 
 def python_program(text: str, python: str | Path = sys.executable) -> str:
@@ -14,3 +17,22 @@ def python_program(text: str, python: str | Path = sys.executable) -> str:
 
     The shell reads the first two lines and becomes Python, for which they are a text."""
     return f"#!/bin/sh\n'''exec' {shlex.quote(str(python))} \"$0\" \"$@\"\n' '''\n{text}"
+
+
+def install_package(
+    prefix: Path, package: str, programs: Mapping[str, str | bytes] | None = None, version: str = "1.0.0"
+) -> Path:
+    """Install a package below an ament prefix, as colcon does: marker, package.xml, and executables by their names.
+
+    Returns its share folder."""
+    marker = prefix / "share/ament_index/resource_index/packages" / package
+    share, binaries = prefix / "share" / package, prefix / "lib" / package
+    for folder in (marker.parent, share, binaries):
+        folder.mkdir(parents=True, exist_ok=True)
+    marker.touch()
+    text = f'<package format="3"><name>{package}</name><version>{version}</version></package>'
+    (share / "package.xml").write_text(text)
+    for name, content in (programs or {}).items():
+        (binaries / name).write_bytes(content.encode() if isinstance(content, str) else content)
+        (binaries / name).chmod(0o755)
+    return share

@@ -25,6 +25,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from tests.programs import install_package
+
 CASES = Path(__file__).parent / "cases"
 DISTROS = ("humble", "jazzy", "rolling")
 EVERYWHERE = "everywhere"
@@ -139,12 +141,4 @@ def _whole(case: Case) -> str:
 def install_packages(prefix: Path) -> None:
     """The packages that cases start nodes from: ``pk``, ``rc`` and ``empty`` (without executables)."""
     for package, executables in (("pk", ("e", "one", "two", "late")), ("rc", ("cc",)), ("empty", ())):
-        marker = prefix / "share/ament_index/resource_index/packages" / package
-        marker.parent.mkdir(parents=True, exist_ok=True)
-        marker.touch()
-        (prefix / "share" / package).mkdir(parents=True, exist_ok=True)
-        for name in executables:
-            path = prefix / "lib" / package / name
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text("#!/bin/sh\n")
-            path.chmod(0o755)
+        install_package(prefix, package, dict.fromkeys(executables, "#!/bin/sh\n"))

@@ -14,6 +14,7 @@ from enclave_launch.policy.derivation import allowed_names
 from enclave_launch.report.explained import explained
 from enclave_launch.report.plan_json import plan_json
 from enclave_launch.report.tree import plan_tree
+from tests.programs import COMPILED, install_package
 
 QOS = "{history: SYSTEM_DEFAULT, reliability: SYSTEM_DEFAULT}"
 Launch = Callable[..., LaunchPlan]
@@ -29,18 +30,7 @@ def install(prefix: Path) -> Callable[..., Path]:
     """A package with an executable: compiled, unless a Python source is given."""
 
     def make(package: str, executable: str, version: str = "1.0.0", source: str = "") -> Path:
-        marker = prefix / "share/ament_index/resource_index/packages" / package
-        program = prefix / "lib" / package / executable
-        share = prefix / "share" / package
-        for folder in (marker.parent, program.parent, share):
-            folder.mkdir(parents=True, exist_ok=True)
-        marker.touch()
-        (share / "package.xml").write_text(
-            f"<package><name>{package}</name><version>{version}</version></package>"
-        )
-        program.write_bytes(source.encode() if source else b"\x7fELF\0")
-        program.chmod(0o755)
-        return share
+        return install_package(prefix, package, {executable: source or COMPILED}, version)
 
     return make
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from enclave_launch import __version__
+from tests.programs import COMPILED, install_package
 
 DEMO_WS = Path(__file__).parents[2] / "fixtures/demo_ws"
 TALKER = ("--prefix", str(DEMO_WS), "demo_nodes", "talker_listener.launch.xml")
@@ -104,12 +105,7 @@ def test_counts_agree_in_number(tmp_path: Path) -> None:
 @pytest.fixture
 def robot(tmp_path: Path) -> Path:
     """A prefix with one compiled program, and a launch file that starts it."""
-    (tmp_path / "ws/share/ament_index/resource_index/packages").mkdir(parents=True)
-    (tmp_path / "ws/share/ament_index/resource_index/packages/pk").touch()
-    program = tmp_path / "ws/lib/pk/prog"
-    program.parent.mkdir(parents=True)
-    program.write_bytes(b"\x7fELF")
-    program.chmod(0o755)
+    install_package(tmp_path / "ws", "pk", {"prog": COMPILED})
     file = tmp_path / "robot.launch.xml"
     file.write_text('<launch><node pkg="pk" exec="prog"/></launch>')
     return file

@@ -8,15 +8,14 @@ import pytest
 
 from enclave_launch import UsageError
 from enclave_launch.verb.target import LaunchTarget, find_target, parse_arguments
+from tests.programs import install_package
 
 
 @pytest.fixture
 def prefix(tmp_path: Path) -> Path:
-    marker = tmp_path / "share" / "ament_index" / "resource_index" / "packages" / "demo"
-    marker.parent.mkdir(parents=True)
-    marker.touch()
+    share = install_package(tmp_path, "demo")
     for place in ("launch/one.launch.xml", "launch/twice.launch.xml", "other/deep/twice.launch.xml"):
-        file = tmp_path / "share" / "demo" / place
+        file = share / place
         file.parent.mkdir(parents=True, exist_ok=True)
         file.touch()
     return tmp_path

@@ -18,7 +18,7 @@ from enclave_launch import LaunchPlan, ResolveOptions, resolve
 from enclave_launch.diagnostics import Code, Diagnostic
 from enclave_launch.report.terminal_style import TerminalStyle, terminal_style_of
 from enclave_launch.report.tree import plan_tree
-from tests.programs import PYTHON, python_program
+from tests.programs import PYTHON, install_package, python_program
 
 DEMO = Path(__file__).parents[2] / "fixtures" / "demo_ws"
 MANY = [f"/robot/sensor_{number}/points" for number in range(40)]
@@ -132,13 +132,8 @@ def test_a_slow_analysis_says_what_it_does_once_in_a_while(monkeypatch: pytest.M
 
 
 def test_the_analysis_of_each_program_is_told(tmp_path: Path) -> None:
-    program = tmp_path / "lib" / "pk" / "prog"
-    program.parent.mkdir(parents=True)
-    program.write_text("#!/usr/bin/env python3\nimport rclpy\nrclpy.init()\nrclpy.create_node('n')\n")
-    program.chmod(0o755)
-    index = tmp_path / "share/ament_index/resource_index/packages"
-    index.mkdir(parents=True)
-    (index / "pk").touch()
+    program = "#!/usr/bin/env python3\nimport rclpy\nrclpy.init()\nrclpy.create_node('n')\n"
+    install_package(tmp_path, "pk", {"prog": program})
     file = tmp_path / "one.launch.xml"
     file.write_text('<launch><node pkg="pk" exec="prog"/></launch>')
     told: list[str] = []

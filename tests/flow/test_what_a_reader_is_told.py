@@ -8,27 +8,22 @@ from pathlib import Path
 
 import pytest
 
+from tests.programs import COMPILED, install_package
+
 from .conftest import SecureLaunch
 
 Write = Callable[..., Path]
-COMPILED = b"\x7fELF\x02\x01\x01"
 
 
 @pytest.fixture
 def workspace(tmp_path: Path) -> Path:
     """A package ``robot`` with a Python node ``hello`` and a compiled ``engine``, both without a manifest."""
-    prefix = tmp_path / "install"
-    for folder in ("share/ament_index/resource_index/packages", "share/robot", "lib/robot"):
-        (prefix / folder).mkdir(parents=True)
-    (prefix / "share/ament_index/resource_index/packages/robot").touch()
-    (prefix / "lib/robot/hello").write_text(
+    hello = (
         "#!/usr/bin/env python3\nimport rclpy\nfrom std_msgs.msg import String\n\nrclpy.init()\n"
         "node = rclpy.create_node('hello')\nnode.create_publisher(String, 'greeting', 1)\nrclpy.spin(node)\n"
     )
-    (prefix / "lib/robot/engine").write_bytes(COMPILED)
-    for program in ("hello", "engine"):
-        (prefix / "lib/robot" / program).chmod(0o755)
-    return prefix
+    install_package(tmp_path / "install", "robot", {"hello": hello, "engine": COMPILED})
+    return tmp_path / "install"
 
 
 def test_the_tree_tells_what_was_inferred(secure_launch: SecureLaunch, write: Write, workspace: Path) -> None:

@@ -9,24 +9,19 @@ from typing import Any
 
 import pytest
 
+from tests.programs import COMPILED, install_package
+
 from .conftest import SecureLaunch
 
 Write = Callable[..., Path]
-COMPILED = b"\x7fELF\x02\x01\x01"
 
 
 @pytest.fixture
 def robot(tmp_path: Path) -> Path:
     """A package ``robot`` with a compiled ``engine`` of which nothing is known."""
     prefix = tmp_path / "install"
-    for folder in ("share/ament_index/resource_index/packages", "share/robot", "lib/robot"):
-        (prefix / folder).mkdir(parents=True)
-    (prefix / "share/ament_index/resource_index/packages/robot").touch()
-    (prefix / "share/ament_index/resource_index/packages/rclcpp_components").touch()
-    (prefix / "lib/rclcpp_components").mkdir()
-    for program in ("robot/engine", "rclcpp_components/component_container"):
-        (prefix / "lib" / program).write_bytes(COMPILED)
-        (prefix / "lib" / program).chmod(0o755)
+    install_package(prefix, "robot", {"engine": COMPILED})
+    install_package(prefix, "rclcpp_components", {"component_container": COMPILED})
     return prefix
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from nodl import errors
 from nodl.lookup import Lookup, ManifestLookup
+from tests.programs import install_package
 
 
 class Prefix:
@@ -18,12 +19,7 @@ class Prefix:
         self.root = root
 
     def package(self, name: str) -> Path:
-        marker = self.root / "share/ament_index/resource_index/packages" / name
-        marker.parent.mkdir(parents=True, exist_ok=True)
-        marker.touch()
-        share = self.root / "share" / name
-        share.mkdir(parents=True, exist_ok=True)
-        return share
+        return install_package(self.root, name)
 
     def v1(self, package: str, file: str, *nodes: tuple[str, str, str]) -> Path:
         """``nodes``: (executable, node name, topic)."""

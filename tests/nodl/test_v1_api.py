@@ -11,6 +11,7 @@ import pytest
 import nodl
 from nodl import errors, types
 from nodl.ament_index import PackageNotFoundError
+from tests.programs import install_package
 
 DOCUMENT = """\
 <interface version="1">
@@ -31,11 +32,7 @@ DOCUMENT = """\
 
 @pytest.fixture
 def share(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    marker = tmp_path / "share/ament_index/resource_index/packages/example"
-    marker.parent.mkdir(parents=True)
-    marker.touch()
-    folder = tmp_path / "share/example"
-    folder.mkdir()
+    folder = install_package(tmp_path, "example")
     (folder / "example.nodl.xml").write_text(DOCUMENT)
     monkeypatch.setenv("AMENT_PREFIX_PATH", str(tmp_path))
     return folder

@@ -15,6 +15,7 @@ from nodl.document.v2 import parse_v2
 from nodl.document.write import v1_xml, v2_yaml
 from nodl.node_interface import ManifestNode
 from nodl.verb import main
+from tests.programs import install_package
 
 V1 = """\
 <interface version="1">
@@ -77,10 +78,7 @@ def test_showing_a_document(folder: Path, capsys: pytest.CaptureFixture[str]) ->
 
 def test_showing_a_package(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     prefix = folder / "install"
-    (prefix / "share/ament_index/resource_index/packages").mkdir(parents=True)
-    (prefix / "share/ament_index/resource_index/packages/demo").touch()
-    (prefix / "share/demo").mkdir()
-    (prefix / "share/demo/demo.nodl.xml").write_text(V1)
+    (install_package(prefix, "demo") / "demo.nodl.xml").write_text(V1)
     assert main(["show", "demo", "--prefix", str(prefix), "--format", "json"]) == 0
     nodes = json.loads(capsys.readouterr().out)
     assert [(node["package"], node["name"], len(node["endpoints"])) for node in nodes] == [

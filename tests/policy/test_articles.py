@@ -20,6 +20,7 @@ from enclave_launch.process import (
 from enclave_launch.source_location import SourceLocation
 from keystore.formats.policy_xml import policy_xml
 from nodl.lookup import ManifestLookup
+from tests.programs import install_package
 
 MANIFEST = """\
 <interface version="1">
@@ -35,11 +36,7 @@ MANIFEST = """\
 
 @pytest.fixture
 def prefix(tmp_path: Path) -> str:
-    marker = tmp_path / "share/ament_index/resource_index/packages/demo_nodes_cpp"
-    marker.parent.mkdir(parents=True)
-    marker.touch()
-    share = tmp_path / "share/demo_nodes_cpp"
-    share.mkdir()
+    share = install_package(tmp_path, "demo_nodes_cpp")
     (share / "demo_nodes_cpp.nodl.xml").write_text(MANIFEST)
     return str(tmp_path)
 

@@ -10,6 +10,7 @@ import pytest
 from enclave_launch import LaunchPlan, ManifestError, ResolveOptions, provision, resolve
 from enclave_launch.diagnostics import Code
 from enclave_launch.verb.secure_launch import params_yaml
+from tests.programs import install_package
 
 NODE = """#!/usr/bin/env python3
 import rclpy
@@ -27,13 +28,7 @@ Launch = Callable[..., LaunchPlan]
 @pytest.fixture
 def launch(tmp_path: Path) -> Launch:
     """``launch(text, name=content)``: files beside a launch file that uses package ``pk`` with node ``speaker``."""
-    index = tmp_path / "share/ament_index/resource_index/packages"
-    index.mkdir(parents=True)
-    (index / "pk").touch()
-    program = tmp_path / "lib/pk/speaker"
-    program.parent.mkdir(parents=True)
-    program.write_text(NODE)
-    program.chmod(0o755)
+    install_package(tmp_path, "pk", {"speaker": NODE})
 
     def run(text: str, suffix: str = "xml", **files: str) -> LaunchPlan:
         for name, content in files.items():

@@ -22,7 +22,7 @@ from nodl.name_template import NameTemplate, ParameterPart
 from nodl.record.assembly import Record, read_record
 from nodl.record.requested import all_requested
 from nodl.verb import main as secure_nodl
-from tests.programs import python_program
+from tests.programs import install_package, python_program
 from tests.recording.conftest import ROOT, rclpy_python
 
 WORKSPACE = ROOT / "fixtures" / "rclpy_ws"
@@ -276,13 +276,8 @@ rclpy.spin(Lazy())
 
 def test_what_was_never_seen_and_the_source_makes_is_told_when_learning_ends(tmp_path: Path) -> None:
     """A subscription that exists only while somebody reads the node's output."""
-    program = tmp_path / "ws/lib/lazy_nodes/lazy"
-    marker = tmp_path / "ws/share/ament_index/resource_index/packages/lazy_nodes"
-    for file in (program, marker):
-        file.parent.mkdir(parents=True)
-    marker.touch()
-    program.write_text(python_program(LAZY, rclpy_python("jazzy")))
-    program.chmod(0o755)
+    program = python_program(LAZY, rclpy_python("jazzy"))
+    install_package(tmp_path / "ws", "lazy_nodes", {"lazy": program})
     launch_file = tmp_path / "lazy.launch.xml"
     launch_file.write_text('<launch><node pkg="lazy_nodes" exec="lazy"/></launch>')
     ran = secure_launch(

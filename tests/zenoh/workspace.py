@@ -10,7 +10,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from tests.programs import python_program
+from tests.programs import install_package, python_program
 from tests.zenoh import kit
 
 ROUTER = """
@@ -78,22 +78,8 @@ TALKER_AND_LISTENER = """<launch>
 """
 
 
-def install_program(prefix: Path, package: str, name: str, text: str) -> None:
-    """A Python program of a package below an ament prefix."""
-    index = prefix / "share/ament_index/resource_index/packages"
-    for folder in (index, prefix / "share" / package, prefix / "lib" / package):
-        folder.mkdir(parents=True, exist_ok=True)
-    (index / package).touch()
-    (prefix / "share" / package / "package.xml").write_text(
-        f'<package format="3"><name>{package}</name><version>0.0.0</version></package>'
-    )
-    program = prefix / "lib" / package / name
-    program.write_text(python_program(text))
-    program.chmod(0o755)
-
-
 def install_router(prefix: Path) -> None:
-    install_program(prefix, "rmw_zenoh_cpp", "rmw_zenohd", ROUTER)
+    install_package(prefix, "rmw_zenoh_cpp", {"rmw_zenohd": python_program(ROUTER)})
 
 
 class Workspace:
@@ -105,9 +91,9 @@ class Workspace:
         self.keystore = root / "ks"
         if router:
             install_router(self.prefix)
-        install_program(self.prefix, "zenoh_nodes", "talker", TALKER)
-        install_program(self.prefix, "zenoh_nodes", "listener", LISTENER)
-        (self.prefix / "share/zenoh_nodes/zenoh_nodes.nodl.xml").write_text(MANIFEST)
+        programs = {"talker": python_program(TALKER), "listener": python_program(LISTENER)}
+        share = install_package(self.prefix, "zenoh_nodes", programs)
+        (share / "zenoh_nodes.nodl.xml").write_text(MANIFEST)
 
     def launch_file(self, talker: str = "", text: str = TALKER_AND_LISTENER) -> Path:
         file = self.root / "test.launch.xml"
