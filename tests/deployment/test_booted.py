@@ -6,8 +6,8 @@ Units are exported once, at the beginning, and never again unless a node comes o
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
 from datetime import timedelta
+from pathlib import Path
 
 import pytest
 
@@ -29,18 +29,7 @@ RESPAWNED = (
 )
 
 
-@pytest.fixture(scope="module")
-def host(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Host]:
-    folder = tmp_path_factory.mktemp("robot")
-    for parent in (folder, *folder.parents[:2]):
-        os.chmod(parent, 0o755)  # services have users of their own
-    (folder / "shared").mkdir()
-    with booted(folder / "root", folder / "shared") as machine:
-        yield Host(machine, folder / "shared")
-
-
-@pytest.fixture(scope="module")
-def running(host: Host) -> Host:
+def started(host: Host) -> None:
     """Day one: units exported from a keystore without a CRL, installed, and a bundle imported."""
     units = host.launch(robot(*TALKING))
     host.keystore("units", "install", units)
@@ -48,29 +37,28 @@ def running(host: Host) -> Host:
     for name in (SPEAKER, EAR, SPY):
         assert f"{name}: up" in host.keystore("units", "restart", name)
     until(lambda: host.hears(EAR) and host.hears(SPY), lambda: host.machine.journal(EAR))
-    return host
 
 
-def test_units_talk(running: Host) -> None:
+def units_talk(running: Host) -> None:
     assert "secured by enclave /ear" in running.machine.journal(EAR)
     assert running.machine.run("systemctl", "is-enabled", "ros-robot.target").strip() == "enabled"
 
 
-def test_a_renewal_restarts_the_unit_of_the_renewed_enclave_and_no_other(running: Host) -> None:
+def a_renewal_restarts_the_unit_of_the_renewed_enclave_and_no_other(running: Host) -> None:
     others = {name: running.machine.property(name, "MainPID") for name in (EAR, SPY)}
     renew(running.ca, ["/speaker"], options=RenewOptions(provisioning=options()))
     assert up(running.take()) == [SPEAKER]
     assert {name: running.machine.property(name, "MainPID") for name in others} == others
 
 
-def test_a_ca_is_rolled_over_and_the_units_that_were_exported_before_start(running: Host) -> None:
+def a_ca_is_rolled_over_and_the_units_that_were_exported_before_start(running: Host) -> None:
     for step in (Step.START, Step.SWITCH, Step.FINISH):
         roll_over(running.ca, step, tuple(Role), options=options())
         assert {SPEAKER, EAR, SPY} <= set(up(running.take()))
     until(lambda: running.hears(EAR), lambda: running.machine.journal(EAR))
 
 
-def test_a_revoked_listener_is_refused_by_units_from_before_any_revocation_and_a_new_ca_follows(
+def a_revoked_listener_is_refused_by_units_from_before_any_revocation_and_a_new_ca_follows(
     running: Host,
 ) -> None:
     """Its host took no part: it goes on with the keystore that it had."""
@@ -108,7 +96,7 @@ def test_a_revoked_listener_is_refused_by_units_from_before_any_revocation_and_a
     until(lambda: running.hears(EAR), lambda: machine.journal(EAR))
 
 
-def test_the_target_that_a_boot_wants_starts_and_stops_all(running: Host) -> None:
+def the_target_that_a_boot_wants_starts_and_stops_all(running: Host) -> None:
     machine = running.machine
     machine.run("systemctl", "stop", "ros-robot.target")
     until(lambda: machine.property(EAR, "ActiveState") == "inactive", lambda: machine.journal(EAR))
@@ -118,7 +106,7 @@ def test_the_target_that_a_boot_wants_starts_and_stops_all(running: Host) -> Non
     assert machine.property("ros-robot-expiry.timer", "ActiveState") == "active"
 
 
-def test_a_node_that_leaves_the_launch_file_is_stopped_and_a_new_one_is_started(running: Host) -> None:
+def a_node_that_leaves_the_launch_file_is_stopped_and_a_new_one_is_started(running: Host) -> None:
     units = running.launch(robot(*TALKING[:2], node("listener", "new")))
     running.take()
     printed = running.keystore("units", "install", units, "--restart")
@@ -127,7 +115,7 @@ def test_a_node_that_leaves_the_launch_file_is_stopped_and_a_new_one_is_started(
     until(lambda: running.hears("ros-robot-new.service"), lambda: running.machine.journal("ros-robot-new"))
 
 
-def test_a_unit_is_called_by_its_node_or_enclave_and_unknown_names_are_refused(running: Host) -> None:
+def a_unit_is_called_by_its_node_or_enclave_and_unknown_names_are_refused(running: Host) -> None:
     for name in ("/ear", "ros-robot-ear", EAR):
         assert up(running.keystore("units", "restart", name)) == [EAR]
     assert "no installed unit, node or enclave is called" in running.keystore(
@@ -135,7 +123,7 @@ def test_a_unit_is_called_by_its_node_or_enclave_and_unknown_names_are_refused(r
     )
 
 
-def test_a_process_is_respawned_as_often_as_the_launch_file_says_however_often_it_is_started_by_hand(
+def a_process_is_respawned_as_often_as_the_launch_file_says_however_often_it_is_started_by_hand(
     running: Host,
 ) -> None:
     running.keystore("units", "install", running.launch(robot(RESPAWNED), "--name", "flaky"))
@@ -173,7 +161,7 @@ def test_a_process_is_respawned_as_often_as_the_launch_file_says_however_often_i
     assert f"{EAR}: runs" in running.keystore("units", "status", "/ear")
 
 
-def test_a_unit_waits_for_a_clock_that_is_earlier_than_the_import(running: Host) -> None:
+def a_unit_waits_for_a_clock_that_is_earlier_than_the_import(running: Host) -> None:
     """As on a board without a battery; here the import lies in the future."""
     machine = running.machine
     machine.run("touch", "--date=+6 seconds", f"{KS}/enclaves/speaker/cert.pem")
@@ -182,7 +170,7 @@ def test_a_unit_waits_for_a_clock_that_is_earlier_than_the_import(running: Host)
     assert machine.property(SPEAKER, "ActiveState") == "active"
 
 
-def test_what_expires_soon_makes_the_daily_look_fail_and_what_does_not_leaves_it_well(running: Host) -> None:
+def what_expires_soon_makes_the_daily_look_fail_and_what_does_not_leaves_it_well(running: Host) -> None:
     machine = running.machine
     machine.run("systemctl", "start", "ros-robot-expiry.service")
     renew(running.ca, ["/ear"], options=RenewOptions(provisioning=options(lifetime=9 * DAY)))
@@ -191,7 +179,7 @@ def test_what_expires_soon_makes_the_daily_look_fail_and_what_does_not_leaves_it
     assert "/ear" in machine.journal("ros-robot-expiry.service")
 
 
-def test_a_disk_that_is_full_at_an_import_leaves_the_keystore_and_the_units_as_they_were(
+def a_disk_that_is_full_at_an_import_leaves_the_keystore_and_the_units_as_they_were(
     running: Host,
 ) -> None:
     machine = running.machine
@@ -209,7 +197,7 @@ def test_a_disk_that_is_full_at_an_import_leaves_the_keystore_and_the_units_as_t
     assert machine.run("readlink", f"{place}/keystore") == before
 
 
-def test_removing_stops_and_deletes_what_was_installed_and_nothing_else(running: Host) -> None:
+def removing_stops_and_deletes_what_was_installed_and_nothing_else(running: Host) -> None:
     machine = running.machine
     machine.write("/etc/systemd/system/mine.service", "[Service]\nExecStart=true\n")
     printed = running.keystore("units", "remove", "ros-robot")
@@ -218,3 +206,31 @@ def test_removing_stops_and_deletes_what_was_installed_and_nothing_else(running:
     assert [name for name in left if name.startswith("ros-")] == []
     assert "mine.service" in left
     assert machine.property(SPEAKER, "MainPID") == "0"
+
+
+DAYS = (
+    started,
+    units_talk,
+    a_renewal_restarts_the_unit_of_the_renewed_enclave_and_no_other,
+    a_ca_is_rolled_over_and_the_units_that_were_exported_before_start,
+    a_revoked_listener_is_refused_by_units_from_before_any_revocation_and_a_new_ca_follows,
+    the_target_that_a_boot_wants_starts_and_stops_all,
+    a_node_that_leaves_the_launch_file_is_stopped_and_a_new_one_is_started,
+    a_unit_is_called_by_its_node_or_enclave_and_unknown_names_are_refused,
+    a_process_is_respawned_as_often_as_the_launch_file_says_however_often_it_is_started_by_hand,
+    a_unit_waits_for_a_clock_that_is_earlier_than_the_import,
+    what_expires_soon_makes_the_daily_look_fail_and_what_does_not_leaves_it_well,
+    a_disk_that_is_full_at_an_import_leaves_the_keystore_and_the_units_as_they_were,
+    removing_stops_and_deletes_what_was_installed_and_nothing_else,
+)
+
+
+def test_day_two_on_a_booted_host(tmp_path: Path) -> None:
+    """One host goes through all of it: each step begins where the one before it ended."""
+    for parent in (tmp_path, *tmp_path.parents[:2]):
+        os.chmod(parent, 0o755)  # services have users of their own
+    (tmp_path / "shared").mkdir()
+    with booted(tmp_path / "root", tmp_path / "shared") as machine:
+        host = Host(machine, tmp_path / "shared")
+        for step in DAYS:
+            step(host)
