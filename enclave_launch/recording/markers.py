@@ -46,12 +46,12 @@ def questions(folder: Path) -> Questions:
     found: dict[tuple[str, str], dict[str, object]] = {}
     for path in sorted(folder.glob("records/*.record")):
         for node in all_requested(read_record(path.read_bytes()).attributed()):
-            if not node.executable:
+            if not node.start.executable:
                 continue
             seen = observation_of(node)
             sources = {source for name in seen.names for source in possible_sources(name, seen)}
             values = {name: seen.values[name] for source in sources for name in source.parameters}
-            found.setdefault((node.package, node.executable), {}).update(values)
+            found.setdefault((node.start.package, node.start.executable), {}).update(values)
     return Questions(found)
 
 

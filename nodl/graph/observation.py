@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 from nodl.errors import NoDLError
 from nodl.graph.json_form import NotAGraph, graph_document, graph_from_document
 from nodl.graph.model import Graph, GraphProcess
-from nodl.graph.starts import StartedNode
 from nodl.record.lines import RecordedRun
+from nodl.record.requested import StartedNode
 
 
 class ObservationError(NoDLError):

@@ -13,12 +13,12 @@ from typing import NamedTuple
 from nodl.builtin_interfaces import DISTROS, BuiltinCondition, built_in_interfaces
 from nodl.graph.model import GraphNode, SeenInterface
 from nodl.graph.observation import Observed
-from nodl.graph.starts import StartedNode, start_for, start_of_command
+from nodl.graph.starts import start_for, start_of_command
 from nodl.names import split_fqn
 from nodl.node_interface import ClientLibrary, EndpointKind
 from nodl.record.learning import OBSERVED, Learnt, learn_from
 from nodl.record.lines import RecordedRun
-from nodl.record.requested import RequestedEndpoint, RequestedNode
+from nodl.record.requested import RequestedEndpoint, RequestedNode, StartedNode
 from nodl.record.written import final_names, written_names
 from nodl.ros_arguments import arguments_as_inputs
 
@@ -112,9 +112,7 @@ def _requested_node(placed: _Placed, others: Sequence[_Placed], left_out: list[s
         elif not every.has(interface):
             endpoints.append(_endpoint(interface, placed, others))
     return RequestedNode(
-        package=start.package,
-        executable=start.executable,
-        plugin=start.plugin,
+        start=start,
         name=_known_name(placed, others),
         namespace="" if moved or namespace == "/" else namespace,
         fqn=placed.node.fqn,
@@ -122,9 +120,6 @@ def _requested_node(placed: _Placed, others: Sequence[_Placed], left_out: list[s
         lifecycle=BuiltinCondition.LIFECYCLE in every.there,
         states=(),
         endpoints=tuple(endpoints),
-        parameters=start.parameters,
-        arguments=start.arguments,
-        rules=rules,
         known_start=True,
         logger_services=BuiltinCondition.LOGGER_SERVICES in every.there,
         container=BuiltinCondition.CONTAINER in every.there,

@@ -4,41 +4,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any
 
-from nodl.remap import RemapRules, valid_rules
+from nodl.record.requested import StartedNode
 from nodl.ros_arguments import ParameterRule, parse_ros_arguments, words_without_ros_arguments
 
 _IN_PREFIX = re.compile(r"(?:.*/)?lib/([^/]+)/([^/]+)\Z")  # an executable of an ament package
 _GENERATED_FILE = re.compile(r"<params:\d+>")
 _UNSPECIFIED = "<node_name_unspecified>"
 _NO_NAMESPACE = "<node_namespace_unspecified>"
-
-
-class StartedNode(NamedTuple):
-    """What is known of how a node was started. ``fqn`` is empty where the launch file gives no name; ``command`` where
-    it is a component, whose rules are those of the load request."""
-
-    package: str = ""
-    executable: str = ""
-    plugin: str = ""
-    fqn: str = ""
-    namespace: str = ""
-    command: tuple[str, ...] = ()
-    rule_texts: tuple[str, ...] = ()
-    parameters: Mapping[str, object] = MappingProxyType({})
-    arguments: tuple[str, ...] = ()
-
-    @property
-    def program(self) -> str:
-        return f"{self.package}/{self.plugin or self.executable}"
-
-    @property
-    def rules(self) -> RemapRules:
-        """Return the rules that rcl would take."""
-        rules = valid_rules(self.rule_texts)
-        return RemapRules(local=rules) if self.plugin else RemapRules(process=rules)
 
 
 def start_of_command(command: Sequence[str]) -> StartedNode | None:

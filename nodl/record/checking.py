@@ -160,7 +160,7 @@ def _find(requested: RequestedEndpoint, described: Iterable[_Described]) -> _Des
 
 
 def _described(node: RequestedNode, endpoint: Endpoint) -> Iterable[_Described]:
-    inputs = {**arguments_as_inputs(node.arguments), **node.parameters}
+    inputs = {**arguments_as_inputs(node.start.arguments), **node.start.parameters}
     readings = (endpoint.name, *endpoint.readings)
     for template in (each for reading in readings for each in reading.fill_each(inputs)):
         for final in _finals(node, endpoint.kind, template):
@@ -174,7 +174,7 @@ _STAND_IN = "STAR_OF_A_PATTERN"
 def _finals(node: RequestedNode, kind: EndpointKind, template: NameTemplate) -> set[str]:
     """Return the final name; of an action, with and without its remapping, as the distribution is not known here."""
     namespace, name = split_fqn(node.fqn)
-    names = NodeNames(name, namespace, node.rules)
+    names = NodeNames(name, namespace, node.start.rules)
     text = template.text.replace("*", _STAND_IN)
     try:
         if kind.family == "action":

@@ -112,11 +112,11 @@ def learn_from(runs: Iterable[tuple[RecordedRun, Sequence[RequestedNode]]]) -> L
             if node.started_as == "container":
                 unforeseeable.add(f"{node.fqn} in a container, which this launch did not load,")
                 continue
-            place, pattern = (node.process, node.program), _unforeseeable(node)
+            place, pattern = (node.process, node.start.program), _unforeseeable(node)
             if pattern == _TF_LISTENER and place in before:
                 listeners.add(before[place])
             elif pattern:
-                unforeseeable.add(f"{pattern} of {node.program}")
+                unforeseeable.add(f"{pattern} of {node.start.program}")
             else:
                 before[place] = _key(node)
                 groups.setdefault(_key(node), []).append(_Seen(node, run))
@@ -136,7 +136,7 @@ def _unforeseeable(node: RequestedNode) -> str:
     pattern = f"{_numbered(name)}_*"
     if pattern == _TF_LISTENER:
         return pattern
-    by_code = _numbered(name) and name != node.name and not node.rules.node_name(node.name).rules
+    by_code = _numbered(name) and name != node.name and not node.start.rules.node_name(node.name).rules
     return pattern if by_code else ""
 
 
@@ -147,7 +147,7 @@ def _numbered(name: str) -> str:
 
 def _key(node: RequestedNode) -> ProgramKey:
     name = _numbered(node.name) or node.name
-    return ProgramKey(node.package, node.executable, node.plugin, name, node.namespace)
+    return ProgramKey(node.start.package, node.start.executable, node.start.plugin, name, node.namespace)
 
 
 def _learnt(key: ProgramKey, seen: Sequence[_Seen]) -> LearntNode:
@@ -249,7 +249,7 @@ def _common(qualities: Sequence[tuple[int, ...]]) -> tuple[int, ...]:
 def observation_of(node: RequestedNode, run: str = "") -> Observation:
     """Return what ``node`` was given, and the names that it requested."""
     names = frozenset(_name(endpoint) for endpoint in node.endpoints if endpoint.rc in (0, 1))
-    inputs = {**node.parameters, **arguments_as_inputs(node.arguments)}
+    inputs = {**node.start.parameters, **arguments_as_inputs(node.start.arguments)}
     defaults = {
         n: value for n, value in node.declared.items() if n not in inputs and isinstance(value, str | int)
     }
@@ -294,11 +294,11 @@ def _readings(endpoint: RequestedEndpoint, node: RequestedNode) -> tuple[str, ..
 
 
 def _texts(node: RequestedNode) -> Iterable[str]:
-    for value in (*node.parameters.values(), *node.declared.values()):
+    for value in (*node.start.parameters.values(), *node.declared.values()):
         yield from (
             each for each in (value if isinstance(value, list | tuple) else (value,)) if isinstance(each, str)
         )
-    yield from node.arguments
+    yield from node.start.arguments
 
 
 def _left(readings: tuple[str, ...], node: RequestedNode, places: Mapping[str, Set[str]]) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from nodl.builtin_interfaces import LOGGER_SERVICES, PARAMETER_SERVICES
 from nodl.node_interface import ClientLibrary, EndpointKind
 from nodl.record.assembly import RecordedNode, RecordedProcess
-from nodl.record.lines import EndpointMade, LoadedComponent, StartedProcess
+from nodl.record.lines import EndpointMade
 from nodl.record.written import meant_name
 from nodl.remap import RemapRules, valid_rules
 
@@ -64,17 +64,42 @@ class RequestedEndpoint(NamedTuple):
         return self.rc == 0
 
 
+class StartedNode(NamedTuple):
+    """What is known of how a node was started, from a record, a plan or a command line.
+
+    ``fqn`` and ``namespace`` are those of a plan, ``fqn`` empty if it gives no name; ``command`` is empty for a
+    component, whose rules are those of the load request.
+    """
+
+    package: str = ""
+    executable: str = ""
+    plugin: str = ""
+    fqn: str = ""
+    namespace: str = ""
+    command: tuple[str, ...] = ()
+    rule_texts: tuple[str, ...] = ()
+    parameters: Mapping[str, object] = MappingProxyType({})
+    arguments: tuple[str, ...] = ()
+
+    @property
+    def program(self) -> str:
+        return f"{self.package}/{self.plugin or self.executable}"
+
+    @property
+    def rules(self) -> RemapRules:
+        """Return the rules that act on the node; one that rcl would refuse cannot have acted."""
+        rules = valid_rules(self.rule_texts)
+        return RemapRules(local=rules) if self.plugin else RemapRules(process=rules)
+
+
 class RequestedNode(NamedTuple):
     """The requests of one node. ``name`` and ``namespace`` are the source's own, ``fqn`` the final name.
 
-    ``parameters``, ``arguments`` and ``rules`` are those that the launch gave it; ``known_start``: whether a line of
-    the supervisor reports them at all; ``declared``: values of parameters that the node declared;
-    ``started_as``: what the launch calls it (``node``, ``component`` ...).
+    ``known_start``: a line of the supervisor reports its start; ``declared``: values of parameters that the node
+    declared; ``started_as``: what the launch calls it (``node``, ``component`` ...).
     """
 
-    package: str
-    executable: str
-    plugin: str
+    start: StartedNode
     name: str
     namespace: str
     fqn: str
@@ -82,9 +107,6 @@ class RequestedNode(NamedTuple):
     lifecycle: bool
     states: tuple[str, ...]
     endpoints: tuple[RequestedEndpoint, ...]
-    parameters: Mapping[str, object]
-    arguments: tuple[str, ...]
-    rules: RemapRules
     known_start: bool
     logger_services: bool = False
     container: bool = False
@@ -93,10 +115,6 @@ class RequestedNode(NamedTuple):
     distro: str = ""
     started_as: str = ""
     declared: Mapping[str, object] = MappingProxyType({})
-
-    @property
-    def program(self) -> str:
-        return f"{self.package}/{self.plugin or self.executable}"
 
 
 def role_of(endpoint: EndpointMade) -> EndpointRole:
@@ -132,16 +150,12 @@ def _role_of_server(endpoint: EndpointMade) -> EndpointRole:
 def requested_by(process: RecordedProcess, node: RecordedNode) -> RequestedNode:
     """Return what ``node`` requested, with what the launch started there."""
     started, component = process.started, node.component
-    rules = _rules(started, component)
     made = node.made
     roles = [role_of(endpoint) for endpoint in node.endpoints]
-    endpoints = tuple(_requested_endpoints(node, roles, rules if started else None))
-    package, executable, plugin = _program(process, started, component)
+    endpoints = tuple(_requested_endpoints(node, roles, _rules(process, node)))
     origin = component or started
     return RequestedNode(
-        package=package,
-        executable=executable,
-        plugin=plugin,
+        start=_start(process, node),
         name=made.name if made else "",
         namespace=_namespace(made.namespace if made else ""),
         fqn=node.fqn,
@@ -149,9 +163,6 @@ def requested_by(process: RecordedProcess, node: RecordedNode) -> RequestedNode:
         lifecycle=EndpointRole.LIFECYCLE in roles,
         states=tuple(node.states),
         endpoints=endpoints,
-        parameters=origin.parameters if origin else {},
-        arguments=started.arguments if started and not component else (),
-        rules=rules,
         known_start=started is not None,
         logger_services=EndpointRole.LOGGER_SERVICE in roles,
         container=EndpointRole.CONTAINER in roles,
@@ -168,8 +179,7 @@ def requested_endpoint(
     """Return ``endpoint`` of ``node`` as it comes in; None for a part of an action, or rcl's own call."""
     if role_of(endpoint) in (EndpointRole.PART_OF_ACTION, EndpointRole.REPEATED):
         return None
-    rules = _rules(process.started, node.component) if process.started else None
-    return _own(endpoint, node, rules, set())
+    return _own(endpoint, node, _rules(process, node), set())
 
 
 def parts_of(node: RecordedNode, endpoint: EndpointMade) -> list[EndpointMade]:
@@ -193,21 +203,29 @@ def all_requested(processes: Iterable[RecordedProcess]) -> list[RequestedNode]:
     ]
 
 
-def _program(
-    process: RecordedProcess, started: StartedProcess | None, component: LoadedComponent | None
-) -> tuple[str, str, str]:
+def _start(process: RecordedProcess, node: RecordedNode) -> StartedNode:
+    started, component = process.started, node.component
     if component is not None:
-        return component.package, "", component.plugin
+        return StartedNode(
+            component.package,
+            plugin=component.plugin,
+            rule_texts=component.rules,
+            parameters=component.parameters,
+        )
     if started is not None:
-        return started.package, started.executable.rpartition("/")[2], ""
-    return "", process.loaded.program.rpartition("/")[2] if process.loaded else "", ""
+        return StartedNode(
+            started.package,
+            started.executable.rpartition("/")[2],
+            rule_texts=started.rules,
+            parameters=started.parameters,
+            arguments=started.arguments,
+        )
+    return StartedNode(executable=process.loaded.program.rpartition("/")[2] if process.loaded else "")
 
 
-def _rules(started: StartedProcess | None, component: LoadedComponent | None) -> RemapRules:
-    """Return the launch's rules that act on the node; one that rcl would refuse cannot have acted."""
-    if component is not None:
-        return RemapRules(local=valid_rules(component.rules))
-    return RemapRules(process=valid_rules(started.rules if started else ()))
+def _rules(process: RecordedProcess, node: RecordedNode) -> RemapRules | None:
+    """Return the launch's rules; None if it is not known what started the process."""
+    return _start(process, node).rules if process.started else None
 
 
 def _requested_endpoints(

@@ -91,7 +91,7 @@ def never_seen(
                     kind = difference.kind.value.replace("_", " ")
                     said = f"{kind} {difference.name} ({who}: {difference.detail})"
                     here.setdefault((difference.kind, difference.detail), said)
-        about = f"{node.program}, node {node.name}"
+        about = f"{node.start.program}, node {node.name}"
         before = unseen.get(about)  # what another run showed was seen
         unseen[about] = here if before is None else {key: before[key] for key in before if key in here}
     return {about: tuple(names.values()) for about, names in unseen.items() if names}
@@ -129,15 +129,17 @@ def _judge(node: RequestedNode, known: _Known, judges: Iterable[str]) -> Iterabl
 
 
 def _described(node: RequestedNode, known: _Known) -> tuple[Sequence[NodeInterface], str]:
-    found = known.lookup.find(node.package, executable=node.executable or None, plugin=node.plugin or None)
+    found = known.lookup.find(
+        node.start.package, executable=node.start.executable or None, plugin=node.start.plugin or None
+    )
     return found.found, f"no manifest; looked at {', '.join(found.searched)}"
 
 
 def _inferred(node: RequestedNode, known: _Known) -> tuple[Sequence[NodeInterface], str]:
     inferred = infer_executable(
-        node.package,
-        node.executable or None,
-        node.plugin or None,
+        node.start.package,
+        node.start.executable or None,
+        node.start.plugin or None,
         prefixes=known.prefixes,
         sources=_sources(known.prefixes, known.folders),
         start_of=_RecordedStart(node),
@@ -149,14 +151,14 @@ class _RecordedStart(NamedTuple):
     node: RequestedNode
 
     def parameters(self, node: str | None) -> Mapping[str, object]:
-        return self.node.parameters
+        return self.node.start.parameters
 
     def final_name(self, node: str | None) -> tuple[str | None, str | None]:
         """Return the final name of the recorded node, or what the launch's rules make of another's."""
         namespace, name = split_fqn(self.node.fqn)
         if node is None or node == self.node.name:
             return name, namespace
-        return self.node.rules.node_name(node).name, namespace
+        return self.node.start.rules.node_name(node).name, namespace
 
     def inputs(self, names: Iterable[str]) -> Mapping[str, str | None]:
         """Return nothing: a record does not say what the command line and the environment were."""
@@ -169,13 +171,13 @@ def _sources(prefixes: tuple[str, ...], folders: tuple[str, ...]) -> SourcesInRe
 
 
 def _of_library(node: RequestedNode, known: _Known) -> tuple[Sequence[NodeInterface], str]:
-    hit = Library().find(node.package, node.plugin or node.executable, distro=node.distro)
+    hit = Library().find(node.start.package, node.start.plugin or node.start.executable, distro=node.distro)
     return ((), "the library has no document of it") if hit is None else ((hit.document.interface,), "")
 
 
 def _at_this_start(node: RequestedNode, interfaces: Iterable[NodeInterface]) -> list[NodeInterface]:
     namespace, name = split_fqn(node.fqn)
-    situation = Situation(node.distro, name, namespace, node.parameters, node.arguments)
+    situation = Situation(node.distro, name, namespace, node.start.parameters, node.start.arguments)
     documents = LibraryDocuments(Library(), node.distro)
     found: list[NodeInterface] = []
     waiting = list(interfaces)
@@ -199,7 +201,7 @@ def _counted(judgements: Sequence[Judgement]) -> list[Judgement]:
 def _text(judgements: Sequence[Judgement]) -> str:
     lines: list[str] = []
     for node, judge, comparison, why in _counted(judgements):
-        head = f"{node.fqn} ({node.program}), {judge}: "
+        head = f"{node.fqn} ({node.start.program}), {judge}: "
         if comparison is None:
             lines.append(f"{head}{why}")
             continue
@@ -212,7 +214,7 @@ def _json(judgements: Iterable[Judgement]) -> str:
     rows = [
         {
             "node": node.fqn,
-            "program": node.program,
+            "program": node.start.program,
             "judged": judge,
             "says_something": comparison is not None,
             "agreed": comparison.agreed if comparison else 0,

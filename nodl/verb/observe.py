@@ -33,12 +33,13 @@ from nodl.graph.model import Graph, GraphNode, GraphProcess
 from nodl.graph.observation import Observed, command_lines, observed_text, read_observed
 from nodl.graph.observing import Quiet, Where, in_own_process, observe_until, observer
 from nodl.graph.sources import learn_observed
-from nodl.graph.starts import StartedNode, starts_of_plan
+from nodl.graph.starts import starts_of_plan
 from nodl.graph.text import graph_text
 from nodl.names import split_fqn
 from nodl.node_interface import EndpointKind
 from nodl.record.lines import RecordedRun
 from nodl.record.manifest import OBSERVED_HEAD, manifest_file_name, manifest_text
+from nodl.record.requested import StartedNode
 from nodl.verb import write_documents
 
 _HIGHEST_DOMAIN = 232  # beyond, there are no ports (DDS-RTPS 9.6.1)

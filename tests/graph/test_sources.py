@@ -8,10 +8,11 @@ import pytest
 
 from nodl.graph.observation import Observed
 from nodl.graph.sources import learn_observed
-from nodl.graph.starts import StartedNode, start_for, start_of_command, starts_of_plan
+from nodl.graph.starts import start_for, start_of_command, starts_of_plan
 from nodl.node_interface import EndpointKind as Kind
 from nodl.record.learning import LearntEndpoint, LearntNode
 from nodl.record.lines import RecordedRun
+from nodl.record.requested import StartedNode
 from tests.graph.made import Made, one_node
 from tests.graph.nodes import action, service, topic
 

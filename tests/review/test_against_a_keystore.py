@@ -12,11 +12,10 @@ from enclave_launch import ResolveOptions, SecurityOptions, provision, resolve
 from enclave_launch.review.document import GrantedName
 from enclave_launch.review.signed import as_signed
 from enclave_launch.verb.secure_plan import main
-from keystore import ProvisionOptions
+from keystore import CaAccess, ProvisionOptions, Role
 from keystore.disk.view import keystore_at
 from keystore.formats.validity import utc_now
 from keystore.signing import smime
-from keystore import CaAccess, Role
 
 PREFIX = Path(__file__).parent.parent.parent / "fixtures" / "demo_ws"
 LAUNCH = PREFIX / "share" / "demo_nodes" / "launch"

@@ -50,7 +50,7 @@ def test_a_node_behind_a_shell_belongs_to_the_process_of_the_launch() -> None:
     (asked,) = nodes(
         started, loaded(10, 1, 10), loaded(11, 10, 10), Initialised(11, 0, 0), node(11, 1, "t", "/t")
     )
-    assert (asked.program, asked.process) == ("demo/talker", "talker-1")
+    assert (asked.start.program, asked.process) == ("demo/talker", "talker-1")
 
 
 def test_a_node_in_a_session_of_its_own_is_found_by_its_parents() -> None:
@@ -65,7 +65,7 @@ def test_what_started_it_may_be_told_after_its_first_lines() -> None:
     (asked,) = nodes(
         loaded(10, 1, 10), node(10, 1, "t", "/t"), StartedProcess(10, "late-1", "demo", "talker")
     )
-    assert asked.program == "demo/talker"
+    assert asked.start.program == "demo/talker"
 
 
 def test_a_process_of_which_nothing_is_heard_is_named() -> None:
@@ -89,7 +89,7 @@ def test_components_of_a_container_are_told_apart_by_their_final_names() -> None
         node(10, 2, "talker", "/a/front"),
         node(10, 3, "listener", "/listener"),
     )
-    assert [(each.plugin, each.fqn) for each in found] == [
+    assert [(each.start.plugin, each.fqn) for each in found] == [
         ("", "/box"),
         ("demo::Talker", "/a/front"),
         ("demo::Listener", "/listener"),
@@ -106,7 +106,7 @@ def test_two_components_of_one_name_are_told_apart_by_their_order() -> None:
         node(10, 2, "one", "/same"),
         node(10, 3, "two", "/same"),
     )
-    assert [each.plugin for each in found] == ["", "demo::One", "demo::Two"]
+    assert [each.start.plugin for each in found] == ["", "demo::One", "demo::Two"]
 
 
 def test_a_helper_node_of_a_component_belongs_to_it() -> None:
@@ -119,7 +119,7 @@ def test_a_helper_node_of_a_component_belongs_to_it() -> None:
         node(10, 2, "planner", "/planner"),
         node(10, 3, "costmap", "/costmap/costmap"),
     )
-    assert [each.plugin for each in found] == ["", "nav::Planner", "nav::Planner"]
+    assert [each.start.plugin for each in found] == ["", "nav::Planner", "nav::Planner"]
 
 
 def test_a_component_that_somebody_else_loads_is_that_of_the_same_plugin_or_nobodys() -> None:
@@ -135,7 +135,10 @@ def test_a_component_that_somebody_else_loads_is_that_of_the_same_plugin_or_nobo
         node(10, 4, "talker", "/again"),
         node(10, 5, "stranger", "/stranger")._replace(at=60_000_000_000),
     )
-    assert [(each.plugin, each.fqn) for each in found[3:]] == [("demo::Talker", "/again"), ("", "/stranger")]
+    assert [(each.start.plugin, each.fqn) for each in found[3:]] == [
+        ("demo::Talker", "/again"),
+        ("", "/stranger"),
+    ]
 
 
 def test_what_a_launch_did_not_load_and_executables_are_not_learnt() -> None:

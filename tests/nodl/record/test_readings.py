@@ -8,7 +8,7 @@ from nodl.node_interface import ClientLibrary, EndpointKind
 from nodl.record.learning import LearntEndpoint, learn_from
 from nodl.record.lines import RecordedRun
 from nodl.record.origins import Source
-from nodl.record.requested import RequestedEndpoint, RequestedNode
+from nodl.record.requested import RequestedEndpoint, RequestedNode, StartedNode
 from nodl.record.written import meant_name
 from nodl.remap import RemapRules
 
@@ -18,15 +18,15 @@ P = EndpointKind.PUBLISHER
 def node(
     fqn: str, *written: str, own_namespace: str = "", parameters: Mapping[str, object] | None = None
 ) -> RequestedNode:
-    rules = RemapRules()
     namespace = fqn.rpartition("/")[0]
     finals = [each if each.startswith("/") else f"{namespace}/{each}" for each in written]
-    names = [meant_name(P, each, final, fqn, rules).name for each, final in zip(written, finals, strict=True)]
+    names = [
+        meant_name(P, each, final, fqn, RemapRules()).name
+        for each, final in zip(written, finals, strict=True)
+    ]
     made = zip(written, names, finals, strict=True)
     return RequestedNode(
-        package="p",
-        executable="x",
-        plugin="",
+        start=StartedNode("p", "x", parameters=parameters or {}),
         name="source_name",
         namespace=own_namespace,
         fqn=fqn,
@@ -34,9 +34,6 @@ def node(
         lifecycle=False,
         states=(),
         endpoints=tuple(RequestedEndpoint(P, each, name, final, "m/msg/A", 0) for each, name, final in made),
-        parameters=parameters or {},
-        arguments=(),
-        rules=rules,
         known_start=True,
         started_as="node",
     )
