@@ -17,7 +17,7 @@ from keystore.formats.governance import DomainRule, Governance, Protection, Topi
 from keystore.formats.strict_yaml import Strict, StrictDocument, parse_strict
 
 
-class _Topic(Strict):
+class _Topic(Strict, frozen=True):
     topic_expression: StrictStr
     enable_discovery_protection: StrictBool = True
     enable_liveliness_protection: StrictBool = True
@@ -27,7 +27,7 @@ class _Topic(Strict):
     data_protection_kind: Protection = Protection.ENCRYPT
 
 
-class _Domain(Strict):
+class _Domain(Strict, frozen=True):
     domains: Union[StrictInt, StrictStr] = 0
     allow_unauthenticated_participants: StrictBool = False
     enable_join_access_control: StrictBool = True
@@ -37,7 +37,7 @@ class _Domain(Strict):
     topic_rules: list[_Topic] = Field(default_factory=list)
 
 
-class _Document(StrictDocument):
+class _Document(StrictDocument, frozen=True):
     domain_rules: list[_Domain]
 
 

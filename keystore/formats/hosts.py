@@ -8,9 +8,10 @@ that is an error: nobody should have to know which line wins.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 from fnmatch import fnmatchcase
 from pathlib import Path
+from types import MappingProxyType
 from typing import NamedTuple, Optional
 
 from pydantic import Field, StrictBool, StrictStr
@@ -25,15 +26,15 @@ _DEVICE = re.compile(r"/dev/[A-Za-z0-9._/-]+\Z")
 _GROUP = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_-]{0,31}\Z")
 
 
-class HostPatterns(NamedTuple):
+# Only what pydantic 1.8 and 2 have in common, see strict_yaml.
+class HostPatterns(Strict, frozen=True):
     """Patterns of what belongs on one host."""
 
-    name: str
-    enclaves: tuple[str, ...] = ()
-    nodes: tuple[str, ...] = ()
+    enclaves: list[StrictStr] = Field(default_factory=list)
+    nodes: list[StrictStr] = Field(default_factory=list)
 
 
-class Needs(NamedTuple):
+class Needs(Strict, frozen=True):
     """What a process needs of its host beyond the network.
 
     Attributes:
@@ -41,57 +42,61 @@ class Needs(NamedTuple):
         groups: Names or numbers of supplementary groups, such as those of the devices.
     """
 
-    devices: tuple[str, ...] = ()
-    realtime: bool = False
-    writable_code: bool = False
-    memory: str | None = None
-    groups: tuple[str, ...] = ()
+    devices: list[StrictStr] = Field(default_factory=list)
+    realtime: StrictBool = False
+    writable_code: StrictBool = False
+    memory: Optional[StrictStr] = None
+    groups: list[StrictStr] = Field(default_factory=list)
 
 
-class NodeNeeds(NamedTuple):
+class NodeNeeds(Needs, frozen=True):
     """What the named nodes need of the host they run on."""
 
-    nodes: tuple[str, ...]
-    needs: Needs
+    nodes: list[StrictStr]
+
+
+class _Document(StrictDocument, frozen=True):
+    hosts: dict[StrictStr, HostPatterns] = Field(default_factory=dict)
+    needs: list[NodeNeeds] = Field(default_factory=list)
 
 
 class Hosts(NamedTuple):
-    """The contents of a hosts file. ``where`` names it in errors."""
+    """The contents of a hosts file, hosts by their names. ``where`` names it in errors."""
 
-    hosts: tuple[HostPatterns, ...] = ()
-    needs: tuple[NodeNeeds, ...] = ()
+    hosts: Mapping[str, HostPatterns] = MappingProxyType({})
+    needs: Sequence[NodeNeeds] = ()
     where: str = "the hosts file"
 
     @property
     def names(self) -> tuple[str, ...]:
         """Return the names of the hosts."""
-        return tuple(host.name for host in self.hosts)
+        return tuple(self.hosts)
 
     def of_enclave(self, enclave: str) -> str | None:
         """Return the host of ``enclave``, None if there is none. Raises InvalidInputError if there are several."""
-        return self._of("enclave", enclave, {host.name: host.enclaves for host in self.hosts})
+        return self._of("enclave", enclave, {host: one.enclaves for host, one in self.hosts.items()})
 
     def of_node(self, node: str) -> str | None:
         """Return the host of a fully qualified node name, as ``of_enclave`` does."""
-        return self._of("node", node, {host.name: host.nodes for host in self.hosts})
+        return self._of("node", node, {host: one.nodes for host, one in self.hosts.items()})
 
     def needs_of(self, nodes: Iterable[str]) -> Needs:
         """Return what the nodes of one process need together; the last matching ``memory`` counts."""
         names = list(nodes)
         found = [
-            entry.needs
+            entry
             for entry in self.needs
             if any(fnmatchcase(name, pattern) for name in names for pattern in entry.nodes)
         ]
         return Needs(
-            tuple(sorted({device for one in found for device in one.devices})),
-            any(one.realtime for one in found),
-            any(one.writable_code for one in found),
-            next((one.memory for one in reversed(found) if one.memory is not None), None),
-            tuple(sorted({group for one in found for group in one.groups})),
+            devices=sorted({device for one in found for device in one.devices}),
+            realtime=any(one.realtime for one in found),
+            writable_code=any(one.writable_code for one in found),
+            memory=next((one.memory for one in reversed(found) if one.memory is not None), None),
+            groups=sorted({group for one in found for group in one.groups}),
         )
 
-    def _of(self, what: str, name: str, patterns: dict[str, tuple[str, ...]]) -> str | None:
+    def _of(self, what: str, name: str, patterns: Mapping[str, list[str]]) -> str | None:
         exact = [host for host, listed in patterns.items() if name in listed]
         fitting = exact or [
             host for host, listed in patterns.items() if any(fnmatchcase(name, one) for one in listed)
@@ -104,26 +109,6 @@ class Hosts(NamedTuple):
         return fitting[0] if fitting else None
 
 
-# Only what pydantic 1.8 and 2 have in common, see strict_yaml.
-class _Host(Strict):
-    enclaves: list[StrictStr] = Field(default_factory=list)
-    nodes: list[StrictStr] = Field(default_factory=list)
-
-
-class _Needs(Strict):
-    nodes: list[StrictStr]
-    devices: list[StrictStr] = Field(default_factory=list)
-    realtime: StrictBool = False
-    writable_code: StrictBool = False
-    memory: Optional[StrictStr] = None
-    groups: list[StrictStr] = Field(default_factory=list)
-
-
-class _Document(StrictDocument):
-    hosts: dict[StrictStr, _Host] = Field(default_factory=dict)
-    needs: list[_Needs] = Field(default_factory=list)
-
-
 def load_hosts(path: Path) -> Hosts:
     """Read a hosts file. Raises InvalidInputError naming the file and the line or the entry."""
     return parse_hosts(read_given(path), str(path))
@@ -134,13 +119,12 @@ def parse_hosts(text: bytes, where: str) -> Hosts:
     document = parse_strict(_Document, text, where)
     for name in document.hosts:
         refuse_host_name(name, where)
-    hosts = tuple(
-        HostPatterns(name, tuple(one.enclaves), tuple(one.nodes)) for name, one in document.hosts.items()
-    )
-    return Hosts(hosts, tuple(_needs(one, where) for one in document.needs), where)
+    for needs in document.needs:
+        _check(needs, where)
+    return Hosts(document.hosts, document.needs, where)
 
 
-def _needs(one: _Needs, where: str) -> NodeNeeds:
+def _check(one: Needs, where: str) -> None:
     if one.memory is not None and not _MEMORY.match(one.memory):
         raise InvalidInputError(f"{where}: memory: {printable(one.memory)} is not a size such as 256Mi")
     for device in one.devices:
@@ -149,5 +133,3 @@ def _needs(one: _Needs, where: str) -> NodeNeeds:
     for group in one.groups:
         if not _GROUP.match(group):
             raise InvalidInputError(f"{where}: groups: {printable(group)} is not a group's name or number")
-    needs = Needs(tuple(one.devices), one.realtime, one.writable_code, one.memory, tuple(one.groups))
-    return NodeNeeds(tuple(one.nodes), needs)

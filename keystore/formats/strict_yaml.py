@@ -13,11 +13,11 @@ from keystore.formats.given_file import MAX_BYTES
 
 
 # Only what pydantic 1.8 and 2 have in common: no Python union operator, no ``model_*``, no constraint on a list.
-class Strict(BaseModel, extra="forbid"):
+class Strict(BaseModel, extra="forbid", frozen=True):
     """The base of all entries: an unknown key is an error."""
 
 
-class StrictDocument(Strict):
+class StrictDocument(Strict, frozen=True):
     """The base of whole files."""
 
     version: StrictInt

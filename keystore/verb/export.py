@@ -115,7 +115,7 @@ def _assigned(arguments: argparse.Namespace) -> dict[str, list[str]]:
     unknown = sorted(set(arguments.host) - set(assigned))
     if unknown:
         raise InvalidInputError(f"{arguments.hosts} has no host {', '.join(unknown)}")
-    if by_node := [host.name for host in hosts.hosts if host.nodes]:
+    if by_node := [name for name, one in hosts.hosts.items() if one.nodes]:
         common.warn([
             f"{arguments.hosts}: the nodes of {', '.join(by_node)} are not looked at here: a keystore knows enclaves. "
             "secure-plan hosts PLAN --hosts FILE --write-enclaves NEW.yaml names the enclaves"

@@ -87,12 +87,12 @@ def test_hosts_with_their_enclaves_go_on_to_the_keystore(tmp_path: Path) -> None
     written = tmp_path / "enclaves.yaml"
     secure_plan("hosts", launch, "--hosts", hosts_file(tmp_path), "--write-enclaves", str(written))
     hosts = load_hosts(written)
-    assert {host.name: host.enclaves for host in hosts.hosts} == {
-        "arm": ("/ear",),
-        "base": ("/front/speaker",),
+    assert {name: one.enclaves for name, one in hosts.hosts.items()} == {
+        "arm": ["/ear"],
+        "base": ["/front/speaker"],
     }
     ks = provisioned(launch, tmp_path / "ks")
-    made = export_hosts(ks, tmp_path / "out", {host.name: host.enclaves for host in hosts.hosts})
+    made = export_hosts(ks, tmp_path / "out", {name: one.enclaves for name, one in hosts.hosts.items()})
     assert [one.manifest.names for one in made] == [("/ear",), ("/front/speaker",)]
 
 
