@@ -95,7 +95,7 @@ def parameters_unknown(process: str, path: str, why: str, place: SourceLocation)
         process,
         text,
         place,
-        "rcl would not start the node with it: correct the file",
+        "rcl would not start the node with it: correct the file, or the value in the launch file",
     )
 
 

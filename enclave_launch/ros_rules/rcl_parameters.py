@@ -15,19 +15,18 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 import yaml
 
 from enclave_common.files import read_text
-from enclave_common.yaml_reader import load_yaml
 from enclave_launch.ros_rules.parameter_file import (
     MAX_BYTES,
     RefusedParameters,
     sections_of_text,
     value_of_text,
 )
-from enclave_launch.ros_rules.parameter_value import ParameterValue, Scalar, plain_scalar, type_slot
+from enclave_launch.ros_rules.parameter_value import ParameterValue, plain_scalar, type_slot
 from nodl.ros_arguments import ParameterFileArgument, ParameterRule
 
 Section = Mapping[str, ParameterValue]
@@ -114,22 +113,6 @@ def _matches(pattern: Sequence[str], tokens: Sequence[str | None]) -> bool:
         if not reached:
             return False
     return len(tokens) in reached
-
-
-def as_rcl_reads(value: Any) -> ParameterValue:
-    """Return a value that PyYAML writes as rcl reads it back: ``1e3`` without quotes is 1000.0 there."""
-    return (
-        tuple(map(_item_as_rcl_reads, value))
-        if isinstance(value, (list, tuple))
-        else _item_as_rcl_reads(value)
-    )
-
-
-def _item_as_rcl_reads(value: Scalar | bytes) -> Scalar | bytes:
-    typed = plain_scalar(value) if isinstance(value, str) else value
-    if typed is value or isinstance(typed, str):
-        return value
-    return typed if isinstance(load_yaml(str(value)), str) else value
 
 
 def _value_of_rule(rule: ParameterRule) -> ParameterValue | None:

@@ -8,12 +8,12 @@ from typing import Any
 
 import pytest
 import yaml
-from hypothesis import example, given
+from hypothesis import given
 from hypothesis import strategies as st
 
 from enclave_launch.description.parameters import yaml_text
 from enclave_launch.process import Evaluation
-from enclave_launch.ros_rules.rcl_parameters import as_rcl_reads, resolve_parameters
+from enclave_launch.ros_rules.rcl_parameters import resolve_parameters
 from nodl.ros_arguments import ParameterFileArgument, ParameterRule, parse_ros_arguments
 
 Evaluate = Callable[..., Evaluation]
@@ -220,6 +220,27 @@ def test_of_a_launched_node(launched: Evaluate, tmp_path: Path) -> None:
     assert set(process.parameter_files) <= set(process.cmd)
 
 
+@pytest.mark.parametrize(
+    ("texts", "read"),
+    [
+        ("x, z", ("x", "z")),
+        ("x, y", None),
+        ("y, n", (True, False)),
+        ("1e3, a", None),
+    ],
+)
+def test_a_list_of_texts_of_which_rcl_reads_some_as_another_type_is_not_known(
+    texts: str, read: tuple[object, ...] | None, launched: Evaluate
+) -> None:
+    """PyYAML writes ``y`` and ``1e3`` without quotes; rcl reads a truth and a number, and refuses a mixed list."""
+    text = f'<node pkg="pk" exec="e"><param name="p" value="{texts}" value-sep=", "/></node>'
+    (process,) = launched(text).processes
+    assert process.parameters.get("p") == read
+    assert [why for _, why in process.unread_parameter_files] == (
+        [] if read else ["line 5: the items of a list must be of one type"]
+    )
+
+
 def test_files_are_written_by_the_host_only(launched: Evaluate) -> None:
     (process,) = launched('<node pkg="pk" exec="e"><param name="a" value="1"/></node>').processes
     assert process.cmd[-2:] == ("--params-file", "<params:1>")
@@ -238,16 +259,3 @@ values = st.one_of(
 def test_a_written_file_is_what_pyyaml_writes(parameters: dict[str, Any], section: str) -> None:
     expected = yaml.dump({section: {"ros__parameters": parameters}}, default_flow_style=False)
     assert yaml_text.parameter_file(section, parameters) == expected
-
-
-@given(scalars)
-@example("\xa00")  # a no-break space is no blank for strtoll
-def test_what_is_written_is_read_back_as_rcl_reads_it(value: Any) -> None:
-    document = yaml_text.parameter_file("/**", {"p": value})
-    root: Any = yaml.compose(document)
-    node = root.value[0][1].value[0][1].value[0][1]
-    plain = node.value if node.style is None else None
-    found = as_rcl_reads(value)
-    assert found == (
-        resolve_parameters([], [ParameterRule("p", plain)]).values.get("p") if plain else node.value
-    )

@@ -17,11 +17,9 @@ from enclave_launch.description.parameters.descriptions import Parameter
 from enclave_launch.description.parameters.evaluate import evaluate_parameters
 from enclave_launch.diagnostics.evaluation import parameter_file_missing
 from enclave_launch.ros_rules.distro import Feature
-from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.ros_rules.rcl_parameters import (
     ResolvedParameters,
     Section,
-    as_rcl_reads,
     parameters_of_text,
     resolve_parameters,
 )
@@ -81,9 +79,9 @@ class NodeParameters:
     def __write_file(self, context: LaunchContext, section: str, values: Mapping[str, Any]) -> str:
         quoted = context.host.release.has(Feature.QUOTED_TEXT_PARAMETERS)
         write = yaml_text.quoted_parameter_file if quoted else yaml_text.parameter_file
-        path = context.host.write_parameter_file(write(section, values))
-        read = _as_written if quoted else as_rcl_reads
-        self.__written[path] = lambda: {section: {name: read(value) for name, value in values.items()}}
+        text = write(section, values)
+        path = context.host.write_parameter_file(text)
+        self.__written[path] = partial(parameters_of_text, text, path)
         return path
 
     def resolve(
@@ -101,10 +99,6 @@ class NodeParameters:
     def written_files(self, context: LaunchContext) -> dict[str, str]:
         """Map path to text of the files that were generated for this node."""
         return {path: context.host.parameter_file(path) or "" for path in self.__written}
-
-
-def _as_written(value: Any) -> ParameterValue:
-    return tuple(value) if isinstance(value, list) else value
 
 
 def _global_words(context: LaunchContext) -> Iterator[tuple[str, str]]:
