@@ -6,12 +6,17 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
+
+from enclave_launch import LaunchPlan, ResolveOptions, resolve
+from enclave_launch.policy.derivation import allowed_names
 
 DEMO = Path(__file__).parents[2] / "fixtures" / "demo_ws"
 
 SecureLaunch = Callable[..., "subprocess.CompletedProcess[str]"]
+Launch = Callable[..., LaunchPlan]
 
 
 @pytest.fixture
@@ -47,3 +52,33 @@ def secure_launch(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> SecureLaun
         return subprocess.run(command, capture_output=True, text=True, cwd=home, timeout=60, check=False)
 
     return run
+
+
+@pytest.fixture
+def prefix(tmp_path: Path) -> Path:
+    return tmp_path / "install"
+
+
+@pytest.fixture
+def launch(tmp_path: Path, prefix: Path, monkeypatch: pytest.MonkeyPatch) -> Launch:
+    """``launch('<node .../>')`` with the packages that a test installed in ``prefix``; keywords are options."""
+    monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
+
+    def plan(text: str, **options: Any) -> LaunchPlan:
+        file = tmp_path / "t.launch.xml"
+        file.write_text(f"<launch>{text}</launch>")
+        given = {"distro": "jazzy", "allow_missing_packages": True, **options}
+        prefixes = (prefix,) if prefix.exists() else ()
+        return resolve(file, options=ResolveOptions(prefixes=prefixes, **given))
+
+    return plan
+
+
+def allowed(plan: LaunchPlan, kind: str) -> list[str]:
+    """The names of one list in all enclaves, without what every node has."""
+    return sorted(
+        name
+        for enclave in plan.derived.policy.enclaves
+        for name in allowed_names(enclave)[kind]
+        if (kind, name) not in plan.derived.built_in_names(enclave.path)
+    )

@@ -2,36 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from enclave_launch import LaunchPlan, ResolveOptions, resolve
+from enclave_launch import LaunchPlan
 from enclave_launch.policy.derivation import allowed_names
 
-Launch = Callable[..., LaunchPlan]
-
-
-@pytest.fixture
-def launch(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Launch:
-    monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
-
-    def plan(text: str, distro: str = "jazzy") -> LaunchPlan:
-        file = tmp_path / "t.launch.xml"
-        file.write_text(f"<launch>{text}</launch>")
-        return resolve(file, options=ResolveOptions(distro=distro, allow_missing_packages=True))
-
-    return plan
-
-
-def allowed(plan: LaunchPlan, kind: str) -> list[str]:
-    return sorted(
-        name
-        for enclave in plan.derived.policy.enclaves
-        for name in allowed_names(enclave)[kind]
-        if (kind, name) not in plan.derived.built_in_names(enclave.path)
-    )
+from .conftest import Launch, allowed
 
 
 def problems(plan: LaunchPlan) -> str:
@@ -99,7 +77,7 @@ global_costmap:
 
 def test_servo_is_another_program_in_humble(launch: Launch) -> None:
     node = '<node pkg="moveit_servo" exec="{}" name="servo"><param name="moveit_servo.joint_topic" value="/js"/></node>'
-    old = launch(node.format("servo_node_main"), "humble")
+    old = launch(node.format("servo_node_main"), distro="humble")
     assert "/servo/start_servo" in allowed(old, "serve_services") and "/js" in allowed(old, "subscribe")
     new = launch(node.format("servo_node"))
     assert "/servo/start_servo" not in allowed(new, "serve_services")
@@ -133,7 +111,7 @@ def test_a_behavior_tree_says_what_bt_navigator_calls(launch: Launch, tmp_path: 
     assert "node 'MyNode' of the behavior tree uses is not known" in problems(launch(node))
     tree.write_text(TREE.format("turn", "<GoalUpdater/>"))
     assert "/goal_update" in allowed(launch(node), "subscribe")
-    assert "/goals_update" in allowed(launch(node, "kilted"), "subscribe")
+    assert "/goals_update" in allowed(launch(node, distro="kilted"), "subscribe")
     node = node.replace("</node>", '<param name="goal_updater_topic" value="/person"/></node>')
     plan = launch(node)
     assert "/person" in allowed(plan, "subscribe") and not plan.problems
@@ -155,7 +133,7 @@ def test_a_tree_of_nav2s_own_is_known_where_nav2_is_not_installed(launch: Launch
     assert not plan.problems
     assert allowed(plan, "call_actions") == ["/compute_path_to_pose", "/follow_path", "/navigate_to_pose"]
     assert {"/controller_selector", "/planner_selector"} <= set(allowed(plan, "subscribe"))
-    plan = launch(node.format(own.format("navigate_w_replanning_time")), "humble")
+    plan = launch(node.format(own.format("navigate_w_replanning_time")), distro="humble")
     assert "/controller_selector" not in allowed(plan, "subscribe")
     for other in (own.format("mine"), "my_trees/navigate_w_replanning_time.xml"):
         assert "the behavior tree cannot be read" in problems(launch(node.format(other)))
@@ -403,7 +381,7 @@ def test_republish_publishes_in_the_one_transport_that_it_is_told(launch: Launch
     node = '<node pkg="image_transport" exec="republish" name="r" {}</node>'
     told = node.format('><param name="out_transport" value="compressed"/>')
     assert allowed(launch(told), "publish") == ["/out/compressed"]
-    arguments = launch(node.format('args="compressed raw">'), "humble")
+    arguments = launch(node.format('args="compressed raw">'), distro="humble")
     assert allowed(arguments, "subscribe") == ["/in/compressed"]
     assert allowed(arguments, "publish") == ["/out"]
 
@@ -445,11 +423,11 @@ def test_hardware_that_nobody_describes_is_a_gap(launch: Launch, tmp_path: Path,
         "controller_manager: {ros__parameters: {arm: {type: joint_state_broadcaster/JointStateBroadcaster}}}"
     )
     text = CONTROL.format(urdf=HARDWARE, file=file, words="")
-    plan = launch(text.format(plugin="mock_components/GenericSystem"), distro)
+    plan = launch(text.format(plugin="mock_components/GenericSystem"), distro=distro)
     assert not plan.problems
     assert ("/arm" in [node.fqn for node in plan.nodes]) and ("Gear" not in problems(plan))
     assert "hardware component 'Arm' of class 'own/Hw' needs is not known" in problems(
-        launch(text.format(plugin="own/Hw"), distro)
+        launch(text.format(plugin="own/Hw"), distro=distro)
     )
 
 
@@ -467,8 +445,8 @@ def test_an_ekf_subscribes_its_inputs_and_publishes_tf_in_its_namespace_too(laun
 
 def test_slam_toolbox_is_a_lifecycle_node_since_jazzy_only(launch: Launch) -> None:
     node = '<node pkg="slam_toolbox" exec="async_slam_toolbox_node" name="slam_toolbox"/>'
-    (old,) = (e for e in launch(node, "humble").derived.policy.enclaves)
-    (new,) = (e for e in launch(node, "jazzy").derived.policy.enclaves)
+    (old,) = (e for e in launch(node, distro="humble").derived.policy.enclaves)
+    (new,) = (e for e in launch(node, distro="jazzy").derived.policy.enclaves)
     assert "/slam_toolbox/change_state" not in allowed_names(old)["serve_services"]
     assert "/slam_toolbox/change_state" in allowed_names(new)["serve_services"]
 

@@ -5,24 +5,19 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-from enclave_launch import LaunchPlan, ManifestError, ResolveOptions, UsageError, resolve
+from enclave_launch import LaunchPlan, ManifestError, UsageError
 from enclave_launch.policy.derivation import allowed_names
 from enclave_launch.report.explained import explained
 from enclave_launch.report.plan_json import plan_json
 from enclave_launch.report.tree import plan_tree
 from tests.programs import COMPILED, install_package
 
+from .conftest import Launch, allowed
+
 QOS = "{history: SYSTEM_DEFAULT, reliability: SYSTEM_DEFAULT}"
-Launch = Callable[..., LaunchPlan]
-
-
-@pytest.fixture
-def prefix(tmp_path: Path) -> Path:
-    return tmp_path / "install"
 
 
 @pytest.fixture
@@ -49,31 +44,6 @@ def document(tmp_path: Path) -> Callable[..., Path]:
         return tmp_path / "own"
 
     return write
-
-
-@pytest.fixture
-def launch(tmp_path: Path, prefix: Path, monkeypatch: pytest.MonkeyPatch) -> Launch:
-    """``launch('<node .../>')`` with the installed packages; keywords are options."""
-    monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
-
-    def plan(text: str, **options: Any) -> LaunchPlan:
-        file = tmp_path / "t.launch.xml"
-        file.write_text(f"<launch>{text}</launch>")
-        given = {"distro": "jazzy", "allow_missing_packages": True, **options}
-        prefixes = (prefix,) if prefix.exists() else ()
-        return resolve(file, options=ResolveOptions(prefixes=prefixes, **given))
-
-    return plan
-
-
-def allowed(plan: LaunchPlan, kind: str) -> list[str]:
-    """The names of one list in all enclaves, without what every node has."""
-    return sorted(
-        name
-        for enclave in plan.derived.policy.enclaves
-        for name in allowed_names(enclave)[kind]
-        if (kind, name) not in plan.derived.built_in_names(enclave.path)
-    )
 
 
 PYTHON = """#!/usr/bin/env python3
