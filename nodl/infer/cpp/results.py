@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Container, Iterator, Mapping, Sequence
 from itertools import pairwise
 
 from nodl.dependence import Dependence, Variation, When
@@ -11,6 +11,7 @@ from nodl.infer.cpp.findings import AllocatedNode, Condition, PossibleEndpoint
 from nodl.infer.cpp.program import ProgramFindings
 from nodl.infer.cpp.running.values import NodeNamePart, Text, Value, concatenated, plain
 from nodl.infer.results import certainty_of, own_name
+from nodl.infer.start import Start
 from nodl.name_template import NameTemplate, ParameterPart, Part, UnknownPart, melted
 from nodl.node_interface import (
     RANDOM_ENDING,
@@ -29,12 +30,17 @@ def interfaces_of(
     package: str | None,
     executable: str | None,
     plugin: str | None,
+    start: Start | None = None,
 ) -> list[NodeInterface]:
-    """Return one interface for each node and each name that it may have; gaps of the whole program go to the first."""
+    """Return one interface for each node and each name that it may have; gaps of the whole program go to the first.
+
+    ``start``: the launch that gives the first node its parameters, which those beside it may use in their names.
+    """
     found: list[NodeInterface] = []
     for record in findings.nodes:
         unreached = _unreached(record, findings)
-        found += [_opened(each, unreached) for each in _of_node(record, package, executable, plugin)]
+        given = _given_to_the_first(findings, start) if record is not findings.nodes[0] else {}
+        found += [_opened(each, unreached, given) for each in _of_node(record, package, executable, plugin)]
     if found:
         found[0] = found[0]._replace(gaps=tuple(dict.fromkeys((*found[0].gaps, *program_gaps(findings)))))
     return found
@@ -49,21 +55,41 @@ def _unreached(record: AllocatedNode, findings: ProgramFindings) -> set[str]:
     return every - set(record.parameters) if record is findings.nodes[0] and not renamed else every
 
 
-def _opened(interface: NodeInterface, unreached: set[str]) -> NodeInterface:
-    """Return the interface with what launch gives to these parameters not known."""
+def _given_to_the_first(findings: ProgramFindings, start: Start | None) -> dict[str, object]:
+    """Return the parameters that only the first node has and that a launch alone decides, with what it sets for each
+    (``None``: nothing, so that the default counts)."""
+    first = findings.nodes[0]
+    names = _texts(first.names, first)
+    if start is None or first.arguments or not first.use_global_arguments or len(names) != 1:
+        return {}
+    others = {name for each in findings.nodes[1:] for name in each.parameters}
+    in_code = {*first.overrides, *first.set_values}
+    set_by_launch = start.parameters(names[0])
+    return {name: set_by_launch.get(name) for name in set(first.parameters) - others - in_code}
+
+
+def _opened(
+    interface: NodeInterface, unreached: Container[str], given: Mapping[str, object]
+) -> NodeInterface:
+    """Return the interface with what launch gives to the parameters ``unreached`` not known, unless it is ``given``."""
     endpoints = []
     for each in interface.endpoints:
-        parts = tuple(
-            UnknownPart(f"parameter {part.name} of a node beside it")
-            if isinstance(part, ParameterPart) and part.name in unreached
-            else part
-            for part in each.name.parts
-        )
-        name = NameTemplate(parts)
+        parts = tuple(_reached(part, unreached, given) for part in each.name.parts)
+        name = NameTemplate(melted(parts))
         endpoints.append(
             each if parts == each.name.parts else each._replace(name=name, certainty=certainty_of(name))
         )
     return interface._replace(endpoints=tuple(dict.fromkeys(endpoints)))
+
+
+def _reached(part: Part, unreached: Container[str], given: Mapping[str, object]) -> Part:
+    if not isinstance(part, ParameterPart) or part.name not in unreached:
+        return part
+    texts: tuple[str, ...] = ()
+    if part.name in given:
+        value = given[part.name]
+        texts = part.texts({} if value is None else {part.name: value})
+    return texts[0] if len(texts) == 1 else UnknownPart(f"parameter {part.name} of a node beside it")
 
 
 def program_gaps(findings: ProgramFindings) -> list[Gap]:

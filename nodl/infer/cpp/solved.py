@@ -51,12 +51,13 @@ def solve(sources: Sources, key: LaunchKey, entry: Entry, start: Start | None = 
 def _solved(sources: Sources, key: LaunchKey, entry: Entry, start: Start | None) -> Made:
     with _garbage_at_the_end():
         findings = run_program(sources, entry, start)
+    nodes = interfaces_of(findings, *key, start)
     solved = Solved(
-        nodes=tuple(interfaces_of(findings, key.package, key.executable, key.plugin)),
+        nodes=tuple(nodes),
         gaps=tuple(program_gaps(findings)),
         dead=tuple(Gap(answer.source, answer.reason) for answer in findings.answers if answer.dead),
         classes=tuple(sorted(findings.classes)),
-        consulted=findings.consulted,
+        consulted=findings.consulted or nodes != interfaces_of(findings, *key),
     )
     read = (*findings.files, *sources.unreadable)
     return Made(solved, {name: sources.digests[name] for name in read})

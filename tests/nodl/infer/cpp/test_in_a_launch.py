@@ -190,17 +190,29 @@ int main(int argc, char ** argv) {
 )
 
 
-def test_a_name_from_a_parameter_of_another_node_is_not_known(tmp_path: Path) -> None:
-    package(
+def test_a_node_may_take_its_names_from_parameters_of_the_first_one(tmp_path: Path) -> None:
+    """The other way round the name is not known, nor one that the program sets itself."""
+    folder = package(
         tmp_path / "src/demo", {"src/filter.cpp": TWO_NODES}, "add_executable(filter_node src/filter.cpp)\n"
     )
     install(tmp_path)
-    found = plan(
-        tmp_path,
-        '<launch><node pkg="demo" exec="filter_node"><param name="channel" value="one"/></node></launch>',
+    launch = '<launch><node pkg="demo" exec="filter_node" {}><param name="{}" value="one"/></node></launch>'
+    for given, name, others in (
+        (("", "channel"), "/cloud/one", ("/cloud/data",)),
+        (('name="both"', "channel"), "/cloud/one", ("/cloud/data",)),
+        (("", "back"), "/cloud/data", ("/cloud/one",)),
+    ):
+        found = plan(tmp_path, launch.format(*given))
+        assert ["parameter back of a node beside it" in each.text for each in found.problems] == [True]
+        assert may(found, name)
+        assert not any(may(found, other) for other in (*others, "/b", "/one"))
+    of_code = TWO_NODES.replace(
+        "auto out", 'inner->set_parameter(rclcpp::Parameter("channel", "x")); auto out'
     )
-    assert found.problems
-    assert not any(may(found, name) for name in ("/cloud/one", "/cloud/data", "/b"))
+    write(Path(folder, "src/filter.cpp"), of_code)
+    found = plan(tmp_path, launch.format("", "channel"))
+    assert any("parameter channel, which the program sets" in each.text for each in found.problems)
+    assert not any(may(found, name) for name in ("/cloud/one", "/cloud/data", "/cloud/x"))
 
 
 DECIDES = (
