@@ -71,6 +71,9 @@ class Build:
     # Header of generate_parameter_library -> YAML.
     parameter_files: dict[str, str] = field(default_factory=dict)
     scripts: dict[str, str] = field(default_factory=dict)  # executable -> file that is installed as it is
+    headers: dict[str, str] = field(
+        default_factory=dict
+    )  # path below include/ -> folder that is installed there
 
     @property
     def libraries(self) -> list[Target]:
@@ -341,8 +344,12 @@ class BuildReader:
                 self.build.renamed[target] = "".join(name)
 
     def _do_install(self, given: list[str], variables: dict[str, str]) -> None:
-        """Note the files that become executables of the package as they are: those in ``lib/<package>``."""
+        """Note the files that become executables of the package as they are: those in ``lib/<package>``; and where
+        folders of headers go.
+        """
         destination = given[given.index("DESTINATION") + 1 :][:1] if "DESTINATION" in given else []
+        if destination and given[0] == "DIRECTORY" and destination[0].startswith("include/"):
+            self._note_headers(given[1 : given.index("DESTINATION")], destination[0], variables)
         if [each.rstrip("/") for each in destination] != [f"lib/{variables.get('PROJECT_NAME')}"]:
             return
         words = given[1 : given.index("DESTINATION")]
@@ -355,6 +362,12 @@ class BuildReader:
             folders = [absolute(word, variables) for word in words if word.endswith("/")]
             for file in (each for folder in folders for each in sorted(Path(folder).glob("*"))):
                 self.build.scripts[file.name] = str(file)
+
+    def _note_headers(self, words: Sequence[str], destination: str, variables: dict[str, str]) -> None:
+        below = destination.removeprefix("include/").strip("/")
+        for word in words:
+            name = below if word.endswith("/") else f"{below}/{os.path.basename(word)}"
+            self.build.headers.setdefault(name.strip("/"), absolute(word, variables))
 
     def _do_rclcpp_components_register_node(self, given: list[str], variables: dict[str, str]) -> None:
         options = {w: given[i + 1] for i, w in enumerate(given[:-1]) if w in ("PLUGIN", "EXECUTABLE")}

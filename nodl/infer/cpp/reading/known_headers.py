@@ -23,7 +23,7 @@ KNOWN_HEADERS = frozenset({
     "mcap", "zstd", "rosbag2_storage", "geometric_shapes", "eigen_stl_containers", "random_numbers", "srdfdom",
     "controller_interface", "hardware_interface", "semantic_components",
     "rviz_rendering", "rviz_ogre_vendor", "polyclipping", "backward_ros", "range", "magic_enum", "tl_expected",
-    "SDL", "SDL2", "SDL3", "libusb-1.0", "lcm", "Poco", "thrust", "cub",
+    "SDL", "SDL2", "SDL3", "libusb-1.0", "lcm", "Poco", "thrust", "cub", "metavision",
 })  # fmt: skip
 
 

@@ -156,7 +156,7 @@ class Names:
     def used_namespaces(self, file: str) -> tuple[str, ...]:
         """Return those that ``using namespace`` brings into a file, its headers included."""
         seen = (self.files[each] for each in sorted(self.visible(file)) if each in self.files)
-        return tuple(used for index in seen for used in index.using)
+        return tuple(dict.fromkeys(used for index in seen for used in index.using))
 
     @cached_property
     def functions_by_name(self) -> dict[str, list[Function]]:

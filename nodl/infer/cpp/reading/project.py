@@ -53,6 +53,16 @@ class SourcePackage:
         found = [*self.build.includes, *usual, os.path.join(self.folder, "src"), self.folder]
         return [folder for folder in dict.fromkeys(found) if os.path.isdir(folder)]
 
+    def header(self, name: str) -> str | None:
+        """Return the source of the header that is installed as ``include/<name>``, if the build says so."""
+        parts = name.split("/")
+        for count in range(len(parts) - 1, 0, -1):
+            folder = self.build.headers.get("/".join(parts[:count]))
+            path = os.path.normpath(os.path.join(folder, *parts[count:])) if folder else ""
+            if path and os.path.isfile(path):
+                return path
+        return None
+
 
 @dataclass
 class Workspace:
@@ -87,7 +97,13 @@ class Workspace:
         own = package.include_folders if package else []
         first = self.packages.get(name.partition("/")[0])
         others = first.include_folders if first else []
-        for folder in (*own, *others, *self._all_folders, *self._installed(name)):
+        for folder in (*own, *others):
+            path = os.path.normpath(os.path.join(folder, name))
+            if os.path.isfile(path):
+                return path
+        if first is not None and (installed := first.header(name)) is not None:
+            return installed
+        for folder in (*self._all_folders, *self._installed(name)):
             path = os.path.normpath(os.path.join(folder, name))
             if os.path.isfile(path):
                 return path

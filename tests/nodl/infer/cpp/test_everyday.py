@@ -561,6 +561,39 @@ def test_a_class_of_eigen_may_be_named_without_its_namespace(tmp_path: Path) -> 
     assert any("Strange is not in reach" in why for why in gaps(infer(tmp_path / "strange", strange)))
 
 
+def test_a_namespace_that_the_header_uses_too_is_one(tmp_path: Path) -> None:
+    header = (
+        '#include "eigen/all.hpp"\nusing namespace Eigen;\nstruct State { explicit State(Vector3d x); };\n'
+    )
+    source = '#include "state.hpp"\nusing namespace Eigen;\n' + in_class(
+        f'Vector3d v(1, 2, 3); State s(v); {PUB}("a", 1);', "", "State::State(Vector3d x) { Vector3d y(x); }"
+    )
+    system = infer(tmp_path, source, src__state_hpp=header)
+    assert (names(system), gaps(system)) == (["a"], [])
+    other = infer(tmp_path / "other", source.replace("Vector3d v", "Strange v"), src__state_hpp=header)
+    assert any("Strange is not in reach" in why for why in gaps(other))
+
+
+@pytest.mark.parametrize(
+    ("installed", "included", "found"),
+    [
+        ("DIRECTORY include/ DESTINATION include/${PROJECT_NAME}", "common/topics.hpp", True),
+        ("DIRECTORY include DESTINATION include/${PROJECT_NAME}", "common/include/topics.hpp", True),
+        ("DIRECTORY include/ DESTINATION include/other", "common/topics.hpp", False),
+        ("DIRECTORY include/ DESTINATION share/${PROJECT_NAME}", "common/topics.hpp", False),
+    ],
+)
+def test_a_header_of_another_package_is_included_by_the_name_that_it_is_installed_under(
+    installed: str, included: str, found: bool, tmp_path: Path
+) -> None:
+    topics = {"include/topics.hpp": 'namespace topics { const std::string kMap{"map"}; }\n'}
+    package(tmp_path / "common", topics, f"install({installed})")
+    source = f"#include <{included}>\n" + in_class(f"{PUB}(topics::kMap, 1);")
+    package(tmp_path / "demo", {"src/main.cpp": source}, depends=("rclcpp", "common"))
+    system = infer_paths([tmp_path])
+    assert (names(system) == ["map"]) == found
+
+
 def test_kernels_of_cuda_are_read_as_cpp(tmp_path: Path) -> None:
     kernel = (
         "__global__ void add(const float * __restrict__ x) {}\n"
