@@ -108,7 +108,8 @@ class SourcesInReach:
         return [folder for folder in found if folder not in ("/", "/usr", "/opt")]
 
     def _searched(self) -> str:
-        places = [*self._folders, *(os.path.join(space, "src") for space in self._workspaces)]
+        beside = (os.path.join(space, "src") for space in self._workspaces)
+        places = tuple(dict.fromkeys((*self._folders, *beside)))
         return (
             f"looked below {', '.join(places)}"
             if places
