@@ -48,6 +48,8 @@ def parameter_names(run: Machine, value: Value) -> list[str | None]:
 
 def read(run: Machine, record: AllocatedNode, name: Value, default: Value = BOTTOM) -> Value:
     """Read a parameter: its value is open until launch, with what is known of its default."""
+    if len(name) > 1 and len(default) > 1:
+        default = unknown("a default, of several, which go with several parameters")
     found: list[object] = []
     for filled in parameter_names(run, name):
         if filled is None:

@@ -204,7 +204,16 @@ def _through_pointer(run: Machine, pointer: Node, value: Value, frame: Frame) ->
     elif REFERRED_TO in before or is_elsewhere or points_to_plain(run, pointer, frame, _ANYTHING):
         through(run, pointer, frame)
     elif not all(isinstance(atom, Obj) for atom in (*before, *value)) or not before:
-        assign(run, pointer, value, frame)
+        shared = _may_be_shared(run, pointer, frame)
+        assign(run, pointer, lost(value, f"what {name} points to") if shared else value, frame)
+
+
+def _may_be_shared(run: Machine, pointer: Node, frame: Frame) -> bool:
+    """Return whether it is a smart pointer or of type ``auto``: others may point to the same text, too."""
+    kind, _ = declared_type(run, pointer, frame)
+    holder = frame.owner_of(text(pointer))
+    written = holder.types.get(text(pointer), "") if holder is not None else ""
+    return kind.name == "auto" or (kind.pointer and not written.endswith("*")) or "_ptr" in written
 
 
 def _assign_name(run: Machine, target: Node, value: Value, frame: Frame) -> None:
@@ -262,6 +271,8 @@ def _assign_field(run: Machine, node: Node, value: Value, frame: Frame) -> None:
             through(run, node, frame)
         if each.cls is None and is_plain(value) and name not in (known := each.data.get("written", ())):
             each.data["written"] = (*known, name)
+        if declaring is None and each.cls is not None and not each.foreign_base:  # of an anonymous union
+            value = lost(value, f"what {text(node)[:40]} shares with others")
         strong = len(owners) == 1 and not each.several
         cell = (each, name)
         before = run.store.get(cell) or BOTTOM

@@ -43,13 +43,25 @@ from nodl.infer.cpp.running.static_types import (
     TEXTS,
     class_around,
     class_of_member,
-    class_of_method,
     current_object,
     declared_type,
+    methods_meant,
     points_to_plain,
 )
 from nodl.infer.cpp.running.unknown_calls import changed_by_standard, unknown_call, without_source
-from nodl.infer.cpp.running.values import BOTTOM, Atom, Bound, Lambda, Obj, Seq, Unknown, Value, join, unknown
+from nodl.infer.cpp.running.values import (
+    BOTTOM,
+    Atom,
+    Bound,
+    Lambda,
+    Obj,
+    Seq,
+    Unknown,
+    Value,
+    join,
+    lost,
+    unknown,
+)
 from nodl.infer.cpp.running.variables import member, variable
 from nodl.infer.cpp.syntax import Node, callee_name, field_of, text, unwrapped
 
@@ -129,6 +141,8 @@ def _cast(run: Machine, name: str, site: CallSite) -> Value:
         keep_reference(run, site.given[0], site.frame)
     if name == "std::move" and is_plain(value):
         forget(run, site.given[0], site.frame, "what is left after std::move", told=False)
+    if name == "std::any_cast":  # to another type it gives nothing, or throws
+        return join(lost(value, "what a std::any holds"), unknown("what a std::any holds"))
     return cast(run, site.types[0], value) if name == "static_cast" else value
 
 
@@ -378,11 +392,12 @@ def on_object(run: Machine, atom: Obj, name: str, site: CallSite) -> Value:
         argument = field_of(callee, "argument")
         own = argument is not None and argument.type == "this" and "::" not in text(field_of(callee, "field"))
         seen = None if own else class_of_member(run, atom, callee, frame)
-        if seen is atom.cls and argument is not None:
-            seen = class_of_method(run, seen, name, argument, site.node, frame)
-        methods = (
-            of_this(run, atom, name, site.node, frame) if seen is None else run.names.find_methods(seen, name)
-        )
+        if seen is None:
+            methods = of_this(run, atom, name, site.node, frame)
+        elif seen is atom.cls and argument is not None:
+            methods = methods_meant(run, seen, name, argument, site.node, frame)
+        else:
+            methods = run.names.find_methods(seen, name)
         if methods:
             return site.call_methods(methods, atom)
         field = member(run, atom, name, seen)
@@ -414,11 +429,7 @@ def only_declared(
 def of_this(run: Machine, this: Obj, name: str, node: Node, frame: Frame) -> list[Function]:
     """Return what ``name()`` calls inside of a class: its own while it is made as a base."""
     cls = this.building or this.cls
-    methods = (
-        run.names.find_methods(class_of_method(run, cls, name, None, node, frame), name)
-        if cls is not None
-        else []
-    )
+    methods = methods_meant(run, cls, name, None, node, frame) if cls is not None else []
     return methods or run.names.find_methods(this.cls, name)
 
 

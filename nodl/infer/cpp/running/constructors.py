@@ -8,6 +8,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES, Call, is_harmless_class
 from nodl.infer.cpp.reading.declarations import (
@@ -38,6 +39,7 @@ from nodl.infer.cpp.running.values import (
     Value,
     join,
     literal,
+    lost,
     open_sequence,
     unknown,
 )
@@ -350,9 +352,9 @@ def construct(
         if members is None and arguments and is_aggregate(run, cls):
             members = dict(zip(fields_of(cls), arguments, strict=False))
         made_object.data["members"] = members or {}
-        check_hidden(run, cls, node, frame)
-        _check_operators(run, cls, node, frame)
         _start_fields(run, made_object, cls)
+        check_hidden(run, made_object, cls, node, frame)
+        _check_operators(run, cls, node, frame)
         if any(cls.name in run.names.pointers_to_plain.get(field, ()) for field in cls.fields):
             for each, value in zip(given_to(node, frame), arguments, strict=False):
                 if is_plain(value):
@@ -452,7 +454,15 @@ def _only_reads(method: Function) -> bool:
 _NOT_FOLLOWED = re.compile(r"operator (?!new|delete)\w.*|operator(?:,|&&|\|\||==|<=>)")
 
 
+def _never_known(run: Machine, this: Obj, cls: Class, why: str) -> None:
+    """Know nothing of the texts and numbers that members of ``cls`` hold, whatever is written to them."""
+    for name in cls.fields:
+        run.store.share_cell((this, name), partial(lost, why=why))
+
+
 def _start_fields(run: Machine, made_object: Obj, cls: Class) -> None:
+    if cls.node.type == "union_specifier":
+        _never_known(run, made_object, cls, "a member of a union")
     for each in run.names.ancestry(cls):
         for name, member in each.fields.items():
             if not member.static:
@@ -510,6 +520,7 @@ def construct_class(
     if constructor is not None:
         run.active.pop()
     elif arguments and not this.data["members"] and not cls.inherits_constructors:
+        this.data["arguments"] = list(arguments)  # closures among them may be called with it
         _made_unseen(run, cls, arguments, node, frame)
 
 
@@ -569,6 +580,8 @@ def _bases(
         base = run.class_of(kind, cls)
         if cls.virtual_base and ((where is not None and values) or base in this.bindings):
             run.gap(where or node, inner, f"{cls.name} has a virtual base: who makes it is not followed")
+            for each in run.names.ancestry(base):
+                _never_known(run, this, each, "a member of a virtual base")
         if base is not None and base is not cls:
             construct_class(run, this, base, kind, values, where or node, inner)
         else:

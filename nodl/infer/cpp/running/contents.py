@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from nodl.infer.cpp.reading.declarations import Class, Function
 from nodl.infer.cpp.reading.type_names import Type
+from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.launch_values import given_by_launch
 from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.values import (
@@ -21,6 +22,7 @@ from nodl.infer.cpp.running.values import (
     Value,
     join,
     literal,
+    lost,
     unknown,
 )
 from nodl.infer.cpp.syntax import Node
@@ -73,24 +75,29 @@ def _copy(run: Machine, atom: object, node: Node, frame: Frame, cls: Class | Non
     target = cls if cls is not None and cls in run.names.ancestry(atom.cls) else atom.cls
     if atom.heap and target is not cls:
         return atom
-    own = [each for each in run.names.methods[target].get(target.name, ()) if takes_another(each)]
-    if any(map(run.makes_interfaces, own)) or (
-        own and any("string" in f.type for f in target.fields.values())
-    ):
+    ancestry = run.names.ancestry(target)
+    own = [f for each in ancestry for f in run.names.methods[each].get(each.name, ()) if takes_another(f)]
+    if any(map(run.makes_interfaces, own)):
         run.gap(node, frame, f"the constructor of {target.name} that copies or moves it is not followed here")
-    cells = {
-        (each, name): run.store.get((atom, name))
-        for each in run.names.ancestry(target)
-        for name in each.fields
-    }
+    cells = {(each, name): run.store.get((atom, name)) for each in ancestry for name in each.fields}
     kind = atom.type if target is atom.cls else Type(target.qualified)
     key = ("copy", atom, frame.file.file, node.start_byte, node.end_byte, frame.path, target)
     twin = run.obj(key, kind, cls=target, bindings=atom.bindings, foreign_base=atom.foreign_base)
     for (each, name), value in cells.items():
         if value is not None:
             taken = _member_copied(run, each, name, value, node, frame)
-            run.store.set((twin, name), taken)
+            run.store.set((twin, name), lost(taken, f"what {target.name} copies") if own else taken)
+    for constructor in own:
+        _forget_written(run, constructor)
     return twin
+
+
+def _forget_written(run: Machine, constructor: Function) -> None:
+    """Make unknown, by their names, what a constructor that copies or moves may write: also static members, globals."""
+    code = [constructor.node, *(value for _, value in constructor.initialisers)]
+    for name in sorted(frozenset[str]().union(*map(writes_of, code))):
+        for cell in run.store.named(name):
+            run.store.set(cell, lost(run.store.get(cell) or BOTTOM, f"what {constructor.name} copies"))
 
 
 def _member_copied(run: Machine, cls: Class, name: str, value: Value, node: Node, frame: Frame) -> Value:

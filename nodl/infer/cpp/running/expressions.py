@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.reading.writes import FILLS
@@ -35,6 +36,7 @@ from nodl.infer.cpp.running.values import (
     join,
     join_in_doubt,
     literal,
+    lost,
     plain,
     unknown,
 )
@@ -229,9 +231,8 @@ def lambda_(run: Machine, node: Node, frame: Frame) -> Value:
         depth=frame.depth, captured=True,
     )  # fmt: skip
     inner = run.frame((node.id, frame, frame.path), inner)
-    if re.search(r"\)\s*mutable\b", text(field_of(node, "declarator"))) and (
-        run.subtree_matters(node) or '"' in text(node)
-    ):
+    is_mutable = re.search(r"\)\s*mutable\b", text(field_of(node, "declarator"))) is not None
+    if is_mutable and (run.subtree_matters(node) or '"' in text(node)):
         run.gap(node, frame, "a mutable closure changes what it captured: what it makes is not followed")
     outer: Frame | None = frame
     while outer is not None:
@@ -241,7 +242,10 @@ def lambda_(run: Machine, node: Node, frame: Frame) -> Value:
         if child.type == "lambda_capture_initializer" and len(children(child)) >= 2:
             named = children(child)
             name, refers = text(named[0]).lstrip("&"), text(named[0]).startswith("&")
-            run.local(inner, name, initial_value(run, named[-1], frame, refers))
+            held = initial_value(run, named[-1], frame, refers)
+            if is_mutable:
+                run.store.share_cell((inner, name), partial(lost, why=_MUTABLE))
+            run.local(inner, name, held)
     if frame.blocks or frame.kept:
         owners = {name: frame.owner_of(name) for name in words_of(node)}
         inner.kept = {name: owner for name, owner in owners.items() if owner is not None}
@@ -252,8 +256,13 @@ def lambda_(run: Machine, node: Node, frame: Frame) -> Value:
         owner = frame.owner_of(name)
         if owner is not None and name not in inner.names:
             held, written = run.store.get((owner, name)) or BOTTOM, owner.types.get(name, "")
+            if is_mutable:
+                run.store.share_cell((inner, name), partial(lost, why=_MUTABLE))
             run.local(inner, name, _captured(run, held, written, node, owner), written)
     return (Lambda(node, inner),)
+
+
+_MUTABLE = "what a mutable closure captured"
 
 
 def _captured(run: Machine, value: Value, written: str, node: Node, owner: Frame) -> Value:

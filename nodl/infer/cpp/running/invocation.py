@@ -287,7 +287,7 @@ def call_methods(
     if len(fitting) > MAX_OVERLOADS and not any(map(run.makes_interfaces, fitting)):
         return _one_of_many(run, fitting, node, frame)
     if this_object is not None and not exactly and len(values) < len(fitting[0].parameters):
-        _check_defaults(run, fitting[0], this_object, len(values), node, frame)
+        values = _with_defaults(run, fitting[0], this_object, values)
 
     def call(each: Function) -> Value:
         return invoke(run, each, this_object, values, node, frame, types, bindings)
@@ -295,12 +295,13 @@ def call_methods(
     return _any_of(run, fitting, call, node, frame)
 
 
-def _check_defaults(
-    run: Machine, function: Function, this: Obj, given: int, node: Node, frame: Frame
-) -> None:
-    """Check defaults: a virtual method gets those of the class its object is seen as ([dcl.fct.default]/10)."""
+def _with_defaults(run: Machine, function: Function, this: Obj, values: Sequence[Value]) -> Sequence[Value]:
+    """Add unknowns for defaults in which classes differ: a virtual method gets those of the class that its object is
+    seen as ([dcl.fct.default]/10).
+    """
     if this.cls is None or not function.virtual:
-        return
+        return values
+    given = len(values)
     named = [
         each
         for cls in run.names.ancestry(this.cls)
@@ -311,9 +312,10 @@ def _check_defaults(
         if len(each.parameters) == len(function.parameters)
     ]
     written = {tuple(text(p.default) for p in each.parameters[given:]) for each in named}
-    if len(written - {("",) * (len(function.parameters) - given)}) > 1:
-        why = f"which default arguments {function.name}() gets here is not known: classes differ"
-        run.gap(node, frame, why)
+    if len(written - {("",) * (len(function.parameters) - given)}) < 2:
+        return values
+    why = f"the default arguments of {function.name}(): classes differ"
+    return [*values, *(unknown(why) for _ in function.parameters[given:])]
 
 
 def invoke(

@@ -51,7 +51,8 @@ class AbstractStore:
         self._watched_from = 0
         self._history: Changes | None = None
         self._held: dict[Cell, Value | None] | None = None
-        self._shared: dict[Cell, Value] = {}  # variables that unknown code may write to at any time
+        # Variables that others may write to at any time: what is left of a value that is written to them.
+        self._shared: dict[Cell, Callable[[Value], Value]] = {}
         self.log = NoteLog()
 
     def get(self, cell: Cell) -> Value | None:
@@ -108,7 +109,7 @@ class AbstractStore:
         if old is not value:
             value = bounded(value)
             if cell in self._shared:
-                value = join(value, self._shared[cell])
+                value = self._shared[cell](value)
             if old is _ABSENT and not _is_of_a_call(cell):
                 self._by_name.setdefault(name_of(cell), {})[cell] = None
             if any(map(holds_callable, value)):
@@ -121,13 +122,21 @@ class AbstractStore:
             if self._held is not None:
                 self._hold(cell, None if old is _ABSENT else join(old, value))
 
-    def share(self, action: Callable[[], None], why: Value) -> None:
-        """Run what writes to a variable; whatever is written to it from then on, it may also be ``why``."""
+    def share(self, action: Callable[[], None], left: Callable[[Value], Value]) -> None:
+        """Run what writes to a variable; of whatever is written to it from then on, only ``left`` of it is known."""
         mark = len(self._trail)
         action()
-        for cell, _, _ in self._trail[mark:]:
-            self._shared[cell] = why
-            self.set(cell, join(self._cells.get(cell, BOTTOM), why))
+        for cell in dict.fromkeys(cell for cell, _, _ in self._trail[mark:]):
+            self.share_cell(cell, left)
+
+    def share_cell(self, cell: Cell, left: Callable[[Value], Value]) -> None:
+        """Know of the value of ``cell`` only what is ``left`` of it, from now on."""
+        self._shared[cell] = left
+        self.set(cell, left(self._cells.get(cell, BOTTOM)))
+
+    def everything(self) -> list[Cell]:
+        """Return all variables that hold something."""
+        return [cell for cell in self._cells if not _is_over(cell)]
 
     def named(self, name: str) -> list[Cell]:
         """Return the members, globals and static members of that name that were ever set."""

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from functools import partial
 
 from nodl.infer.cpp.ledger import CREATES
+from nodl.infer.cpp.reading.declarations import Class
 from nodl.infer.cpp.running.effects import effects_of, referred_to, written_in
 from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.memory import Cell
@@ -29,7 +30,6 @@ from nodl.infer.cpp.running.values import (
     Unknown,
     Value,
     lost,
-    unknown,
 )
 from nodl.infer.cpp.syntax import Node, children, field_of, last_name, text, unwrapped, words_in
 
@@ -148,12 +148,29 @@ def forget(
 def keep_reference(run: Machine, what: Node, frame: Frame) -> None:
     """Make the variable ``what`` unknown from now on: a reference to it is stored, and may be written through."""
     why = f"what is written through a reference to {text(what)[:40]}"
-    run.store.share(partial(forget, run, what, frame, why, told=False), unknown(why))
+    run.store.share(partial(forget, run, what, frame, why, told=False), partial(lost, why=why))
 
 
 def through(run: Machine, what: Node, frame: Frame) -> None:
-    """Add a gap: a plain value is written through ``what``, and it is not known which."""
+    """Add a gap: a plain value is written through ``what``, and it is not known which: so none is any more."""
     run.gap(what, frame, f"what {text(what)[:40]} refers to is written: which variable that is is not known")
+    for cell in run.store.everything():
+        held = run.store.get(cell) or BOTTOM
+        if is_plain(held) and not _is_constant(cell):
+            run.store.set(cell, lost(held, f"what is written through {text(what)[:40]}"))
+
+
+def _is_constant(cell: Cell) -> bool:
+    """Return whether a variable was declared ``const``."""
+    owner, name = cell
+    if isinstance(owner, Frame):
+        written = owner.types.get(name, "")
+    elif isinstance(owner, Obj):
+        return False
+    else:
+        declared = owner.fields[name] if isinstance(owner, Class) else owner
+        written = text(getattr(declared, "node", None)).partition("=")[0]
+    return re.search(r"\bconst(?:expr)?\b", written) is not None
 
 
 def _behind(run: Machine, what: Node | None, frame: Frame, seen: set[object]) -> Iterator[Cell]:

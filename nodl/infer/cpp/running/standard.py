@@ -264,7 +264,14 @@ def called_now(run: Machine, values: Sequence[Value], node: Node, frame: Frame) 
         run.calls.call_lambda(run, atom, [unknown("an argument")] * 8, node, frame)
         return NEXT
 
-    for atom in (atom for value in values for atom in value if isinstance(atom, Lambda)):
+    held = (
+        each
+        for value in values
+        for atom in value
+        if isinstance(atom, Obj)
+        for each in atom.data.get("arguments", ())
+    )
+    for atom in (atom for value in (*values, *held) for atom in value if isinstance(atom, Lambda)):
         if writes_of(atom.node):
             run.branches(
                 [partial(once, atom), lambda: NEXT], doubt="what a closure writes that may be called"

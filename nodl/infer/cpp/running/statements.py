@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from functools import partial
 
@@ -15,6 +16,7 @@ from nodl.infer.cpp.running.constructors import declared_value, fields_of
 from nodl.infer.cpp.running.contents import copied, iterated
 from nodl.infer.cpp.running.effects import only_changes_variables
 from nodl.infer.cpp.running.launch_values import decided, in_doubt, settled
+from nodl.infer.cpp.running.left_out import forget_writes
 from nodl.infer.cpp.running.machine import (
     BREAK,
     CONTINUE,
@@ -41,6 +43,7 @@ from nodl.infer.cpp.running.values import (
     has_text,
     in_any_order,
     join,
+    lost,
     may_name,
     plain,
     unknown,
@@ -81,8 +84,26 @@ def braces(run: Machine, node: Node, frame: Frame) -> int:
     """Names declared inside end here; those in the body of a function stay in its frame."""
     parent = node.parent
     if parent is None or parent.type in ("function_definition", "lambda_expression"):
-        return block(run, node, frame)
+        jumps = _JUMP.search(text(node)) and next((n for n in walk(node) if n.type == "goto_statement"), None)
+        return _not_followed(run, node, jumps, frame) if jumps else block(run, node, frame)
     return _inner_block(run, node, frame)
+
+
+_JUMP = re.compile(r"\bgoto\b")
+
+
+def _not_followed(run: Machine, body: Node, jump: Node, frame: Frame) -> int:
+    """Leave a function out that uses ``goto``: a gap if it may make interfaces; what it may write is not known."""
+    why = f"{text(jump).rstrip(';')}: what this function does is not followed"
+    if run.subtree_matters(body):
+        run.gap(jump, frame, why)
+    if frame.function is not None:
+        forget_writes(run, frame.function)
+    for name in sorted(writes_of(body)):
+        for cell in (*run.store.named(name), *((owner, name) for owner in (frame.owner_of(name),) if owner)):
+            run.store.set(cell, lost(run.store.get(cell) or BOTTOM, why))
+    frame.returned = unknown(why)
+    return NEXT
 
 
 @statement("declaration_list", "case_statement", "labeled_statement", "preproc_else", "else_clause")
@@ -147,14 +168,6 @@ def break_statement(run: Machine, node: Node, frame: Frame) -> int:
     if frame.loops:
         frame.loops[-1].breaks.append(run.store.changes(frame.loops[-1].start))
     return BREAK
-
-
-@statement("goto_statement")
-def goto_statement(run: Machine, node: Node, frame: Frame) -> int:
-    """Go on as if it were not there; a gap in a function that could make interfaces."""
-    if frame.function is None or run.makes_interfaces(frame.function):
-        run.gap(node, frame, f"{text(node).rstrip(';')}: what runs behind the label is not followed")
-    return NEXT
 
 
 @statement("continue_statement")
@@ -384,7 +397,10 @@ def _vexing(run: Machine, node: Node, declarator: Node, frame: Frame) -> None:
             for each in found
         ):
             run.calls.may_be_written(run, f"the constructor of {written}", [], children(given), frame)
-        run.local(frame, text(field_of(declarator, "declarator")), found, written)
+        name = text(field_of(declarator, "declarator"))
+        run.local(frame, name, found, written)
+        frame.initial[name] = given
+        bind_reference(run, name, written, given, frame)
 
 
 @statement("using_declaration", "alias_declaration", "type_definition", "static_assert_declaration", "comment",

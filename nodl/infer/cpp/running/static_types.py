@@ -6,23 +6,37 @@ A member that a derived class hides shares its cell with the hidden one; where a
 from __future__ import annotations
 
 import re
+from functools import partial
 
-from nodl.infer.cpp.reading.declarations import Class, type_text
+from nodl.infer.cpp.reading.declarations import Class, Function, type_text
 from nodl.infer.cpp.reading.names import hidden
 from nodl.infer.cpp.reading.type_names import NO_TYPE, Type
 from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.machine import Frame, Machine
-from nodl.infer.cpp.running.values import Obj
-from nodl.infer.cpp.syntax import Node, callee_name, children, field_of, template_arguments, text, unwrapped
+from nodl.infer.cpp.running.values import Obj, lost
+from nodl.infer.cpp.syntax import (
+    Node,
+    callee_name,
+    children,
+    field_of,
+    parse_expression,
+    template_arguments,
+    text,
+    unwrapped,
+)
 
 
-def check_hidden(run: Machine, cls: Class, node: Node, frame: Frame) -> None:
-    """Add a gap if ``cls`` has two plain members, or operators that matter, of one name: they are not distinguished."""
+def check_hidden(run: Machine, this: Obj, cls: Class, node: Node, frame: Frame) -> None:
+    """Add a gap if ``this`` has two plain members, or operators that matter, of one name: they are not distinguished,
+    and what such a member holds is not known.
+    """
     ancestry = run.names.ancestry(cls)
     for name in hidden(run.names, cls):
         plain = any(_PLAIN.search(each.fields[name].type) for each in ancestry if name in each.fields)
         if plain or (name.startswith("operator") and _methods_matter(run, cls, name)):
-            run.gap(node, frame, f"{cls.name} hides {name} of a base: which of them is meant is not followed")
+            why = f"{cls.name} hides {name} of a base: which of them is meant is not followed"
+            run.gap(node, frame, why)
+            run.store.share_cell((this, name), partial(lost, why=why))
 
 
 def _methods_matter(run: Machine, cls: Class, name: str) -> bool:
@@ -35,25 +49,26 @@ def _methods_matter(run: Machine, cls: Class, name: str) -> bool:
     )
 
 
-def class_of_method(
+def methods_meant(
     run: Machine, cls: Class, name: str, receiver: Node | None, call: Node, frame: Frame
-) -> Class:
-    """Return the class in which ``name()`` is looked up for an object of ``cls``.
+) -> list[Function]:
+    """Return what ``name()`` calls on an object of ``cls``.
 
-    Of a method that hides a base's the class that the receiver has at compile time; a gap if that is not known.
-    ``receiver``: ``None`` inside of a class.
+    Of a method that hides a base's that of the class that the receiver has at compile time; if that is not known, each
+    that it may be, with a gap. ``receiver``: ``None`` inside of a class.
     """
     if name not in hidden(run.names, cls):
-        return cls
+        return run.names.find_methods(cls, name)
     is_own = receiver is None or receiver.type == "this"
     seen = class_around(run, frame) if is_own else seen_class(run, receiver, frame)
     ancestry = run.names.ancestry(cls)
     virtual = any(each.virtual for owner in ancestry for each in run.names.methods[owner].get(name, ()))
     if seen in ancestry and seen is not None and not virtual:
-        return seen
-    if _methods_matter(run, cls, name):
-        run.gap(call, frame, f"{cls.name} hides {name} of a base: which of them is called is not known")
-    return cls
+        return run.names.find_methods(seen, name)
+    if not _methods_matter(run, cls, name):
+        return run.names.find_methods(cls, name)
+    run.gap(call, frame, f"{cls.name} hides {name} of a base: which of them is called is not known")
+    return [each for owner in ancestry for each in run.names.methods[owner].get(name, ())]
 
 
 def class_around(run: Machine, frame: Frame) -> Class | None:
@@ -130,6 +145,8 @@ def _given(call: Node, frame: Frame) -> Node | None:
         made = [each for each in children(call) if each.type.endswith("declarator")]
         if len(made) > 1:  # the path ends in the name of the variable that is made
             made = [each for each in made if text(field_of(each, "declarator")) in frame.path[-1:]]
+        if made and made[0].type == "function_declarator":  # ``Foo f(a);``
+            return field_of(parse_expression(f"f{text(field_of(made[0], 'parameters'))}"), "arguments")
         return field_of(made[0], "value") if made else None
     if call.type == "field_initializer":
         return call.named_children[-1]

@@ -117,7 +117,7 @@ def may_be_written(
         before = run.evaluate(target, frame)
         if not is_const and is_plain(before) and is_plain_type(declared_type(run, target, frame)[0].name):
             # And it may keep a reference.
-            run.store.share(partial(assign, run, target, join(before, why), frame), why)
+            run.store.share(partial(assign, run, target, join(before, why), frame), partial(join, why))
 
 
 def changed_by_standard(run: Machine, name: str, given: Sequence[Node], frame: Frame) -> None:

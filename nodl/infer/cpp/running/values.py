@@ -377,9 +377,11 @@ def _parameter_parts(param: Param) -> tuple[Part, ...]:
 
 
 def concatenated(*values: Value) -> Value:
-    """Return every way to put one alternative of each behind another."""
+    """Put one alternative of each behind another: of two that have several it is not known which go together."""
     results: list[tuple[Part | NodeNamePart, ...]] = [()]
     for value in values:
+        if len(value) > 1 and len(results) > 1:
+            value = unknown("one of several texts, which go with others before them")
         size = sum(len(part) if isinstance(part, str) else 1 for parts in results for part in parts)
         if size > MAX_LETTERS:
             return unknown("a text that is too long to be a name")
