@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import math
 import operator
 import re
@@ -103,11 +104,17 @@ def as_type(name: str, value: Value) -> Value:
     if name in ("double", "float"):
         if any(isinstance(atom, Unknown | Text) for atom in value):
             return unknown("a number")
-        return tuple(float(atom) if type(atom) is int else atom for atom in value)
+        exact = tuple(float(atom) if type(atom) is int else atom for atom in value)
+        return tuple(single(atom) if name == "float" and isinstance(atom, float) else atom for atom in exact)
     if name == "bool":
         return join(*((_as_bool(atom),) for atom in value))
     match = _INTEGER.fullmatch(name)
     return value if match is None else join(*((_held(atom, match),) for atom in value))
+
+
+def single(value: float) -> float:
+    """Return a number as a ``float`` of 32 bits holds it."""
+    return ctypes.c_float(value).value
 
 
 def _as_bool(atom: object) -> object:

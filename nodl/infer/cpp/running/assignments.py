@@ -12,7 +12,14 @@ from nodl.infer.cpp.running.constructors import gives_pointer, in_braces
 from nodl.infer.cpp.running.contents import copied, elements_copied, overwrite
 from nodl.infer.cpp.running.effects import referred_to
 from nodl.infer.cpp.running.machine import Frame, Machine, expression
-from nodl.infer.cpp.running.references import REFERRED_TO, forget, is_plain, leads_into, through
+from nodl.infer.cpp.running.references import (
+    REFERRED_TO,
+    forget,
+    forget_everything,
+    is_plain,
+    leads_into,
+    through,
+)
 from nodl.infer.cpp.running.static_types import (
     current_object,
     declared_type,
@@ -25,6 +32,7 @@ from nodl.infer.cpp.running.static_types import (
 )
 from nodl.infer.cpp.running.values import (
     BOTTOM,
+    Lambda,
     Map,
     Obj,
     Param,
@@ -159,7 +167,11 @@ def assign(run: Machine, target: Node, value: Value, frame: Frame) -> None:
             run, inner, field_of(inner, "argument") or inner, field_of(inner, "indices"), value, frame
         )
     elif inner.type == "pointer_expression":
-        _through_pointer(run, field_of(inner, "argument") or inner, value, frame)
+        pointer = unwrapped(field_of(inner, "argument")) or inner
+        if pointer.type == "pointer_expression" and is_plain(value):  # ``**p = x``
+            through(run, inner, frame)
+        else:
+            _through_pointer(run, pointer, value, frame)
     elif inner.type == "call_expression":
         _assign_result(run, inner, value, frame)
     else:
@@ -180,6 +192,8 @@ def _assign_result(run: Machine, call: Node, value: Value, frame: Frame) -> None
         _write_element(run, call, owner, field_of(call, "arguments"), value, frame)
     elif text(function).startswith("const_cast"):
         through(run, call, frame)
+    elif owner is None and any(isinstance(atom, Lambda) for atom in run.evaluate(function, frame)):
+        forget_everything(run, f"what {text(call)[:40]} refers to")
     elif is_plain(value) or _gives_reference(run, function) or text(function) in ("std::tie", "tie"):
         forget(run, call, frame, written=value, told=owner is not None or _gives_reference(run, function))
 
@@ -240,7 +254,8 @@ def _assign_name(run: Machine, target: Node, value: Value, frame: Frame) -> None
     static = (declaring, name) if declaring is not None else static_by_name(run, name, frame)
     if static is not None:
         several = bool(static[0].templates)  # a variable of each specialisation
-        run.store.set(static, join(static_member(run, *static), value) if several else value)
+        why = f"the value of {name} in one of several classes"
+        run.store.set(static, lost(join(static_member(run, *static), value), why) if several else value)
         return
     outside = run.names.find_global(name, frame.scope, frame.file)
     if outside is not None:
@@ -269,6 +284,8 @@ def _assign_field(run: Machine, node: Node, value: Value, frame: Frame) -> None:
         declaring = next((cls for cls in run.names.ancestry(each.cls) if name in cls.fields), None)
         if declaring is not None and _writes_through(declaring.fields[name], value):
             through(run, node, frame)
+        if each.cls is None and each.data.get("copied"):
+            value = lost(value, "a member that a copy has, too")
         if each.cls is None and is_plain(value) and name not in (known := each.data.get("written", ())):
             each.data["written"] = (*known, name)
         if declaring is None and each.cls is not None and not each.foreign_base:  # of an anonymous union

@@ -19,7 +19,7 @@ from nodl.infer.cpp.libraries import (
 )
 from nodl.infer.cpp.reading.declarations import Class, Function, Scope
 from nodl.infer.cpp.reading.names import STANDARD_TYPES
-from nodl.infer.cpp.reading.type_names import NO_TYPE
+from nodl.infer.cpp.reading.type_names import NO_TYPE, Type
 from nodl.infer.cpp.reading.writes import FILLS
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.callbacks import run_meanwhile
@@ -94,6 +94,8 @@ def call_expression(run: Machine, node: Node, frame: Frame) -> Value:
     site = CallSite(run, node, callee, frame)
     name = callee_name(callee)
     if _RUNS_OTHERS.search(name):
+        if callee.type in _NAMES:
+            _ = site.values  # made before anything spins: ``spin(std::make_shared<Talker>())``
         run.store.others_run()
     if _SPINS.search(name):
         run.spins_beside = run.spins_beside or bool(run.closures)
@@ -141,9 +143,22 @@ def _cast(run: Machine, name: str, site: CallSite) -> Value:
         keep_reference(run, site.given[0], site.frame)
     if name == "std::move" and is_plain(value):
         forget(run, site.given[0], site.frame, "what is left after std::move", told=False)
+    if name.rpartition("::")[2] in ("dynamic_cast", "dynamic_pointer_cast") and site.types:
+        return _cast_down(run, site.types[0], value, site.frame)
     if name == "std::any_cast":  # to another type it gives nothing, or throws
         return join(lost(value, "what a std::any holds"), unknown("what a std::any holds"))
     return cast(run, site.types[0], value) if name == "static_cast" else value
+
+
+def _cast_down(run: Machine, kind: Type, value: Value, frame: Frame) -> Value:
+    """Return the objects that are of a class, or of one derived from it; whether a pointer is set is open otherwise."""
+    cls = run.class_of(kind, frame)
+    kept = tuple(
+        atom
+        for atom in value
+        if cls is None or not isinstance(atom, Obj) or atom.cls is None or cls in run.names.ancestry(atom.cls)
+    )
+    return value if len(kept) == len(value) else join(kept, unknown("a cast that gives nothing"))
 
 
 def _own_method(run: Machine, name: str, site: CallSite) -> Value | None:

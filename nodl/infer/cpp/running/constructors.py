@@ -521,7 +521,7 @@ def construct_class(
         run.active.pop()
     elif arguments and not this.data["members"] and not cls.inherits_constructors:
         this.data["arguments"] = list(arguments)  # closures among them may be called with it
-        _made_unseen(run, cls, arguments, node, frame)
+        _made_unseen(run, this, cls, arguments, node, frame)
 
 
 def _holds_text(constructor: Function) -> bool:
@@ -529,7 +529,9 @@ def _holds_text(constructor: Function) -> bool:
     return '"' in text(constructor.node).partition(")")[2]
 
 
-def _made_unseen(run: Machine, cls: Class, arguments: Sequence[Value], node: Node, frame: Frame) -> None:
+def _made_unseen(
+    run: Machine, this: Obj, cls: Class, arguments: Sequence[Value], node: Node, frame: Frame
+) -> None:
     """Make an object though no constructor in reach takes these arguments: a copy, or one that is not known."""
     if cls.name in cls.declared:
         whom = f"the constructor of {cls.name}, whose source is not in reach"
@@ -537,7 +539,10 @@ def _made_unseen(run: Machine, cls: Class, arguments: Sequence[Value], node: Nod
         run.calls.may_be_written(run, whom, arguments, given_to(node, frame), frame)
         run.gap(node, frame, f"the source of the constructor of {cls.name} is not in reach")
     elif len(arguments) > 1 or not all(isinstance(atom, Obj | Unknown) for atom in arguments[0]):
-        run.gap(node, frame, f"how {cls.name} is made of what it is given is not known")
+        why = f"how {cls.name} is made of what it is given is not known"
+        run.gap(node, frame, why)
+        for cell in ((this, name) for each in run.names.ancestry(cls) for name in each.fields):
+            run.store.set(cell, lost(run.store.get(cell) or BOTTOM, why))
 
 
 def _written_arguments(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from itertools import chain
@@ -177,7 +178,8 @@ def _map_call(run: Machine, atom: Map, name: str, site: CallSite) -> Value:
     if name in ("end", "cend"):
         return (END,)
     if name in ("begin", "cbegin"):
-        return (Seq(tuple((Group(entry),) for entry in atom.entries), atom.open, place=True),)
+        is_open = atom.open or len(atom.entries) > 1  # entries stand as they were made, not by their keys
+        return (Seq(tuple((Group(entry),) for entry in atom.entries), is_open, place=True),)
     return unknown(f"the result of {name}()")
 
 
@@ -274,12 +276,17 @@ def _text_call(run: Machine, atom: Text | Param, name: str, site: CallSite) -> V
         if name == "str" and values:
             assign(run, site.receiver, values[0], site.frame)
         return (atom,)
+    if name == "clear" and "stream" in declared_type(run, site.receiver, site.frame)[0].name:
+        return BOTTOM  # of its flags
     if name in _CHANGES_TEXT:
         adds = name in ("append", "push_back") and len(values) == 1
         changed = literal("") if name == "clear" else computed_text(run, atom, name, values)
         found = added((atom,), values[0]) if adds else changed
         assign(run, site.receiver, found, site.frame)
         return found
+    named = site.receiver.type in ("identifier", "field_expression")
+    if isinstance(atom, Text) and named and name not in _OF_TEXT and not _READS_TEXT.fullmatch(name):
+        assign(run, site.receiver, unknown(f"what {name}() leaves of a text or stream"), site.frame)
     return computed_text(run, atom, name, values)
 
 
@@ -324,6 +331,11 @@ _OF_TEXT: dict[str, Callable[..., str | int]] = {
 }  # fmt: skip
 
 
+_READS_TEXT = re.compile(
+    r"good|fail|eof|bad|is_open|tell[pg]|rdstate|compare|capacity|reserve|shrink_to_fit|max_size|copy|hash\w*|c?r?(?:begin|end)|"
+    r"find\w*|count|has_\w+|is_\w+|get_\w+|as_\w+|to_\w+|filename|stem|extension|\w+_path|native|(?:generic_)?\w*string"
+)
+"""Further methods that leave a text, stream or path as it is."""
 _CHANGES_TEXT = frozenset({
     "erase", "replace", "insert", "pop_back", "assign", "resize", "remove_prefix", "remove_suffix", "swap", "clear",
     "push_back", "append", "emplace",

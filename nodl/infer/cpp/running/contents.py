@@ -64,9 +64,21 @@ def copied(run: Machine, value: Value, node: Node, frame: Frame, cls: Class | No
 
     Into an object of ``cls`` goes of a derived class what it has of ``cls`` (slicing), also from behind a pointer.
     """
+    for atom in value:
+        if isinstance(atom, Obj) and atom.cls is None and atom.node is None and not atom.heap:
+            _shared_with_copy(run, atom)
     if not any(isinstance(atom, Obj) and atom.cls is not None and atom.node is None for atom in value):
         return value
     return tuple(_copy(run, atom, node, frame, cls) for atom in value)
+
+
+def _shared_with_copy(run: Machine, atom: Obj) -> None:
+    """Know nothing of the texts and numbers that members of a library's object hold, which stands for its copy, too."""
+    atom.data["copied"] = True
+    for name in atom.data.get("written", ()):
+        run.store.set(
+            (atom, name), lost(run.store.get((atom, name)) or BOTTOM, "a member that a copy has, too")
+        )
 
 
 def _copy(run: Machine, atom: object, node: Node, frame: Frame, cls: Class | None) -> object:

@@ -9,7 +9,7 @@ from functools import partial
 
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.reading.writes import FILLS
-from nodl.infer.cpp.running.arithmetic import added, computed
+from nodl.infer.cpp.running.arithmetic import added, computed, single
 from nodl.infer.cpp.running.assignments import as_declared, assign
 from nodl.infer.cpp.running.constructors import cast, construct, default_value, initial_value, made
 from nodl.infer.cpp.running.contents import copied, elements_copied, items_of
@@ -17,7 +17,13 @@ from nodl.infer.cpp.running.invocation import by_operator, pointed_to
 from nodl.infer.cpp.running.launch_values import decided, in_doubt, settled, settled_text
 from nodl.infer.cpp.running.machine import NEXT, Frame, Machine, expression
 from nodl.infer.cpp.running.references import as_referred_to, is_plain, keep_reference
-from nodl.infer.cpp.running.static_types import class_of_member, current_object, seen_type
+from nodl.infer.cpp.running.static_types import (
+    class_of_member,
+    current_object,
+    declared_type,
+    is_pointer,
+    seen_type,
+)
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     Bound,
@@ -51,7 +57,8 @@ def string_literal(run: Machine, node: Node, frame: Frame) -> Value:
     """Return the text between the quotes with its escapes resolved; a prefix like ``u8`` is dropped."""
     whole = text(node)
     inner = whole[whole.find('"') + 1 : -1]
-    return literal(re.sub(r"\\(x[0-9a-fA-F]+|[0-7]{1,3}|u[0-9a-fA-F]{4}|.)", lambda m: _escaped(m[1]), inner))
+    found = re.sub(r"\\(x[0-9a-fA-F]+|[0-7]{1,3}|u[0-9a-fA-F]{4}|.)", lambda m: _escaped(m[1]), inner)
+    return unknown("a text with a zero in it") if "\0" in found else literal(found)
 
 
 def _escaped(written: str) -> str:
@@ -99,7 +106,8 @@ def number(run: Machine, node: Node, frame: Frame) -> Value:
     with suppress(ValueError):
         return (int(digits, 8 if octal else 0),)
     with suppress(ValueError):
-        return (float.fromhex(written) if hexadecimal else float(written.rstrip("fl")),)
+        found = float.fromhex(written) if hexadecimal else float(written.rstrip("fl"))
+        return (single(found) if written.endswith("f") and not hexadecimal else found,)
     return unknown("a number")
 
 
@@ -370,11 +378,21 @@ def _streamed(
         return left or unknown("a stream")
     if written is not None and _MANIPULATORS.match(text(written)):
         found = unknown("a stream that writes in a way of its own")
+    elif any(type(atom) is int for atom in right) and _is_letter(run, written, frame):
+        found = concatenated(left, unknown("the letter of a number"))
     else:
         pieces = tuple(literal(f"{atom:g}")[0] if isinstance(atom, float) else atom for atom in right)
         found = concatenated(left, pieces) if right else left
     _write_stream(run, target, found, frame)
     return found
+
+
+def _is_letter(run: Machine, written: Node | None, frame: Frame) -> bool:
+    """Return whether a number is one of 8 bits, which a stream writes as a letter."""
+    small = re.compile(r"(?:std::)?u?int8_t|(?:un)?signed char|char")
+    return small.fullmatch(seen_type(run, written, frame).name) is not None or (
+        re.search(r"\b(?:u?int8_t|char)\b", text(written)) is not None
+    )
 
 
 def _write_stream(run: Machine, target: Node | None, written: Value, frame: Frame) -> None:
@@ -496,11 +514,19 @@ def subscript(run: Machine, node: Node, frame: Frame) -> Value:
     own = by_operator(run, "[]", held, keys, node, frame)
     if own is not None:
         return own
+    if container is not None and has_text(held) and _is_pointer_to_text(run, container, frame):
+        return unknown("a text behind a pointer")
     if container is not None and keys and any(isinstance(atom, Map) for atom in held):
         held = _with_new_entries(run, held, keys[0], container, node, frame)
     found = [element(run, atom, keys[0] if keys else BOTTOM) for atom in held]
     result = join(*found) if found else BOTTOM
     return result or unknown(f"the value of {text(node)[:60]}")
+
+
+def _is_pointer_to_text(run: Machine, container: Node, frame: Frame) -> bool:
+    """Return whether ``p[1]`` is a text, not a letter: ``p`` points to the first of several."""
+    kind, marked = declared_type(run, container, frame)
+    return marked and kind.last == "string" and is_pointer(run, container, frame)
 
 
 def _with_new_entries(

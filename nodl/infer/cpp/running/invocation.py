@@ -20,7 +20,7 @@ from nodl.infer.cpp.running.left_out import leave_out
 from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
 from nodl.infer.cpp.running.memory import MEMORY_DEPTH, CallOutcome, Changes
 from nodl.infer.cpp.running.overloads import candidates, chosen
-from nodl.infer.cpp.running.references import forget
+from nodl.infer.cpp.running.references import forget, forget_everything, is_plain, through
 from nodl.infer.cpp.running.static_types import declared_type, given_to
 from nodl.infer.cpp.running.unknown_calls import may_be_written as may_be_written
 from nodl.infer.cpp.running.unknown_calls import unknown_call
@@ -114,6 +114,7 @@ def call_values(run: Machine, callee: Value, values: Sequence[Value], node: Node
             name = text(field_of(node, "function"))[:60]
             if "*" in name and ("->*" in name or ".*" in name):
                 run.gap(node, frame, f"which method {name} is is not known; it may make interfaces")
+                forget_everything(run, f"what {name} may have written")
             handed_over(run, f"{name}()", values, node, frame)
             found.append(unknown(f"the result of {name}()"))
     run.left = run.left if len(found) == 1 else None
@@ -485,6 +486,8 @@ def write_back(
             if not all(isinstance(atom, Obj) for atom in value):
                 forget(run, target, frame, told=False)
         elif value != run.evaluate(target, frame):
+            if "**" in parameter.type.replace(" ", "") and is_plain(value):
+                through(run, target, frame)  # it points elsewhere now
             assign(run, target, value, frame)
 
 

@@ -197,14 +197,16 @@ class AbstractStore:
         return found
 
     def undo(self, mark: int) -> None:
+        undone = dict.fromkeys(cell for cell, _, _ in self._trail[mark:]) if self._history is not None else ()
         while len(self._trail) > mark:
             cell, old, self._since[cell] = self._trail.pop()
             if old is _ABSENT:
                 self._cells.pop(cell, None)
             else:
                 self._cells[cell] = old
-                if self._history is not None:
-                    self._remember(cell, old)
+        for cell in undone:
+            if cell in self._cells:
+                self._remember(cell, self._cells[cell])
 
     def merge(self, alternatives: Sequence[Changes], doubt: str = "") -> None:
         """Continue with any of ``alternatives``, each made from the present state.

@@ -72,7 +72,7 @@ def bind_reference(run: Machine, name: str, kind: str, initial: Node | None, fra
 _VIEW = re.compile(r"\b(?:string_view|span)\b")
 _INTO = re.compile(
     r"(?:^std::|[.>])(?:ranges::)?(?:c?r?(?:begin|end)|find\w*|(?:lower|upper|equal)_\w+|(?:min|max)_element|next|prev|data|"
-    r"emplace|insert\w*|try_emplace)$"
+    r"emplace|insert\w*|try_emplace|tie|forward_as_tuple)$"
 )
 
 
@@ -94,6 +94,8 @@ def _changes_behind(run: Machine, initial: Node | None, frame: Frame) -> bool:
     if frame.function is None or initial is None or is_made:
         return False
     behind = words_in(field_of(callee, "argument") or initial)
+    named = run.names.functions_by_name.get(last_name(callee), ()) if callee is not None else ()
+    behind = behind.union(*map(referred_to, named))
     for each in effects_of(run, frame.function).functions:
         written = written_in(each)
         given = (words for callee, *_, words in written.passed if not CREATES.fullmatch(callee))
@@ -154,10 +156,15 @@ def keep_reference(run: Machine, what: Node, frame: Frame) -> None:
 def through(run: Machine, what: Node, frame: Frame) -> None:
     """Add a gap: a plain value is written through ``what``, and it is not known which: so none is any more."""
     run.gap(what, frame, f"what {text(what)[:40]} refers to is written: which variable that is is not known")
+    forget_everything(run, f"what is written through {text(what)[:40]}")
+
+
+def forget_everything(run: Machine, why: str) -> None:
+    """Make every text, number and container unknown that a variable holds which is not constant."""
     for cell in run.store.everything():
         held = run.store.get(cell) or BOTTOM
         if is_plain(held) and not _is_constant(cell):
-            run.store.set(cell, lost(held, f"what is written through {text(what)[:40]}"))
+            run.store.set(cell, lost(held, why))
 
 
 def _is_constant(cell: Cell) -> bool:

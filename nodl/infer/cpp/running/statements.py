@@ -30,7 +30,7 @@ from nodl.infer.cpp.running.machine import (
 )
 from nodl.infer.cpp.running.memory import Changes
 from nodl.infer.cpp.running.references import bind_reference, forget, is_plain
-from nodl.infer.cpp.running.static_types import element_type, seen_type
+from nodl.infer.cpp.running.static_types import current_object, element_type, seen_type
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     Const,
@@ -478,10 +478,11 @@ def for_range_loop(run: Machine, node: Node, frame: Frame) -> int:
     right, body = field_of(node, "right"), field_of(node, "body")
     subject = run.evaluate(right, frame)
     items, exact = iterated(run, subject)
-    container = seen_type(run, right, frame).last
-    if container == "map":
-        items = _by_key(items)
-    exact = exact and (len(items) < 2 or not container.startswith("unordered"))
+    kind = seen_type(run, right, frame)
+    ordered = True
+    if kind.last == "map":
+        items, ordered = _by_key(items, len(kind.arguments) > 2)
+    exact = exact and (len(items) < 2 or (ordered and not kind.last.startswith("unordered")))
     declarator, written = field_of(node, "declarator"), type_text(node)
     parts = list(walk(declarator)) if declarator is not None else []
     names = [text(part) for part in parts if part.type == "identifier"]
@@ -508,15 +509,15 @@ def for_range_loop(run: Machine, node: Node, frame: Frame) -> int:
     return outcome
 
 
-def _by_key(entries: Sequence[Value]) -> list[Value]:
-    """Return the entries of a map in the order of their keys, if these are known."""
+def _by_key(entries: Sequence[Value], is_own: bool) -> tuple[list[Value], bool]:
+    """Return the entries of a map in the order of their keys, and whether that is known; ``is_own``: one of its own."""
     keys = [atom.items[0] for entry in entries for atom in entry if isinstance(atom, Group)]
     known = [key[0] if type(key[0]) is int else plain(key[0]) for key in keys if len(key) == 1]
     kind = int if any(type(each) is int for each in known) else str
     in_order = {key: entry for key, entry in zip(known, entries, strict=False) if type(key) is kind}
-    if len(in_order) != len(entries):
-        return list(entries)
-    return [in_order[key] for key in sorted(in_order)]
+    if is_own or len(in_order) != len(entries):
+        return list(entries), False
+    return [in_order[key] for key in sorted(in_order)], True
 
 
 def _hold_pointers(run: Machine, right: Node | None, frame: Frame) -> bool:
@@ -541,6 +542,8 @@ def _over(
     if not steps and exact:
         run.kill(body, frame, "the loop runs over nothing")
         return NEXT
+    if not exact and len(steps) > 1:
+        _forget_counted(run, body, frame)
     loop = Loop(run.store.mark(), run.steps)
     returns, outer_path, outcome = 0, frame.path, NEXT
     for again in range(1 if exact else 2):
@@ -564,6 +567,24 @@ def _over(
             break
     frame.path = outer_path
     return returns | _after(run, loop, outcome)
+
+
+def _forget_counted(run: Machine, body: Node | None, frame: Frame) -> None:
+    """Make texts and numbers unknown that each turn of a loop changes for the next, where turns come in any order."""
+    targets = (
+        field_of(each, _CHANGED[each.type])
+        for each in (walk(body) if body is not None else ())
+        if each.type in _CHANGED
+    )
+    this = current_object(frame)
+    for name in {text(target).removeprefix("this->") for target in targets}:
+        owner = frame.owner_of(name) or this
+        held = run.store.get((owner, name)) or BOTTOM if owner is not None else BOTTOM
+        if any(isinstance(atom, Text | int | float) for atom in held):
+            run.store.set((owner, name), lost(held, "a value that a loop in any order changes"))
+
+
+_CHANGED = {"assignment_expression": "left", "update_expression": "argument"}
 
 
 def _forget_order(run: Machine, body: Node | None, loop: Loop) -> bool:
@@ -642,6 +663,7 @@ def _counted(run: Machine, node: Node, frame: Frame) -> int:
             )
         ):
             returns |= _repeated(run, body, update, condition, frame, loop)
+            _doubt_returned(frame, returns if holds else 0)
             break
         mark, frame.path = run.store.mark(), (*outer_path, index)
         outcome = _iteration(run, body, frame, loop)
@@ -652,8 +674,15 @@ def _counted(run: Machine, node: Node, frame: Frame) -> int:
         run.evaluate(update, frame)
     else:
         returns |= _repeated(run, body, update, condition, frame, loop)
+        _doubt_returned(frame, returns)
     frame.path = outer_path
     return returns | _after(run, loop, NEXT)
+
+
+def _doubt_returned(frame: Frame, returns: int) -> None:
+    """Know nothing of the texts that a loop gives back whose turns are decided, and were not all followed."""
+    if returns & RETURN:
+        frame.returned = lost(frame.returned, "what a loop of many turns gives back")
 
 
 def _computes(run: Machine, loop: Node) -> bool:
