@@ -24,6 +24,7 @@ from nodl.infer.cpp.running.values import (
     Text,
     Value,
     as_one_map,
+    functions_in,
     in_any_order,
     join,
     open_sequence,
@@ -114,9 +115,9 @@ def _with_held(run: Machine, atom: object) -> Iterator[Lambda | Bound]:
         mentioned = (run.store.callables.keys() & effects_of(run, each).words) - names
         names |= mentioned
         for cell in (cell for name in sorted(mentioned) for cell in list(run.store.callables[name])):
-            for other in run.store.get(cell) or BOTTOM:
-                key = other.node.id if isinstance(other, Lambda) else getattr(other, "function", None)
-                if isinstance(other, Lambda | Bound) and key not in code:
+            for other in functions_in(run.store.get(cell) or BOTTOM):
+                key = other.node.id if isinstance(other, Lambda) else other.function
+                if key not in code:
                     code.add(key)
                     waiting.append(other)
 

@@ -202,13 +202,21 @@ class Obj:
 
 def holds_callable(atom: Atom) -> bool:
     """Return whether an alternative is or holds a function or closure."""
-    if isinstance(atom, Lambda | Bound):
-        return True
-    if isinstance(atom, Seq | Group):
-        return any(holds_callable(each) for item in atom.items for each in item)
-    if isinstance(atom, Map):
-        return any(holds_callable(each) for entry in atom.entries for item in entry for each in item)
-    return False
+    return next(functions_in((atom,)), None) is not None
+
+
+def functions_in(value: Value) -> Iterator[Lambda | Bound]:
+    """Yield the functions and closures among the alternatives, and in the containers among them."""
+    for atom in value:
+        if isinstance(atom, Lambda | Bound):
+            yield atom
+        elif isinstance(atom, Seq | Group):
+            for item in atom.items:
+                yield from functions_in(item)
+        elif isinstance(atom, Map):
+            for entry in atom.entries:
+                for item in entry:
+                    yield from functions_in(item)
 
 
 def may_name(value: Value) -> bool:
