@@ -97,13 +97,13 @@ _NAMED = 5
 _FOLDED = frozenset({
     "container-elsewhere", "enclave-shared", "executable-not-built", "executable-without-enclave", "include-left-out",
     "interface-unknown", "library-version", "no-manifest", "no-publisher", "no-server", "no-subscriber",
-    "node-name-unknown", "other-end-optional", "package-not-installed", "parameter-file-missing", "parameter-unknown",
+    "node-name-unknown", "package-not-installed", "parameter-file-missing", "parameter-unknown",
     "pattern-accepted", "program-not-installed", "remap-dead", "wildcard",
 })  # fmt: skip
 """Codes with one cause and often many subjects; what is wrong with a keystore is reported one by one."""
 _SUMMED_UP = frozenset({
-    "enclave-shared", "ends-not-judged", "executable-not-built", "library-version", "no-subscriber",
-    "other-end-optional", "package-not-installed",
+    "enclave-shared", "ends-not-judged", "executable-not-built", "library-version", "no-publisher", "no-server",
+    "no-subscriber", "package-not-installed",
 })  # fmt: skip
 """Codes of which a plan has many that are as they are meant to be, or that follow from a finding that is printed."""
 

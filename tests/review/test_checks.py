@@ -56,6 +56,16 @@ def codes(checked: dict[str, Any]) -> set[str]:
         ),
         (
             "nearly-the-same-name",
+            ({"publish": ["/camera/image"]}, {"subscribe": ["/image"]}),
+            ({"publish": ["/camera/image"]}, {"subscribe": ["/left/image"]}),
+        ),
+        (
+            "nearly-the-same-name",
+            ({"serve_services": ["/reset"]}, {"call_services": ["/robot/reset"]}),
+            ({"serve_services": ["/reset"], "call_services": ["/robot/reset"]}, {}),
+        ),
+        (
+            "nearly-the-same-name",
             ({"publish": ["/lora/rxt"]}, {"subscribe": ["/lora/txt"]}),
             ({"publish": ["/lora/rx"]}, {"subscribe": ["/lora/tx"]}),
         ),
@@ -137,39 +147,18 @@ def test_missing_ends_are_one_finding_where_not_all_is_known() -> None:
     assert "no-publisher" in {each.code for each in checks(checked)}, "no gap: the name is a known pattern"
 
 
-def test_the_other_end_of_rviz_and_of_a_default_of_the_library_is_optional() -> None:
-    def code(program: str, place: str, **more: object) -> str:
-        checked = two({"subscribe": ["/x"]}, {})
-        for node in checked["nodes"]:
-            node["program"] = program
-            for each in node["interfaces"]:
-                each.update({"place": place, "remapped_by": [], "note": "", **more})
-        (found,) = [each.code for each in checks(checked) if each.subject == "/x"]
-        return found
-
-    document = "/opt/nodl/library/documents/slam_toolbox/sync.nodl.yaml:12"
-    assert code("rviz2/rviz2", "view.rviz:12") == code("slam_toolbox/sync", document) == "other-end-optional"
-    assert code("slam_toolbox/sync", document, remapped_by=["scan:=x"]) == "no-publisher"
-    default = "parameter scan_topic, its default; plugin slam of class slam::Slam"
-    assert code("slam_toolbox/sync", document, note=default) == "other-end-optional"
-    for given in (
-        "parameter scan_topic, set by launch",
-        "argument 1 of the command line",
-        "parameter scan_topic",
-    ):
-        assert code("slam_toolbox/sync", document, note=given) == "no-publisher"
-        assert code("slam_toolbox/sync", document, note=f"{default}; {given}") == "no-publisher"
-    assert code("demo/node", "node.cpp:12") == "no-publisher"
-
-
-def test_transforms_may_be_published_on_one_topic_of_two_or_by_another_launch() -> None:
-    def found(published: str) -> dict[str, str]:
-        given = checks(two({"subscribe": ["/r/tf", "/r/tf_static"]}, {"publish": [published]}))
-        return {each.subject: each.code for each in given if "publishes" in each.text}
-
-    assert found("/r/tf") == {"/r/tf_static": "other-end-optional"}
-    assert found("/tf") == {"/r/tf": "no-publisher", "/r/tf_static": "no-publisher"}
-    assert found("/scan") == {"/r/tf": "other-end-optional", "/r/tf_static": "other-end-optional"}
+@pytest.mark.parametrize(
+    ("types", "found"),
+    [(("A", "A"), True), (("A", ""), True), (("", ""), True), (("A", "B"), False)],
+)
+def test_names_that_differ_by_a_namespace_may_be_one_only_if_their_types_are(
+    types: tuple[str, str], found: bool
+) -> None:
+    checked = two({"publish": ["/camera/image"]}, {"subscribe": ["/image"]})
+    for node, written in zip(checked["nodes"], types, strict=True):
+        for each in node["interfaces"]:
+            each["type"] = written
+    assert ("nearly-the-same-name" in codes(checked)) is found
 
 
 def test_a_wildcard_that_planning_told_of_is_not_told_again() -> None:

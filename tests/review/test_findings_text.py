@@ -20,18 +20,18 @@ def told(
 
 
 def test_findings_of_one_kind_are_one_paragraph() -> None:
-    text = findings_text([told("no-publisher", name) for name in ("/a", "/b", "/c")])
+    text = findings_text([told("remap-dead", name) for name in ("/a", "/b", "/c")])
     assert text == (
-        "warning: /a is odd (and 2 more of this kind, about /a, /b, /c) [no-publisher]\n  mend it\n"
+        "warning: /a is odd (and 2 more of this kind, about /a, /b, /c) [remap-dead]\n  mend it\n"
         "0 errors, 3 warnings\n"
     )
 
 
 def test_findings_of_two_kinds_are_two_paragraphs_errors_first() -> None:
-    text = findings_text([told("no-publisher", "/a"), told("no-manifest", "p/x", "error")])
+    text = findings_text([told("remap-dead", "/a"), told("no-manifest", "p/x", "error")])
     assert [line for line in text.splitlines() if "[" in line] == [
         "error: p/x is odd [no-manifest]",
-        "warning: /a is odd [no-publisher]",
+        "warning: /a is odd [remap-dead]",
     ]
 
 
@@ -88,7 +88,15 @@ def test_every_code_has_a_section_of_its_own_in_the_documentation() -> None:
     assert sorted(headings) == sorted(MEANINGS)
 
 
-def test_what_nobody_hears_is_counted_and_what_nobody_says_is_printed() -> None:
-    text = findings_text([told("no-subscriber", "/debug"), told("no-publisher", "/scan")])
-    assert "[no-publisher]" in text and "[no-subscriber]" not in text
-    assert text.endswith("0 errors, 2 warnings (1 no-subscriber; -v lists them)\n")
+def test_ends_that_another_launch_may_have_are_counted_and_those_of_nearly_the_same_name_are_printed() -> (
+    None
+):
+    found = [
+        told("no-subscriber", "/debug"),
+        told("no-publisher", "/scan"),
+        told("nearly-the-same-name", "/x"),
+    ]
+    text = findings_text(found)
+    assert "[nearly-the-same-name]" in text
+    assert "[no-publisher]" not in text and "[no-subscriber]" not in text
+    assert text.endswith("0 errors, 3 warnings (1 no-subscriber, 1 no-publisher; -v lists them)\n")

@@ -76,55 +76,38 @@ def _missing_ends(plan: PlanDocument, document: DryRun) -> Iterator[Diagnostic]:
                 who = sorted({user.node for user in using})
                 use = f"{' and '.join(who)} use{'' if len(who) > 1 else 's'}"
                 text = f"nothing in this plan {verb} {name}, which {use}"
-                place = _first_place(using)
-                optional = code != "no-subscriber" and using and all(map(_is_optional, using))
-                optional = optional or (here == "subscribe" and _lacks_transforms_only(name, others))
-                yield finding("other-end-optional" if optional else code, name, text, place)
-
-
-def _is_optional(user: _User) -> bool:
-    """Return True for rviz2, which shows what there is, and for a name that a node of the library has by default: it
-    has inputs for every robot."""
-    interface = user.interface
-    by_default = _LIBRARY in interface.place and not interface.remapped_by and _is_by_default(interface.note)
-    return user.program == "rviz2/rviz2" or by_default
-
-
-def _is_by_default(note: str) -> bool:
-    """Return True if all that ``note`` says of a name is a default, or the plugin whose name it is."""
-    parts = filter(None, note.split("; "))
-    return all(part.endswith(", its default") or part.startswith("plugin ") for part in parts)
-
-
-_LIBRARY = "/nodl/library/documents/"
-_TRANSFORMS = {"tf": "tf_static", "tf_static": "tf"}
-
-
-def _lacks_transforms_only(topic: str, published: set[str]) -> bool:
-    """Return True if ``topic`` has transforms and may be without a publisher.
-
-    Many robots publish on one of the two topics only, and a launch of a part of a robot on none.
-    """
-    namespace, slash, last = topic.rpartition("/")
-    other = _TRANSFORMS.get(last)
-    return other is not None and (
-        namespace + slash + other in published
-        or not any(name.rpartition("/")[2] in _TRANSFORMS for name in published)
-    )
+                yield finding(code, name, text, _first_place(using))
 
 
 def near_names(plan: PlanDocument, document: DryRun) -> Iterator[Diagnostic]:
-    """Yield pairs of names with opposite ends that never meet and differ by a typing error."""
+    """Yield pairs of names with opposite ends that never meet and differ by a typing error or a namespace."""
     requested, users = _requested_names(plan), _users(document)
     for here, there in _PAIRS:
         lonely_here = requested.get(here, set()) - requested.get(there, set())
         lonely_there = requested.get(there, set()) - requested.get(here, set())
         for one, two in product(sorted(lonely_here), sorted(lonely_there)):
+            ends = users.get((here, one), []), users.get((there, two), [])
             if _nearly(one, two):
-                uses = f"{one} ({here.replace('_', ' ')}) and {two} ({there.replace('_', ' ')})"
-                text = f"{uses} never meet and are nearly the same"
-                place = _first_place(users.get((here, one), ()))
-                yield finding("nearly-the-same-name", one, text, place)
+                how = "are nearly the same"
+            elif _differ_by_namespace(one, two) and _may_match(*ends):
+                how = "differ by a namespace only"
+            else:
+                continue
+            uses = f"{one} ({here.replace('_', ' ')}) and {two} ({there.replace('_', ' ')})"
+            yield finding("nearly-the-same-name", one, f"{uses} never meet and {how}", _first_place(ends[0]))
+
+
+def _differ_by_namespace(one: str, two: str) -> bool:
+    """Return True if one name is the other with a namespace before it: ``/image`` and ``/camera/image``."""
+    return one.endswith(two) or two.endswith(one)
+
+
+def _may_match(some: list[_User], others: list[_User]) -> bool:
+    """Return True if the ends are of two nodes, and of one type as far as the types are known."""
+    types = (
+        (one.interface.type, two.interface.type) for one, two in product(some, others) if one.node != two.node
+    )
+    return any(one == two or not (one and two) for one, two in types)
 
 
 def _nearly(one: str, two: str) -> bool:

@@ -13,13 +13,10 @@ _SHOWS_ALL = f"{_PROVISION}; secure-plan diff KEYSTORE ... shows all"
 _TABLE: Mapping[str, tuple[str, str]] = {
     "no-publisher": ("A topic is subscribed and nothing in this plan publishes it.", _OTHER_END),
     "no-subscriber": ("A topic is published and nothing in this plan subscribes it.", _OTHER_END),
-    "other-end-optional": (
-        "rviz2, a listener to transforms, or a node of the library by a default name, uses what nothing in this "
-        "plan offers.", _OTHER_END),
     "no-server": ("A service or action is called and nothing in this plan serves it.", _OTHER_END),
     "ends-not-judged": ("Names have one end only among what is known of this plan, which has gaps.",
                         "close the gaps, and check again"),
-    "nearly-the-same-name": ("Two names that never meet differ by one slash, letter or capital only.",
+    "nearly-the-same-name": ("Two names that never meet differ by one slash, letter, capital or namespace.",
                              "if they are meant to be one, write or remap both alike"),
     "types-differ": ("Both ends of a topic, service or action have different types: they never match.",
                      "they never match: correct one of them"),
