@@ -10,7 +10,7 @@ from nodl.infer.cpp.libraries import is_harmless_class
 from nodl.infer.cpp.reading.collect import STRUCTURES, declared_names, local_scope
 from nodl.infer.cpp.reading.declarations import type_text
 from nodl.infer.cpp.reading.type_names import Type
-from nodl.infer.cpp.reading.writes import writes_of
+from nodl.infer.cpp.reading.writes import writes_of, written_by
 from nodl.infer.cpp.running.callbacks import run_meanwhile
 from nodl.infer.cpp.running.constructors import declared_value, fields_of
 from nodl.infer.cpp.running.contents import copied, iterated
@@ -643,11 +643,18 @@ def _counted(run: Machine, node: Node, frame: Frame) -> int:
     condition, body, update = (field_of(node, name) for name in ("condition", "body", "update"))
     loop = Loop(run.store.mark(), run.steps)
     returns, outer_path = 0, frame.path
+    alike_after, first = _alike_after(node), None
+    tested: list[bool | None] = []
+
+    def test(is_certain: bool) -> None:
+        tested.append(is_certain or decided(run, condition_of(run, condition, frame)))
+
     for index in range(MAX_UNROLLED):
         if run.spins_beside:
             run_meanwhile(run, frame)
         is_certain = condition is None or (index == 0 and node.type == "do_statement")
-        holds = is_certain or decided(run, condition_of(run, condition, frame))
+        seen = run.store.watched(partial(test, is_certain))
+        first, holds = (first or seen) if index or not is_certain else None, tested[-1]
         if holds is False:
             if index == 0:
                 run.kill(body, frame, "the condition of the loop is never true")
@@ -655,7 +662,7 @@ def _counted(run: Machine, node: Node, frame: Frame) -> int:
         if (
             holds is None
             or loop.breaks
-            or (index == MAX_ENDLESS and _is_endless(condition))
+            or (index == alike_after and (first is None or run.store.holds(first)))
             or (
                 index == MAX_NAMELESS
                 and not any(map(may_name, run.store.changes(loop.start).values()))
@@ -688,6 +695,27 @@ def _doubt_returned(frame: Frame, returns: int) -> None:
 def _computes(run: Machine, loop: Node) -> bool:
     """Return whether a loop makes no interface and does nothing but change variables."""
     return not run.subtree_matters(loop) and only_changes_variables(run, words_in(loop))
+
+
+def _alike_after(loop: Node) -> int:
+    """Return after how many turns a loop is run to a fixpoint, if its condition sees then what it saw at first.
+
+    One if its text neither leaves it nor writes to what the condition names: others end it.
+    """
+    condition, body = field_of(loop, "condition"), field_of(loop, "body")
+    if condition is None or body is None or _is_endless(condition):
+        return MAX_ENDLESS
+    waiting = [body]
+    while waiting:
+        each = waiting.pop()
+        if each.type in _LEAVES:
+            return MAX_ENDLESS
+        waiting += each.named_children if each.type != "lambda_expression" else ()
+    written = written_by(loop)
+    return 1 if words_in(condition).isdisjoint(written.assigned | written.changed) else MAX_ENDLESS
+
+
+_LEAVES = ("break_statement", "return_statement", "throw_statement", "goto_statement")
 
 
 def _is_endless(condition: Node | None) -> bool:

@@ -45,6 +45,28 @@ def test_one_that_comes_to_its_end_does_not(tmp_path: Path) -> None:
     assert gaps(system) == []
 
 
+FLAG = "bool running = true; int turns = 0;"
+
+
+def test_loops_that_only_others_end_are_not_counted_within_each_other(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("nodl.infer.cpp.running.machine.MAX_STEPS", 20_000)
+    turn = '++turns; create_publisher<std_msgs::msg::String>("a", 1);'
+    nested = f"while (running) {{ while (running) {{ while (running) {{ {turn} }} }} }}"
+    system = infer(tmp_path, in_class(nested + 'create_publisher<std_msgs::msg::String>("behind", 1);', FLAG))
+    assert names(system) == ["a", "behind"]
+    assert gaps(system) == []
+
+
+def test_one_that_its_own_turns_end_is(tmp_path: Path) -> None:
+    turn = 'create_publisher<std_msgs::msg::String>("t" + std::to_string(turns), 1); ++turns;'
+    assigned = f"while (running) {{ {turn} running = turns < 3; }}"
+    left = f"while (running) {{ {turn} if (turns == 3) {{ break; }} }}"
+    assert names(infer(tmp_path / "assigned", in_class(assigned, FLAG))) == ["t0", "t1", "t2"]
+    assert names(infer(tmp_path / "left", in_class(left, FLAG))) == ["t0", "t1", "t2"]
+
+
 def test_long_looks_back_at_what_was_written_count_as_steps_and_short_ones_do_not() -> None:
     spent: list[int] = []
     store = AbstractStore(spent.append)
