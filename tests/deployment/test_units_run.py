@@ -58,7 +58,7 @@ def deployed(tmp_path: Path, text: str) -> dict[str, Path]:
     enclaves = tmp_path / "enclaves.yaml"
     hosts = ("--hosts", str(tmp_path / "hosts.yaml"))
     assert secure_plan("hosts", launch, *hosts, "--write-enclaves", str(enclaves)) == 0
-    assigned = {host.name: host.enclaves for host in load_hosts(enclaves).hosts}
+    assigned = {host: one.enclaves for host, one in load_hosts(enclaves).hosts.items()}
     for bundle in export_hosts(ca, tmp_path / "bundles", assigned):
         host = bundle.manifest.host
         (tmp_path / host).mkdir()
