@@ -24,10 +24,11 @@ def install_package(
 ) -> Path:
     """Install a package below an ament prefix, as colcon does: marker, package.xml, and executables by their names.
 
+    Its folder of executables is missing if ``programs`` is empty, and there for the caller to fill if it is not given.
     Returns its share folder."""
     marker = prefix / "share/ament_index/resource_index/packages" / package
     share, binaries = prefix / "share" / package, prefix / "lib" / package
-    for folder in (marker.parent, share, binaries):
+    for folder in (marker.parent, share, *([binaries] if programs is None or programs else ())):
         folder.mkdir(parents=True, exist_ok=True)
     marker.touch()
     text = f'<package format="3"><name>{package}</name><version>{version}</version></package>'
