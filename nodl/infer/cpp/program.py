@@ -24,7 +24,7 @@ from nodl.infer.cpp.reading.parameter_library import listener_of
 from nodl.infer.cpp.reading.preprocess import Preprocessed, preprocess
 from nodl.infer.cpp.reading.project import SourcePackage, Workspace, sources_of, targets_of
 from nodl.infer.cpp.reading.type_names import Type
-from nodl.infer.cpp.running import calls, expressions, invocation, statements  # noqa: F401 (how each runs)
+from nodl.infer.cpp.running import calls, expressions, invocation, loops, statements  # noqa: F401 (how each runs)
 from nodl.infer.cpp.running.callbacks import run_callbacks
 from nodl.infer.cpp.running.constructors import construct
 from nodl.infer.cpp.running.invocation import invoke

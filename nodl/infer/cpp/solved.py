@@ -57,7 +57,7 @@ def _solved(sources: Sources, key: LaunchKey, entry: Entry, start: Start | None)
         gaps=tuple(program_gaps(findings)),
         dead=tuple(Gap(answer.source, answer.reason) for answer in findings.answers if answer.dead),
         classes=tuple(sorted(findings.classes)),
-        consulted=findings.consulted or nodes != interfaces_of(findings, *key),
+        consulted=findings.consulted or (start is not None and nodes != interfaces_of(findings, *key)),
     )
     read = (*findings.files, *sources.unreadable)
     return Made(solved, {name: sources.digests[name] for name in read})

@@ -71,9 +71,8 @@ class Build:
     # Header of generate_parameter_library -> YAML.
     parameter_files: dict[str, str] = field(default_factory=dict)
     scripts: dict[str, str] = field(default_factory=dict)  # executable -> file that is installed as it is
-    headers: dict[str, str] = field(
-        default_factory=dict
-    )  # path below include/ -> folder that is installed there
+    # Path below include/ -> folder that is installed there.
+    headers: dict[str, str] = field(default_factory=dict)
 
     @property
     def libraries(self) -> list[Target]:

@@ -97,17 +97,12 @@ class Workspace:
         own = package.include_folders if package else []
         first = self.packages.get(name.partition("/")[0])
         others = first.include_folders if first else []
-        for folder in (*own, *others):
-            path = os.path.normpath(os.path.join(folder, name))
-            if os.path.isfile(path):
-                return path
-        if first is not None and (installed := first.header(name)) is not None:
-            return installed
-        for folder in (*self._all_folders, *self._installed(name)):
-            path = os.path.normpath(os.path.join(folder, name))
-            if os.path.isfile(path):
-                return path
-        return self._generated(name, package, first)
+        return (
+            _first_below((*own, *others), name)
+            or (first.header(name) if first is not None else None)
+            or _first_below((*self._all_folders, *self._installed(name)), name)
+            or self._generated(name, package, first)
+        )
 
     def _generated(self, name: str, *packages: SourcePackage | None) -> str | None:
         """Return the file of parameters that generate_parameter_library makes this header of."""
@@ -219,3 +214,9 @@ def targets_of(target: Target, build: Build) -> list[Target]:
 def sources_of(targets: Iterable[Target]) -> list[str]:
     """Return what targets are built from, each file once."""
     return list(dict.fromkeys(file for target in targets for file in target.sources))
+
+
+def _first_below(folders: Iterable[str], name: str) -> str | None:
+    """Return the file of that name below the first folder that has it."""
+    paths = (os.path.normpath(os.path.join(folder, name)) for folder in folders)
+    return next(filter(os.path.isfile, paths), None)

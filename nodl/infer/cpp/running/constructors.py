@@ -541,8 +541,7 @@ def _made_unseen(
     elif len(arguments) > 1 or not all(isinstance(atom, Obj | Unknown) for atom in arguments[0]):
         why = f"how {cls.name} is made of what it is given is not known"
         run.gap(node, frame, why)
-        for cell in ((this, name) for each in run.names.ancestry(cls) for name in each.fields):
-            run.store.set(cell, lost(run.store.get(cell) or BOTTOM, why))
+        run.store.lose([(this, name) for each in run.names.ancestry(cls) for name in each.fields], why)
 
 
 def _written_arguments(

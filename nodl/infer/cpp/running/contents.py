@@ -75,10 +75,7 @@ def copied(run: Machine, value: Value, node: Node, frame: Frame, cls: Class | No
 def _shared_with_copy(run: Machine, atom: Obj) -> None:
     """Know nothing of the texts and numbers that members of a library's object hold, which stands for its copy, too."""
     atom.data["copied"] = True
-    for name in atom.data.get("written", ()):
-        run.store.set(
-            (atom, name), lost(run.store.get((atom, name)) or BOTTOM, "a member that a copy has, too")
-        )
+    run.store.lose([(atom, name) for name in atom.data.get("written", ())], "a member that a copy has, too")
 
 
 def _copy(run: Machine, atom: object, node: Node, frame: Frame, cls: Class | None) -> object:
@@ -108,8 +105,7 @@ def _forget_written(run: Machine, constructor: Function) -> None:
     """Make unknown, by their names, what a constructor that copies or moves may write: also static members, globals."""
     code = [constructor.node, *(value for _, value in constructor.initialisers)]
     for name in sorted(frozenset[str]().union(*map(writes_of, code))):
-        for cell in run.store.named(name):
-            run.store.set(cell, lost(run.store.get(cell) or BOTTOM, f"what {constructor.name} copies"))
+        run.store.lose(run.store.named(name), f"what {constructor.name} copies")
 
 
 def _member_copied(run: Machine, cls: Class, name: str, value: Value, node: Node, frame: Frame) -> Value:

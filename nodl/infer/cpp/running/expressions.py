@@ -389,10 +389,12 @@ def _streamed(
 
 def _is_letter(run: Machine, written: Node | None, frame: Frame) -> bool:
     """Return whether a number is one of 8 bits, which a stream writes as a letter."""
-    small = re.compile(r"(?:std::)?u?int8_t|(?:un)?signed char|char")
-    return small.fullmatch(seen_type(run, written, frame).name) is not None or (
+    return _LETTER.fullmatch(seen_type(run, written, frame).name) is not None or (
         re.search(r"\b(?:u?int8_t|char)\b", text(written)) is not None
     )
+
+
+_LETTER = re.compile(r"(?:std::)?u?int8_t|(?:un)?signed char|char")
 
 
 def _write_stream(run: Machine, target: Node | None, written: Value, frame: Frame) -> None:

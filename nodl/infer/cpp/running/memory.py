@@ -3,7 +3,7 @@ calls that were run before, whose outcome is the same where all that they read i
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple, TypeVar
 
 from nodl.infer.cpp.running.values import (
@@ -17,6 +17,7 @@ from nodl.infer.cpp.running.values import (
     holds_callable,
     join,
     join_in_doubt,
+    lost,
 )
 
 MEMORY_DEPTH = 20
@@ -133,6 +134,11 @@ class AbstractStore:
         """Know of the value of ``cell`` only what is ``left`` of it, from now on."""
         self._shared[cell] = left
         self.set(cell, left(self._cells.get(cell, BOTTOM)))
+
+    def lose(self, cells: Iterable[Cell], why: str) -> None:
+        """Know nothing of the texts and numbers that these variables hold now."""
+        for cell in cells:
+            self.set(cell, lost(self.get(cell) or BOTTOM, why))
 
     def everything(self) -> list[Cell]:
         """Return all variables that hold something."""

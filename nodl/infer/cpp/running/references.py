@@ -161,10 +161,8 @@ def through(run: Machine, what: Node, frame: Frame) -> None:
 
 def forget_everything(run: Machine, why: str) -> None:
     """Make every text, number and container unknown that a variable holds which is not constant."""
-    for cell in run.store.everything():
-        held = run.store.get(cell) or BOTTOM
-        if is_plain(held) and not _is_constant(cell):
-            run.store.set(cell, lost(held, why))
+    cells = [cell for cell in run.store.everything() if not _is_constant(cell)]
+    run.store.lose([cell for cell in cells if is_plain(run.store.get(cell) or BOTTOM)], why)
 
 
 def _is_constant(cell: Cell) -> bool:
