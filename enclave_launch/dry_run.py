@@ -11,9 +11,13 @@ Within one ``version`` fields are only ever added; a removed or changed field ra
 
 from __future__ import annotations
 
-from typing import Any, Literal, Optional, Union
+from typing import Any, Literal, Optional, TypeVar, Union
 
 from pydantic import BaseModel, Field, StrictBool, StrictFloat, StrictInt, StrictStr
+
+from enclave_launch.source_location import SourceLocation
+
+Entry = TypeVar("Entry", bound="_Strict")
 
 # Only what pydantic 1.8 and 2 have in common: no ``|``, strict types in unions, ``...`` for what is required.
 JsonScalar = Union[StrictBool, StrictInt, StrictFloat, StrictStr]
@@ -30,6 +34,10 @@ _ORIGIN = "where they come from: --nodl, manifest of the package, recorded, infe
 class _Strict(BaseModel, extra="forbid", frozen=True):
     """The base of all entries: an unknown key is an error."""
 
+    def changed(self: Entry, **fields: object) -> Entry:
+        """Return a copy with other values in ``fields``."""
+        return type(self)(**{**dict(self), **fields})
+
 
 class _Written(_Strict, frozen=True):
     """The base of what an element of a launch file says."""
@@ -40,7 +48,7 @@ class _Written(_Strict, frozen=True):
     @property
     def place(self) -> str:
         """Return ``file:line``, or the file alone if the line is not known."""
-        return f"{self.launch_file}:{self.line}" if self.line else self.launch_file
+        return str(SourceLocation(self.launch_file, self.line))
 
 
 class Respawn(_Strict, frozen=True):
@@ -168,7 +176,7 @@ class Diagnostic(_Strict, frozen=True):
     @property
     def place(self) -> str:
         """Return ``file:line``, the file alone where the whole of it is meant, or nothing."""
-        return f"{self.file}:{self.line}" if self.file and self.line else self.file or ""
+        return str(SourceLocation(self.file or "", self.line if self.file else 0))
 
 
 class DryRun(_Strict, frozen=True):

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 from enclave_common.words import counted
-from enclave_launch.dry_run import Diagnostic, DryRun
+from enclave_launch.dry_run import DryRun
 from enclave_launch.report.graph import ChannelUse, EnclaveGraph, plan_graph, short_path
 from enclave_launch.report.review_text import Judged
 from enclave_launch.review.checks.keystore import Ending
@@ -64,12 +64,7 @@ def report_contents(
         title,
         plan_graph(document, root),
         [
-            (
-                Diagnostic(
-                    **{**dict(diagnostic), "file": diagnostic.file and short_path(diagnostic.file, root)}
-                ),
-                why,
-            )
+            (diagnostic.changed(file=diagnostic.file and short_path(diagnostic.file, root)), why)
             for diagnostic, why in judged
         ],
         tuple(_influences(plan)),

@@ -150,7 +150,7 @@ def _reasons(
 def _reason(item: Interface, root: str) -> Interface:
     rules = (rule.rpartition(" at ") for rule in item.remapped_by)
     remapped_by = [f"{rule}{at}{short_path(origin, root)}" for rule, at, origin in rules]
-    return Interface(**{**dict(item), "place": short_path(item.place, root), "remapped_by": remapped_by})
+    return item.changed(place=short_path(item.place, root), remapped_by=remapped_by)
 
 
 def _channels(reasons: Mapping[_Key, list[Interface]]) -> tuple[Channel, ...]:

@@ -223,7 +223,7 @@ class Node(ExecuteProcess):
             remaps=tuple(self.__placed_remaps(process)),
             parameters=parameters.values,
             unread_parameter_files=parameters.unread,
-            parameter_files=self.__parameters.written_files(context),
+            parameter_files=self.__parameters.written_files(),
         )
 
     def __placed_remaps(self, process: ResolvedProcess) -> Iterator[RemapRule]:

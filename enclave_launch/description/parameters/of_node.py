@@ -8,8 +8,7 @@ section equal to the component's name; other patterns do not count; a file witho
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import partial
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from enclave_launch.description.parameters import yaml_text
@@ -50,7 +49,7 @@ class NodeParameters:
 
     def __init__(self, own: Parameters):
         self.__own = own
-        self.__written: dict[str, Callable[[], Mapping[str, Section]]] = {}  # content of generated files
+        self.__written: dict[str, str] = {}  # generated file -> its text
 
     def write(self, context: LaunchContext, section: str) -> list[str]:
         """Return words to append to the command line. ``section`` is the node's full name, or ``/**``."""
@@ -70,7 +69,7 @@ class NodeParameters:
     def __file_words(self, context: LaunchContext, path: str) -> Sequence[str]:
         text = context.host.parameter_file(path)
         if text is not None:
-            self.__written[path] = partial(parameters_of_text, text, path)
+            self.__written[path] = text
         elif not os.path.isfile(path):
             context.host.warn(parameter_file_missing(path))
             return ()
@@ -81,7 +80,7 @@ class NodeParameters:
         write = yaml_text.quoted_parameter_file if quoted else yaml_text.parameter_file
         text = write(section, values)
         path = context.host.write_parameter_file(text)
-        self.__written[path] = partial(parameters_of_text, text, path)
+        self.__written[path] = text
         return path
 
     def resolve(
@@ -91,14 +90,16 @@ class NodeParameters:
         directory: str | None,
     ) -> ResolvedParameters:
         """Return what the node sees after rcl has merged everything on its command line."""
-        written = self.__written
-        return resolve_parameters(
-            name_tokens, sources, lambda path: written[path]() if path in written else None, directory
-        )
 
-    def written_files(self, context: LaunchContext) -> dict[str, str]:
+        def generated(path: str) -> Mapping[str, Section] | None:
+            text = self.__written.get(path)
+            return None if text is None else parameters_of_text(text, path)
+
+        return resolve_parameters(name_tokens, sources, generated, directory)
+
+    def written_files(self) -> dict[str, str]:
         """Map path to text of the files that were generated for this node."""
-        return {path: context.host.parameter_file(path) or "" for path in self.__written}
+        return dict(self.__written)
 
 
 def _global_words(context: LaunchContext) -> Iterator[tuple[str, str]]:
