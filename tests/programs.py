@@ -9,7 +9,7 @@ from pathlib import Path
 
 PYTHON = shlex.quote(sys.executable)
 COMPILED = b"\x7fELF\x02\x01\x01"
-"""What a compiled program begins with."""
+"""The first bytes of a compiled program (ELF)."""
 
 
 def python_program(text: str, python: str | Path = sys.executable) -> str:
@@ -24,7 +24,7 @@ def install_package(
 ) -> Path:
     """Install a package below an ament prefix, as colcon does: marker, package.xml, and executables by their names.
 
-    Its folder of executables is missing if ``programs`` is empty, and there for the caller to fill if it is not given.
+    Without ``programs`` the folder of executables is left empty for the caller; with an empty mapping there is none.
     Returns its share folder."""
     marker = prefix / "share/ament_index/resource_index/packages" / package
     share, binaries = prefix / "share" / package, prefix / "lib" / package

@@ -65,7 +65,7 @@ class RequestedEndpoint(NamedTuple):
 
 
 class StartedNode(NamedTuple):
-    """What is known of how a node was started, from a record, a plan or a command line.
+    """The start of a node as a record, a plan or a command line reports it.
 
     ``fqn`` and ``namespace`` are those of a plan, ``fqn`` empty if it gives no name; ``command`` is empty for a
     component, whose rules are those of the load request.
@@ -183,7 +183,7 @@ def requested_endpoint(
 
 
 def parts_of(node: RecordedNode, endpoint: EndpointMade) -> list[EndpointMade]:
-    """Return the parts of an action, which come before its own line; empty for what is no action."""
+    """Return the services and topics of an action, which are made before it; none for any other endpoint."""
     parts: list[EndpointMade] = []
     if endpoint.kind.family != "action":
         return parts

@@ -61,7 +61,7 @@ def prefix(tmp_path: Path) -> Path:
 
 @pytest.fixture
 def launch(tmp_path: Path, prefix: Path, monkeypatch: pytest.MonkeyPatch) -> Launch:
-    """``launch('<node .../>')`` with the packages that a test installed in ``prefix``; keywords are options."""
+    """Plan a launch of ``<node .../>`` elements with the packages installed in ``prefix``; keywords are options."""
     monkeypatch.delenv("AMENT_PREFIX_PATH", raising=False)
 
     def plan(text: str, **options: Any) -> LaunchPlan:

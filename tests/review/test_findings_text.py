@@ -15,14 +15,14 @@ def told(
 ) -> tuple[Diagnostic, str | None]:
     text = f"{subject} is odd"
     return Diagnostic(
-        severity=severity, code=code, subject=subject, file=None, line=0, text=text, remedy="mend it"
+        severity=severity, code=code, subject=subject, file=None, line=0, text=text, remedy="fix it"
     ), None
 
 
 def test_findings_of_one_kind_are_one_paragraph() -> None:
     text = findings_text([told("remap-dead", name) for name in ("/a", "/b", "/c")])
     assert text == (
-        "warning: /a is odd (and 2 more of this kind, about /a, /b, /c) [remap-dead]\n  mend it\n"
+        "warning: /a is odd (and 2 more of this kind, about /a, /b, /c) [remap-dead]\n  fix it\n"
         "0 errors, 3 warnings\n"
     )
 
@@ -62,7 +62,7 @@ def test_what_this_machine_lacks_of_a_launch_is_one_paragraph() -> None:
         "  install or build them, and check again; -v lists each with its place\n"
         "0 errors, 5 warnings\n"
     )
-    assert findings_text(missing, verbose=True).count("mend it") == 5
+    assert findings_text(missing, verbose=True).count("fix it") == 5
 
 
 def test_files_of_the_launch_itself_that_are_not_there_are_findings_of_their_own() -> None:
