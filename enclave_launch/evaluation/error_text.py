@@ -70,8 +70,12 @@ def _syntax(error: SyntaxError) -> str:
     return f"{type(error).__name__}: {error.msg}"
 
 
+def _modules(error: BaseException) -> list[object]:
+    return [step.tb_frame.f_globals.get("__name__", "") for step in frames(error)]
+
+
 def _raised_by_us(error: BaseException) -> bool:
-    modules = [step.tb_frame.f_globals.get("__name__", "") for step in frames(error)]
+    modules = _modules(error)
     if modules[-1:] == [WatchedConfigurations.__module__]:  # a dict to whoever looks something up in it
         modules.pop()
     if not modules:
@@ -96,6 +100,11 @@ def _next_step(error: BaseException, text: str) -> str:
         return did_you_mean(unknown[2], [name for names in known for name in names])
     if text.startswith((MISSING_ARGUMENT, REQUIRED_ARGUMENT)):
         return "\ngive it as NAME:=VALUE after the launch file (--show-args lists all), or in the include"
+    raised_in = _modules(error)[-1:]
+    if isinstance(error, KeyError) and raised_in == ["os"]:
+        return f"\nthe launch file needs the environment variable {error.args[0]}, which is not set"
+    if isinstance(error, FileNotFoundError) and raised_in == ["subprocess"]:
+        return "\nthe launch file runs this program itself; install it, or add its folder to PATH"
     if isinstance(error, OSError) and f"'{MISSING_PREFIX}/" in text:
         return "\nthat file is part of a package that is not installed here; this launch file reads it itself"
     if isinstance(error, ModuleNotFoundError) and not missing_dependency(error):

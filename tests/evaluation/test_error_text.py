@@ -67,6 +67,25 @@ def test_what_python_raised_in_the_users_code_keeps_its_class(tmp_path: Path) ->
     assert message(tmp_path, "a.launch.py", code) == "a.launch.py:2: KeyError: speed"
 
 
+def test_a_variable_that_the_file_needs_is_called_an_environment_variable(tmp_path: Path) -> None:
+    code = "import os\n\ndef generate_launch_description():\n    return os.environ['NEED_COMPILE_OF_TEST']\n"
+    assert message(tmp_path, "a.launch.py", code) == (
+        "a.launch.py:4: KeyError: NEED_COMPILE_OF_TEST\n"
+        "the launch file needs the environment variable NEED_COMPILE_OF_TEST, which is not set"
+    )
+
+
+def test_a_program_that_the_file_runs_is_told_from_a_file_that_it_reads(tmp_path: Path) -> None:
+    code = "import subprocess\n\ndef generate_launch_description():\n    {}\n"
+    text = message(tmp_path, "a.launch.py", code.format("subprocess.check_output(['no-xacro', 'a.urdf'])"))
+    assert text.startswith(
+        "a.launch.py:4: No such file or directory: 'no-xacro'\nthe launch file runs this program"
+    )
+    assert message(tmp_path, "a.launch.py", code.format("open('a.urdf')")) == (
+        "a.launch.py:4: No such file or directory: 'a.urdf'"
+    )
+
+
 @pytest.mark.parametrize("returned", ["None", "5"])
 def test_a_python_file_must_return_a_description(tmp_path: Path, returned: str) -> None:
     text = message(tmp_path, "a.launch.py", f"def generate_launch_description():\n    return {returned}\n")
