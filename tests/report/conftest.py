@@ -82,7 +82,7 @@ def contents(plan: DryRun, title: str = "robot.launch.xml") -> ReportContents:
     return report_contents(plan, [(told, None) for told in check_plan(plan)], title=title)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def page() -> Iterator[Page]:
     if chromium() is None and os.environ.get("CI") != "true":
         pytest.skip("Chromium is not installed (apt install chromium)")
