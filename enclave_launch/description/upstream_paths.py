@@ -254,6 +254,16 @@ PATHS: dict[str, dict[str, str]] = {
     "lifecycle_msgs": {
         "msg": "lifecycle_msgs: | State Transition TransitionEvent",
     },
+    "nav2_common": {},
+    "nav2_common.launch": {
+        "has_node_params": "nav2_common: HasNodeParams",
+        "launch_config_as_bool": "nav2_common: LaunchConfigAsBool",
+        "replace_string": "nav2_common: ReplaceString",
+        "rewritten_yaml": "nav2_common: RewrittenYaml",
+    },
+    "xacro": {
+        "": "xacro: parse process_doc process_file",
+    },
 }
 
 # Names that a package has only from a feature on; the module below it always has them.
