@@ -40,9 +40,11 @@ def situation_of(
     Raises ``LaunchFileError`` for a remap rule at which the process would end.
     """
     words: tuple[str, ...] = ()
+    files: Mapping[str, str] = {}
     if isinstance(started, ResolvedProcess):
         node = node_of_process(started, interface, "/", "node")
         words = tuple(own_words(started))
+        files = started.parameter_files
     else:
         node = node_of_component(started, container, interface, "/")
     return Situation(
@@ -53,6 +55,7 @@ def situation_of(
         words=words,
         installed=installed,
         remap=_remap(node),
+        files=files,
     )
 
 

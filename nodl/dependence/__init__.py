@@ -177,7 +177,8 @@ class Situation(NamedTuple):
     """One start of a node. ``node`` and ``namespace`` are final; ``words``: of its command line, without ROS arguments.
 
     ``installed``: the packages of the ament index, ``None`` when nothing can be said about them. ``remap``: the final
-    name of a topic, for programs that ask for it and make other names from it.
+    name of a topic, for programs that ask for it and make other names from it. ``files``: path -> text of the files in
+    its command line that launch writes.
     """
 
     distro: str
@@ -188,3 +189,4 @@ class Situation(NamedTuple):
     installed: frozenset[str] | None = None
     launched: Launched = Launched()
     remap: Callable[[str], str] = str
+    files: Mapping[str, str] = MappingProxyType({})

@@ -280,6 +280,20 @@ def test_rviz_gets_what_its_displays_and_tools_name(launch: Launch, tmp_path: Pa
     assert "display of class 'my_rviz/Display' needs is not known" in problems(launch(node))
 
 
+def test_rviz_is_given_a_file_that_the_launch_file_writes(launch: Launch, tmp_path: Path) -> None:
+    """Nav2's launch of RViz replaces the namespace in a file; a dry run writes none, and it is not rviz's default."""
+    (tmp_path / "view.rviz").write_text(RVIZ.format(more="").replace("/map", "<robot>/map"))
+    (tmp_path / "rviz.launch.py").write_text(
+        "from launch import LaunchDescription\nfrom launch_ros.actions import Node\n"
+        "from nav2_common.launch import ReplaceString\n\ndef generate_launch_description():\n"
+        f"    view = ReplaceString('{tmp_path}/view.rviz', {{'<robot>': '/r1'}})\n"
+        "    return LaunchDescription([Node(package='rviz2', executable='rviz2', arguments=['-d', view])])\n"
+    )
+    plan = launch(f'<include file="{tmp_path}/rviz.launch.py"/>')
+    assert {"/r1/map", "/r1/map_updates", "/scan"} <= set(allowed(plan, "subscribe"))
+    assert allowed(plan, "publish") == ["/goal"] and not plan.problems
+
+
 def test_rviz_without_a_file_has_that_of_the_user_else_its_own_default(
     launch: Launch, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

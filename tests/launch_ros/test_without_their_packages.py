@@ -87,6 +87,16 @@ def test_texts_are_replaced_if_the_condition_holds(
     assert launched(text, syntax="py").processes[0].parameters == {**PLAIN, "scan": scan, "sim": True}
 
 
+def test_it_may_be_a_file_for_all_nodes(launched: Evaluate, tmp_path: Path) -> None:
+    (tmp_path / "p.yaml").write_text(PARAMETERS)
+    text = FILE.format(before=NAV2, parameters="").replace(
+        "[DeclareLaunchArgument",
+        f"[SetParametersFromFile(RewrittenYaml('{tmp_path}/p.yaml', {{'sim': 'true'}})), DeclareLaunchArgument",
+    )
+    imported = text.replace("import Node\n", "import Node, SetParametersFromFile\n")
+    assert launched(imported, syntax="py").processes[0].parameters == {**PLAIN, "sim": True}
+
+
 def test_nothing_is_written_by_a_dry_run(
     launched: Evaluate, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

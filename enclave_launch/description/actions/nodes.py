@@ -212,7 +212,7 @@ class Node(ExecuteProcess):
     def resolve(self, context: LaunchContext) -> ResolvedProcess:
         process = super().resolve(context)
         sources = self.ros_arguments().parameters
-        parameters = self.__parameters.resolve(self.__name_tokens(), sources, process.cwd)
+        parameters = self.__parameters.resolve(context, self.__name_tokens(), sources, process.cwd)
         return process._replace(
             kind=self.process_kind,
             package=None if self.__node_package is None else _performed(context, self.__node_package),
@@ -223,7 +223,6 @@ class Node(ExecuteProcess):
             remaps=tuple(self.__placed_remaps(process)),
             parameters=parameters.values,
             unread_parameter_files=parameters.unread,
-            parameter_files=self.__parameters.written_files(),
         )
 
     def __placed_remaps(self, process: ResolvedProcess) -> Iterator[RemapRule]:

@@ -211,6 +211,9 @@ class ExecuteLocal(Action):
             respawn=Respawn(self.__respawn_delay or 0.0, self.__respawn_max_retries)
             if self.__respawn
             else None,
+            parameter_files={
+                word: text for word in cmd if (text := context.host.parameter_file(word)) is not None
+            },
         )
 
     def ros_arguments(self) -> RosArguments:

@@ -49,7 +49,6 @@ class NodeParameters:
 
     def __init__(self, own: Parameters):
         self.__own = own
-        self.__written: dict[str, str] = {}  # generated file -> its text
 
     def write(self, context: LaunchContext, section: str) -> list[str]:
         """Return words to append to the command line. ``section`` is the node's full name, or ``/**``."""
@@ -67,10 +66,7 @@ class NodeParameters:
         return ("--params-file", self.__write_file(context, section, item))
 
     def __file_words(self, context: LaunchContext, path: str) -> Sequence[str]:
-        text = context.host.parameter_file(path)
-        if text is not None:
-            self.__written[path] = text
-        elif not os.path.isfile(path):
+        if context.host.parameter_file(path) is None and not os.path.isfile(path):
             context.host.warn(parameter_file_missing(path))
             return ()
         return ("--params-file", path)
@@ -78,13 +74,11 @@ class NodeParameters:
     def __write_file(self, context: LaunchContext, section: str, values: Mapping[str, Any]) -> str:
         quoted = context.host.release.has(Feature.QUOTED_TEXT_PARAMETERS)
         write = yaml_text.quoted_parameter_file if quoted else yaml_text.parameter_file
-        text = write(section, values)
-        path = context.host.write_parameter_file(text)
-        self.__written[path] = text
-        return path
+        return context.host.write_parameter_file(write(section, values))
 
     def resolve(
         self,
+        context: LaunchContext,
         name_tokens: Sequence[str | None],
         sources: Sequence[ParameterFileArgument | ParameterRule],
         directory: str | None,
@@ -92,14 +86,10 @@ class NodeParameters:
         """Return what the node sees after rcl has merged everything on its command line."""
 
         def generated(path: str) -> Mapping[str, Section] | None:
-            text = self.__written.get(path)
+            text = context.host.parameter_file(path)
             return None if text is None else parameters_of_text(text, path)
 
         return resolve_parameters(name_tokens, sources, generated, directory)
-
-    def written_files(self) -> dict[str, str]:
-        """Map path to text of the files that were generated for this node."""
-        return dict(self.__written)
 
 
 def _global_words(context: LaunchContext) -> Iterator[tuple[str, str]]:
@@ -107,6 +97,9 @@ def _global_words(context: LaunchContext) -> Iterator[tuple[str, str]]:
     for item in context.launch_configurations.get("global_params") or ():
         if isinstance(item, tuple):
             yield "-p", f"{item[0]}:={item[1]}"
+            continue
+        if context.host.parameter_file(item) is not None:
+            yield "--params-file", item
             continue
         path = os.path.abspath(item)
         if not os.path.isfile(path) and context.host.allow_missing_packages:

@@ -50,10 +50,12 @@ def read_configuration(kind: str, file: str, situation: Situation, place: Source
         return of_tree(file, situation)
     if kind == "cartographer":
         return of_lua(file)
-    if kind == "rviz" and not os.path.isfile(file) and not file.startswith(f"{MISSING_PREFIX}/"):
+    text = situation.files.get(file)
+    is_there = text is not None or os.path.isfile(file)
+    if kind == "rviz" and not is_there and not file.startswith(f"{MISSING_PREFIX}/"):
         return rviz.default(SourceRef(file))
     try:
-        root = _read(file, last_counts=kind == "rviz")  # as rviz_common's YamlConfigReader does
+        root = _read(file, text, last_counts=kind == "rviz")  # as rviz_common's YamlConfigReader does
     except InvalidNoDLError as error:
         return Configured(gaps=(Gap(SourceRef(file), f"{kind} file cannot be used: {error}"),))
     if kind == "rviz":
@@ -65,11 +67,12 @@ def read_configuration(kind: str, file: str, situation: Situation, place: Source
     return Configured(gaps=(Gap(place, f"there is no reader for files of kind {kind!r}"),))
 
 
-def _read(file: str, *, last_counts: bool) -> YamlValue:
-    """Read the file. Raises ``InvalidNoDLError``, also for a file that is not there."""
+def _read(file: str, text: str | None, *, last_counts: bool) -> YamlValue:
+    """Read the file, or ``text`` in its place. Raises ``InvalidNoDLError``, also for a file that is not there."""
     try:
-        if not os.path.isfile(file):
+        if text is None and not os.path.isfile(file):
             raise InvalidNoDLError.at(SourceRef(file), "there is no such file")
-        return parse_yaml(read_bytes(file), file, last_counts=last_counts)
+        content = read_bytes(file) if text is None else text.encode()
+        return parse_yaml(content, file, last_counts=last_counts)
     except OSError as error:
         raise InvalidNoDLError.at(SourceRef(file), f"cannot be read: {error.strerror}") from None
