@@ -39,7 +39,6 @@ SOURCE_VARIABLE = "SECURE_LAUNCH_SOURCE"
 CONTAINER_PACKAGE = "rclcpp_components"
 """Its executables (``component_container``, ``_mt``, ``_isolated``) are containers and nothing else."""
 
-_PLACES = 2  # named in a message
 # rclcpp_components/src/component_manager.hpp, the constructor's default.
 _CONTAINER_NODE_NAME = "ComponentManager"
 
@@ -155,13 +154,13 @@ class InterfaceFinder:
         hit = self._library.find(subject.package, name)
         if hit:
             found.append(Found((hit.document.interface,), InterfaceOrigin.LIBRARY, hit.doubt))
-        searched = ["looked at " + _shortly(named.searched)]
-        searched += [f"--nodl describes {', '.join(named.described)}"] if named.described else []
-        searched += [analysed.why] if analysed is not None and analysed.why else []
+        searched = [analysed.why] if analysed is not None and analysed.why else []
         if self._options.infer and not self._infers:
             searched.append("inference is not part of this installation")
         if self._options.library:
             searched.append("the library has no document of it")
+        searched += [f"--nodl describes {', '.join(named.described)}"] if named.described else []
+        searched.append("looked for a manifest at " + _shortly(named.searched))
         return _Known((*found,), (*searched,), analysed is not None and analysed.of_this_start)
 
     def _inferred(
@@ -200,12 +199,11 @@ class InterfaceFinder:
 
 
 def _shortly(places: Sequence[str]) -> str:
-    """Return the first places, which are the package's own, and how many more there are: each prefix of a workspace
+    """Return the first place, which is the package's own, and how many more there are: each prefix of a workspace
     has some.
     """
-    if len(places) <= _PLACES + 1:
-        return ", ".join(places)
-    return f"{', '.join(places[:_PLACES])} and {counted(len(places) - _PLACES, 'more place')}"
+    more = f" and {counted(len(places) - 1, 'more place')}" if len(places) > 1 else ""
+    return f"{places[0]}{more}"
 
 
 def _of_manifest(manifest: Lookup) -> Found:

@@ -107,7 +107,9 @@ def _compiled(
         answer = sources.infer(package, executable, plugin, start_of)
     except CppSupportMissing as error:
         return InferredExecutable((), f"{what}: {error}")
-    why = f"{what}: {answer.why}" if answer.why else ""
+    why = answer.why  # of a build in reach: what is installed of it beside that explains nothing
+    if why and not sources.hold(package):
+        why = f"{what}: {why}"
     return InferredExecutable(answer.interfaces, why, answer.consulted)
 
 

@@ -67,7 +67,7 @@ def scripts_of(folder: str) -> Mapping[str, str]:
 
 def _literal_texts(path: Path) -> Iterator[str]:
     try:
-        tree = ast.parse(text_or_nothing(path))
+        tree = ast.parse(text_or_nothing(path).removeprefix("\ufeff"))
     except (SyntaxError, ValueError):
         return
     named = {

@@ -421,6 +421,8 @@ def test_a_controller_manager_gets_what_its_spawners_load(launch: Launch, tmp_pa
     plan = launch(CONTROL.format(urdf=urdf, file=file, words=""))
     assert "the class of plugin 'arm' is not known" in problems(plan)
     assert "/controller_manager/set_parameters" not in allowed(plan, "call_services")
+    plan = launch(CONTROL.format(urdf="output of xacro, which is not installed", file=file, words=""))
+    assert ": 'output of xacro, which is not installed'" in problems(plan), "the text says what is missing"
 
 
 HARDWARE = (

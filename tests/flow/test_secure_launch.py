@@ -231,7 +231,9 @@ def test_secure_refuses_to_start_anything_when_one_node_has_no_manifest(
     assert looked.returncode == 0 and "no NoDL manifest for bare/compiled" in looked.stdout
     refused = secure_launch("--secure", "--keystore", tmp_path / "ks", *words)
     assert refused.returncode == 1
-    assert f"{file}:3: <node> no NoDL manifest for bare/compiled: looked at " in refused.stderr
+    compiled = f"{prefix}/compiled is a compiled program"
+    assert f"{file}:3: <node> no NoDL manifest for bare/compiled: {compiled}" in refused.stderr
+    assert "looked for a manifest at " in refused.stderr
     assert "process started" not in refused.stdout and not (tmp_path / "ks").exists()
 
 

@@ -17,6 +17,7 @@ from nodl.node_interface import Gap
 from nodl.source_ref import SourceRef
 from nodl.xml_text import parse_xml
 
+_QUOTED = 80  # characters of a text that is no URDF: it may be a placeholder for the output of a program
 _WITHOUT_NODES = DISTROS[: DISTROS.index("jazzy")]
 
 
@@ -28,7 +29,8 @@ def of_robot_description(text: str, place: SourceRef, distro: str) -> Configured
     try:
         root = parse_xml(text, "robot_description")
     except InvalidXMLError as error:
-        why = f"the robot_description, which names the hardware components, cannot be read: {error}"
+        begins = shown(text if len(text) <= _QUOTED else f"{text[:_QUOTED]}...")
+        why = f"the robot_description, which names the hardware components, cannot be read: {error}: {begins}"
         return Configured(gaps=(Gap(place, why),))
     names = map(_node_of, root.iter("ros2_control"))
     return Configured(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from codecs import BOM_UTF8
 from collections.abc import Iterable
 from dataclasses import dataclass
 
@@ -108,7 +109,8 @@ class Sources:
                 return None
             content = read_bytes(file)
             self.digests[file] = digest_of_content(content)
-            return content.decode("utf-8", "replace").replace("\r\n", "\n").replace("\r", "\n")
+            text = content.removeprefix(BOM_UTF8).decode("utf-8", "replace")
+            return text.replace("\r\n", "\n").replace("\r", "\n")
         except OSError as error:
             self.digests[file] = digest_of(file)
             self.unreadable[file] = f"this file cannot be read: {error.strerror}"

@@ -11,6 +11,7 @@ from functools import cached_property
 from pathlib import Path
 
 from enclave_common.files import text_or_nothing
+from enclave_common.words import some_of
 from nodl.dependence import COMPONENT, HOST
 from nodl.infer.answers.cpp import Answers, Made, WatchedStart
 from nodl.infer.cpp.entry import Answer, CppSupportMissing, Entry, Solved, failure
@@ -23,10 +24,12 @@ from nodl.infer.cpp.reading.names import Names
 from nodl.infer.cpp.reading.project import SourcePackage, Workspace, find_packages
 from nodl.infer.cpp.solved import solve, solve_all
 from nodl.infer.cpp.syntax import check_support
+from nodl.infer.packages import read_package
 from nodl.infer.start import LaunchKey, Start
 from nodl.node_interface import Gap, NodeInterface
 from nodl.source_ref import SourceRef
 
+_NAMED = 5  # programs of a package in a message
 _TESTS = frozenset({"test", "tests", "testing", "benchmark", "examples", "example", "mock"})
 
 
@@ -291,9 +294,15 @@ class Answering:
                 return _answer(self._solved(key, entry, start))
         what = f"executable '{executable}'" if executable else f"component {plugin}"
         by_cmake = os.path.isfile(os.path.join(package.folder, "CMakeLists.txt"))
-        return Answer(
-            (), f"{'CMakeLists.txt' if by_cmake else 'setup.py'} in {package.folder} makes no {what}"
-        )
+        made = {(key.executable if executable else key.plugin) or "" for key, _ in programs}
+        if executable:
+            made |= {
+                *package.build.scripts,
+                *(each.executable for each in read_package(package.folder).entry_points),
+            }
+        others = f"; it makes {some_of(sorted(made - {''}), _NAMED)}" if made - {""} else ""
+        build = "CMakeLists.txt" if by_cmake else "setup.py"
+        return Answer((), f"{build} in {package.folder} makes no {what}{others}")
 
     def of_plugin(self, name: str, instance: str, start: Start | None) -> Answer:
         """Infer what the plugin that descriptions call ``name`` makes when a host loads it as ``instance``.

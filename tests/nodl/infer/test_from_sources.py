@@ -67,7 +67,16 @@ def test_an_entry_point_is_followed_into_the_sources(tmp_path: Path, entry: str,
     write(robot / "robot/base.py", NODE.format(imports="", topic="'odom'"))
     assert names(inferred(tmp_path)) == ["odom"]
     other = inferred(tmp_path, "arm")
-    assert not other and "setup.py in" in other.why and "makes no executable 'arm'" in other.why
+    assert not other
+    assert other.why == f"setup.py in {robot} makes no executable 'arm'; it makes base", (
+        "whatever is installed"
+    )
+
+
+def test_a_byte_order_mark_hides_no_entry_point(tmp_path: Path) -> None:
+    robot = package(tmp_path / "robot", "\ufeff" + setup_py("'base = robot.base:main'"))
+    write(robot / "robot/base.py", "\ufeff" + NODE.format(imports="", topic="'odom'"))
+    assert names(inferred(tmp_path)) == ["odom"]
 
 
 def test_the_first_line_of_a_module_does_not_decide(tmp_path: Path) -> None:

@@ -707,3 +707,11 @@ RANGES = {
 def test_a_range_is_taken_in_its_order(body: str, made: list[str], tmp_path: Path) -> None:
     start = 'std::vector<std::string> v{"a", "b"}; std::string s = "x";'
     assert names(infer(tmp_path, in_class(f"{start} {body} {PUB}(s, 1);"))) == made
+
+
+def test_a_byte_order_mark_hides_no_include(tmp_path: Path) -> None:
+    program = '\ufeff#include "own.hpp"\n' + in_class(f"{PUB}(OWN, 1);")
+    system = infer_paths(
+        [package(tmp_path / "demo", {"src/main.cpp": program, "src/own.hpp": '#define OWN "own"\n'})]
+    )
+    assert names(system) == ["own"] and gaps(system) == []
