@@ -34,6 +34,7 @@ _TRANSPARENT = frozenset({
 })  # fmt: skip
 _PROPERTIES = frozenset({"builtins.property", "abc.abstractproperty"})
 _PLAIN_METACLASSES = frozenset({"abc.ABCMeta", "enum.EnumMeta", "enum.EnumType", "builtins.type"})
+_OPEN_NAMES = frozenset({"[class]", "__doc__", "__module__", "__qualname__", "__getattr__"})
 _PLAIN_DECORATORS = frozenset(
     {"functools.total_ordering", "typing.final", "typing.runtime_checkable", "enum.unique"}
 )
@@ -162,13 +163,21 @@ _HOOKS = frozenset({
 })  # fmt: skip
 
 
+def _is_plain(metaclass: object) -> bool:
+    """Return True if its classes are made as by ``type``: what ``__getattr__`` gives is open, as any attribute that no
+    class has."""
+    if isinstance(metaclass, ClassValue):
+        named = {name for base in program_classes(metaclass) for name in base.cells if isinstance(name, str)}
+        return named <= _OPEN_NAMES and all(map(_is_plain, linearized(metaclass)[1:]))
+    return isinstance(metaclass, External) and metaclass.path in _PLAIN_METACLASSES
+
+
 def _made_otherwise(
     run: Run, cls: ClassValue, keywords: dict[str, Value], node: ast.AST, frame: Frame
 ) -> None:
     """Add a gap for a class whose objects, attributes or subclasses ``type`` and ``object`` do not make."""
     metaclass = sole(keywords.get("metaclass", external("builtins.type")))
-    plain = isinstance(metaclass, External) and metaclass.path in _PLAIN_METACLASSES
-    if not plain or any(base.node in run.with_metaclass for base in program_classes(cls)[1:]):
+    if not _is_plain(metaclass) or any(base.node in run.with_metaclass for base in program_classes(cls)[1:]):
         run.with_metaclass.add(cls.node)
         run.gap(node, frame, f"class {cls.name} has a metaclass, which is not analysed")
         run.escape_value((cls,))

@@ -233,7 +233,7 @@ _NOT_OF_ROS = frozenset({
     "numba", "torch", "torchvision", "ultralytics", "mediapipe", "tensorflow", "onnxruntime", "open3d",
     "trimesh", "depthai", "pyrealsense2", "serial", "smbus", "smbus2", "gpiozero", "spidev", "can", "evdev",
     "pynput", "pygame", "pymavlink", "mavsdk", "pyproj", "utm", "pynmea2", "psutil", "requests", "websockets",
-    "zmq", "flask", "jinja2", "yaml", "lxml", "simple_pid", "filterpy", "cvxpy", "osqp",
+    "zmq", "flask", "jinja2", "yaml", "lxml", "simple_pid", "filterpy", "cvxpy", "osqp", "gtsam",
 })  # fmt: skip
 _MAKERS = {
     "rosbag2_py": frozenset({"Recorder", "Player"}),

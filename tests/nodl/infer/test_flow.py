@@ -421,6 +421,28 @@ def test_what_others_may_run_and_was_followed_is_no_gap(
     assert (list(system.gaps), [gap for node in system.nodes for gap in node.gaps]) == ([], [])
 
 
+@pytest.mark.parametrize(("hook", "gaps"), [("getattr", 0), ("call", 1)])
+def test_a_metaclass_that_only_gives_missing_attributes_is_followed(
+    hook: str, gaps: int, infer: Infer
+) -> None:
+    program = f"""
+        import rclpy
+        from std_msgs.msg import String
+        class M(type):
+            def __{hook}__(cls, name):
+                return name
+        class C(metaclass=M):
+            a = 'a'
+        node = rclpy.create_node('n')
+        node.create_publisher(String, C.a, 1)
+        """
+    system = infer(program)
+    (node,) = system.nodes
+    assert [str(each.name) for each in node.endpoints] == ["a"]
+    found = [gap.why for gap in (*system.gaps, *node.gaps)]
+    assert found == ["class C has a metaclass, which is not analysed"] * gaps
+
+
 def test_parts_of_an_element_that_may_not_go_together_are_a_pattern(node_body: NodeBody) -> None:
     entries = "self.declare_parameter('l', ['motor:left', 'arm:right']).value"
     body = f"for each in {entries}:\n    first, last = each.split(':')\n    self.P(first + '/' + last)"
