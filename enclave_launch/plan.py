@@ -74,11 +74,13 @@ class Described(NamedTuple):
 
 
 class Missing(NamedTuple):
-    """Nothing is known of an executable or component, and why: what was searched. ``unnamed``: but its name."""
+    """Nothing is known of an executable or component, and why: what was searched. ``unnamed``: but its name.
+    ``not_made``: no build in reach makes it, and it is not installed."""
 
     subject: str
     why: str
     unnamed: bool = False
+    not_made: bool = False
 
 
 InterfaceLookup = Callable[

@@ -61,8 +61,9 @@ def problems(
 
 
 def _missing(missing: Missing, place: SourceLocation) -> Diagnostic:
-    diagnostic = node_name_unknown if missing.unnamed else no_manifest
-    return diagnostic(missing.subject, missing.why, place)
+    if missing.unnamed:
+        return node_name_unknown(missing.subject, missing.why, place)
+    return no_manifest(missing.subject, missing.why, place, not_made=missing.not_made)
 
 
 def notes(

@@ -16,6 +16,10 @@ _LEARN = (
     "let it run once with --learn, or name the folder of its source with --source; else describe it in a NoDL manifest "
     "(secure-nodl infer writes a first one), named with --nodl"
 )
+_NOT_MADE = (
+    "correct the name in the launch file, or let the package install it; if it does, build it and let it run once "
+    "with --learn"
+)
 
 
 def library_version(program: str, doubt: str, location: SourceLocation) -> Diagnostic:
@@ -114,8 +118,9 @@ def name_unremappable(node: str, name: str, place: SourceLocation) -> Diagnostic
     return Diagnostic(Code.NAME_UNREMAPPABLE, node, text, place)
 
 
-def no_manifest(subject: str, why: str, place: SourceLocation) -> Diagnostic:
-    return Diagnostic(Code.NO_MANIFEST, subject, f"no NoDL manifest for {subject}: {why}", place, _LEARN)
+def no_manifest(subject: str, why: str, place: SourceLocation, *, not_made: bool = False) -> Diagnostic:
+    remedy = _NOT_MADE if not_made else _LEARN
+    return Diagnostic(Code.NO_MANIFEST, subject, f"no NoDL manifest for {subject}: {why}", place, remedy)
 
 
 def node_name_unknown(subject: str, why: str, place: SourceLocation) -> Diagnostic:

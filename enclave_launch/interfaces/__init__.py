@@ -55,11 +55,13 @@ class _Subject(NamedTuple):
 
 
 class _Known(NamedTuple):
-    """The descriptions of a program; ``of_this_start``: another start of it needs another lookup."""
+    """The descriptions of a program; ``of_this_start``: another start of it needs another lookup. ``not_made``: there
+    is none, since no build in reach makes it."""
 
     descriptions: tuple[Found, ...]
     searched: tuple[str, ...] = ()
     of_this_start: bool = False
+    not_made: bool = False
 
 
 class InterfaceFinder:
@@ -103,7 +105,7 @@ class InterfaceFinder:
                 if not known.of_this_start:
                     self._known[subject] = known
             if not known.descriptions:
-                return Missing(str(subject), "; ".join(known.searched))
+                return Missing(str(subject), "; ".join(known.searched), not_made=known.not_made)
             applied = [self._applied(each, started, container) for each in known.descriptions]
             start = ProgramStart(started, container, self._distro)
             return meeting(applied, start, also_unseen=UNSEEN in self._options.also)
@@ -154,6 +156,8 @@ class InterfaceFinder:
         hit = self._library.find(subject.package, name)
         if hit:
             found.append(Found((hit.document.interface,), InterfaceOrigin.LIBRARY, hit.doubt))
+        if analysed is not None and analysed.not_made and not found:
+            return _Known((), (analysed.why,), not_made=True)
         searched = [analysed.why] if analysed is not None and analysed.why else []
         if self._options.infer and not self._infers:
             searched.append("inference is not part of this installation")

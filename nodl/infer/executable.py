@@ -22,11 +22,13 @@ if TYPE_CHECKING:
 
 
 class InferredExecutable(NamedTuple):
-    """``interfaces`` is empty when nothing could be inferred; ``why`` then says what was found instead."""
+    """``interfaces`` is empty when nothing could be inferred; ``why`` then says what was found instead. ``not_made``:
+    it is not installed, and the build of its package makes no such program."""
 
     interfaces: tuple[NodeInterface, ...]
     why: str = ""
     of_this_start: bool = False  # another start may have other interfaces: parameters decide what is made
+    not_made: bool = False
 
     def __bool__(self) -> bool:
         return bool(self.interfaces)
@@ -49,7 +51,8 @@ def infer_executable(
     ``compiled_only``: programs in Python, which are read again each time, are left alone.
     """
     if executable is None:
-        return _compiled(package, None, plugin, sources, start_of, f"component {plugin} is compiled code")
+        found = _compiled(package, None, plugin, sources, start_of, f"component {plugin} is compiled code")
+        return found._replace(not_made=False)  # whether another package has it, is not looked up
     script = None
     try:
         path = executable_path(package, executable, prefixes)
@@ -61,7 +64,8 @@ def infer_executable(
         path = script.file if script is not None else ""
         in_python = script is not None and (script.module is not None or _is_python(path))
     if not in_python:
-        return _compiled(package, executable, None, sources, start_of, what)
+        found = _compiled(package, executable, None, sources, start_of, what)
+        return found._replace(not_made=found.not_made and not path)
     if compiled_only:
         return InferredExecutable((), f"{path} is a Python program")
     from nodl.infer.python_executable import infer_python, infer_script
@@ -110,7 +114,7 @@ def _compiled(
     why = answer.why  # of a build in reach: what is installed of it beside that explains nothing
     if why and not sources.hold(package):
         why = f"{what}: {why}"
-    return InferredExecutable(answer.interfaces, why, answer.consulted)
+    return InferredExecutable(answer.interfaces, why, answer.consulted, answer.not_made)
 
 
 def _is_python(path: str) -> bool:

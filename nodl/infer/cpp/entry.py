@@ -56,9 +56,18 @@ def failure(what: str, error: Exception) -> str:
 
 
 class Answer:
-    """What the sources say of one program. ``consulted``: parameters of the launch decided what it makes."""
+    """What the sources say of one program. ``consulted``: parameters of the launch decided what it makes; ``not_made``:
+    the build of its package makes no such program."""
 
-    def __init__(self, interfaces: tuple[NodeInterface, ...], why: str = "", consulted: bool = False):
+    def __init__(
+        self,
+        interfaces: tuple[NodeInterface, ...],
+        why: str = "",
+        consulted: bool = False,
+        *,
+        not_made: bool = False,
+    ):
         self.interfaces = interfaces
         self.why = why
         self.consulted = consulted
+        self.not_made = not_made

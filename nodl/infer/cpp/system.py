@@ -11,7 +11,7 @@ from functools import cached_property
 from pathlib import Path
 
 from enclave_common.files import text_or_nothing
-from enclave_common.words import some_of
+from enclave_common.words import did_you_mean, some_of
 from nodl.dependence import COMPONENT, HOST
 from nodl.infer.answers.cpp import Answers, Made, WatchedStart
 from nodl.infer.cpp.entry import Answer, CppSupportMissing, Entry, Solved, failure
@@ -293,16 +293,17 @@ class Answering:
             if (executable is not None and key.executable == executable) or (plugin and key.plugin == plugin):
                 return _answer(self._solved(key, entry, start))
         what = f"executable '{executable}'" if executable else f"component {plugin}"
-        by_cmake = os.path.isfile(os.path.join(package.folder, "CMakeLists.txt"))
-        made = {(key.executable if executable else key.plugin) or "" for key, _ in programs}
+        made = {(key.executable if executable else key.plugin) or "" for key, _ in programs} - {""}
         if executable:
             made |= {
                 *package.build.scripts,
                 *(each.executable for each in read_package(package.folder).entry_points),
             }
-        others = f"; it makes {some_of(sorted(made - {''}), _NAMED)}" if made - {""} else ""
-        build = "CMakeLists.txt" if by_cmake else "setup.py"
-        return Answer((), f"{build} in {package.folder} makes no {what}{others}")
+        others = f"; it makes {some_of(sorted(made), _NAMED)}" if made else ""
+        by_cmake = os.path.isfile(os.path.join(package.folder, "CMakeLists.txt"))
+        build = f"{'CMakeLists.txt' if by_cmake else 'setup.py'} in {package.folder}"
+        meant = did_you_mean(executable or plugin or "", made) or others
+        return Answer((), f"{build} makes no {what}{meant}", not_made=True)
 
     def of_plugin(self, name: str, instance: str, start: Start | None) -> Answer:
         """Infer what the plugin that descriptions call ``name`` makes when a host loads it as ``instance``.

@@ -67,7 +67,7 @@ def test_an_entry_point_is_followed_into_the_sources(tmp_path: Path, entry: str,
     write(robot / "robot/base.py", NODE.format(imports="", topic="'odom'"))
     assert names(inferred(tmp_path)) == ["odom"]
     other = inferred(tmp_path, "arm")
-    assert not other
+    assert not other and other.not_made
     assert other.why == f"setup.py in {robot} makes no executable 'arm'; it makes base", (
         "whatever is installed"
     )

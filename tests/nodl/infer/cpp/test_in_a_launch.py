@@ -161,6 +161,17 @@ def test_what_is_missing_says_where_was_looked(workspace: Path) -> None:
     assert "makes no executable 'filter_node'" in str(problem)
 
 
+@pytest.mark.parametrize(("name", "fix"), [("filter", "correct the name"), ("filter_node", "--learn")])
+def test_a_program_that_the_build_does_not_make_has_another_name(
+    workspace: Path, name: str, fix: str
+) -> None:
+    """But not one that is installed: it may be of another build."""
+    (workspace / "src/demo/CMakeLists.txt").write_text("add_executable(filter_node2 src/filter.cpp)\n")
+    (problem,) = plan(workspace, LAUNCH.replace("filter_node", name), allow_missing_packages=True).problems
+    assert f"makes no executable '{name}'; did you mean 'filter_node2'?" in str(problem)
+    assert fix in problem.remedy and ("looked for a manifest" in str(problem)) == (name == "filter_node")
+
+
 def test_what_is_easiest_to_close_is_told_first(workspace: Path) -> None:
     """Of one node the short questions first."""
     few = FILTER.replace("auto input =", "acme::attach(this); auto input =")
