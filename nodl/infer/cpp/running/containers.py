@@ -10,7 +10,14 @@ from itertools import chain
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES
 from nodl.infer.cpp.running.arithmetic import added
 from nodl.infer.cpp.running.assignments import assign, with_entry
-from nodl.infer.cpp.running.constructors import ORDERED, construct, copies, made
+from nodl.infer.cpp.running.constructors import (
+    ORDERED,
+    construct,
+    copies,
+    default_value,
+    is_plain_type,
+    made,
+)
 from nodl.infer.cpp.running.contents import copied, elements_copied, handed_over, items_of
 from nodl.infer.cpp.running.expressions import element
 from nodl.infer.cpp.running.invocation import CallSite
@@ -18,10 +25,11 @@ from nodl.infer.cpp.running.launch_values import settled_text
 from nodl.infer.cpp.running.machine import Machine
 from nodl.infer.cpp.running.references import forget
 from nodl.infer.cpp.running.standard import called_now
-from nodl.infer.cpp.running.static_types import declared_type
+from nodl.infer.cpp.running.static_types import declared_type, seen_type
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     END,
+    MAX_ITEMS,
     NPOS,
     Atom,
     Group,
@@ -259,9 +267,24 @@ def _sequence_call(run: Machine, atom: Seq | Group, name: str, site: CallSite) -
         assign(run, site.receiver, (Seq(()),), site.frame)
     elif name == "assign" and len(values) == 2 and END in values[1]:
         _inserted(run, Seq(()), first, site)
+    elif name == "resize" and isinstance(atom, Seq) and (resized := _resized(run, atom, site)) is not None:
+        assign(run, site.receiver, (resized,), site.frame)
     elif name in _CHANGES and isinstance(atom, Seq):
         assign(run, site.receiver, _changed_by(atom, name, values), site.frame)
     return unknown(f"the result of {name}()")
+
+
+def _resized(run: Machine, atom: Seq, site: CallSite) -> Seq | None:
+    """Return a list of texts, numbers or pointers with as many items as it gets; ``None`` where that is not known."""
+    arguments = seen_type(run, site.receiver, site.frame).arguments
+    if len(arguments) != 1 or not (arguments[0].pointer or is_plain_type(arguments[0].name)):
+        return None
+    count, *given = site.values or [BOTTOM]
+    if atom.open or len(count) != 1 or type(count[0]) is not int or not 0 <= count[0] <= MAX_ITEMS:
+        return None
+    at_first = BOTTOM if arguments[0].pointer else default_value(run, site.node, arguments[0], site.frame)
+    new = given[0] if given else at_first
+    return Seq((*atom.items, *[new] * (count[0] - len(atom.items)))[: count[0]])
 
 
 _SAME_TEXT = frozenset({

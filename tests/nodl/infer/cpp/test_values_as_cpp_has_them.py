@@ -46,6 +46,15 @@ PROGRAMS: dict[str, tuple[str, str, str, set[str], set[str]]] = {
         'const char * t = "abcd"; pub(t + 1); std::string k = "k"; k += \'a\' + 1; pub(k);',
         "", "", set(), {"abcd", "abcd1", "k", "ka1", "k1"},
     ),
+    "a list has as many elements as resize() says, new ones empty or as they are given": (
+        'std::vector<std::string> v{"a"}; v.resize(3); v[1] = "b"; for (auto & t : v) { pub("v_" + t); }'
+        'v.resize(1); pub("n" + std::to_string(v.size())); v.resize(2, "c"); pub(v[1]);',
+        "", "", {"v_a", "v_b", "v_", "n1", "c"}, {"b", "n3", "v_c"},
+    ),
+    "how many elements resize() leaves is not known where its number is not": (
+        'std::vector<std::string> v{"a", "b"}; v.resize(now().nanoseconds() % 2); for (auto & t : v) { pub("v_" + t); }',
+        "", "", set(), {"v_a", "v_b"},
+    ),
     "numbers are those of their types": (
         'uint8_t u = 250; u += 10; pub("u" + std::to_string(u)); pub("d" + std::to_string(-7 / 2 + 9));'
         'bool b = 3; pub("b" + std::to_string(b)); int n = 2.9; pub("n" + std::to_string(n));'
