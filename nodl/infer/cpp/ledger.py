@@ -450,7 +450,14 @@ def _is_dead(run: Machine, file: str, offset: int) -> bool:
 
 def leads_to_interfaces(run: Machine, words: frozenset[str]) -> bool:
     """Return whether a function with these words, or one that it may call, makes an interface, a node or a plugin."""
-    return makes_by_words(words) or any(makes_by_words(each.words) for each in Reach(run).from_words(words))
+    return without_interfaces(run, words) is None
+
+
+def without_interfaces(run: Machine, words: frozenset[str]) -> set[Function] | None:
+    """Return what a function with these words may call, if neither it nor any of that makes an interface or a node."""
+    reach = Reach(run)
+    makes = makes_by_words(words) or any(makes_by_words(each.words) for each in reach.from_words(words))
+    return None if makes else reach.reached
 
 
 @lru_cache(maxsize=50_000)

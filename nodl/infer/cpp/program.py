@@ -97,8 +97,9 @@ class Sources:
         package = self.workspace.package_of(found)
         if folder in _MODELLED_IF_INSTALLED:
             return package is None
-        if os.path.basename(name) == "json.hpp" and "JSON for Modern C++" in (self._read(found) or "")[:1000]:
-            return True  # a copy of nlohmann's, which knows nothing of ROS
+        said = _COPIED.get(os.path.basename(name))
+        if said is not None and said in (self._read(found) or "")[:1000]:
+            return True
         return folder in KNOWN_HEADERS and package is not self.workspace.package_of(file)
 
     def _read(self, file: str) -> str | None:
@@ -170,6 +171,8 @@ _CORE = frozenset({
     "pluginlib", "class_loader", "rosidl_runtime_cpp", "rosidl_typesupport_cpp", "tracetools",
 })  # fmt: skip
 
+_COPIED = {"json.hpp": "JSON for Modern C++", "robin_hood.h": "based on robin hood hashing"}
+"""Headers that packages have copies of, with what these begin with: they know nothing of ROS."""
 
 _MODELLED_IF_INSTALLED = frozenset({"nav2_core", "nav2_costmap_2d", "nav2_ros_common", "nav2_util"})
 """Of whose classes the table has what plugins and nodes of others use; beside its sources nav2 itself is followed."""

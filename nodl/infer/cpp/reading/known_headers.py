@@ -24,6 +24,7 @@ KNOWN_HEADERS = frozenset({
     "controller_interface", "hardware_interface", "semantic_components",
     "rviz_rendering", "rviz_ogre_vendor", "polyclipping", "backward_ros", "range", "magic_enum", "tl_expected",
     "SDL", "SDL2", "SDL3", "libusb-1.0", "lcm", "Poco", "thrust", "cub", "metavision",
+    "robin_hood",
 })  # fmt: skip
 
 

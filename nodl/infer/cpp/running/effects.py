@@ -309,6 +309,7 @@ def _may_lead(names: Names) -> frozenset[Function]:
     return frozenset(found)
 
 
+@lru_cache(maxsize=50_000)
 def _not_local(function: Function) -> tuple[set[str], set[str]]:
     """Return the variables whose value a function may use, not its own, nor those that it only replaces; and members of
     other objects.

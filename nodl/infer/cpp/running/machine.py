@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from nodl.dependence import ALWAYS, When
 from nodl.infer.cpp.findings import AllocatedNode, Condition, Follows, PossibleEndpoint
-from nodl.infer.cpp.ledger import CREATES, leads_to_interfaces
+from nodl.infer.cpp.ledger import CREATES, without_interfaces
 from nodl.infer.cpp.reading.declarations import Class, FileIndex, Function, Scope
 from nodl.infer.cpp.reading.names import Names
 from nodl.infer.cpp.reading.type_names import Type
@@ -387,10 +387,12 @@ class Machine:
         return self._leads(node.id, words_in(node))
 
     def _leads(self, key: object, words: frozenset[str]) -> bool:
-        known = (key, len(self.used_classes()))
-        if known not in self._leading:
-            self._leading[known] = leads_to_interfaces(self, words)
-        return self._leading[known]
+        count = len(self.used_classes())
+        if (key, count) not in self._leading:
+            reached = without_interfaces(self, words)
+            self._leading[key, count] = reached is None
+            self._leading.update(((each, count), False) for each in reached or ())  # nor does what it calls
+        return self._leading[key, count]
 
 
 _CALLS_ALL = frozenset({"fold_expression", "co_await_expression", "generic_expression"})

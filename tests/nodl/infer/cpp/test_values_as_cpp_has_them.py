@@ -52,7 +52,8 @@ PROGRAMS: dict[str, tuple[str, str, str, set[str], set[str]]] = {
         "", "", {"v_a", "v_b", "v_", "n1", "c"}, {"b", "n3", "v_c"},
     ),
     "how many elements resize() leaves is not known where its number is not": (
-        'std::vector<std::string> v{"a", "b"}; v.resize(now().nanoseconds() % 2); for (auto & t : v) { pub("v_" + t); }',
+        'std::vector<std::string> v{"a", "b"}; v.resize(now().nanoseconds() % 2);'
+        'for (auto & t : v) { pub("v_" + t); }',
         "", "", set(), {"v_a", "v_b"},
     ),
     "numbers are those of their types": (
