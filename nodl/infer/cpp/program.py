@@ -7,6 +7,7 @@ import re
 from codecs import BOM_UTF8
 from collections.abc import Iterable
 from dataclasses import dataclass
+from typing import TypeAlias
 
 from enclave_common.files import read_bytes
 from nodl.infer.answers.folder import digest_of, digest_of_content
@@ -15,14 +16,14 @@ from nodl.infer.cpp.findings import AllocatedNode
 from nodl.infer.cpp.ledger import CREATES, SiteAnswer, account, leads_to_interfaces
 from nodl.infer.cpp.models.loaded import host_of, load
 from nodl.infer.cpp.models.nodes import ARGUMENT
-from nodl.infer.cpp.reading.built import Definitions
+from nodl.infer.cpp.reading.built import Definitions, named_in
 from nodl.infer.cpp.reading.cmake import Target
 from nodl.infer.cpp.reading.collect import index_file
 from nodl.infer.cpp.reading.declarations import Class, FileIndex, Function, FunctionParameter, Global
 from nodl.infer.cpp.reading.known_headers import KNOWN_HEADERS
 from nodl.infer.cpp.reading.names import Names
 from nodl.infer.cpp.reading.parameter_library import listener_of
-from nodl.infer.cpp.reading.preprocess import Preprocessed, preprocess
+from nodl.infer.cpp.reading.preprocess import Include, Preprocessed, preprocess
 from nodl.infer.cpp.reading.project import SourcePackage, Workspace, sources_of, targets_of
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running import calls, expressions, invocation, loops, statements  # noqa: F401 (how each runs)
@@ -56,6 +57,9 @@ class ProgramFindings:
     from_default: tuple[str, ...]
 
 
+_Included: TypeAlias = dict[tuple[str, bool], Preprocessed | None]
+
+
 class Sources:
     """Files of one workspace, each preprocessed and indexed once for each set of definitions."""
 
@@ -63,7 +67,8 @@ class Sources:
         self.workspace = workspace
         self._preprocessed: dict[tuple[str, Definitions], Preprocessed | None] = {}
         self._elsewhere: dict[tuple[str, Definitions], Definitions] = {}  # in another package, by its name
-        self._indexed: dict[tuple[str, Definitions], FileIndex] = {}
+        self._alike: dict[tuple[str, Definitions], list[tuple[Preprocessed, _Included]]] = {}
+        self._indexed: dict[int, FileIndex] = {}  # by the ``id`` of what was preprocessed
         self.unreadable: dict[str, str] = {}
         self.digests: dict[str, str] = {}  # SHA-256 of what was read
 
@@ -82,8 +87,24 @@ class Sources:
                         return None
                     return self.preprocessed(found, definitions)
 
-                self._preprocessed[key] = preprocess(file, source, self._of(file, definitions), include)
+                own = named_in(source, self._of(file, definitions))
+                self._preprocessed[key] = self._preprocess(file, source, own, include)
         return self._preprocessed[key]
+
+    def _preprocess(self, file: str, source: str, own: Definitions, include: Include) -> Preprocessed:
+        """Preprocess a file, or return what was made of it with other definitions, if it sees no difference."""
+        before = self._alike.setdefault((file, own), [])
+        for found, included in before:
+            if all(include(*asked) is given for asked, given in included.items()):
+                return found
+        seen: dict[tuple[str, bool], Preprocessed | None] = {}
+
+        def noted(name: str, quoted: bool) -> Preprocessed | None:
+            seen[name, quoted] = include(name, quoted)
+            return seen[name, quoted]
+
+        before.append((preprocess(file, source, own, noted), seen))
+        return before[-1][0]
 
     def _is_modelled(self, name: str, found: str, file: str) -> bool:
         """Return whether a header is of rclcpp or a library of the table, known by its model alone, seen from
@@ -128,19 +149,18 @@ class Sources:
         return self._elsewhere[key]
 
     def index(self, file: str, definitions: Definitions) -> FileIndex | None:
-        key = (file, definitions)
-        if key not in self._indexed:
-            try:
-                source = self.preprocessed(file, definitions)
-                if source is None:
-                    return None
-                self._indexed[key] = index_file(source)
-            except CppSupportMissing:
-                raise
-            except Exception as error:
-                self.unreadable[file] = failure("reading this file", error)
+        try:
+            source = self.preprocessed(file, definitions)
+            if source is None:
                 return None
-        return self._indexed[key]
+            if id(source) not in self._indexed:
+                self._indexed[id(source)] = index_file(source)
+            return self._indexed[id(source)]
+        except CppSupportMissing:
+            raise
+        except Exception as error:
+            self.unreadable[file] = failure("reading this file", error)
+            return None
 
     def closure(self, files: Iterable[str], definitions: Definitions) -> list[FileIndex]:
         """Return ``files``, what they include, and the library sources of other packages that define what they

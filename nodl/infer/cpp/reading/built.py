@@ -44,6 +44,14 @@ def joined(several: Iterable[Definitions]) -> Definitions:
     )
 
 
+def named_in(source: str, definitions: Definitions) -> Definitions:
+    """Return the part of ``definitions`` that decides how ``source`` alone is read."""
+    symbols = tuple(each for each in definitions.symbols if each[0] in source)
+    return Definitions(
+        symbols, definitions.complete, tuple(name for name in definitions.open if name in source)
+    )
+
+
 UNBUILT = Definitions()
 
 
