@@ -313,6 +313,9 @@ def _repeated(
         moved = [*run.moved(mark, loop.steps)]
         if not moved:
             break
-        for cell, before, _ in moved if round_ >= MAX_ROUNDS - 1 else ():
-            run.store.set(cell, join(before, unknown("a value that changes in a loop")))
+        for cell, before, value in moved:
+            if round_ >= MAX_ROUNDS - 1:
+                run.store.set(cell, join(before, unknown("a value that changes in a loop")))
+            elif before != BOTTOM:
+                run.store.set(cell, in_any_order(value))  # what grows has any number of elements
     return returns

@@ -220,11 +220,12 @@ class Machine:
     def moved(self, mark: int, steps: int) -> Iterator[tuple[Cell, Value, Value]]:
         """Yield each variable that has another value than at ``mark``, with that value and the present one.
 
-        Not those of calls that began after ``steps``: each call has new ones.
+        Not those of calls that began after ``steps``, nor of blocks that have ended: each has new ones.
         """
         before = self.store.before(mark)
         for cell, value in self.store.changes(mark).items():
-            is_new = isinstance(cell[0], Frame) and cell[0].started > steps
+            owner, name = cell
+            is_new = isinstance(owner, Frame) and (owner.started > steps or name not in owner.names)
             if not is_new and set(before[cell]) != set(value):
                 yield cell, before[cell], value
 

@@ -302,9 +302,9 @@ def _one_container(atoms: Value) -> Value:
 
 def in_any_order(atoms: Value) -> Value:
     """Join many possible lists to one whose items come any number of times, and maps to one with all their entries."""
-    found: list[Atom] = [atom for atom in atoms if not isinstance(atom, Seq | Map)]
-    lists = [atom for atom in atoms if isinstance(atom, Seq)]
+    lists = [atom for atom in atoms if isinstance(atom, Seq) and not atom.place]
     maps = [atom for atom in atoms if isinstance(atom, Map)]
+    found: list[Atom] = [atom for atom in atoms if not isinstance(atom, Map) and atom not in lists]
     if lists:
         found.append(open_sequence(item for atom in lists for item in atom.items))
     if maps:

@@ -56,6 +56,11 @@ PROGRAMS: dict[str, tuple[str, str, str, set[str], set[str]]] = {
         'for (auto & t : v) { pub("v_" + t); }',
         "", "", set(), {"v_a", "v_b"},
     ),
+    "a list that a loop fills holds what any of its turns adds": (
+        'std::vector<std::string> v; while (now().nanoseconds() % 2) { std::string t = "a"; v.push_back(t); }'
+        "for (auto & t : v) { pub(t); }",
+        "", "", {"a"}, set(),
+    ),
     "numbers are those of their types": (
         'uint8_t u = 250; u += 10; pub("u" + std::to_string(u)); pub("d" + std::to_string(-7 / 2 + 9));'
         'bool b = 3; pub("b" + std::to_string(b)); int n = 2.9; pub("n" + std::to_string(n));'
