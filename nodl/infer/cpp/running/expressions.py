@@ -246,6 +246,12 @@ def lambda_(run: Machine, node: Node, frame: Frame) -> Value:
     while outer is not None:
         outer.captured, outer = True, outer.outer
     captures = children(field_of(node, "captures"))
+    initialised: set[str] = set()
+
+    def keep(name: str, held: Value, written: str = "") -> None:
+        before = run.store.get((inner, name)) or BOTTOM  # what closures have that were made here before
+        run.local(inner, name, join(before, held), written)
+
     for child in captures:
         if child.type == "lambda_capture_initializer" and len(children(child)) >= 2:
             named = children(child)
@@ -253,7 +259,8 @@ def lambda_(run: Machine, node: Node, frame: Frame) -> Value:
             held = initial_value(run, named[-1], frame, refers)
             if is_mutable:
                 run.store.share_cell((inner, name), partial(lost, why=_MUTABLE))
-            run.local(inner, name, held)
+            keep(name, held)
+            initialised.add(name)
     if frame.blocks or frame.kept:
         owners = {name: frame.owner_of(name) for name in words_of(node)}
         inner.kept = {name: owner for name, owner in owners.items() if owner is not None}
@@ -262,11 +269,11 @@ def lambda_(run: Machine, node: Node, frame: Frame) -> Value:
         names |= set(words_of(node))
     for name in sorted(names):
         owner = frame.owner_of(name)
-        if owner is not None and name not in inner.names:
+        if owner is not None and name not in initialised:
             held, written = run.store.get((owner, name)) or BOTTOM, owner.types.get(name, "")
             if is_mutable:
                 run.store.share_cell((inner, name), partial(lost, why=_MUTABLE))
-            run.local(inner, name, _captured(run, held, written, node, owner), written)
+            keep(name, _captured(run, held, written, node, owner), written)
     return (Lambda(node, inner),)
 
 

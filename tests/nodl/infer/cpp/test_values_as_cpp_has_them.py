@@ -61,6 +61,12 @@ PROGRAMS: dict[str, tuple[str, str, str, set[str], set[str]]] = {
         "for (auto & t : v) { pub(t); }",
         "", "", {"a"}, set(),
     ),
+    "closures that are made at one place keep what each was made with": (
+        'std::string s = "a"; std::vector<std::function<void()>> made; int i = 2 + now().nanoseconds() % 2;'
+        'while (i-- > 0) { std::string t = "t_" + s; made.push_back([this, t]() { pub(t); }); s = "b"; }'
+        "for (auto & f : made) { f(); }",
+        "", "", {"t_a", "t_b"}, set(),
+    ),
     "numbers are those of their types": (
         'uint8_t u = 250; u += 10; pub("u" + std::to_string(u)); pub("d" + std::to_string(-7 / 2 + 9));'
         'bool b = 3; pub("b" + std::to_string(b)); int n = 2.9; pub("n" + std::to_string(n));'
