@@ -348,7 +348,7 @@ def method_call(run: Machine, site: CallSite) -> Value:
             run.store.undo(before)
     if alternatives:
         run.store.merge(alternatives)
-        run.left = None
+        run.left = False
     return join(*found)
 
 

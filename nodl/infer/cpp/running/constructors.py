@@ -510,9 +510,10 @@ def construct_class(
         _bases(run, this, cls, given, arguments, node, inner)
         _members(run, this, cls, given, inner)
     this.building, outside = cls, this.building
-    if constructor is not None and constructor.body is not None:
+    if constructor is not None and constructor.body is not None and not run.left:
         outcome = run.execute(constructor.body, inner)
         run.settle(inner.mark, inner.exits, bool(outcome & NEXT))
+        run.left = not outcome & NEXT and not inner.exits
     this.building = outside
     if constructor is not None:
         _written_arguments(run, constructor, arguments, inner, node, frame)

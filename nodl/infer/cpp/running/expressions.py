@@ -330,6 +330,8 @@ def binary(run: Machine, node: Node, frame: Frame) -> Value:
     operator = text(field_of(node, "operator"))
     left_node, right_node = field_of(node, "left"), field_of(node, "right")
     left = run.evaluate(left_node, frame)
+    if run.left:
+        return BOTTOM
     if operator in ("&&", "||", "and", "or"):
         return _logical(run, operator in ("||", "or"), left, right_node, frame)
     right = run.evaluate(right_node, frame)
@@ -479,6 +481,8 @@ def method_pointer(run: Machine, node: Node, frame: Frame) -> Value | None:
 def conditional(run: Machine, node: Node, frame: Frame) -> Value:
     """Evaluate ``a ? b : c``: the side that is chosen, the other one dead; both joined if that is not decided."""
     condition = run.evaluate(field_of(node, "condition"), frame)
+    if run.left:
+        return BOTTOM
     known = decided(run, condition)
     sides = {True: field_of(node, "consequence"), False: field_of(node, "alternative")}
     if known is not None:

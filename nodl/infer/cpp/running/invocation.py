@@ -16,7 +16,7 @@ from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.constructors import as_parameter, bind_parameters
 from nodl.infer.cpp.running.contents import copied, handed_over
 from nodl.infer.cpp.running.effects import effects_of, looked_at
-from nodl.infer.cpp.running.left_out import leave_out
+from nodl.infer.cpp.running.left_out import forget_writes, leave_out
 from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
 from nodl.infer.cpp.running.memory import MEMORY_DEPTH, CallOutcome, Changes
 from nodl.infer.cpp.running.overloads import candidates, chosen
@@ -24,7 +24,19 @@ from nodl.infer.cpp.running.references import forget, forget_everything, is_plai
 from nodl.infer.cpp.running.static_types import declared_type, given_to
 from nodl.infer.cpp.running.unknown_calls import may_be_written as may_be_written
 from nodl.infer.cpp.running.unknown_calls import unknown_call
-from nodl.infer.cpp.running.values import Atom, Bound, Lambda, Obj, Seq, Value, join, join_in_doubt, unknown
+from nodl.infer.cpp.running.values import (
+    BOTTOM,
+    Atom,
+    Bound,
+    Lambda,
+    Obj,
+    Seq,
+    Value,
+    join,
+    join_in_doubt,
+    lost,
+    unknown,
+)
 from nodl.infer.cpp.syntax import (
     Node,
     addressed,
@@ -117,7 +129,7 @@ def call_values(run: Machine, callee: Value, values: Sequence[Value], node: Node
                 forget_everything(run, f"what {name} may have written")
             handed_over(run, f"{name}()", values, node, frame)
             found.append(unknown(f"the result of {name}()"))
-    run.left = run.left if len(found) == 1 else None
+    run.left = run.left and len(found) == 1
     return join(*found) if found else unknown("the result of a call")
 
 
@@ -139,7 +151,7 @@ def call_lambda(run: Machine, atom: Lambda, values: Sequence[Value], node: Node,
                 frame,
                 "a closure calls itself, or is called deeper than is followed; it may make interfaces",
             )
-        return unknown("a recursion")
+        return _too_deep(run, atom, node, frame)
     outer = atom.frame
     inner = Frame(
         outer.file, outer.scope, outer.function, None, outer.bindings, outer,
@@ -149,7 +161,9 @@ def call_lambda(run: Machine, atom: Lambda, values: Sequence[Value], node: Node,
     inner = run.frame((atom, inner.path), inner)
     run.begin(inner)
     declarator = field_of(atom.node, "declarator")
-    for index, parameter in enumerate(parameters_of(declarator) if declarator is not None else ()):
+    given = parameters_of(declarator) if declarator is not None else []
+    values = _seen_once(run, atom, given, values, node, frame)
+    for index, parameter in enumerate(given):
         value = values[index] if index < len(values) else unknown(f"the argument {parameter.name}")
         run.local(
             inner, parameter.name, as_parameter(run, parameter, value, atom.node, inner), parameter.type
@@ -159,12 +173,20 @@ def call_lambda(run: Machine, atom: Lambda, values: Sequence[Value], node: Node,
     outcome = run.execute(body, inner) if body is not None else NEXT
     run.closures.pop()
     run.settle(inner.mark, inner.exits, bool(outcome & NEXT))
+    run.left = not outcome & NEXT and not inner.exits
     inner.active = False
-    given = parameters_of(declarator) if declarator is not None else []
     left = {p.name: run.store.get((inner, p.name)) for p in given if p.written_back}
     if left and len(children(field_of(node, "arguments"))) == len(values):
         write_back(run, given, left, node, frame)
     return inner.returned
+
+
+def _too_deep(run: Machine, of: Function | Lambda, node: Node, frame: Frame) -> Value:
+    """Know nothing of what a call that is not followed any deeper gives back, or may write."""
+    if forget_writes(run, of) is None:
+        forget_everything(run, "what a recursion may have written")
+    may_be_written(run, "a recursion", [], children(field_of(node, "arguments")), frame)
+    return unknown("a recursion")
 
 
 def call_functions(
@@ -324,16 +346,20 @@ def invoke(
     types: Sequence[Type], bindings: dict[str, Type] | None = None,
 ) -> Value:  # fmt: skip
     """Run the body of ``function``."""
+    if run.left:
+        run.kill(node, frame, "an argument of this call throws, or ends the program")
+        return BOTTOM
     run.handle(node, frame)
     run.called.add(function)
     if run.active.count(function) > MAX_RECURSION or frame.depth > MAX_DEPTH:
         if run.makes_interfaces(function):
             run.gap(node, frame, f"{function} calls itself, deeper than is followed")
-        return unknown("a recursion")
+        return _too_deep(run, function, node, frame)
     if function.only_computes and not run.makes_interfaces(function):
         return unknown(f"the result of {function.name}()")
     if leave_out(run, function, values, node, frame):
         return unknown(f"the result of {function.name}()")
+    values = _seen_once(run, function, function.parameters, values, node, frame)
     inner = Frame(
         function.file, function.scope, function, this_object, bindings or {},
         path=(*frame.path[-24:], (frame.file.file, node.start_byte, node.end_byte)),
@@ -349,8 +375,57 @@ def invoke(
     outcome = _outcome(run, key, given, inner.depth, lambda: _run_body(run, function, values, inner))
     write_back(run, function.parameters, outcome.meanwhile, node, frame)
     write_back(run, function.parameters, outcome.parameters, node, frame)
-    run.left = node.id if outcome.ends else None
+    run.left = outcome.ends
     return outcome.returned
+
+
+def _seen_once(
+    run: Machine,
+    of: Function | Lambda,
+    parameters: Sequence[FunctionParameter],
+    values: Sequence[Value],
+    node: Node,
+    frame: Frame,
+) -> Sequence[Value]:
+    """Return the arguments; nothing is known of a text or number that the code sees under two names, and writes."""
+    given = [addressed(each) for each in children(field_of(node, "arguments"))]
+    named = {
+        at: name
+        for at, (parameter, argument, value) in enumerate(zip(parameters, given, values, strict=False))
+        if parameter.type.rstrip().endswith(("&", "*")) and is_plain(value) and (name := _variable(argument))
+    }
+    found = list(values)
+    for at, name in named.items():
+        parameter = parameters[at]
+        alike = [each for each, other in named.items() if _is_part(name, other) or _is_part(other, name)]
+        twice = len(alike) > 1 and any(parameters[each].written_back for each in alike)
+        last = re.split(r"\W+", name)[-1]
+        is_seen = isinstance(of, Lambda) or frame.owner_of(name) is None
+        if twice or (is_seen and last != parameter.name and _touches(run, of, last, parameter.written_back)):
+            why = f"what {name} holds, which a function that writes to it has under two names"
+            found[at] = lost(values[at], why)
+            if parameter.written_back:
+                forget(run, given[at] or node, frame, why, told=False)
+    return found
+
+
+_ELEMENT = re.compile(r"\[|[.>](?:at|front|back|data|begin)\(")
+
+
+def _variable(argument: Node | None) -> str:
+    """Return the variable that an argument is, or is an element of; empty for anything else."""
+    found = _ELEMENT.split(text(argument))[0].removeprefix("this->").rstrip("-")
+    return found if re.fullmatch(r"\w+(?:(?:\.|->|::)\w+)*", found) else ""
+
+
+def _is_part(whole: str, part: str) -> bool:
+    return part == whole or part.startswith((f"{whole}.", f"{whole}->"))
+
+
+def _touches(run: Machine, of: Function | Lambda, name: str, reads: bool) -> bool:
+    """Return whether code may write to the variable ``name`` of its caller, or read it where ``reads``."""
+    effects = effects_of(run, of)
+    return name in effects.written.assigned | effects.written.changed or (reads and name in effects.words)
 
 
 def _outcome(

@@ -22,6 +22,7 @@ from nodl.infer.cpp.running.values import (
     Map,
     Seq,
     Text,
+    Unknown,
     Value,
     has_text,
     in_any_order,
@@ -46,6 +47,8 @@ def for_range_loop(run: Machine, node: Node, frame: Frame) -> int:
     """Run one turn for each item; each may also be left out if the items are not exactly known."""
     right, body = field_of(node, "right"), field_of(node, "body")
     subject = run.evaluate(right, frame)
+    if run.left:
+        return RETURN
     items, exact = iterated(run, subject)
     kind = seen_type(run, right, frame)
     ordered = True
@@ -196,8 +199,8 @@ def _iteration(run: Machine, body: Node | None, frame: Frame, loop: Loop) -> int
 @in_a_block
 def for_statement(run: Machine, node: Node, frame: Frame) -> int:
     """Runs like ``while``, behind its initializer."""
-    run.execute(field_of(node, "initializer"), frame)
-    return _counted(run, node, frame)
+    began = run.execute(field_of(node, "initializer"), frame)
+    return _counted(run, node, frame) if began & NEXT else began
 
 
 @statement("while_statement", "do_statement")
@@ -225,6 +228,9 @@ def _counted(run: Machine, node: Node, frame: Frame) -> int:
         if condition is not None and (index > 0 or node.type != "do_statement"):
             seen = run.store.watched(test)
             holds, first = tested[-1], first or seen
+            if run.left:
+                frame.path = outer_path
+                return returns | RETURN | _after(run, loop, 0)
         if holds is False:
             if index == 0:
                 run.kill(body, frame, "the condition of the loop is never true")
@@ -315,7 +321,21 @@ def _repeated(
             break
         for cell, before, value in moved:
             if round_ >= MAX_ROUNDS - 1:
-                run.store.set(cell, join(before, unknown("a value that changes in a loop")))
+                run.store.set(cell, join(before, lost(value, _CHANGES), unknown(_CHANGES)))
             elif before != BOTTOM:
                 run.store.set(cell, in_any_order(value))  # what grows has any number of elements
+    else:
+        if body is not None and any(
+            may_name(value) and not _covers(before, value) for _, before, value in moved
+        ):
+            run.gap(body, frame, "a loop changes what names are made of for more rounds than are followed")
     return returns
+
+
+_CHANGES = "a value that changes in a loop"
+
+
+def _covers(known: Value, value: Value) -> bool:
+    """Return whether something unknown, and what is known beside it, stands for all alternatives of ``value``."""
+    is_open = any(isinstance(atom, Unknown) for atom in known)
+    return is_open and set(lost(value, _CHANGES)) <= set(lost(known, _CHANGES))

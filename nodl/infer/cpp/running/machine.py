@@ -127,7 +127,7 @@ class Machine:
         self.global_arguments: list[tuple[str | None, ...]] = []  # that the program gives to rclcpp::init
         self.active: list[Function] = []
         self.closures: list[int] = []  # that run now, by their nodes
-        self.left: object = None  # the last call that certainly threw, or ended the program
+        self.left = False  # a call in the expression that runs has certainly thrown, or ended the program
         self.steps = 0
         self.repeated = 0  # how many of the elements being made stand for several each
         self.calls_back = False  # callbacks run: at the program's end, or where it spins and goes on
@@ -184,11 +184,15 @@ class Machine:
         if node is None:
             return NEXT
         self.count(1)
+        self.left = False
         handler = STATEMENTS.get(node.type)
-        if handler is None:
+        if handler is not None:
+            outcome = handler(self, node, frame)
+        else:
             self.evaluate(node, frame)
-            return NEXT
-        return handler(self, node, frame)
+            outcome = RETURN if self.left else NEXT
+        self.left = False
+        return outcome
 
     def branches(
         self, alternatives: Sequence[Callable[[], int]], tested: bool = False, doubt: str = ""
@@ -200,9 +204,13 @@ class Machine:
         mark = self.store.mark()
         outcome = 0
         going: list[Changes] = []
+        leaves = False
         self.undecided += tested
         for alternative in alternatives:
+            self.left = False
             result = alternative()
+            if self.left:
+                result, leaves = result & ~NEXT, True
             outcome |= result
             if result & NEXT:
                 going.append(self.store.changes(mark))
@@ -210,7 +218,7 @@ class Machine:
         self.undecided -= tested
         if going:
             self.store.merge(going, doubt)
-        self.left = None
+        self.left = leaves and not going
         return outcome
 
     def begin(self, frame: Frame) -> None:
@@ -335,6 +343,8 @@ class Machine:
         self, record: AllocatedNode, kind: EndpointKind, name: Value, type_name: str, call: Call,
         follows: Follows | None = None, when: When = ALWAYS,
     ) -> None:  # fmt: skip
+        if self.left:
+            return
         source = self.place(call.node, call.frame)
         conditions = self.conditions(call.node, call.frame)
         atoms = concatenated(name or unknown("a name that is never set"))

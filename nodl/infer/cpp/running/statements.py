@@ -123,10 +123,9 @@ def sequence(run: Machine, listed: list[Node], frame: Frame) -> int:
 def expression_statement(run: Machine, node: Node, frame: Frame) -> int:
     """Evaluates it; leaves like a return where a call certainly throws or ends the program."""
     for child in children(node):
-        run.left = None
         run.evaluate(child, frame)
         ends = child.type == "call_expression" and text(field_of(child, "function")) in _ENDS
-        if ends or run.left == child.id:
+        if ends or run.left:
             return RETURN
     return NEXT
 
@@ -140,6 +139,8 @@ def return_statement(run: Machine, node: Node, frame: Frame) -> int:
     value = BOTTOM
     for child in children(node):
         value = run.evaluate(child, frame)
+    if run.left:
+        return RETURN
     frame.returned = join(frame.returned, value)
     frame.exits.append(run.store.changes(frame.mark))
     return RETURN
@@ -183,6 +184,8 @@ def if_statement(run: Machine, node: Node, frame: Frame) -> int:
         for inner in children(child) if child.type == "init_statement" else ():
             run.execute(inner, frame)
     subject = condition_of(run, condition, frame)
+    if run.left:
+        return RETURN
     value = decided(run, subject)
     then, other = field_of(node, "consequence"), field_of(node, "alternative")
     if value is None:
@@ -223,6 +226,8 @@ def switch_statement(run: Machine, node: Node, frame: Frame) -> int:
     """Run the case that is chosen and those it falls through to; any of the cases if that is not decided."""
     condition = field_of(node, "condition")
     subject = settled(run, run.evaluate(field_of(condition, "value") or unwrapped(condition), frame))
+    if run.left:
+        return RETURN
     cases = [c for c in children(field_of(node, "body")) if c.type == "case_statement"]
     chosen = _chosen_case(run, node, cases, subject, frame)
     loop = _Switch(run.store.mark(), run.steps)
@@ -316,7 +321,7 @@ def declaration(run: Machine, node: Node, frame: Frame) -> int:
             bind_reference(run, name, kind, structured[1], frame)
             if name in frame.aliases:
                 frame.aliases[name] = None  # a part of it
-        return NEXT
+        return RETURN if run.left else NEXT
     path = frame.path
     for name, value, pointer, written in declared_names(node):
         if any(text(each).startswith(name) for each in functions):
@@ -332,7 +337,7 @@ def declaration(run: Machine, node: Node, frame: Frame) -> int:
             run.local(frame, name, initial(), kind)
             frame.path, frame.initial[name] = path, value
             bind_reference(run, name, kind, value, frame)
-    return NEXT
+    return RETURN if run.left else NEXT
 
 
 def _structured(declarators: Sequence[Node]) -> tuple[Node, Node | None] | None:
@@ -381,14 +386,17 @@ def _vexing(run: Machine, node: Node, declarator: Node, frame: Frame) -> None:
     arguments = parse_expression(f"f{text(field_of(declarator, 'parameters'))}")
     given = field_of(arguments, "arguments")
     if arguments is not None and arguments.type == "call_expression" and children(given):
-        written = type_text(node)
-        found = declared_value(run, node, written, given, False, frame)
+        written, name = type_text(node), text(field_of(declarator, "declarator"))
+        initial = partial(declared_value, run, node, written, given, False, frame)
+        if _is_static(node):
+            _static_local(run, node, name, written, initial, frame)
+            return
+        found = initial()
         if any(
             isinstance(each, Obj) and each.cls is None and not is_harmless_class(each.type.name)
             for each in found
         ):
             run.calls.may_be_written(run, f"the constructor of {written}", [], children(given), frame)
-        name = text(field_of(declarator, "declarator"))
         run.local(frame, name, found, written)
         frame.initial[name] = given
         bind_reference(run, name, written, given, frame)

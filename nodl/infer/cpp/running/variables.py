@@ -58,7 +58,7 @@ def static_member(run: Machine, cls: object, name: str) -> Value:
     frame = Frame(cls.file, cls.scope)
     defined = [g for g in run.names.globals.get(name, ()) if g.scope == cls.scope and g.value is not None]
     outside = defined[0] if defined else None
-    if any(each.specialises for each in defined):
+    if any(each.specialises for each in defined) or cls.qualified in run.names.doubts:
         found = unknown(f"the value of {name}, which several specialisations have")
     elif declared.default is not None:
         found = _initial(run, declared.default, declared.type, frame)
