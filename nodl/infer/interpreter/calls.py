@@ -5,12 +5,13 @@ from __future__ import annotations
 import ast
 import functools
 
-from nodl.infer.interpreter.conditions import under
+from nodl.infer.interpreter.conditions import is_of_launch, under
 from nodl.infer.interpreter.define import (
     foreign_bases,
     functions_of,
     is_enumeration,
     linearized,
+    member_with_value,
     methods_in,
     new_instance,
     program_classes,
@@ -21,6 +22,7 @@ from nodl.infer.values import (
     ANY,
     BOTTOM,
     NONE,
+    OF_LAUNCH,
     OTHER,
     BoundMethod,
     ClassValue,
@@ -203,7 +205,8 @@ def instantiate(run: Run, cls: ClassValue, call: Call) -> Value:
     for base in program_classes(cls):
         run.instantiated.setdefault(base.node)
     if is_enumeration(cls):
-        return unknown("a member of an enumeration that is looked up by its value")
+        value = call.args.at(0, "value") or ANY
+        return OF_LAUNCH if any(map(is_of_launch, value)) else member_with_value(run, cls, value)
     made = _made_by_new(run, cls, call)
     if made is not None:
         return made

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 
 from nodl.infer.interpreter.run import Arguments, Call, Run
+from nodl.infer.text import constant_text
 from nodl.infer.values import (
     BoundMethod,
     ClassMethod,
@@ -264,7 +265,13 @@ def is_enumeration(cls: ClassValue) -> bool:
 
 
 def enumeration_member(run: Run, cls: ClassValue, name: str) -> Instance:
-    """Return the one object that stands for a member, with its name and what the class gives it as value."""
+    """Return the one object that stands for a member, with its name and what the class gives it as value.
+
+    A second name of one value is another name of the first member.
+    """
+    value = cls.cells[name]
+    if len(value) == 1 and is_constant(value[0]):
+        name = next(each for each in _names_of_members(cls) if cls.cells[each] == value)
     member = run.members.get((cls, name))
     if member is None:
         member = run.members[cls, name] = Instance(cls)
@@ -272,13 +279,28 @@ def enumeration_member(run: Run, cls: ClassValue, name: str) -> Instance:
     return member
 
 
+def _names_of_members(cls: ClassValue) -> list[str]:
+    names = [name for name in cls.cells if isinstance(name, str) and not name.startswith(("_", "["))]
+    return [name for name in names if not isinstance(cls.cells[name][0], _NO_MEMBERS)]
+
+
+_NO_MEMBERS = (FunctionValue, ClassMethod, PropertyValue)
+
+
 def enumeration_members(run: Run, cls: ClassValue) -> tuple[Instance, ...]:
     """Return the members in the order of the class body."""
-    names = [name for name in cls.cells if isinstance(name, str) and not name.startswith(("_", "["))]
-    functions = (FunctionValue, ClassMethod, PropertyValue)
-    return tuple(
-        enumeration_member(run, cls, name) for name in names if not isinstance(cls.cells[name][0], functions)
-    )
+    return tuple(dict.fromkeys(enumeration_member(run, cls, name) for name in _names_of_members(cls)))
+
+
+def member_with_value(run: Run, cls: ClassValue, value: Value) -> Value:
+    """Return the member that ``cls(value)`` finds; unknown unless the value and those of all members are constants."""
+    wanted = constant_text(value[0]) if len(value) == 1 else None
+    members = enumeration_members(run, cls)
+    values = [sole(member.cells["value"]) for member in members]
+    own = any(name in cls.cells for name in ("__new__", "__init__", "_missing_"))
+    if isinstance(wanted, (str, int)) and wanted in values and not own and all(map(is_constant, values)):
+        return (members[values.index(wanted)],)
+    return unknown("a member of an enumeration that is looked up by its value")
 
 
 def _merge(orders: list[list[object]], bases: list[object]) -> list[object]:

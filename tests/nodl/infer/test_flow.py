@@ -258,6 +258,15 @@ OUTSIDE: dict[str, tuple[str, str, str, list[str]]] = {
         "from enum import Enum\nclass E(Enum):\n    X = 'a'\n    Y = 'b'",
         "self.P(E.X.value)\nfor e in E:\n    self.P('all/' + e.value)", "", ["a", "all/a", "all/b"],
     ),
+    "a member of an enumeration by its value": (
+        "from enum import Enum\nclass E(Enum):\n    X = 'a'\n    Y = 'b'\n"
+        "class Own(Enum):\n    X = 'a'\n    @classmethod\n    def _missing_(cls, value):\n        return cls.X",
+        "self.P(E('b').name)\nself.P('own/' + Own('c').name)", "", ["Y", "own/?"],
+    ),
+    "two names of one member": (
+        "from enum import Enum\nclass E(Enum):\n    X = 1\n    Y = 2\n    Z = 2",
+        "self.P(E.Z.name)\nfor e in E:\n    self.P('all/' + e.name)", "", ["Y", "all/X", "all/Y"],
+    ),
     "a dictionary by members of an enumeration": (
         "from enum import Enum\nclass E(Enum):\n    X = 1\n    Y = 2",
         "self.P({E.X: 'a', E.Y: 'b'}[E.X])\nself.P({E.X: 'c', E.Y: 'd'}.get(E.X))", "", ["a", "c"],

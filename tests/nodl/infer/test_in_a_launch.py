@@ -438,8 +438,15 @@ def test_parameters_of_the_launch_decide_for_a_node_that_listens_to_it(
 
 
 CHOSEN = """
+from enum import Enum
 import rclpy
 from std_msgs.msg import String
+
+class Gait(Enum):
+    WALK = "walk"
+    TROT = "trot"
+
+STEPS = {Gait.WALK: ["slow"], Gait.TROT: ["quick", "light"]}
 node = rclpy.create_node("chosen")
 
 def whisper():
@@ -456,6 +463,8 @@ if count % 2 == 0:
     node.create_publisher(String, f"pair_{count // 2}", 10)
 for topic in {1: ["one"], 2: ["one", "two"]}.get(count, []):
     node.create_publisher(String, topic, 10)
+for topic in STEPS[Gait(node.declare_parameter("gait", "walk").value)]:
+    node.create_publisher(String, topic, 10)
 rclpy.spin(node)
 """
 
@@ -463,12 +472,12 @@ rclpy.spin(node)
 @pytest.mark.parametrize(
     ("given", "published"),
     [
-        ({}, {"/whisper", "/low", "/pair_1", "/one", "/two"}),
-        ({"loud": "true", "count": "1"}, {"/shout", "/high", "/one"}),
-        ({"count": "4"}, {"/whisper", "/low", "/pair_2"}),
+        ({}, {"/whisper", "/low", "/pair_1", "/one", "/two", "/slow"}),
+        ({"loud": "true", "count": "1"}, {"/shout", "/high", "/one", "/slow"}),
+        ({"count": "4", "gait": "trot"}, {"/whisper", "/low", "/pair_2", "/quick", "/light"}),
     ],
 )
-def test_functions_lists_and_remainders_that_a_parameter_chooses_are_decided(
+def test_functions_lists_members_and_remainders_that_a_parameter_chooses_are_decided(
     given: dict[str, str], published: set[str], launch: Launch, prefix: Path
 ) -> None:
     install_program(prefix, PYTHON + CHOSEN, "chosen")
