@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ast
 from collections.abc import Callable, Iterable
-from functools import partial
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 from nodl.infer.findings import Findings, OptionDefaults
@@ -151,8 +151,6 @@ class Run(Allocations):
     def __init__(self, program: Program, tables: Tables, main: SourceModule):
         self.program = program
         self.main = main
-        package = find_package(main.path)
-        self.dependencies = package.dependencies if package else frozenset()
         self.beside = main.path.rpartition("/")[0]
         self.tables = tables
         self._expressions = tables.expressions
@@ -202,6 +200,12 @@ class Run(Allocations):
         self.called_back: dict[tuple[object, int | None], Called] = {}
         self.running: set[FunctionValue] = set()  # functions that ran since the latest callback began
         self.without_value = 0  # inside bodies whose handlers catch a parameter that has no value
+
+    @cached_property
+    def dependencies(self) -> frozenset[str]:
+        """Return what the program's package.xml says that it depends on."""
+        package = find_package(self.main.path)
+        return package.dependencies if package else frozenset()
 
     # --- syntax -----------------------------------------------------------------------------------------
 
