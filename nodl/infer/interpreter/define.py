@@ -271,7 +271,7 @@ def enumeration_member(run: Run, cls: ClassValue, name: str) -> Instance:
     """
     value = cls.cells[name]
     if len(value) == 1 and is_constant(value[0]):
-        name = next(each for each in _names_of_members(cls) if cls.cells[each] == value)
+        name = next((each for each in _names_of_members(cls) if cls.cells[each] == value), name)
     member = run.members.get((cls, name))
     if member is None:
         member = run.members[cls, name] = Instance(cls)
@@ -297,7 +297,7 @@ def member_with_value(run: Run, cls: ClassValue, value: Value) -> Value:
     wanted = constant_text(value[0]) if len(value) == 1 else None
     members = enumeration_members(run, cls)
     values = [sole(member.cells["value"]) for member in members]
-    own = any(name in cls.cells for name in ("__new__", "__init__", "_missing_"))
+    own = any(name in base.cells for base in program_classes(cls) for name in ("__new__", "__init__"))
     if isinstance(wanted, (str, int)) and wanted in values and not own and all(map(is_constant, values)):
         return (members[values.index(wanted)],)
     return unknown("a member of an enumeration that is looked up by its value")
