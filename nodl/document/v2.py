@@ -84,6 +84,7 @@ def _identified(root: YamlMap, file: str, package: str | None, name: str) -> Nod
         source=SourceRef(file, 1),
         library=ClientLibrary(section.text("library") or "unknown"),
         lifecycle=section.scalar("lifecycle") is True,
+        parameter_services=section.scalar("parameter_services") is not False,
     )
 
 

@@ -118,6 +118,7 @@ SECTION = map_of(
         "plugin": text_of(),
         "library": one_of("rclcpp", "rclpy"),
         "lifecycle": boolean,
+        "parameter_services": boolean,
         "also": _TEXTS,
         "classes": _TEXTS,
         "own_node": boolean,

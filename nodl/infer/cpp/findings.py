@@ -38,7 +38,8 @@ class PossibleEndpoint:
 
 @dataclass(eq=False)
 class AllocatedNode:
-    """A node under construction. ``description``: the class of a library that makes it for itself."""
+    """A node under construction. ``description``: the class of a library that makes it for itself;
+    ``parameter_services``: they, or its parameter events, are not certainly switched off."""
 
     source: SourceRef
     parameters: Notes
@@ -51,6 +52,7 @@ class AllocatedNode:
     gaps: dict[tuple[SourceRef, str], None] = field(default_factory=dict)
     arguments: list[tuple[str | None, ...]] = field(default_factory=list)
     use_global_arguments: bool = True
+    parameter_services: bool = False
     description: str = ""
 
     def declare(self, name: str, default: Value) -> None:

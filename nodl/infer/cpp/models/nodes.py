@@ -20,6 +20,7 @@ from nodl.infer.cpp.running.launch_values import text_of
 from nodl.infer.cpp.running.machine import Machine
 from nodl.infer.cpp.running.values import (
     BOTTOM,
+    Atom,
     Map,
     NodeNamePart,
     Notes,
@@ -57,11 +58,23 @@ def become_node(run: Machine, call: Call, *, lifecycle: bool = False) -> Allocat
     for atom in (atom for value in rest for atom in value):
         if isinstance(atom, Obj) and atom.type.name == OPTIONS:
             _read_options(run, record, atom, call)
+    if not (rest and rest[0] and all(_without_parameter_services(run, atom) for atom in rest[0])):
+        record.parameter_services = True
     if lifecycle and len(rest) > 1 and truth(rest[1]) is False:
         record.lifecycle = False
     for condition in run.conditions(call.node, call.frame):
         record.gap(record.source, f"this node is made only where the build says {condition[2]}")
     return record
+
+
+def _without_parameter_services(run: Machine, atom: Atom) -> bool:
+    """Return whether node options switch off what a node makes for its parameters (rclcpp node_parameters.cpp)."""
+    names = ("start_parameter_services", "start_parameter_event_publisher")
+    return (
+        isinstance(atom, Obj)
+        and atom.type.name == OPTIONS
+        and all(truth(run.store.get((atom, name)) or BOTTOM) is False for name in names)
+    )
 
 
 def _is_options(value: Value) -> bool:

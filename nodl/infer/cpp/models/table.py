@@ -198,9 +198,8 @@ def listener(run: Machine, call: Call) -> None:
     if owner is None:
         owner = run.obj(("own node", call.this), Type("rclcpp::Node"), heap=True)
         name = concatenated(literal("transform_listener_impl_"), unknown("an address"))
-        become_node(
-            run, replace(call, values=[name], receiver=owner)
-        ).description = "tf2_ros::TransformListener"
+        record = become_node(run, replace(call, values=[name], receiver=owner))
+        record.description, record.parameter_services = "tf2_ros::TransformListener", False
     assert owner.node is not None
     for topic in ("/tf", "/tf_static"):
         run.endpoint(owner.node, SUB, literal(topic), TF, call)

@@ -180,7 +180,6 @@ def _map_call(run: Machine, atom: Map, name: str, site: CallSite) -> Value:
         return becomes(_changed_by(atom, name, values)[0])
     if name in ("at", "find", "count", "contains") and values:
         found, has = element(run, atom, first), _has(atom, first)
-        run.left = run.left or (name == "at" and has is False)
         if name == "find":
             return (*(() if has else (END,)), *(() if has is False else (Group((first, found)),)))
         return found if name == "at" else unknown("a condition") if has is None else (has,)

@@ -84,3 +84,19 @@ def test_a_node_is_told_once_with_the_programs_that_hold_it(
     told = [line for line in capsys.readouterr().out.splitlines() if line.startswith("/filter")]
     assert len(told) == 1
     assert "in demo/alone, demo/filter_node, demo/demo::Filter" in told[0]
+
+
+@pytest.mark.parametrize("switched_off", [True, False])
+def test_the_document_says_that_a_node_has_no_parameter_services(tmp_path: Path, switched_off: bool) -> None:
+    options = "rclcpp::NodeOptions()" + (
+        ".start_parameter_services(false).start_parameter_event_publisher(false)" * switched_off
+    )
+    main_cpp = (
+        "#include <rclcpp/rclcpp.hpp>\n#include <std_msgs/msg/string.hpp>\n"
+        f'int main() {{ auto n = std::make_shared<rclcpp::Node>("n", {options}); '
+        'auto p = n->create_publisher<std_msgs::msg::String>("a", 1); rclcpp::spin(n); }'
+    )
+    folder = package(tmp_path / "src/demo", {"src/main.cpp": main_cpp})
+    assert main(["infer", "-o", str(tmp_path / "nodl"), str(folder)]) == 0
+    (node,) = read_document(next((tmp_path / "nodl").iterdir()))
+    assert node.interface.parameter_services is not switched_off

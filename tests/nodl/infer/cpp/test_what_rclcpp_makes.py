@@ -120,6 +120,24 @@ def test_a_listener_without_a_node_makes_one(tmp_path: Path) -> None:
     helper = node(system, "transform_listener_impl_*")
     assert {str(e.name) for e in helper.endpoints} == {"/tf", "/tf_static"}
     assert node(system, "n").endpoints == ()
+    assert (helper.parameter_services, node(system, "n").parameter_services) == (False, True)
+
+
+@pytest.mark.parametrize(
+    ("options", "has_them"),
+    [
+        ("rclcpp::NodeOptions()", True),
+        (".start_parameter_services(false)", True),
+        (".start_parameter_services(false).start_parameter_event_publisher(false)", False),
+        (".start_parameter_services(argc > 1).start_parameter_event_publisher(false)", True),
+    ],
+)
+def test_a_node_has_parameter_services_unless_both_options_switch_them_off(
+    tmp_path: Path, options: str, has_them: bool
+) -> None:
+    given = options if options.startswith("rclcpp") else f"rclcpp::NodeOptions(){options}"
+    main = f'int main(int argc, char ** argv) {{ auto n = std::make_shared<rclcpp::Node>("n", {given}); }}'
+    assert node(infer(tmp_path, "#include <rclcpp/rclcpp.hpp>\n" + main), "n").parameter_services is has_them
 
 
 def test_an_image_publisher_has_its_transports(tmp_path: Path) -> None:
