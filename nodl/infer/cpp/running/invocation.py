@@ -12,6 +12,7 @@ from itertools import zip_longest
 from nodl.infer.cpp.libraries import IN_PLACE_OF_SOURCE, Call
 from nodl.infer.cpp.reading.declarations import Function, FunctionParameter, parameters_of, type_text
 from nodl.infer.cpp.reading.type_names import Type
+from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.constructors import as_parameter, bind_parameters
 from nodl.infer.cpp.running.contents import copied, handed_over
@@ -162,7 +163,7 @@ def call_lambda(run: Machine, atom: Lambda, values: Sequence[Value], node: Node,
     run.begin(inner)
     declarator = field_of(atom.node, "declarator")
     given = parameters_of(declarator) if declarator is not None else []
-    values = _seen_once(run, atom, given, values, node, frame)
+    values = _seen_once(run, atom, None, given, values, node, frame)
     for index, parameter in enumerate(given):
         value = values[index] if index < len(values) else unknown(f"the argument {parameter.name}")
         run.local(
@@ -359,7 +360,7 @@ def invoke(
         return unknown(f"the result of {function.name}()")
     if leave_out(run, function, values, node, frame):
         return unknown(f"the result of {function.name}()")
-    values = _seen_once(run, function, function.parameters, values, node, frame)
+    values = _seen_once(run, function, this_object, function.parameters, values, node, frame)
     inner = Frame(
         function.file, function.scope, function, this_object, bindings or {},
         path=(*frame.path[-24:], (frame.file.file, node.start_byte, node.end_byte)),
@@ -382,6 +383,7 @@ def invoke(
 def _seen_once(
     run: Machine,
     of: Function | Lambda,
+    this: Obj | None,
     parameters: Sequence[FunctionParameter],
     values: Sequence[Value],
     node: Node,
@@ -395,13 +397,15 @@ def _seen_once(
         if parameter.type.rstrip().endswith(("&", "*")) and is_plain(value) and (name := _variable(argument))
     }
     found = list(values)
+    # What an object of its own class has under the same name is another variable.
+    own = run.names.members(this.cls) if this is not None and this is not frame.this else frozenset()
     for at, name in named.items():
         parameter = parameters[at]
         alike = [each for each, other in named.items() if _is_part(name, other) or _is_part(other, name)]
         twice = len(alike) > 1 and any(parameters[each].written_back for each in alike)
         last = re.split(r"\W+", name)[-1]
-        is_seen = isinstance(of, Lambda) or frame.owner_of(name) is None
-        if twice or (is_seen and last != parameter.name and _touches(run, of, last, parameter.written_back)):
+        is_seen = isinstance(of, Lambda) or (frame.owner_of(name) is None and last not in own)
+        if twice or (is_seen and last != parameter.name and _touches(of, last, parameter.written_back)):
             why = f"what {name} holds, which a function that writes to it has under two names"
             found[at] = lost(values[at], why)
             if parameter.written_back:
@@ -422,10 +426,9 @@ def _is_part(whole: str, part: str) -> bool:
     return part == whole or part.startswith((f"{whole}.", f"{whole}->"))
 
 
-def _touches(run: Machine, of: Function | Lambda, name: str, reads: bool) -> bool:
-    """Return whether code may write to the variable ``name`` of its caller, or read it where ``reads``."""
-    effects = effects_of(run, of)
-    return name in effects.written.assigned | effects.written.changed or (reads and name in effects.words)
+def _touches(of: Function | Lambda, name: str, reads: bool) -> bool:
+    """Return whether code itself writes to the variable ``name`` of its caller, or reads it where ``reads``."""
+    return name in writes_of(of.node) or (reads and name in words_in(of.node))
 
 
 def _outcome(

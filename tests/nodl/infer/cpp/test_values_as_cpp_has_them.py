@@ -46,6 +46,18 @@ PROGRAMS: dict[str, tuple[str, str, str, set[str], set[str]]] = {
         'const char * t = "abcd"; pub(t + 1); std::string k = "k"; k += \'a\' + 1; pub(k);',
         "", "", set(), {"abcd", "abcd1", "k", "ka1", "k1"},
     ),
+    "a member that a helper has under the same name is another variable": (
+        'helper.configure(name_); pub(name_ + "_own");', 'std::string name_ = "n"; Helper helper{*this};',
+        'struct Helper { rclcpp::Node & node; std::string name_; rclcpp::Publisher<std_msgs::msg::String>::SharedPtr p;'
+        ' void configure(const std::string & name) { name_ = "h"; use(name); }'
+        ' void use(const std::string & name) { p = node.create_publisher<std_msgs::msg::String>(name + "/p", 1); } };',
+        {"n/p", "n_own"}, {"h/p"},
+    ),
+    "the member that the node's own function writes is the one that it was given": (
+        "show(name_);",
+        'std::string name_ = "n"; void show(const std::string & name) { name_ = "m"; pub(name + "/p"); }',
+        "", set(), {"n/p"},
+    ),
     "a list has as many elements as resize() says, new ones empty or as they are given": (
         'std::vector<std::string> v{"a"}; v.resize(3); v[1] = "b"; for (auto & t : v) { pub("v_" + t); }'
         'v.resize(1); pub("n" + std::to_string(v.size())); v.resize(2, "c"); pub(v[1]);',
