@@ -43,10 +43,12 @@ class Robot:
     def switch_on(self, *names: str, target: str = "basic.target") -> None:
         for name in names:
             self._on[name] = contextlib.ExitStack()
-            machine = self._on[name].enter_context(booted(self.folder / name, self.folder / "shared", target))
+            machine = self._on[name].enter_context(booted(self.folder / name, self.folder / "shared"))
             self.hosts[name] = Host(machine, self.folder / "shared", name, self.file)
         if len(self.hosts) == len(HOSTS):
             self.hosts["base"].machine.cable(self.hosts["arm"].machine)
+        for name in names:  # a host has its network before its units start, as a robot does
+            self.hosts[name].machine.run("systemctl", "start", "--no-block", target)
 
     def switch_off(self, name: str) -> None:
         """Cut its power."""
