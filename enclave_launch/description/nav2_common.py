@@ -10,7 +10,6 @@ from collections.abc import Iterator, Mapping
 from copy import deepcopy
 from typing import TYPE_CHECKING, Any
 
-from enclave_common.files import read_text
 from enclave_launch.description.parameters import yaml_text
 from enclave_launch.description.substitution import (
     SomeSubstitutionsType,
@@ -19,7 +18,6 @@ from enclave_launch.description.substitution import (
     perform_substitutions,
 )
 from enclave_launch.description.substitutions.variables import LaunchConfiguration
-from enclave_launch.ros_rules.parameter_file import MAX_BYTES
 
 if TYPE_CHECKING:
     from enclave_launch.description.conditions import Condition
@@ -42,18 +40,18 @@ class _OfFile(Substitution):
     def _path(self, context: LaunchContext) -> str:
         return perform_substitutions(context, self.__source_file)
 
-    def _read(self, context: LaunchContext, path: str) -> str:
-        generated = context.host.parameter_file(path)
-        return read_text(path, MAX_BYTES) if generated is None else generated
-
 
 class RewrittenYaml(_OfFile):
-    """The path of a copy of a parameter file with other values, keys, or a root key.
+    """Rewrite values and keys in a copy of a parameter file. Performed, it gives the path of the copy.
 
-    ``param_rewrites`` replaces every key of that name and, given as a path with dots, one value, which is added if it
-    contains ``ros__parameters``; ``key_rewrites`` renames keys, ``value_rewrites`` replaces values. A text of a
-    boolean, and with ``convert_types`` of a number, becomes that. ``out_dir`` is not used: the host decides where files
-    are written.
+    Args:
+        param_rewrites: Key -> new value of every key of that name. A path with dots stands for one value; a path with
+            ``ros__parameters`` in it is added if it is not there.
+        root_key: Key that everything is put below.
+        key_rewrites: Key -> new key.
+        value_rewrites: Value as text -> new value.
+        convert_types: Whether the text of a number becomes a number. The text of a boolean always becomes one.
+        out_dir: Not used: the host decides where files are written.
     """
 
     def __init__(
@@ -76,7 +74,7 @@ class RewrittenYaml(_OfFile):
         if context.host.is_missing(path):
             return path
         parameters, keys, values = (_performed(context, texts) for texts in self.__rewrites)
-        content = deepcopy(yaml_text.load_parameter_file(self._read(context, path)))
+        content = deepcopy(yaml_text.load_parameter_file(context.host.read_parameter_file(path)))
         converted = {name: self.__convert(text) for name, text in parameters.items()}
         _set_keys(content, converted)
         present = [place for place in _places(content, "") if place in converted]
@@ -109,7 +107,10 @@ class RewrittenYaml(_OfFile):
 
 
 class ReplaceString(_OfFile):
-    """The path of a copy of a file with texts replaced, in their order; the file itself if the condition fails."""
+    """Replace texts in a copy of a file, in the order given. Performed, it gives the path of the copy.
+
+    If the condition does not hold, it gives the path of the file itself.
+    """
 
     def __init__(
         self, source_file: SomeSubstitutionsType, replacements: _Texts, condition: Condition | None = None
@@ -129,14 +130,14 @@ class ReplaceString(_OfFile):
             self.__condition is None or self.__condition.evaluate(context)
         ):
             return path
-        lines = self._read(context, path).splitlines(keepends=True)
+        lines = context.host.read_parameter_file(path).splitlines(keepends=True)
         for old, new in _performed(context, self.__replacements).items():
             lines = [line.replace(old, new) for line in lines]
         return context.host.write_parameter_file("".join(lines))
 
 
 class HasNodeParams(_OfFile):
-    """``True`` if a parameter file has a section of this name, else ``False``."""
+    """Check if a parameter file has a section of this name. Performed, it gives ``True`` or ``False``."""
 
     def __init__(self, source_file: SomeSubstitutionsType, node_name: str) -> None:
         super().__init__(source_file)
@@ -146,12 +147,15 @@ class HasNodeParams(_OfFile):
         path = self._path(context)
         if context.host.is_missing(path):
             return "False"
-        content = yaml_text.load_parameter_file(self._read(context, path))
+        content = yaml_text.load_parameter_file(context.host.read_parameter_file(path))
         return str(isinstance(content, dict) and self.__node_name in content)
 
 
 class LaunchConfigAsBool(Substitution):
-    """``True`` if a launch configuration says so in any of the usual words, else ``False``."""
+    """Convert a launch configuration to ``True`` or ``False``.
+
+    ``true``, ``1``, ``yes`` and ``on`` are ``True``, in capitals too; any other text is ``False``.
+    """
 
     def __init__(self, name: str) -> None:
         self.__configuration = LaunchConfiguration(name)

@@ -15,6 +15,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
 
+from enclave_common.files import read_text
 from enclave_launch.diagnostics import Diagnostic
 from enclave_launch.diagnostics.evaluation import (
     command_without_its_file,
@@ -25,6 +26,7 @@ from enclave_launch.diagnostics.evaluation import (
 )
 from enclave_launch.host.environment import environment_snapshot
 from enclave_launch.ros_rules.distro import Distro, choose_release
+from enclave_launch.ros_rules.parameter_file import MAX_BYTES
 from nodl import ament_index
 from nodl.ament_index import MISSING_PREFIX
 
@@ -255,6 +257,15 @@ class Host(ABC):
     @abstractmethod
     def parameter_file(self, path: str) -> str | None:
         """Return the text of a file written by ``write_parameter_file``; None for any other path."""
+
+    def has_parameter_file(self, path: str) -> bool:
+        """Return True if ``path`` is a file that ``write_parameter_file`` wrote, or one on disk."""
+        return self.parameter_file(path) is not None or os.path.isfile(path)
+
+    def read_parameter_file(self, path: str) -> str:
+        """Return the text of such a file; raises ``OSError``, ``UnicodeDecodeError`` if it cannot be read."""
+        written = self.parameter_file(path)
+        return read_text(path, MAX_BYTES) if written is None else written
 
     @abstractmethod
     def started_so_far(self) -> int:

@@ -87,6 +87,20 @@ def test_texts_are_replaced_if_the_condition_holds(
     assert launched(text, syntax="py").processes[0].parameters == {**PLAIN, "scan": scan, "sim": True}
 
 
+@pytest.mark.parametrize("may_lack_packages", [False, True])
+def test_substitutions_in_a_rewritten_file_are_performed_if_they_are_allowed(
+    launched: Evaluate, tmp_path: Path, may_lack_packages: bool
+) -> None:
+    """As Nav2's bring-up has it."""
+    (tmp_path / "p.yaml").write_text(PARAMETERS.replace("front", "$(var topic)"))
+    before = NAV2 + "\n    from launch_ros.parameter_descriptions import ParameterFile"
+    rewritten = f"RewrittenYaml('{tmp_path}/p.yaml', {{'sim': 'true'}})"
+    for allowed, scan in (("True", "/front/scan"), ("False", "$(var topic)")):
+        text = FILE.format(before=before, parameters=f"ParameterFile({rewritten}, allow_substs={allowed})")
+        found = launched(text, syntax="py", allow_missing_packages=may_lack_packages)
+        assert found.processes[0].parameters == {**PLAIN, "sim": True, "scan": scan}
+
+
 def test_it_may_be_a_file_for_all_nodes(launched: Evaluate, tmp_path: Path) -> None:
     (tmp_path / "p.yaml").write_text(PARAMETERS)
     text = FILE.format(before=NAV2, parameters="").replace(

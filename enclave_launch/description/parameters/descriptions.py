@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, Union, cast
 
 import yaml
 
-from enclave_common.files import read_text
 from enclave_launch.description import read_only
 from enclave_launch.description.argument_types import ensure_argument_type
 from enclave_launch.description.markup.parse_substitution import parse_substitution
@@ -149,9 +148,9 @@ class ParameterFile:
 
 
 def _substituted(context: LaunchContext, path: Path) -> Path:
-    if context.host.allow_missing_packages and not path.is_file():
+    if context.host.allow_missing_packages and not context.host.has_parameter_file(str(path)):
         return path  # reported where it is used
-    template = parse_substitution(read_text(path, MAX_BYTES))
+    template = parse_substitution(context.host.read_parameter_file(str(path)))
     text = perform_substitutions(context, template, MAX_BYTES)
     try:
         yaml_text.load_parameter_file(text)

@@ -32,12 +32,10 @@ if TYPE_CHECKING:
 import warnings
 from typing import TYPE_CHECKING, NamedTuple
 
-from enclave_common.files import read_text
 from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.description.parameters.evaluate import evaluate_parameter_dict
 from enclave_launch.description.parameters.normalize import normalize_parameter_dict
 from enclave_launch.host.current import current_release
-from enclave_launch.ros_rules.parameter_file import MAX_BYTES
 from enclave_launch.ros_rules.rcl_parameters import section_applies
 
 if TYPE_CHECKING:
@@ -66,7 +64,7 @@ class NodeParameters:
         return ("--params-file", self.__write_file(context, section, item))
 
     def __file_words(self, context: LaunchContext, path: str) -> Sequence[str]:
-        if context.host.parameter_file(path) is None and not os.path.isfile(path):
+        if not context.host.has_parameter_file(path):
             context.host.warn(parameter_file_missing(path))
             return ()
         return ("--params-file", path)
@@ -98,14 +96,12 @@ def _global_words(context: LaunchContext) -> Iterator[tuple[str, str]]:
         if isinstance(item, tuple):
             yield "-p", f"{item[0]}:={item[1]}"
             continue
-        if context.host.parameter_file(item) is not None:
-            yield "--params-file", item
-            continue
-        path = os.path.abspath(item)
-        if not os.path.isfile(path) and context.host.allow_missing_packages:
-            context.host.warn(parameter_file_missing(path))
-            continue
-        if not os.path.isfile(path):
+        is_written = context.host.parameter_file(item) is not None
+        path = item if is_written else os.path.abspath(item)
+        if not context.host.has_parameter_file(path):
+            if context.host.allow_missing_packages:
+                context.host.warn(parameter_file_missing(path))
+                continue
             raise AssertionError(f"the file of set_parameters_from_file does not exist: {path}")
         yield "--params-file", path
 
@@ -153,11 +149,10 @@ def to_parameters_list(
 
 
 def _read(context: LaunchContext, path: os.PathLike[str]) -> Any:
-    generated = context.host.parameter_file(str(path))
-    if generated is None and context.host.allow_missing_packages and not os.path.isfile(path):
+    if context.host.allow_missing_packages and not context.host.has_parameter_file(str(path)):
         context.host.warn(parameter_file_missing(str(path)))
         return {}
-    return yaml_text.load_parameter_file(read_text(path, MAX_BYTES) if generated is None else generated)
+    return yaml_text.load_parameter_file(context.host.read_parameter_file(str(path)))
 
 
 def _applicable(document: Any, section: str) -> tuple[Mapping[str, Any], bool]:
