@@ -245,7 +245,7 @@ def _read_in(run: Run, test: ast.expr, frame: Frame) -> Iterator[object]:
 
 @functools.lru_cache(maxsize=8192)
 def _parts_that_may_ask(test: ast.expr) -> tuple[ast.expr, ...]:
-    parts = (part for part in _parts_of(test) if isinstance(part, (ast.Name, ast.Attribute, ast.Call)))
+    parts = (part for part in ast.walk(test) if isinstance(part, ast.Name | ast.Attribute | ast.Call))
     return tuple(part for part in parts if _may_ask(part))
 
 
@@ -374,20 +374,7 @@ _READS = EDITS | {"get_parameter", "get_parameter_value", "declare_parameter"}
 
 @functools.lru_cache(maxsize=8192)
 def _calls_in(node: ast.expr) -> tuple[ast.Call, ...]:
-    return tuple(part for part in _parts_of(node) if isinstance(part, ast.Call))
-
-
-def _parts_of(node: ast.expr) -> list[ast.AST]:
-    """Return an expression and all that is in it, as ``ast.walk`` does, but for operators, in a third of the time."""
-    parts: list[ast.AST] = [node]
-    for part in parts:
-        for field in part._fields:
-            value = getattr(part, field)
-            if isinstance(value, list):
-                parts.extend(each for each in value if isinstance(each, ast.AST))
-            elif isinstance(value, ast.AST) and value._fields:
-                parts.append(value)
-    return parts
+    return tuple(part for part in ast.walk(node) if isinstance(part, ast.Call))
 
 
 @functools.lru_cache(maxsize=8192)
@@ -401,10 +388,6 @@ def _may_ask(node: ast.expr) -> bool:
 
 
 def _only_reads(node: ast.expr) -> bool:
-    while isinstance(node, ast.Attribute):
-        node = node.value
-    if isinstance(node, (ast.Name, ast.Constant)):
-        return True
     return all(isinstance(call.func, ast.Attribute) and call.func.attr in _READS for call in _calls_in(node))
 
 
