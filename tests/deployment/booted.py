@@ -28,7 +28,6 @@ _TOOLS = ("nsenter", "--mount", "--uts", "--ipc", "--net", "--pid", "--cgroup", 
 _SETUP = """
 set -eu
 root=$1; shift
-target=$1; shift
 mount --make-rprivate /
 mount --bind "$root" "$root"
 for name in bin lib lib32 lib64 libx32 sbin usr opt; do
@@ -60,7 +59,7 @@ mount -t tmpfs -o mode=755 tmpfs "$root/run"
 for folder; do mkdir -p "$root$folder"; mount --rbind "$folder" "$root$folder"; done
 mount --bind "$1" "$root/srv"
 ip link set lo up
-printf '[Unit]\\nRequires=%s\\nAfter=%s\\n' "$target" "$target" > "$root/etc/systemd/system/test.target"
+printf '[Unit]\\nRequires=basic.target\\nAfter=basic.target\\n' > "$root/etc/systemd/system/test.target"
 # In a container systemd leaves this to who made it; without it credentials do not reach the units.
 mount --make-rshared "$root"
 cd "$root"
@@ -130,13 +129,14 @@ def _configure(machine: Machine, address: str) -> None:
 
 
 @contextlib.contextmanager
-def booted(folder: Path, shared: Path, target: str = "basic.target") -> Iterator[Machine]:
-    """Boot systemd with its root at ``folder``; ``shared`` is at the same path there, and for services at /srv.
+def booted(folder: Path, shared: Path) -> Iterator[Machine]:
+    """Boot systemd to ``basic.target`` with its root at ``folder``.
+
+    ``shared`` is at the same path there, and for services at /srv.
 
     Args:
         folder: A new one, or that of a machine that was booted before and is off.
         shared: That this machine and the booted one both see.
-        target: That the boot brings up.
 
     If this machine does not permit it, the test is skipped with what is missing.
     """
@@ -146,7 +146,7 @@ def booted(folder: Path, shared: Path, target: str = "basic.target") -> Iterator
     folder.mkdir(exist_ok=True)
     log = folder.with_suffix(".log")
     command = ("unshare", "--mount", "--pid", "--fork", "--kill-child", "--uts", "--ipc", "--net", "--cgroup")
-    script = ("sh", "-c", _SETUP, "sh", str(folder), target, str(shared), *repository_folders())
+    script = ("sh", "-c", _SETUP, "sh", str(folder), str(shared), *repository_folders())
     with log.open("w") as stream:
         outer = subprocess.Popen([*command, *script], stdin=subprocess.DEVNULL, stdout=stream, stderr=stream)
     try:
