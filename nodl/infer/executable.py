@@ -22,12 +22,18 @@ if TYPE_CHECKING:
 
 
 class InferredExecutable(NamedTuple):
-    """``interfaces`` is empty when nothing could be inferred; ``why`` then says what was found instead. ``not_made``:
-    it is not installed, and the build of its package makes no such program."""
+    """The interfaces of one executable or component by its sources.
+
+    Attributes:
+        interfaces: Empty if nothing could be inferred.
+        why: What was found instead.
+        of_this_start: Another start may have other interfaces: parameters decide what is made.
+        not_made: It is not installed, and the build of its package makes no such program.
+    """
 
     interfaces: tuple[NodeInterface, ...]
     why: str = ""
-    of_this_start: bool = False  # another start may have other interfaces: parameters decide what is made
+    of_this_start: bool = False
     not_made: bool = False
 
     def __bool__(self) -> bool:

@@ -56,8 +56,12 @@ def failure(what: str, error: Exception) -> str:
 
 
 class Answer:
-    """What the sources say of one program. ``consulted``: parameters of the launch decided what it makes; ``not_made``:
-    the build of its package makes no such program."""
+    """The interfaces of one program by its sources, or why there are none.
+
+    Attributes:
+        consulted: Parameters of the launch decided what it makes.
+        not_made: The build of its package makes no such program.
+    """
 
     def __init__(
         self,

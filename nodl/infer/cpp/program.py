@@ -97,7 +97,7 @@ class Sources:
         for found, included in before:
             if all(include(*asked) is given for asked, given in included.items()):
                 return found
-        seen: dict[tuple[str, bool], Preprocessed | None] = {}
+        seen: _Included = {}
 
         def noted(name: str, quoted: bool) -> Preprocessed | None:
             seen[name, quoted] = include(name, quoted)
@@ -158,7 +158,9 @@ class Sources:
             return self._indexed[id(source)]
         except CppSupportMissing:
             raise
-        except Exception as error:
+        except (
+            Exception
+        ) as error:  # a mistake of ours is a gap of the programs with this file, and ends no plan
             self.unreadable[file] = failure("reading this file", error)
             return None
 

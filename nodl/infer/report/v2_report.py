@@ -148,7 +148,7 @@ def _section(node: NodeInterface, entries: Iterable[_Entry], listener: bool) -> 
     fields |= {"namespace": namespace, "library": library}
     lines = [f"{key}: {_quoted(value)}" for key, value in fields.items() if value]
     lines += ["lifecycle: true"] * node.lifecycle + ["tf_listener: true"] * listener
-    lines += [] if node.parameter_services else ["parameter_services: false"]
+    lines += ["parameter_services: false"] * (not node.parameter_services)
     lines += _names(entries)
     questions = open_questions(node)
     if questions:
