@@ -7,17 +7,21 @@ from functools import partial
 
 from nodl.dependence import When
 from nodl.infer.cpp.findings import AllocatedNode, Follows
-from nodl.infer.cpp.libraries import LIBRARY_CLASSES, Call, library_class, library_function, library_method
+from nodl.infer.cpp.libraries import Call, library_class, library_function, library_method
 from nodl.infer.cpp.models.interfaces import PUB, SRV, SUB, node_of, owner_in, texts_in
+from nodl.infer.cpp.models.parameters import parameter_names
 from nodl.infer.cpp.reading.type_names import Type
+from nodl.infer.cpp.running.launch_values import text_of
 from nodl.infer.cpp.running.machine import Machine
 from nodl.infer.cpp.running.values import (
+    Atom,
     Obj,
+    Param,
     Text,
     Value,
     concatenated,
+    join,
     literal,
-    plain,
     unknown,
 )
 
@@ -78,7 +82,7 @@ def _image(what: str, run: Machine, call: Call, place: int = 3) -> Value:
     if what in ("publisher", "camera publisher"):
         _image_publisher(run, owner.node, base, call)
     else:
-        for transport in _transports_of(owner.node, call, place):
+        for transport in _transports_of(run, owner.node, call, place):
             _image_subscription(run, owner.node, base, call, transport)
     if what.startswith("camera"):
         kind = PUB if what.endswith("publisher") else SUB
@@ -93,7 +97,7 @@ def _image_subscription(
     run: Machine, record: AllocatedNode, base: Value, call: Call, transport: object
 ) -> None:
     """Model image_transport/src/subscriber.cpp: one topic, by the transport."""
-    known = plain(transport) or ""
+    known = text_of(run, transport) or ""
     if known in _TRANSPORTS:
         for topic in concatenated(base):
             name = concatenated((topic,), literal(f"/{known}"))
@@ -109,18 +113,47 @@ def _image_subscription(
         )  # fmt: skip
 
 
-def _transports_of(record: AllocatedNode, call: Call, place: int) -> Value:
-    """Return the transports as given, else ``raw``; for methods of ``ImageTransport`` hints or a parameter decide.
+def _transports_of(run: Machine, record: AllocatedNode, call: Call, place: int) -> Value:
+    """Return the transports as given, else ``raw``; for methods of ``ImageTransport`` those of the hints.
 
     Source: image_transport/src/image_transport.cpp, ``getTransportOrDefault``.
     """
     if call.receiver is None:
         return (call.values[place] or unknown("a transport")) if len(call.values) > place else literal("raw")
-    hints = any(isinstance(a, Obj) and a.type.last == "TransportHints" for v in call.values for a in v)
-    return unknown("a transport") if hints or "image_transport" in record.parameters else literal("raw")
+    hints = [a for v in call.values for a in v if isinstance(a, Obj) and a.type.last == "TransportHints"]
+    if not hints:
+        return _hinted(run, record, literal("raw"), literal("image_transport"))
+    return join(*(each.data.get("transport", unknown("a transport")) for each in hints))
 
 
-LIBRARY_CLASSES["image_transport::TransportHints"] = lambda run, call: None
+def _hinted(run: Machine, record: AllocatedNode, default: Value, parameter: Value) -> Value:
+    """Return the transport that a parameter chooses; one that nobody declares does so only if the options of the node
+    declare what the launch sets, so that the default stays possible.
+    """
+    found: list[Atom] = []
+    for name in parameter_names(run, parameter):
+        declared = name is not None and name in record.parameters
+        found += () if declared else default
+        found += (
+            unknown("a transport")
+            if name is None
+            else (Param(record, name, known=() if declared else default),)
+        )
+    return tuple(dict.fromkeys(found))
+
+
+@library_class("image_transport::TransportHints")
+def _hints(run: Machine, call: Call) -> None:
+    """Model image_transport/transport_hints.hpp: (node, default, name of the parameter)."""
+    owner, texts = owner_in(call.values), texts_in(call.values)
+    if owner is not None and owner.node is not None:
+        given = [*texts, *(literal(each) for each in ("raw", "image_transport")[len(texts) :])]
+        call.this.data["transport"] = _hinted(run, owner.node, *given[:2])
+
+
+@library_method("image_transport::TransportHints", "getTransport")
+def _hinted_transport(run: Machine, call: Call) -> Value:
+    return call.this.data.get("transport") or unknown("a transport")
 
 
 @library_class("image_transport::ImageTransport")

@@ -32,8 +32,8 @@ LAUNCH = """
 COMPRESSED = '<param name="image_transport" value="compressed"/>'
 
 
-def live(workspace: Path, parameter: str) -> LaunchPlan:
-    package(workspace / "src/demo", {"src/main.cpp": SOURCE}, "add_executable(filter_node src/main.cpp)")
+def live(workspace: Path, parameter: str, source: str = SOURCE) -> LaunchPlan:
+    package(workspace / "src/demo", {"src/main.cpp": source}, "add_executable(filter_node src/main.cpp)")
     install(workspace)
     return plan(workspace, LAUNCH.format(parameter=parameter))
 
@@ -67,9 +67,45 @@ def test_a_transport_that_nothing_tells_is_a_gap(tmp_path: Path) -> None:
     assert any("transport of this image subscription" in why for why in gaps(infer(tmp_path, source)))
 
 
-def test_a_transport_that_a_parameter_chooses_is_a_gap(tmp_path: Path) -> None:
-    source = SOURCE.replace('"raw"', "image_transport::TransportHints(this).getTransport()")
-    assert any("transport of this image subscription" in why for why in gaps(infer(tmp_path, source)))
+HINTED = SOURCE.replace('"raw"', "image_transport::TransportHints(this).getTransport()")
+DECLARED = HINTED.replace("in_ =", 'declare_parameter<std::string>("image_transport", "raw");\n in_ =', 1)
+OTHERWISE_NAMED = HINTED.replace("(this)", '(this, "compressed", "t")')
+BY_AN_OBJECT = SOURCE.replace(
+    "in_ = image_transport::create_camera_subscription(this,",
+    "image_transport::ImageTransport it(shared_from_this()); in_ = it.subscribeCamera(",
+).replace(', "raw"', "")
+
+
+@pytest.mark.parametrize(
+    ("source", "parameter", "plain", "compressed"),
+    [
+        (HINTED, "", True, False),
+        (DECLARED, "", True, False),
+        (DECLARED, COMPRESSED, False, True),
+        (HINTED, COMPRESSED, True, True),  # it counts only where the node's options declare what launch sets
+        (OTHERWISE_NAMED, "", False, True),
+        (OTHERWISE_NAMED, COMPRESSED, False, True),
+        (BY_AN_OBJECT, "", True, False),
+        (BY_AN_OBJECT, COMPRESSED, True, True),
+    ],
+)
+def test_the_parameter_of_transport_hints_decides(
+    tmp_path: Path, source: str, parameter: str, plain: bool, compressed: bool
+) -> None:
+    planned = live(tmp_path, parameter, source)
+    assert not planned.problems
+    assert may(planned, "/front/image") == plain
+    assert may(planned, "/front/image/compressed") == compressed
+
+
+def test_a_transport_whose_type_is_not_known_is_a_gap(tmp_path: Path) -> None:
+    assert live(tmp_path, COMPRESSED.replace("compressed", "draco"), DECLARED).problems
+
+
+def test_without_a_launch_the_parameter_of_transport_hints_is_a_gap(tmp_path: Path) -> None:
+    found = infer(tmp_path, HINTED)
+    assert "image_raw" in names(found)
+    assert any("depends on parameter image_transport" in why for why in gaps(found))
 
 
 def test_a_resolved_name_is_the_name_as_launch_makes_it(tmp_path: Path) -> None:
