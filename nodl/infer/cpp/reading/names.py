@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -422,13 +423,16 @@ class Names:
     def foreign_header(self, name: str, file: FileIndex) -> str:
         """Return the header, of a library that was not reviewed, that a class may come from; empty if there is none.
 
-        A class in a namespace comes from a folder of that name, or else from a package that ``package.xml`` names.
+        A class in a namespace comes from a folder of that name, or else from a package that ``package.xml`` names. A
+        header that is called as the class is the one that a reader looks for, whatever else is not in reach.
         """
-        found = ""
+        found, alike = "", ""
         for each in sorted(self.visible(file.file)):
             index = self.files.get(each)
             for header in index.source.foreign if index is not None else ():
                 folder = header.partition("/")[0]
+                if _plain(header) == _plain(name.replace("::", "/")):
+                    alike = header
                 if "/" in header and folder not in KNOWN_HEADERS and not _INTERFACES.search(header):
                     if name.partition("::")[0] == folder:
                         return header
@@ -437,8 +441,8 @@ class Names:
         if not found and "::" in name and name.partition("::")[0] in self.depends:
             return f"package {name.partition('::')[0]}"
         if not found and re.search(r"(?:^|::)\w*Node$", name):
-            return "no header in reach defines it"
-        return found
+            found = "no header in reach defines it"
+        return found and (alike or found)
 
     # --- types ------------------------------------------------------------------------------------------
 
@@ -531,6 +535,11 @@ class Names:
 
 
 Declared = TypeVar("Declared")
+
+
+def _plain(path: str) -> str:
+    """Return the last part of a path without its ending, as ``AStarPlanner`` and ``a_star_planner.hpp`` share it."""
+    return os.path.splitext(os.path.basename(path))[0].replace("_", "").lower()
 
 
 def _extend(table: dict[str, list[Declared]], own: Mapping[str, list[Declared]]) -> None:

@@ -338,6 +338,16 @@ def test_a_class_whose_namespace_is_not_its_package_may_make_a_node(
     assert gaps(infer_paths([made])) == ([expected] if is_gap else [])
 
 
+@pytest.mark.parametrize("header", ["grid_planner.hpp", "planners/GridPlanner.h"])
+def test_a_gap_names_the_header_that_is_called_as_the_class(header: str, tmp_path: Path) -> None:
+    source = in_class(
+        "GridPlanner planner(3);", before=f'#include <eigen3/Eigen/Dense>\n#include "{header}"\n'
+    )
+    made = package(tmp_path / "demo", {"src/main.cpp": source}, depends=("rclcpp", "eigen3"))
+    expected = f"the class GridPlanner is not in reach ({header}): it may be a node or make one"
+    assert gaps(infer_paths([made])) == [expected]
+
+
 UNFOLLOWED = {
     "a fold over a pack": (
         'each("b", "c");',
