@@ -19,6 +19,7 @@ from enclave_launch.diagnostics.enclaves import (
 )
 from enclave_launch.diagnostics.evaluation import parameters_unknown
 from enclave_launch.diagnostics.permissions import (
+    configuration_unused,
     descriptions_differ,
     library_version,
     manifest_lacks,
@@ -133,6 +134,8 @@ def _incomplete(nodes: Iterable[RunningNode]) -> Iterator[Diagnostic]:
     for node in nodes:
         for why in node.interface.incomplete:
             yield recording_incomplete(node.fqn, why, str(node.interface.source), node.location)
+        for why in node.interface.unused_configuration:
+            yield configuration_unused(node.fqn, why, node.location)
 
 
 def _alike(container: str, processes: Iterable[PlannedProcess]) -> tuple[str, ...]:

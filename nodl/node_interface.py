@@ -81,6 +81,7 @@ class NodeInterface(NamedTuple):
     and remap it and give it parameters; ``None``: not known. ``parameter_services``: the program does not switch them
     off. ``depends``: what varies with its start. ``runs``: of a recorded node, how many it was seen in; ``incomplete``:
     why they may not have shown all of it. ``parameters_complete``: its description says that ``parameters`` lists all.
+    ``unused_configuration``: what the program does not take of the files that it is given, and why.
     """
 
     package: str | None
@@ -102,6 +103,7 @@ class NodeInterface(NamedTuple):
     runs: int = 0
     incomplete: tuple[str, ...] = ()
     parameters_complete: bool = False
+    unused_configuration: tuple[str, ...] = ()
 
 
 class ManifestNode(NamedTuple):

@@ -47,6 +47,7 @@ class Code(str, Enum):
     PROGRAM_NOT_EXECUTABLE = "program-not-executable", "A program that launch would start does not exist"
     # of interfaces and permissions
     ACTION_REMAP_IDLE = "action-remap-idle", "A remap rule for an action has no effect in this distribution"
+    CONFIGURATION_UNUSED = "configuration-unused", "A program ignores a configuration file, or a part of it"
     DESCRIPTIONS_DIFFER = (
         "descriptions-differ",
         "The source of a program and the library differ",

@@ -90,6 +90,11 @@ def recording_incomplete(node: str, why: str, manifest: str, place: SourceLocati
     )
 
 
+def configuration_unused(node: str, why: str, place: SourceLocation) -> Diagnostic:
+    """Warn that a program does not take a configuration, or a part of it, as the user wrote it."""
+    return Diagnostic(Code.CONFIGURATION_UNUSED, node, f"node {node}: {why}", place)
+
+
 def action_remap_idle(node: str, rule: str, action: str, distro: str, place: SourceLocation) -> Diagnostic:
     """Warn that a rule for an action's name changes nothing before a release remaps whole actions."""
     text = (

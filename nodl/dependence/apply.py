@@ -61,7 +61,10 @@ def applied(interface: NodeInterface, situation: Situation, documents: Documents
     work = _Application(interface, situation, documents)
     work.describe(interface, "", (), 0)
     result = interface._replace(
-        endpoints=tuple(dict.fromkeys(work.endpoints)), gaps=tuple(dict.fromkeys(work.gaps)), depends=None
+        endpoints=tuple(dict.fromkeys(work.endpoints)),
+        gaps=tuple(dict.fromkeys(work.gaps)),
+        depends=None,
+        unused_configuration=tuple(work.unused_configuration),
     )
     return Applied(result, tuple(work.further))
 
@@ -87,6 +90,7 @@ class _Application:
         self.endpoints: list[Endpoint] = []
         self.gaps: list[Gap] = []
         self.further: list[NodeInterface] = []
+        self.unused_configuration: list[str] = []
 
     def describe(
         self,
@@ -241,6 +245,7 @@ class _Application:
         found = read_configuration(configuration.kind, file or "", self._situation, by.source)
         self.endpoints.extend(found.endpoints)
         self.gaps.extend(found.gaps)
+        self.unused_configuration.extend(found.unused)
         for name in found.nodes:
             described = self._documents.named(configuration.document)
             if described is None:

@@ -307,10 +307,22 @@ def test_rviz_without_a_file_has_that_of_the_user_else_its_own_default(
     of_user.write_text(RVIZ.format(more=""))
     assert allowed(launch(without), "publish") == ["/goal"]
     assert allowed(launch(not_there), "publish") == default
+    told = "there is no file /missing-file.rviz: rviz2 takes its default configuration"
+    assert told in " ".join(each.text for each in launch(not_there).warnings)
+    assert "rviz2 takes" not in " ".join(each.text for each in launch(without).warnings)
     of_missing_package = (
         '<node pkg="rviz2" exec="rviz2" args="-d /missing/my_robot/share/my_robot/view.rviz"/>'
     )
     assert "there is no such file" in problems(launch(of_missing_package))
+
+
+def test_a_display_without_a_class_is_none_and_that_is_said(launch: Launch, tmp_path: Path) -> None:
+    file = tmp_path / "view.rviz"
+    file.write_text(RVIZ.format(more="- {Type: rviz_default_plugins/Path, Topic: /path}"))
+    plan = launch(f'<node pkg="rviz2" exec="rviz2" args="-d {file}"/>')
+    assert "/path" not in allowed(plan, "subscribe") and not plan.problems
+    told = f"{file}:9: rviz2 loads nothing for a display without Class"
+    assert told in " ".join(each.text for each in plan.warnings)
 
 
 def test_displays_and_panels_of_other_packages_are_described_by_documents(

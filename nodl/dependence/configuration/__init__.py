@@ -40,6 +40,8 @@ def read_configuration(kind: str, file: str, situation: Situation, place: Source
         return of_robot_description(situation.launched.robot_description, place, situation.distro)
     if kind == "rviz" and not file:
         file = os.path.expanduser("~/.rviz2/default.rviz")  # rviz_common: visualization_frame.cpp
+        if not os.path.isfile(file):
+            return rviz.default(SourceRef(file))._replace(unused=())  # the launch asks for no file
     if not file:
         return Configured(
             gaps=(Gap(place, f"launch names no {kind} file, from which its topics would follow"),)

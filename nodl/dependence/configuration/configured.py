@@ -28,13 +28,14 @@ class Configured(NamedTuple):
     """The contents of a configuration file. ``nodes``: names of further nodes that the program makes, of which nothing
     else is known to differ.
 
-    ``plugins``: what documents describe, if they do.
+    ``plugins``: what documents describe, if they do. ``unused``: what the tool does not take as it is written, and why.
     """
 
     endpoints: tuple[Endpoint, ...] = ()
     gaps: tuple[Gap, ...] = ()
     nodes: tuple[str, ...] = ()
     plugins: tuple[ConfiguredPlugin, ...] = ()
+    unused: tuple[str, ...] = ()
 
 
 def collected(parts: Iterable[Endpoint | Gap]) -> Configured:

@@ -2,8 +2,9 @@
 
 A display that is switched off counts too: the file offers it, one click of the user starts it. Classes of other
 packages are plugins for a document to describe; their properties are the parameters there, blanks written as ``_``.
-Classes ``rviz/...``, in files from ROS 1, exist in no package of ROS 2: rviz2 loads nothing for them. Source: ros2/rviz
-jazzy, rviz_default_plugins (displays, tools), rviz_common (display_group.cpp, failed_display.cpp).
+Classes ``rviz/...``, in files from ROS 1, exist in no package of ROS 2: rviz2 loads nothing for them, nor for what has
+no class. Source: ros2/rviz jazzy, rviz_default_plugins (displays, tools), rviz_common (display_group.cpp,
+failed_display.cpp, tool_manager.cpp).
 """
 
 from __future__ import annotations
@@ -68,7 +69,8 @@ def default(place: SourceRef) -> Configured:
     """
     note = f"the default configuration of rviz2, as {place.file} does not exist"
     made = (endpoint_named(_PUBLISH, name, kind, place, note) for name, kind in _TOPICS_OF_DEFAULT.items())
-    return Configured(tuple(each for each in made if isinstance(each, Endpoint)))
+    unused = f"there is no file {place.file}: rviz2 takes its default configuration"
+    return Configured(tuple(each for each in made if isinstance(each, Endpoint)), unused=(unused,))
 
 
 def of_file(root: YamlValue, distro: str) -> Configured:
@@ -83,7 +85,8 @@ def of_file(root: YamlValue, distro: str) -> Configured:
         for panel in root.mappings("Panels"):
             reading.panel(panel)
     endpoints = tuple(dict.fromkeys(reading.endpoints))
-    return Configured(endpoints, tuple(reading.gaps), plugins=tuple(reading.plugins))
+    unused = tuple(dict.fromkeys(reading.unused))
+    return Configured(endpoints, tuple(reading.gaps), plugins=tuple(reading.plugins), unused=unused)
 
 
 @dataclass(slots=True)
@@ -92,6 +95,7 @@ class _Reading:
     endpoints: list[Endpoint] = field(default_factory=list)
     gaps: list[Gap] = field(default_factory=list)
     plugins: list[ConfiguredPlugin] = field(default_factory=list)
+    unused: list[str] = field(default_factory=list)
 
     def display(self, display: YamlMap) -> None:
         kind = display.text("Class")
@@ -186,7 +190,9 @@ class _Reading:
             self.gaps.append(made)
 
     def _of_another_package(self, item: YamlMap, what: str, kind: str) -> None:
-        if not kind.startswith(_OF_ROS_1):
+        if not kind:
+            self.unused.append(f"{item.source}: rviz2 loads nothing for a {what} without Class")
+        elif not kind.startswith(_OF_ROS_1):
             shown_as = f"{what} of class {shown(kind)}"
             self.plugins.append(ConfiguredPlugin(shown_as, kind, item.source, dict(_properties(item, ""))))
 
