@@ -263,16 +263,23 @@ def store_attribute(run: Run, owners: Value, name: str, value: Value, node: ast.
             if owner is MODULES[0]:
                 run.gap(node, frame, "a variable of a module out of sys.modules is set")
             if isinstance(owner, External):
-                _patched(run, owner, name, node, frame)
+                _patched(run, owner, name, value, node, frame)
 
 
 _DESCRIBING = frozenset({"__name__", "__qualname__", "__doc__", "__module__", "__version__", "__wrapped__"})
 _UNMODELLED = frozenset({"unittest", "pytest", "tkinter"})  # whose objects hold attributes of the program
 
 
-def _patched(run: Run, owner: External, name: str, node: ast.AST, frame: Frame) -> None:
-    """Add a gap for a replaced attribute of a library's module or class, if its other users are modelled."""
+def _patched(run: Run, owner: External, name: str, value: Value, node: ast.AST, frame: Frame) -> None:
+    """Add a gap for a replaced attribute of a library's module or class, if its other users are modelled.
+
+    A setting of a library that is no part of Python (``torch.backends.cudnn.benchmark = True``) changes nothing of ROS,
+    nor does a type of Python that it has under its own name (``numpy.float = float``, which numpy 1.24 gave up).
+    """
     root = owner.path.partition(".")[0]
+    own = (*external(f"builtins.{name}"), *(atom for atom in value if is_constant(atom)))
+    if root not in sys.stdlib_module_names and all(atom in own for atom in value):
+        return
     modelled = root in sys.stdlib_module_names or run.tables.keeps_off(owner.path)
     if root in _UNMODELLED or not modelled:
         return

@@ -487,8 +487,15 @@ FUNCTIONS: dict[str, Model] = {
     **dict.fromkeys(("importlib.import_module", "importlib.reload"), import_dynamic),
 }
 
+
+def _object_setattr(run: Run, receiver: Instance, call: Call) -> Value:
+    """Set an attribute past the class's own ``__setattr__``, as a frozen dataclass does in ``__post_init__``."""
+    return _setattr(run, Call(call.args.preceded((receiver,)), call.node, call.frame))
+
+
 METHODS: dict[tuple[str, str], Method] = {
     **options.METHODS,
+    ("builtins.object", "__setattr__"): _object_setattr,
     ("threading.Thread", "__init__"): _thread_init,
     ("multiprocessing.Process", "__init__"): _thread_init,
 }

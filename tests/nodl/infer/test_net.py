@@ -191,3 +191,19 @@ def test_a_method_is_not_meant_by_a_name_alone(body: str, main: str, is_gap: boo
     program = PROGRAM.replace("def make(", f"{methods}\n        def make(")
     gaps = infer(program.format(body=body, main=main, before="pass")).gaps
     assert any("set() " in gap.why for gap in gaps) is is_gap
+
+
+SETTINGS = {
+    "numpy.float = float": 0,
+    "numpy.float = getattr": 1,
+    "numpy.float = N": 1,
+    "torch.backends.cudnn.benchmark = True": 0,
+    "torch.relu = rclpy.create_node": 1,
+    "json.dumps = None": 1,
+}
+
+
+@pytest.mark.parametrize("setting", SETTINGS)
+def test_a_setting_of_a_library_is_no_gap_and_a_function_put_into_it_is(setting: str, infer: Infer) -> None:
+    found = _gaps(infer, "pass", before=f"import json, numpy, torch\n    class N: pass\n    {setting}")
+    assert len([why for why in found if "is replaced" in why]) == SETTINGS[setting]
