@@ -169,8 +169,7 @@ class _Collector:
                 note = note or "from a default value in the source"
             self._name(endpoint, template, note)
             return
-        learnt = endpoint.note if self._node.interface.runs else ""
-        note = "; ".join(filter(None, (_parameter_note(template, self._node), learnt)))
+        note = "; ".join(filter(None, (_parameter_note(template, self._node), endpoint.note)))
         for filled in self._filled(template):
             if filled.is_literal:
                 self._name(endpoint, filled, note)

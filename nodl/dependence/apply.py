@@ -282,6 +282,8 @@ def _varied(
 ) -> Iterator[Endpoint]:
     if variation.each:
         notes = (f"entry of {variation.each}", *notes)
+    if endpoint.note:
+        notes = (endpoint.note, *notes)
     for item in _repeated(variation.each, scope):
         if not scope.holds(variation.when, item):
             continue

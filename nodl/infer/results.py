@@ -14,6 +14,7 @@ from nodl.node_interface import Certainty, ClientLibrary, Endpoint, Gap, NodeInt
 from nodl.ros_arguments import parse_ros_arguments
 
 MAX_ALTERNATIVES = 64
+UNDECIDED = "made only under a condition that is not decided before the start"
 
 
 def interfaces_of(findings: Findings, origin: LaunchKey) -> list[NodeInterface]:

@@ -49,6 +49,7 @@ class AllocatedNode:
     names: Value = BOTTOM
     namespaces: Value = BOTTOM
     endpoints: dict[PossibleEndpoint, list[tuple[Condition, ...]]] = field(default_factory=dict)
+    unconditional: set[PossibleEndpoint] = field(default_factory=set)
     gaps: dict[tuple[SourceRef, str], None] = field(default_factory=dict)
     arguments: list[tuple[str | None, ...]] = field(default_factory=list)
     use_global_arguments: bool = True

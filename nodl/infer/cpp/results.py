@@ -10,7 +10,7 @@ from nodl.infer.cpp.entry import FixedMapping
 from nodl.infer.cpp.findings import AllocatedNode, Condition, PossibleEndpoint
 from nodl.infer.cpp.program import ProgramFindings
 from nodl.infer.cpp.running.values import NodeNamePart, Text, Value, concatenated, plain
-from nodl.infer.results import certainty_of, own_name
+from nodl.infer.results import UNDECIDED, certainty_of, own_name
 from nodl.infer.start import Start
 from nodl.name_template import NameTemplate, ParameterPart, Part, UnknownPart, melted
 from nodl.node_interface import (
@@ -159,7 +159,14 @@ def _texts(value: Value, record: AllocatedNode) -> list[str]:
 
 def _endpoint(found: PossibleEndpoint, record: AllocatedNode) -> list[Endpoint]:
     return [
-        Endpoint(found.kind, template, found.type, found.source, _certainty(template, found))
+        Endpoint(
+            found.kind,
+            template,
+            found.type,
+            found.source,
+            _certainty(template, found),
+            note="" if found in record.unconditional else UNDECIDED,
+        )
         for template in _templates(found.name, record)
     ]
 

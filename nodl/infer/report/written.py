@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
 from enclave_common.terminal import json_text, printable
+from nodl.infer.results import UNDECIDED
 from nodl.infer.system import InferredSystem
 from nodl.name_template import NameTemplate, UnknownPart
 from nodl.names import InvalidNameError, expand_name
@@ -28,6 +29,7 @@ class ExpandedInterface(NamedTuple):
     type: str
     certainty: Certainty
     source: SourceRef
+    note: str
 
 
 class ExpandedNode(NamedTuple):
@@ -99,7 +101,11 @@ def _expanded(endpoint: Endpoint, node: NodeInterface) -> Iterator[tuple[Expande
         except InvalidNameError as error:
             yield None, f"{kind}: {error}"
             continue
-        yield ExpandedInterface(endpoint.kind, name, endpoint.type, endpoint.certainty, endpoint.source), why
+        note = endpoint.note if endpoint.name == endpoint.name.unconditional else UNDECIDED
+        yield (
+            ExpandedInterface(endpoint.kind, name, endpoint.type, endpoint.certainty, endpoint.source, note),
+            why,
+        )
 
 
 def _why(template: NameTemplate) -> str:
@@ -147,6 +153,7 @@ def _interface(interface: ExpandedInterface) -> dict[str, object]:
         "certainty": interface.certainty.value,
         "file": interface.source.file,
         "line": interface.source.line,
+        **({"note": interface.note} if interface.note else {}),
     }
 
 
@@ -158,7 +165,11 @@ def to_text(system: ExpandedSystem) -> str:
         lines.append(f"{node.namespace.rstrip('/')}/{node.name}{held}  ({node.interface.source})")
         for interface in node.interfaces:
             kind = interface.kind.value.replace("_", " ")
-            note = "" if interface.certainty.value == "exact" else f"  [{interface.certainty.value}]"
+            said = (
+                "" if interface.certainty is Certainty.EXACT else interface.certainty.value,
+                interface.note,
+            )
+            note = "".join(f"  [{each}]" for each in said if each)
             shown_type = f" [{interface.type}]" if interface.type else ""
             lines.append(f"  {kind:15} {interface.name}{shown_type}{note}  {interface.source}")
     if system.unresolved:

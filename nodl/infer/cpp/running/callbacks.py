@@ -167,11 +167,13 @@ def _call(rounds: _Rounds, key: Key, atom: object, frame: Frame, certainly: bool
 
 
 def _run(run: Machine, atom: object, frame: Frame) -> None:
+    skips, run.skips = run.skips, 0
     if isinstance(atom, Lambda):
         call_lambda(run, atom, [], atom.node, atom.frame)
     elif isinstance(atom, Bound):
         given = atom.fixed or [unknown(f"the argument {p.name}") for p in atom.function.parameters]
         invoke(run, atom.function, atom.this, given, atom.function.node, frame, ())
+    run.skips = skips
 
 
 def _matters(rounds: _Rounds, atom: object) -> bool:

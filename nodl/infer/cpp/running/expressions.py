@@ -368,7 +368,7 @@ def _logical(run: Machine, either: bool, left: Value, right_node: Node | None, f
         found.append(run.evaluate(right_node, frame))
         return NEXT
 
-    run.branches([second, lambda: NEXT])
+    run.branches([second, lambda: NEXT], tested=True)
     right = decided(run, found[0])
     return (either,) if right is either else unknown("a condition")
 
@@ -497,7 +497,7 @@ def conditional(run: Machine, node: Node, frame: Frame) -> Value:
         return NEXT
 
     doubt = in_doubt(condition)
-    run.branches([lambda: side(sides[True]), lambda: side(sides[False])], doubt=doubt)
+    run.branches([lambda: side(sides[True]), lambda: side(sides[False])], tested=True, doubt=doubt)
     return join_in_doubt(found, doubt) if doubt else join(*found)
 
 

@@ -111,7 +111,7 @@ def call_values(run: Machine, callee: Value, values: Sequence[Value], node: Node
             found.append(call_values(run, (atom,), values, node, frame))
             return NEXT
 
-        run.branches([partial(one, atom) for atom in callee])
+        run.branches([partial(one, atom) for atom in callee], tested=True)
         return join(*found)
     for atom in callee:
         if isinstance(atom, Lambda):
@@ -270,7 +270,7 @@ def _any_of(
         made.append(_count(run) - before)
         return NEXT
 
-    run.branches([partial(once, each) for each in functions], doubt=doubt)
+    run.branches([partial(once, each) for each in functions], tested=True, doubt=doubt)
     if any(each.keys() != made[0].keys() for each in made):
         run.gap(node, frame, doubt)
     return join_in_doubt(found, doubt)
@@ -390,7 +390,7 @@ def _seen_once(
     frame: Frame,
 ) -> Sequence[Value]:
     """Return the arguments; nothing is known of a text or number that the code sees under two names, and writes."""
-    given = [addressed(each) for each in children(field_of(node, "arguments"))]
+    given = [_aliased(addressed(each), frame) for each in children(field_of(node, "arguments"))]
     named = {
         at: name
         for at, (parameter, argument, value) in enumerate(zip(parameters, given, values, strict=False))
@@ -411,6 +411,13 @@ def _seen_once(
             if parameter.written_back:
                 forget(run, given[at] or node, frame, why, told=False)
     return found
+
+
+def _aliased(argument: Node | None, frame: Frame) -> Node | None:
+    """Return the variable that an argument is, or is a reference to."""
+    while (target := frame.aliases.get(text(argument))) is not None:
+        argument = target
+    return argument
 
 
 _ELEMENT = re.compile(r"\[|[.>](?:at|front|back|data|begin)\(")

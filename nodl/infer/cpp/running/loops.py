@@ -131,7 +131,9 @@ def _over(
                 held.update(found)
                 return outcome
 
+            run.skips += not exact
             outcome = once() if exact else run.branches([once, lambda: NEXT])
+            run.skips -= not exact
             returns |= outcome & RETURN
             if not outcome & NEXT:
                 break
@@ -315,7 +317,9 @@ def _repeated(
             condition_of(run, condition, frame)
             return outcome
 
+        run.skips += 1
         returns |= run.branches([once, lambda: NEXT]) & RETURN
+        run.skips -= 1
         moved = [*run.moved(mark, loop.steps)]
         if not moved:
             break

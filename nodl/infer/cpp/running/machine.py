@@ -133,6 +133,7 @@ class Machine:
         self.calls_back = False  # callbacks run: at the program's end, or where it spins and goes on
         self.spins_beside = False  # a thread runs callbacks while the program goes on
         self.undecided = 0  # how many conditions that are not known decide whether this runs
+        self.skips = 0  # how many loops, and ways out before it, may leave this out
         self.consulted: dict[str, object] = {}  # parameters whose value decided what is made
         self.from_default: dict[str, None] = {}  # those of them that were decided without a launch
         self.unset: dict[tuple[str, int], tuple[SourceRef, str, str]] = {}  # calls on pointers to nothing
@@ -350,10 +351,14 @@ class Machine:
         atoms = concatenated(name or unknown("a name that is never set"))
         if self.calls_back and self.undecided and sum(plain(atom) is not None for atom in atoms) > 1:
             atoms = unknown("which of several names goes with a condition that callbacks change")
-        for atom in without_covered(atoms):
+        names = without_covered(atoms)
+        certain = len(names) == 1 and not self.undecided and not self.skips
+        for atom in names:
             parts = atom.parts if isinstance(atom, Text) else (UnknownPart(atom.why),)
             found = PossibleEndpoint(kind, Text(parts), type_name, source, follows=follows, when=when)
             record.endpoints.setdefault(found, []).append(conditions)
+            if certain:
+                record.unconditional.add(found)
 
     def later(self, values: Iterable[Value], frame: Frame) -> None:
         """Store closures that code outside of the program holds: they may be called at any time."""

@@ -108,15 +108,17 @@ _inner_block = in_a_block(block)
 
 def sequence(run: Machine, listed: list[Node], frame: Frame) -> int:
     """Runs statements until one certainly leaves; those behind it are dead. Gives every way out."""
-    outcome = 0
+    outcome, skips = NEXT, run.skips
     for index, child in enumerate(listed):
         result = run.execute(child, frame)
-        outcome |= result & ~NEXT
+        outcome = (outcome & ~NEXT) | result
         if not result & NEXT:
             for rest in listed[index + 1 :]:
                 run.kill(rest, frame, "it stands behind a return, break or throw")
-            return outcome
-    return outcome | NEXT
+            break
+        run.skips += result != NEXT
+    run.skips = skips
+    return outcome
 
 
 @statement("expression_statement")
@@ -288,7 +290,7 @@ def try_statement(run: Machine, node: Node, frame: Frame) -> int:
     after: list[Callable[[], int]] = [lambda: outcome]
     doubt = "" if outcome & NEXT else "what is left where an exception was thrown"
     caught = (partial(_caught, run, clause, held, doubt, frame) for clause in catches)
-    return run.branches([*after, *caught])
+    return run.branches([*after, *caught], tested=True)
 
 
 def _caught(run: Machine, clause: Node, held: Changes, doubt: str, frame: Frame) -> int:

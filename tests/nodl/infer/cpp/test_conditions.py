@@ -1,12 +1,16 @@
-"""What ``exact`` says of an interface under a condition: its name, in C++ as in Python; not that every run makes it."""
+"""What ``exact`` says of an interface under a condition: its name, in C++ as in Python; not that every run makes it.
+In C++ its note says so."""
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
 
 from nodl.infer import InferredSystem, infer_paths
+from nodl.infer.report.written import expand, to_json, to_text
+from nodl.infer.results import UNDECIDED as UNDECIDED_NOTE
 from nodl.node_interface import Certainty
 from tests.nodl.infer.cpp.workspace import gaps, in_class, infer
 
@@ -21,6 +25,20 @@ UNDECIDED = {
     "a switch": ('switch (std::rand()) { case 1: pub("a"); break; case 2: pub("b"); }', {"a", "b"}),
     "a loop": ('while (std::rand() > 5) { pub("a"); }', {"a"}),
     "a second operand": ('std::rand() > 5 && (pub("a"), true);', {"a"}),
+    "behind a way out": ('if (std::rand() > 5) { return; } pub("a");', {"a"}),
+    "behind the end of a turn": (
+        'for (int i = 0; i < 2; ++i) { if (std::rand() > 5) { continue; } pub("a"); }',
+        {"a"},
+    ),
+    "a parameter": ('if (declare_parameter<bool>("on", true)) { pub("a"); }', {"a"}),
+}
+DECIDED = {
+    "before a way out": ('pub("a"); if (std::rand() > 5) { return; }', {"a"}),
+    "behind two sides": ('if (std::rand() > 5) { std::rand(); } else { std::rand(); } pub("a");', {"a"}),
+    "a known condition": ('if (1 < 2) { pub("a"); }', {"a"}),
+    "a known number of turns": ("for (int i = 0; i < 2; ++i) { pub(std::to_string(i)); }", {"0", "1"}),
+    "once certainly": ('pub("a"); if (std::rand() > 5) { pub("a"); }', {"a"}),
+    "a callback": ('create_wall_timer(1s, [this]() { pub("a"); });', {"a"}),
 }
 
 
@@ -32,7 +50,32 @@ def certainties(system: InferredSystem) -> dict[str, Certainty]:
 def test_under_an_undecided_condition_the_name_is_exact(body: str, made: set[str], tmp_path: Path) -> None:
     system = infer(tmp_path, in_class(body, PUB))
     assert certainties(system) == dict.fromkeys(made, Certainty.EXACT)
+    assert {e.note for node in system.nodes for e in node.endpoints} == {UNDECIDED_NOTE}
     assert gaps(system) == []
+
+
+def test_the_note_is_in_what_is_written_down(tmp_path: Path) -> None:
+    system = expand(infer(tmp_path, in_class('pub("a"); if (std::rand() > 5) { pub("b"); }', PUB)))
+    (node,) = json.loads(to_json(system))["nodes"]
+    assert [each.get("note") for each in node["interfaces"]] == [None, UNDECIDED_NOTE]
+    a, b = to_text(system).splitlines()[1:]
+    assert "[std_msgs/msg/String]  /" in a
+    assert f"[std_msgs/msg/String]  [{UNDECIDED_NOTE}]  /" in b
+
+
+def test_a_name_from_python_that_a_parameter_decides_says_the_same(tmp_path: Path) -> None:
+    program = tmp_path / "program.py"
+    body = "if node.declare_parameter('on', True).value:\n    pub('a')\npub('b')"
+    program.write_text(_PYTHON + body, encoding="utf-8")
+    (node,) = expand(infer_paths([program])).nodes
+    assert [(each.name, each.note) for each in node.interfaces] == [("/a", UNDECIDED_NOTE), ("/b", "")]
+
+
+@pytest.mark.parametrize(("body", "made"), DECIDED.values(), ids=DECIDED)
+def test_without_one_it_has_no_note(body: str, made: set[str], tmp_path: Path) -> None:
+    system = infer(tmp_path, in_class(body, PUB))
+    assert certainties(system) == dict.fromkeys(made, Certainty.EXACT)
+    assert {e.note for node in system.nodes for e in node.endpoints} == {""}
 
 
 _PYTHON = """\

@@ -311,3 +311,19 @@ def test_what_a_function_writes_behind_a_pointer_into_an_array_is_not_known(tmp_
     for call, made in (("up(a + 1, 1);", ["?"]), ("", ["a"])):
         body = f'std::string a[] = {{"z", "a"}}; {call} {use}'
         assert names(infer(tmp_path / str(len(call)), in_class(body, before=before))) == made
+
+
+TWICE = {
+    "twice": "both(t, t);",
+    "and by a reference to it": "std::string & r = t; both(r, t);",
+    "by two references to it": "std::string & r = t; std::string & q = r; both(q, r);",
+}
+
+
+@pytest.mark.parametrize("body", TWICE.values(), ids=TWICE)
+def test_a_variable_that_a_function_gets_twice_is_open(body: str, tmp_path: Path) -> None:
+    both = "void both(std::string & a, const std::string & b) { a += b; a += b; }\n"
+    use = 'std::string t = "x"; %s create_publisher<std_msgs::msg::String>(t, 1);'
+    assert names(infer(tmp_path, in_class(use % body, before=both))) == ["?"]
+    other = use % 'std::string u = "y"; std::string & r = u; both(t, r);'
+    assert names(infer(tmp_path / "other", in_class(other, before=both))) == ["xyy"]
