@@ -17,6 +17,7 @@ from nodl.infer.cpp.running.values import (
     holds_callable,
     join,
     join_in_doubt,
+    left,
     lost,
 )
 
@@ -84,7 +85,7 @@ class AbstractStore:
                     kept[cell] = value
             if self.log.noted is not None:
                 self.log.noted.update({key: said for key, said in noted.items() if key not in self.log.noted})
-        return Reads(kept, noted)
+        return Reads(kept, left(noted))
 
     def saw(self, reads: Reads) -> None:
         """Tell who watches that all this was read."""

@@ -30,6 +30,7 @@ BOTTOM: Value = ()
 
 Noted = dict[tuple["Notes", str], object]  # what was asked for, and the answer at the first time
 _ABSENT = object()
+_OWN = object()  # written before it was read: what was there before does not matter
 
 
 class NoteLog:
@@ -55,6 +56,8 @@ class Notes:
         return self.get(name)
 
     def __setitem__(self, name: str, value: Any) -> None:
+        if self._log is not None and self._log.noted is not None:
+            self._log.noted.setdefault((self, name), _OWN)
         self._values[name] = value
 
     def update(self, **values: Any) -> None:
@@ -65,6 +68,14 @@ class Notes:
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._values)
+
+
+def left(noted: Noted) -> Noted:
+    """Return the notes with what code left in those that it wrote before it read them."""
+    return {
+        (notes, name): notes._values.get(name, _ABSENT) if said is _OWN else said
+        for (notes, name), said in noted.items()
+    }
 
 
 def hold(noted: Noted) -> bool:

@@ -129,3 +129,16 @@ def test_a_callback_runs_that_calls_a_function_kept_in_a_variable(tmp_path: Path
     use = f"{made} t_ = create_wall_timer(1s, [this] {{ d_.poll(); }});"
     system = infer(tmp_path, in_class(use, "Driver d_; rclcpp::TimerBase::SharedPtr t_;", driver))
     assert (names(system), gaps(system)) == (["late"], [])
+
+
+def test_a_callback_that_makes_structures_in_a_loop_comes_to_an_end(tmp_path: Path) -> None:
+    """Each turn makes another one of them; what the last turn left there is not what the next round begins with."""
+    source = in_class(
+        "create_wall_timer(std::chrono::seconds(1), [this] { tick(); });",
+        "void tick() { std::vector<Point> all; for (int i = 0; i < size_; ++i) { all.push_back({given_[i], i}); }"
+        ' if (last_ == 0) create_publisher<std_msgs::msg::String>("a", 1); last_ = static_cast<int>(all.size()); }'
+        " std::vector<double> given_; int last_ = 0; int size_ = 360;",
+        before="struct Point { double x = 0; int index = -1; };\n",
+    )
+    system = infer(tmp_path, source)
+    assert (names(system), gaps(system)) == (["a"], [])
