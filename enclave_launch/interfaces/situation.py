@@ -13,6 +13,7 @@ from enclave_launch.policy.program_inputs import (
     environment_inputs,
     own_words,
     program_inputs,
+    words_of,
 )
 from enclave_launch.policy.running_node import (
     RunningNode,
@@ -107,6 +108,10 @@ class StartedProgram:
             given = environment_inputs(self.process) if self.process else ProgramInputs()
         return {name: given.values.get(name) for name in names if given.is_known(name)}
 
+    def words(self) -> tuple[str, ...] | None:
+        """Return the words that the program gets; ``None`` for what a container loads."""
+        return tuple(words_of(self._started)) if isinstance(self._started, ResolvedProcess) else None
+
 
 class StartedPlugin:
     """A plugin that a node in ``situation``, one of ``program``, loads under a name."""
@@ -136,3 +141,7 @@ class StartedPlugin:
     def inputs(self, names: Iterable[str]) -> Mapping[str, str | None]:
         """Return what launch gives the options and variables of the program that loads it."""
         return self._program.inputs(names)
+
+    def words(self) -> tuple[str, ...] | None:
+        """Return None: a plugin has no command line of its own."""
+        return None

@@ -71,8 +71,13 @@ def _file_name(word: str) -> str:
     return word.rstrip("/").rpartition("/")[2]
 
 
-def own_words(process: ResolvedProcess) -> Sequence[str]:
-    """Return the words after the executable that are no ROS arguments."""
+def words_of(process: ResolvedProcess) -> Sequence[str]:
+    """Return the words after the executable."""
     program = _file_name(process.executable)
     start = next((i for i, word in enumerate(process.cmd) if _file_name(word) == program), 0)
-    return words_without_ros_arguments(process.cmd[start + 1 :])
+    return process.cmd[start + 1 :]
+
+
+def own_words(process: ResolvedProcess) -> Sequence[str]:
+    """Return the words after the executable that are no ROS arguments."""
+    return words_without_ros_arguments(words_of(process))

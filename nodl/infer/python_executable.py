@@ -63,7 +63,7 @@ def _inferred(
 ) -> tuple[tuple[NodeInterface, ...], str, bool]:
     def answered(launch: ProgramLaunch, lost: tuple[Gap, ...] | None) -> InferredProgram:
         nodes = [(name, sorted(each.parameters.items()), each[1:]) for name, each in launch.nodes.items()]
-        said = (nodes, sorted(launch.inputs.items()))
+        said = (nodes, sorted(launch.inputs.items()), launch.words)
         cached = CachedAnswer(program, (path, key.package, key.executable, target, said))
         answer: InferredProgram | None = cached.find()
         if answer is None:
@@ -78,7 +78,7 @@ def _inferred(
         return found.interfaces, found.why, False
     names = dict.fromkeys(node.name for node in found.interfaces if node.name is not None)
     nodes = {name: LaunchedNode(start.parameters(name), *start.final_name(name)) for name in names}
-    settled = answered(ProgramLaunch(nodes, start.inputs(found.inputs)), found.lost)
+    settled = answered(ProgramLaunch(nodes, start.inputs(found.inputs), start.words()), found.lost)
     if not settled.interfaces or settled.open_places > found.open_places:
         return found.interfaces, found.why, False
     return settled.interfaces, "", True

@@ -27,13 +27,15 @@ class LaunchedNode(NamedTuple):
 
 
 class ProgramLaunch(NamedTuple):
-    """One launch of a program: its nodes, by the names in the source, and its options and variables.
+    """One launch of a program: its nodes, by the names in the source, its variables and its command line.
 
     ``inputs``: by name (``--fps``, ``$ROBOT``), ``None`` for one that has its default; any other stays open.
+    ``words``: what stands behind the executable; ``None`` if that is not known.
     """
 
     nodes: Mapping[str, LaunchedNode] = MappingProxyType({})
     inputs: Mapping[str, str | None] = MappingProxyType({})
+    words: tuple[str, ...] | None = None
 
 
 NO_LAUNCH = ProgramLaunch()
@@ -52,6 +54,10 @@ class Start(Protocol):
 
     def inputs(self, names: Iterable[str]) -> Mapping[str, str | None]:
         """Return what launch gives options and variables (see ``ProgramLaunch``)."""
+        ...
+
+    def words(self) -> tuple[str, ...] | None:
+        """Return the words behind the executable; ``None`` if they are not known."""
         ...
 
 

@@ -164,6 +164,10 @@ class _RecordedStart(NamedTuple):
         """Return nothing: a record does not say what the command line and the environment were."""
         return {}
 
+    def words(self) -> tuple[str, ...] | None:
+        """Return None, for the same reason."""
+        return None
+
 
 @lru_cache(maxsize=4)
 def _sources(prefixes: tuple[str, ...], folders: tuple[str, ...]) -> SourcesInReach:

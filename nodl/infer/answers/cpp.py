@@ -43,6 +43,10 @@ class WatchedStart:
             self.asked.setdefault(_said(self._start, "input", name))
         return self._start.inputs(names)
 
+    def words(self) -> tuple[str, ...] | None:
+        """Return nothing: the command line of a C++ program is not followed."""
+        return None
+
 
 def _said(start: Start, what: str, node: str | None) -> Asked:
     """Return what a launch says of a node: of its ``parameters``, its final ``name``; or of an ``input``."""

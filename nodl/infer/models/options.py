@@ -1,10 +1,14 @@
-"""argparse: options of the command line, with what they are by default."""
+"""argparse: options of the command line, with what they are by default.
+
+In a launch ``nodl/infer/models/command_line.py`` says what they hold.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
-from nodl.infer.interpreter.run import Arguments, Call, Run
+from nodl.infer.interpreter.run import Call, Run
+from nodl.infer.models.command_line import DeclaredOption, read_words
 from nodl.infer.text import Input, Text, input_of
 from nodl.infer.values import (
     ANY,
@@ -19,16 +23,20 @@ from nodl.infer.values import (
     Unknown,
     Value,
     constant_strings,
-    external,
     join,
     join_all,
     sole,
     unknown,
 )
+from nodl.ros_arguments import words_without_ros_arguments
 
 PARSER = "argparse.ArgumentParser"
 NAMESPACE = "argparse.Namespace"
 _COUNT = "positional arguments"
+_DECLARED = "declared arguments"
+_HARMLESS = frozenset(
+    {"prog", "usage", "description", "epilog", "formatter_class", "add_help"}
+)  # of a parser
 _NOT_TOLD = unknown("which word of the command line it is")
 _TAKES_ROS_WORDS = "an option that ROS has, too"
 _ROS_WORDS = (
@@ -51,6 +59,7 @@ def made_parser(run: Run, call: Call) -> Value:
     parser = run.library_object(call, PARSER)
     inherits = "parents" in call.args.keywords
     run.state.store(parser, _COUNT, unknown("positional arguments of parents") if inherits else (0,))
+    run.state.store(parser, _DECLARED, ((),) if _HARMLESS.issuperset(call.args.keywords) else ANY)
     return (parser,)
 
 
@@ -59,18 +68,22 @@ def _add_argument(run: Run, parser: Instance, call: Call) -> Value:
     known = len(flags) == len(call.args.positional) and not call.args.more
     if not known or any(flag.startswith(_ROS_WORDS) for flag in flags):
         run.state.store(parser, _TAKES_ROS_WORDS, (True,))
+    before = sole(parser.cells.get(_DECLARED))
+    declared = DeclaredOption(tuple(flags), call.args.keywords)
+    if known and isinstance(before, tuple) and not call.args.more_keywords:
+        run.state.store(parser, _DECLARED, ((*before, declared),))
+    else:
+        run.state.store(parser, _DECLARED, ANY)
     if not flags:
         return ANY
     long = next((flag for flag in flags if flag.startswith("--")), flags[0])
     dest = sole(call.args.keywords.get("dest", (long.lstrip("-").replace("-", "_"),)))
     default = call.args.keywords.get("default", BOTTOM)
-    owner = parser.cells.get("parser", (parser,))[0]
-    assert isinstance(owner, Instance)
-    name = long if long.startswith("-") else _place(run, owner, long, call)
+    name = long if long.startswith("-") else _place(run, parser, long, call)
     run.options.declare(name, tuple(atom for atom in default if atom is not None))
     if isinstance(dest, str):
-        parsed, before = _parsed(run, name, call), owner.cells.get("dest " + dest)
-        run.state.store(owner, "dest " + dest, parsed if before in (None, parsed) else ANY)
+        parsed, earlier = _parsed(run, name, call), parser.cells.get("dest " + dest)
+        run.state.store(parser, "dest " + dest, parsed if earlier in (None, parsed) else ANY)
     return ANY
 
 
@@ -95,8 +108,6 @@ def _place(run: Run, parser: Instance, name: str, call: Call) -> str:
 
 def _parsed(run: Run, name: str, call: Call) -> Value:
     """Return what the option holds: its text, or whether a flag is there; unknown if it is made into anything else."""
-    if name in run.launch.inputs:
-        return _settled(run, name, call)
     given = call.args.keywords
     action, nargs = sole(given.get("action", ("store",))), sole(given.get("nargs", NONE))
     if action in ("store_true", "store_false"):
@@ -106,29 +117,14 @@ def _parsed(run: Run, name: str, call: Call) -> Value:
         flag = Input(name, run.options, None, (("given", (str(there), str(default))),))
         return (Text((flag,)),) if isinstance(default, bool) else BOOLEAN
     kept = all(isinstance(atom, External) and atom.path in _KEEP_TEXT for atom in given.get("type", BOTTOM))
-    run.asks_launch = run.asks_launch or not kept
-    if action != "store" or nargs not in (None, "?") or not kept:
-        return unknown(f"what is made of the command line option {name}")
-    return (Text((Input(name, run.options),)),)
-
-
-def _settled(run: Run, name: str, call: Call) -> Value:
-    """Return what the option holds in this launch."""
-    keywords, word = call.args.keywords, run.launch.inputs[name]
-    action, nargs = sole(keywords.get("action", ("store",))), sole(keywords.get("nargs", NONE))
-    if action in ("store_true", "store_false"):
-        there = action == "store_true"
-        return keywords.get("default", (not there,)) if word is None else (there,)
-    if action != "store" or nargs not in (None, "?") or (word == "" and nargs == "?"):
-        return unknown(f"what is made of the command line option {name}")
-    values = keywords.get("default", NONE) if word is None else (word,)
-    texts = tuple(atom for atom in values if isinstance(atom, str))
-    others = tuple(atom for atom in values if not isinstance(atom, str))
-    made = keywords.get("type", external("builtins.str"))
-    return join(run.call(made, Arguments([texts]), call.node, call.frame) if texts else BOTTOM, others)
+    if action == "store" and nargs in (None, "?") and kept:
+        return (Text((Input(name, run.options),)),)
+    run.asks_launch = True
+    return unknown(f"what is made of the command line option {name}")
 
 
 def _set_defaults(run: Run, parser: Instance, call: Call) -> Value:
+    run.state.store(parser, _DECLARED, ANY)
     for dest, value in call.args.keywords.items():
         cell = "dest " + dest
         option = input_of(sole(parser.cells.get(cell)))
@@ -139,17 +135,29 @@ def _set_defaults(run: Run, parser: Instance, call: Call) -> Value:
     return NONE
 
 
-def _parse_args(run: Run, parser: Instance, call: Call) -> Value:
+def _parse_args(run: Run, parser: Instance, call: Call, others_too: bool = False) -> Value:
     namespace = run.library_object(call, NAMESPACE)
     run.state.store(namespace, "parser", (parser,))
     given = call.args.at(0, "args") or NONE
     if any(isinstance(atom, Sequence) for atom in given):
         run.state.store(namespace, "[given]", given)
+    elif run.launch.words is not None:
+        whole = others_too and _is_whole(given)  # else words of ROS would end the program
+        words = run.launch.words if whole else words_without_ros_arguments(run.launch.words)
+        declared = sole(parser.cells.get(_DECLARED))
+        held = read_words(run, declared, words, call) if isinstance(declared, tuple) else {}
+        for dest, value in held.items():
+            run.state.store(namespace, "dest " + dest, value)
     return (namespace,)
+
+
+def _is_whole(given: Value) -> bool:
+    return all(atom is None or (isinstance(atom, Unknown) and atom.why == COMMAND_LINE) for atom in given)
 
 
 def _add_subparsers(run: Run, parser: Instance, call: Call) -> Value:
     run.state.store(parser, _COUNT, _NOT_TOLD)
+    run.state.store(parser, _DECLARED, ANY)
     return unknown("the sub-commands of a command line")
 
 
@@ -158,10 +166,9 @@ def _parse_known_args(run: Run, parser: Instance, call: Call) -> Value:
 
     argparse takes an abbreviated option for one of its own, and any word for a positional argument.
     """
-    namespace = _parse_args(run, parser, call)
+    namespace = _parse_args(run, parser, call, others_too=True)
     rest = unknown(COMMAND_LINE)
-    parsed = call.args.at(0, "args") or NONE
-    whole = all(atom is None or (isinstance(atom, Unknown) and atom.why == COMMAND_LINE) for atom in parsed)
+    whole = _is_whole(call.args.at(0, "args") or NONE)
     if not whole or parser.cells.get(_COUNT) != (0,) or _TAKES_ROS_WORDS in parser.cells:
         rest = run.sequence(call.node, "list", Items(None, rest))
     return run.tuple_of((namespace, rest))
@@ -169,6 +176,8 @@ def _parse_known_args(run: Run, parser: Instance, call: Call) -> Value:
 
 def namespace_attribute(run: Run, namespace: Instance, name: str) -> Value:
     """Return what ``args.<name>`` may be; anything if no parser declares it or the program passes the arguments."""
+    if "dest " + name in namespace.cells:
+        return namespace.cells["dest " + name] or unknown(f"the command line option {name}")
     parsers = (atom for atom in namespace.cells.get("parser", BOTTOM) if isinstance(atom, Instance))
     found = join_all(parser.cells.get("dest " + name, BOTTOM) for parser in parsers)
     if "[given]" in namespace.cells:  # not what launch writes on the command line, but a list of the program

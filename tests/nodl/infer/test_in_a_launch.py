@@ -540,15 +540,80 @@ def test_numbers_of_the_command_line_variables_and_lengths_decide(
     assert own - {"/rosout", "/parameter_events"} == published
 
 
-@pytest.mark.parametrize("words", ["-f 5", "--fp 5", "stray"])
-def test_an_option_that_the_command_line_may_set_unseen_decides_nothing(
-    words: str, launch: Launch, prefix: Path
-) -> None:
-    """``-f`` may be any option, argparse takes ``--fp`` for ``--fps``; a bare word is no option."""
+@pytest.mark.parametrize(("words", "fast"), [("-f 5", True), ("--fp 5", False), ("stray", True)])
+def test_an_option_is_read_as_argparse_reads_it(words: str, fast: bool, launch: Launch, prefix: Path) -> None:
+    """``-f`` is not declared, ``--fp`` is short for ``--fps``; a bare word is no option."""
     install_program(prefix, PYTHON + NUMBERS, "numbers")
     plan = launch(f'<launch><node pkg="demo" exec="numbers" args="{words}"/></launch>')
-    assert bool(plan.problems) is (words == "-f 5")
-    assert ("publish", "/fast") in permissions(plan)
+    assert not plan.problems
+    assert (("publish", "/fast") in permissions(plan)) is fast
+
+
+LISTS = """
+import argparse
+import rclpy
+from rclpy.utilities import remove_ros_args
+from std_msgs.msg import String
+parser = argparse.ArgumentParser({parser})
+parser.add_argument("topics", nargs="*")
+parser.add_argument("--robots", nargs="+", default=["base"], choices=["base", "arm", "head"])
+parser.add_argument("-s", "--sensor", action="append", dest="sensors", default=[])
+parser.add_argument("--rear", nargs="?", const="rear", default="front")
+given, _ = parser.{read}
+rclpy.init()
+node = rclpy.create_node("lists")
+for name in given.topics + given.robots + given.sensors + [given.rear]:
+    node.create_publisher(String, name, 10)
+rclpy.spin(node)
+"""
+
+
+@pytest.mark.parametrize(
+    ("words", "published"),
+    [
+        ("", {"/base", "/front"}),
+        ("a b", {"/a", "/b", "/base", "/front"}),
+        ("--robots arm head", {"/arm", "/head", "/front"}),
+        ("a -s gps --sensor=imu --rear", {"/a", "/base", "/gps", "/imu", "/rear"}),
+        ("--rear back -- --odd", {"/base", "/back", "/_odd"}),
+    ],
+)
+def test_lists_of_words_of_the_command_line_are_names(
+    words: str, published: set[str], launch: Launch, prefix: Path
+) -> None:
+    program = LISTS.format(parser="", read="parse_known_args(remove_ros_args()[1:])")
+    install_program(
+        prefix, PYTHON + program.replace("String, name", "String, name.replace('--', '_')"), "lists"
+    )
+    given = f'args="{words}"' if words else ""
+    plan = launch(f'<launch><node pkg="demo" exec="lists" {given}/></launch>')
+    assert [str(problem) for problem in plan.problems] == []
+    own = {name for operation, name in permissions(plan) if operation == "publish"}
+    assert own - {"/rosout", "/parameter_events"} == published
+
+
+@pytest.mark.parametrize(
+    ("parser", "read"),
+    [
+        ("fromfile_prefix_chars='@'", "parse_known_args()"),
+        ("", "parse_known_args(['a', 'b'])"),
+    ],
+)
+def test_words_that_are_not_only_the_launchs_are_gaps(
+    parser: str, read: str, launch: Launch, prefix: Path
+) -> None:
+    install_program(prefix, PYTHON + LISTS.format(parser=parser, read=read), "lists")
+    assert launch('<launch><node pkg="demo" exec="lists" args="@file"/></launch>').problems
+
+
+def test_argparse_that_is_given_the_words_of_ros_takes_them(launch: Launch, prefix: Path) -> None:
+    """``-r`` of the launch's remap rule is short for the program's own ``--rear`` where that is declared with it."""
+    program = LISTS.format(parser="", read="parse_known_args()").replace('"--rear"', '"-r", "--rear"')
+    install_program(prefix, PYTHON + program, "lists")
+    plan = launch('<launch><node pkg="demo" exec="lists" name="own"/></launch>')
+    own = {name for operation, name in permissions(plan) if operation == "publish"}
+    assert "/front" not in own
+    assert any("__node:=own" in str(problem) for problem in plan.problems)
 
 
 CONFIGURED = """
