@@ -11,7 +11,7 @@ from itertools import chain
 from typing import Any, Concatenate, NamedTuple, ParamSpec, TypeVar
 
 from nodl.infer.cpp.reading.declarations import Class, Field, FileIndex, Function, Global, Scope
-from nodl.infer.cpp.reading.known_headers import KNOWN_HEADERS
+from nodl.infer.cpp.reading.known_headers import ROS_LIBRARIES, is_reviewed
 from nodl.infer.cpp.reading.type_names import POINTER_MEMBERS, Type, split_type
 from nodl.infer.cpp.syntax import Node, text
 
@@ -29,7 +29,6 @@ STANDARD_TYPES = frozenset({
     "condition_variable", "reference_wrapper", "any", "exception", "runtime_error", "bitset", "complex", "future",
     "promise", "regex", "random_device", "mt19937", "priority_queue", "forward_list", "jthread",
 })  # fmt: skip
-_INTERFACES = re.compile(r"/(?:msg|srv|action)/")
 
 Asked = ParamSpec("Asked")
 Answer = TypeVar("Answer")
@@ -433,7 +432,7 @@ class Names:
                 folder = header.partition("/")[0]
                 if _plain(header) == _plain(name.replace("::", "/")):
                     alike = header
-                if "/" in header and folder not in KNOWN_HEADERS and not _INTERFACES.search(header):
+                if "/" in header and not is_reviewed(header):
                     if name.partition("::")[0] == folder:
                         return header
                     is_possible = folder in self.depends or ("::" not in name and not self.depends)
@@ -443,6 +442,19 @@ class Names:
         if not found and re.search(r"(?:^|::)\w*Node$", name):
             found = "no header in reach defines it"
         return found and (alike or found)
+
+    @_once
+    def unreviewed(self, scope: Scope, file: FileIndex) -> str:
+        """Return what a class without a namespace may come from, of what nobody reviewed; empty if there is nothing.
+
+        That is a header, or a library for ROS whose namespace is used or written in.
+        """
+        entered = [*self.used_namespaces(file.file), *scope[:1]]
+        ours = next((each for each in entered if each.partition("::")[0] in ROS_LIBRARIES), "")
+        if ours:
+            return f"namespace {ours}"
+        indexes = (self.files[each] for each in sorted(self.visible(file.file)) if each in self.files)
+        return next((h for each in indexes for h in each.source.foreign if not is_reviewed(h)), "")
 
     # --- types ------------------------------------------------------------------------------------------
 

@@ -397,7 +397,7 @@ def _unmodelled(run: Machine, kind: Type, node: Node, frame: Frame, deliberate: 
 
     ``deliberate``: it is made with arguments or with new, as structures of C are not.
     """
-    why = unmodelled(run.names, kind.name, frame.file, deliberate)
+    why = unmodelled(run.names, kind.name, frame.scope, frame.file, deliberate)
     if why and all(why != said for _, said in run.gaps):  # one place says it of a class
         run.gap(node, frame, why)
 

@@ -11,7 +11,7 @@ from nodl.infer.cpp.libraries import (
     is_harmless_class,
     is_harmless_function,
 )
-from nodl.infer.cpp.reading.declarations import Class, FileIndex, Function
+from nodl.infer.cpp.reading.declarations import Class, FileIndex, Function, Scope
 from nodl.infer.cpp.reading.known_headers import KNOWN_HEADERS, ROS_LIBRARIES
 from nodl.infer.cpp.reading.names import Names
 from nodl.infer.cpp.syntax import (
@@ -36,7 +36,7 @@ _KNOWN = re.compile(rf"(?:add|remove|get|spin)_\w+|spin|{_HANDS_ON.pattern}")
 _MAKES = re.compile(r"(?:make|allocate)_(?:shared|unique)|make_intrusive")
 
 
-def unmodelled(names: Names, name: str, file: FileIndex, deliberate: bool) -> str:
+def unmodelled(names: Names, name: str, scope: Scope, file: FileIndex, deliberate: bool) -> str:
     """Return why an object of a class that is neither in reach nor in the table may be a node or make one.
 
     Args:
@@ -52,7 +52,7 @@ def unmodelled(names: Names, name: str, file: FileIndex, deliberate: bool) -> st
         return f"the class {name} is not in the table of {first}: it may be a node or make one"
     header = names.foreign_header(name, file)
     if not header and deliberate and "::" not in name:
-        header = "no header in reach defines it"
+        header = names.unreviewed(scope, file)
     return f"the class {name} is not in reach ({header}): it may be a node or make one" if header else ""
 
 
@@ -119,7 +119,7 @@ def _class_of(names: Names, written: str, function: Function, deliberate: bool) 
         return True, False
     if is_harmless_class(kind.name):
         return False, False
-    return True, bool(unmodelled(names, kind.name, function.file, deliberate))
+    return True, bool(unmodelled(names, kind.name, function.scope, function.file, deliberate))
 
 
 def _is_unknown_call(names: Names, call: Node) -> bool:

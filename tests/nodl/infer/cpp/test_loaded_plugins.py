@@ -131,6 +131,9 @@ def names(plan: LaunchPlan) -> set[str]:
     return {rule.expression for rules in plan.derived.reasons.values() for rule in rules}
 
 
+OF_A_FIELD_BUS = '\n#include "field_bus.hpp"\nauto bus = std::make_shared<FieldBus>();'
+
+
 @pytest.fixture
 def hardware(planned: Planned) -> Callable[..., LaunchPlan]:
     def plan(body: str, name: str = "own/It", cmake: str = CMAKE) -> LaunchPlan:
@@ -159,7 +162,7 @@ def test_a_hardware_component_brings_the_node_that_it_makes(hardware: Planned) -
 def test_a_plugin_is_found_where_macros_of_its_own_list_the_sources(hardware: Planned) -> None:
     cmake = CMAKE.replace("src/own.cpp", "${LISTED_BY_A_MACRO}")
     assert not hardware("", cmake=cmake).problems
-    (problem,) = hardware("auto bus = std::make_shared<FieldBus>();", cmake=cmake).problems
+    (problem,) = hardware(OF_A_FIELD_BUS, cmake=cmake).problems
     assert "FieldBus is not in reach" in str(problem)
 
 
@@ -174,7 +177,7 @@ def test_a_hardware_component_makes_interfaces_on_the_node_that_it_is_given(hard
 
 
 def test_a_hardware_component_that_cannot_be_followed_is_a_gap_with_the_reason(hardware: Planned) -> None:
-    (problem,) = hardware("auto bus = std::make_shared<FieldBus>();").problems
+    (problem,) = hardware(OF_A_FIELD_BUS).problems
     assert "FieldBus is not in reach" in str(problem)
     assert "hardware component 'arm' of class 'own/It'" in str(problem)
 

@@ -338,6 +338,29 @@ def test_a_class_whose_namespace_is_not_its_package_may_make_a_node(
     assert gaps(infer_paths([made])) == ([expected] if is_gap else [])
 
 
+@pytest.mark.parametrize(
+    ("before", "source"),
+    [
+        (
+            "#include <apriltag.h>\n#include <opencv2/core.hpp>\n#include <sensor_msgs/image_encodings.hpp>",
+            "",
+        ),
+        ("#include <gtsam/nonlinear/ISAM2.h>\n#include <vector>\nusing namespace gtsam;", ""),
+        ("#include <time.h>\n#include <std_msgs/msg/string.hpp>", ""),
+        ("#include <acme/thing.hpp>", "acme/thing.hpp"),  # its package is missing in package.xml
+        ("#include <thing.h>", "thing.h"),
+        ('#include "thing.hpp"', "thing.hpp"),
+        ("using namespace rclcpp_lifecycle;", "namespace rclcpp_lifecycle"),
+    ],
+)
+def test_a_class_without_a_namespace_is_a_gap_unless_all_headers_that_may_have_it_are_reviewed(
+    before: str, source: str, tmp_path: Path
+) -> None:
+    made = package(tmp_path / "demo", {"src/main.cpp": in_class("Thing thing(1);", before=f"{before}\n")})
+    expected = f"the class Thing is not in reach ({source}): it may be a node or make one"
+    assert gaps(infer_paths([made])) == ([expected] if source else [])
+
+
 @pytest.mark.parametrize("header", ["grid_planner.hpp", "planners/GridPlanner.h"])
 def test_a_gap_names_the_header_that_is_called_as_the_class(header: str, tmp_path: Path) -> None:
     source = in_class(
