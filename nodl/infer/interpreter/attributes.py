@@ -157,6 +157,8 @@ def _of_module(run: Run, module: ModuleValue, name: str, node: ast.AST, frame: F
 def _of_external(run: Run, atom: External, name: str, node: ast.AST, frame: Frame) -> Value:
     if name == "__name__":
         return (atom.path.rpartition(".")[2],)
+    if name == "__dict__" and foreign.is_node_class(atom.path):
+        return run.variables_of(node, frame)
     if atom.path.endswith(RESULT) and not foreign.is_asked_of(name):
         return (atom,)
     known = run.foreign_attributes.get((atom.path, name))

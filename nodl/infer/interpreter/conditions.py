@@ -458,6 +458,8 @@ def compare_values(op: ast.cmpop, left: Value, right: Value) -> bool | None:
 
 def _compare_atoms(op: ast.cmpop, left: object, right: object) -> bool | None:
     left, right = constant_text(left), constant_text(right)
+    if not isinstance(op, (ast.Is, ast.IsNot)):
+        left, right = _compared_as(left), _compared_as(right)
     if isinstance(op, (ast.In, ast.NotIn)):
         found = _is_among(left, right)
         return None if found is None else found is isinstance(op, ast.In)
@@ -478,6 +480,19 @@ def _compare_atoms(op: ast.cmpop, left: object, right: object) -> bool | None:
         own = isinstance(other, Instance) and isinstance(op, (ast.Eq, ast.NotEq))
         return not same if isinstance(other, _NEVER_NONE) and not own else None
     return None
+
+
+def _compared_as(atom: object) -> object:
+    """Return the number or text that a member of an ``IntEnum`` or ``StrEnum`` is."""
+    if not isinstance(atom, Instance) or not isinstance(atom.cls, ClassValue) or not is_enumeration(atom.cls):
+        return atom
+    cls, value = atom.cls, sole(atom.cells.get("value"))
+    plain = any(isinstance(base, External) and base.path in _PLAIN_MEMBERS for base in cls.linear or ())
+    return value if plain and isinstance(value, (int, str)) and _COMPARISONS.isdisjoint(cls.cells) else atom
+
+
+_PLAIN_MEMBERS = frozenset({"enum.IntEnum", "enum.StrEnum", "builtins.int", "builtins.str"})
+_COMPARISONS = frozenset({"__eq__", "__ne__", "__lt__", "__le__", "__gt__", "__ge__", "__contains__"})
 
 
 def _is_among(constant: object, container: object) -> bool | None:

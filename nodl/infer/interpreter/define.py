@@ -303,6 +303,14 @@ def member_with_value(run: Run, cls: ClassValue, value: Value) -> Value:
     return unknown("a member of an enumeration that is looked up by its value")
 
 
+def member_with_name(run: Run, cls: ClassValue, name: Value) -> Value:
+    """Return the member that ``cls[name]`` finds; unknown unless the name is."""
+    wanted = constant_text(sole(name))
+    if wanted in _names_of_members(cls):
+        return (enumeration_member(run, cls, str(wanted)),)
+    return unknown("a member of an enumeration that is looked up by its name")
+
+
 def _merge(orders: list[list[object]], bases: list[object]) -> list[object]:
     sequences = [order for order in (*orders, bases) if order]
     result: list[object] = []

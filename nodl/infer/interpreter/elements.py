@@ -7,7 +7,13 @@ import sys
 from functools import partial
 
 from nodl.infer.interpreter.conditions import is_of_launch
-from nodl.infer.interpreter.define import enumeration_members, is_constant, is_enumeration, setter_of
+from nodl.infer.interpreter.define import (
+    enumeration_members,
+    is_constant,
+    is_enumeration,
+    member_with_name,
+    setter_of,
+)
 from nodl.infer.interpreter.run import Arguments, Run
 from nodl.infer.text import Input, Text, constant_text, input_of
 from nodl.infer.values import (
@@ -21,6 +27,7 @@ from nodl.infer.values import (
     OTHER,
     OTHER_KEYS,
     RESULT,
+    TOO_MANY,
     ClassValue,
     Dictionary,
     External,
@@ -75,7 +82,7 @@ def _element(run: Run, atom: object, key: Value, node: ast.Subscript, frame: Fra
             return (Text((Input(piece.name, piece.owner, index, piece.edits),)),)
         return unknown("a part of a text that is not known")
     if isinstance(atom, ClassValue):
-        return ANY if is_enumeration(atom) else (atom,)  # Generic[T]
+        return member_with_name(run, atom, key) if is_enumeration(atom) else (atom,)  # Generic[T]
     if isinstance(atom, External) and atom.path == "os.environ":
         return run.call(external("os.environ.get"), Arguments([key]), node, frame)
     if isinstance(atom, External):
@@ -428,9 +435,11 @@ def _delete_item(run: Run, owner: object, key: Value, certain: bool) -> None:
 def change(run: Run, owner: Sequence, added: Value, taken: bool = True) -> None:
     """Let ``added`` come to the elements; in which order they are is not kept.
 
-    ``taken``: something was taken away, nobody knows what; a text among the elements may be the one.
+    ``taken``: something was taken away, nobody knows what; a text or class among the elements may be the one.
     """
     others = join(owner.items.any_element(), added)
+    if taken and any(isinstance(atom, ClassValue) for atom in others):
+        others = join(others, unknown(TOO_MANY))
     if taken and any(isinstance(atom, (str, Text)) for atom in others):
         others = join(tuple(atom for atom in others if not isinstance(atom, (str, Text))), EDITED)
     run.state.store(owner, ITEMS, (Items(None, others),))

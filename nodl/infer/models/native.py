@@ -127,6 +127,15 @@ def _pop(run: Run, owner: Sequence, call: Call) -> Value:
     return element or ANY
 
 
+def _index(run: Run, owner: Sequence, call: Call) -> Value:
+    wanted, elements_ = constant_text(sole(call.args.at(0))), owner.items.exact
+    known = [constant_text(sole(each)) for each in elements_ or ()]
+    plain = (
+        elements_ is not None and all(map(is_constant, (wanted, *known))) and len(call.args.positional) == 1
+    )
+    return (known.index(wanted),) if plain and wanted in known else ANY
+
+
 def _edited(run: Run, owner: Sequence, call: Call) -> Value:
     """Handle ``insert``, ``remove``, ``sort`` ...: what is left, in which order, is not known."""
     call_each(run, call.args.keywords.get("key", NONE), owner.items.any_element(), call)
@@ -140,6 +149,7 @@ _SEQUENCE: dict[str, SequenceMethod] = {
     **dict.fromkeys(("extend", "update"), _extend),
     **dict.fromkeys(("insert", "remove", "discard", "sort", "reverse", "clear"), _edited),
     **dict.fromkeys(("pop", "popleft"), _pop),
+    "index": _index,
 }
 
 

@@ -16,9 +16,12 @@ from nodl.infer.values import (
     BOTTOM,
     COMMAND_LINE,
     NONE,
+    OTHER,
+    Dictionary,
     External,
     Instance,
     Items,
+    Key,
     Sequence,
     Unknown,
     Value,
@@ -184,6 +187,19 @@ def namespace_attribute(run: Run, namespace: Instance, name: str) -> Value:
         known = tuple(atom for atom in found if not isinstance(atom, (str, Text)))
         return join(known, unknown(f"the option {name} in arguments that the program makes"))
     return found or unknown(f"the command line option {name}")
+
+
+def as_dictionary(run: Run, namespace: Instance, call: Call) -> Value:
+    """Return ``vars(namespace)``: an entry for each option; any if which there are is not known."""
+    made = run.allocate(call.node, "options", Dictionary)
+    parsers = [atom for atom in namespace.cells.get("parser", BOTTOM) if isinstance(atom, Instance)]
+    if any(not isinstance(sole(parser.cells.get(_DECLARED)), tuple) for parser in parsers) or not parsers:
+        run.state.store(made, OTHER, ANY)
+    for cell in (cell for parser in parsers for cell in list(parser.cells)):
+        if isinstance(cell, str) and cell.startswith("dest "):
+            name = cell.removeprefix("dest ")
+            run.state.store(made, Key(name), namespace_attribute(run, namespace, name))
+    return (made,)
 
 
 METHODS: dict[tuple[str, str], Callable[[Run, Instance, Call], Value]] = {

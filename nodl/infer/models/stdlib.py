@@ -310,6 +310,13 @@ def import_dynamic(run: Run, call: Call) -> Value:
 
 def _variables(run: Run, call: Call) -> Value:
     """Model ``vars``, ``globals``, ``locals``."""
+    given = sole(call.args.at(0))
+    if (
+        isinstance(given, Instance)
+        and isinstance(given.cls, External)
+        and given.cls.path == options.NAMESPACE
+    ):
+        return options.as_dictionary(run, given, call)
     return run.variables_of(call.node, call.frame)
 
 
@@ -408,6 +415,13 @@ def _path_join(run: Run, call: Call) -> Value:
     return text_value(concatenations(separated)) if separated else ANY
 
 
+def _base_name(run: Run, call: Call) -> Value:
+    path = constant_text(sole(call.args.at(0)))
+    if isinstance(path, str):
+        return (os.path.basename(path),)
+    return OF_LAUNCH if is_of_launch(path) else unknown("the last part of a path")
+
+
 # --- callables ----------------------------------------------------------------------------------------------
 
 
@@ -476,6 +490,7 @@ FUNCTIONS: dict[str, Model] = {
     "os.environ.setdefault": _set_default_environment,
     **dict.fromkeys(("os.environ.update", "os.environ.pop", "os.putenv"), _change_environment),
     "os.path.join": _path_join,
+    "os.path.basename": _base_name,
     "functools.partial": _partial,
     **{f"threading.{name}": _lock for name in ("Lock", "RLock", "Condition", "Semaphore", "Event")},
     "threading.Thread": _thread,

@@ -488,6 +488,64 @@ def test_functions_lists_members_and_remainders_that_a_parameter_chooses_are_dec
     assert own - {"/rosout", "/parameter_events"} == published
 
 
+MEMBERS = """
+import argparse
+import enum
+import os
+import rclpy
+from std_msgs.msg import String
+Kind = {kind}
+LEVELS = ("ok", "warn", "error")
+parser = argparse.ArgumentParser()
+parser.add_argument("--port", default="/dev/usb0")
+parser.add_argument("--only-errors", action="store_true")
+given, _ = parser.parse_known_args()
+rclpy.init()
+node = rclpy.create_node("members")
+
+def make(port, only_errors):
+    node.create_publisher(String, os.path.basename(port), 10)
+    for level in LEVELS[LEVELS.index("error" if only_errors else "warn"):]:
+        node.create_publisher(String, level, 10)
+
+make(**vars(given))
+kind = Kind(node.declare_parameter("kind", 0).value)
+if kind > Kind.GRID:
+    node.create_publisher(String, "edges", 10)
+node.create_publisher(String, Kind[node.declare_parameter("name", "GRAPH").value].name.lower(), 10)
+rclpy.spin(node)
+"""
+
+
+@pytest.mark.parametrize(
+    ("words", "inside", "published"),
+    [
+        ("--port /dev/usb1", "", {"/usb1", "/warn", "/error", "/graph"}),
+        ("--only-errors", '<param name="kind" value="1"/>', {"/usb0", "/error", "/edges", "/graph"}),
+        ("--port x", '<param name="name" value="GRID"/>', {"/x", "/warn", "/error", "/grid"}),
+    ],
+)
+def test_members_by_name_and_number_options_as_keywords_and_parts_of_paths_are_decided(
+    words: str, inside: str, published: set[str], launch: Launch, prefix: Path
+) -> None:
+    class_of = "None\nclass Kind(enum.IntEnum):\n    GRID = 0\n    GRAPH = 1"
+    install_program(prefix, PYTHON + MEMBERS.format(kind=class_of), "members")
+    plan = launch(f'<launch><node pkg="demo" exec="members" args="{words}">{inside}</node></launch>')
+    assert [str(problem) for problem in plan.problems] == []
+    own = {name for operation, name in permissions(plan) if operation == "publish"}
+    assert own - {"/rosout", "/parameter_events"} == published
+
+
+def test_members_that_compare_as_their_class_says_decide_nothing(launch: Launch, prefix: Path) -> None:
+    class_of = (
+        "None\nclass Kind(enum.IntEnum):\n    GRID = 0\n    GRAPH = 1\n"
+        "    def __gt__(self, other): return True"
+    )
+    install_program(prefix, PYTHON + MEMBERS.format(kind=class_of), "members")
+    plan = launch('<launch><node pkg="demo" exec="members"/></launch>')
+    assert ("publish", "/edges") in permissions(plan)
+
+
 NUMBERS = """
 import argparse
 import os
