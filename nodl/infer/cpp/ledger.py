@@ -120,6 +120,8 @@ def open_calls(run: Machine, function: Function) -> Iterator[Site]:
     resolved = run.resolved.get(function.file.file, set())
     for match in _CALL.finditer(source):
         word, offset = match[1].decode("utf-8", "replace"), start + match.start()
+        if word in run.names.named_as_messages:
+            word = word.rpartition("::")[2]
         called = run.names.functions_by_name.get(word, ()) if word not in _STATEMENTS else ()
         if not any(run.makes_interfaces(each) for each in called if _may_have_object(run, each)):
             continue
@@ -137,7 +139,7 @@ def _may_have_object(run: Machine, function: Function) -> bool:
 
 _STATEMENTS = frozenset({"if", "for", "while", "switch", "catch", "return"})
 """What the parser may take for functions in code that it does not understand."""
-_CALL = re.compile(rb'(?<!["\w])([A-Za-z_]\w*)\s*(?=[(<])')
+_CALL = re.compile(rb'(?<!["\w])((?:(?:msg|srv|action)::)?[A-Za-z_]\w*)\s*(?=[(<])')
 
 
 def _called_at(node: Node | None) -> Node | None:

@@ -8,6 +8,7 @@ from contextlib import suppress
 from itertools import chain
 
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES
+from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.arithmetic import added
 from nodl.infer.cpp.running.assignments import assign, with_entry
 from nodl.infer.cpp.running.constructors import (
@@ -130,8 +131,13 @@ def _added(run: Machine, atom: object, name: str, site: CallSite) -> Value:
         if name == "insert" and len(listed) == 3:
             return _inserted(run, atom, listed[1], site)
         value = listed[-1] if listed else BOTTOM
-        if name.startswith("emplace") and (inner is None or not inner.pointer):
-            handed_over(run, f"an element that {name}() makes", listed, site.node, frame)
+        if inner is not None and inner.name == "std::pair" and _as_they_are(inner.arguments, site.values):
+            value = (Group(tuple(site.values)),)
+        elif name.startswith("emplace") and (inner is None or not inner.pointer):
+            what = f"an element that {name}() makes"
+            handed_over(run, what, listed, site.node, frame)
+            if len(listed) > 1 + (name == "emplace"):
+                value = unknown(what)
     run.handle(site.node, frame)
     if not isinstance(atom, Seq):
         assign(run, receiver, (open_sequence((value, (atom,))),), frame)
@@ -141,6 +147,14 @@ def _added(run: Machine, atom: object, name: str, site: CallSite) -> Value:
     longer = (*atom.items, value)
     assign(run, receiver, (Seq(longer) if is_exact else open_sequence(longer),), frame)
     return value
+
+
+def _as_they_are(kinds: Sequence[Type], values: Sequence[Value]) -> bool:
+    """Return whether a pair of these types, made of texts and pointers, holds just these values."""
+    return len(kinds) == len(values) == 2 and all(
+        kind.pointer or (kind.name == "std::string" and all(isinstance(atom, Text) for atom in value))
+        for kind, value in zip(kinds, values, strict=True)
+    )
 
 
 def _inserted(run: Machine, atom: object, source: Value, site: CallSite) -> Value:

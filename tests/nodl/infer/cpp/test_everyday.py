@@ -715,3 +715,49 @@ def test_a_byte_order_mark_hides_no_include(tmp_path: Path) -> None:
         [package(tmp_path / "demo", {"src/main.cpp": program, "src/own.hpp": '#define OWN "own"\n'})]
     )
     assert names(system) == ["own"] and gaps(system) == []
+
+
+PAIRS = {
+    "of texts": (
+        'std::vector<std::pair<std::string, std::string>> v; v.emplace_back("a", "b");',
+        "second",
+        "ab",
+    ),
+    "of a text and a pointer": (
+        'E e; std::vector<std::pair<std::string, E *>> v; v.emplace_back("a", &e); e.t = "late";',
+        "second->t",
+        "alate",
+    ),
+    "of a text and a structure": (
+        'E e; std::vector<std::pair<std::string, E>> v; v.emplace_back("a", e); e.t = "late";',
+        "second.t",
+        "?",
+    ),
+}
+
+
+@pytest.mark.parametrize(("made", "second", "name"), PAIRS.values(), ids=PAIRS)
+def test_a_pair_made_in_a_list_holds_what_it_is_given(
+    made: str, second: str, name: str, tmp_path: Path
+) -> None:
+    use = f"{made} {PUB}(v[0].first + v[0].{second}, 1);"
+    assert names(infer(tmp_path, in_class(use, before='struct E { std::string t = "x"; };\n'))) == [name]
+
+
+@pytest.mark.parametrize("own", [False, True])
+def test_a_message_is_not_the_class_of_the_same_name(own: bool, tmp_path: Path) -> None:
+    late = f'namespace msg {{ struct Imu {{ explicit Imu(rclcpp::Node * n) {{ n->{PUB}("late", 1); }} }}; }}'
+    before = f"""namespace own {{
+{late if own else ""}
+struct Sensor {{ virtual void publish() = 0; }};
+struct Imu : Sensor {{
+  explicit Imu(rclcpp::Node * node) : n(node), pub(n->{PUB}("imu", 1)) {{}}
+  void publish() override {{ pub->publish({"own::msg::Imu(n)" if own else "sensor_msgs::msg::Imu()"}); }}
+  rclcpp::Node * n; rclcpp::Publisher<std_msgs::msg::String>::SharedPtr pub;
+}};
+}}
+"""
+    use = "all.push_back(new own::Imu(this)); create_wall_timer(1s, [this]() { for (auto s : all) { s->publish(); } });"
+    system = infer(tmp_path, in_class(use, "std::list<own::Sensor *> all;", before=before))
+    assert "imu" in names(system)
+    assert ("late" in names(system) or bool(gaps(system))) == own
