@@ -194,7 +194,11 @@ def _assign_result(run: Machine, call: Node, value: Value, frame: Frame) -> None
         through(run, call, frame)
     elif owner is None and any(isinstance(atom, Lambda) for atom in run.evaluate(function, frame)):
         forget_everything(run, f"what {text(call)[:40]} refers to")
-    elif is_plain(value) or _gives_reference(run, function) or text(function) in ("std::tie", "tie"):
+    elif (
+        not all(isinstance(atom, Obj) for atom in value)
+        or _gives_reference(run, function)
+        or text(function) in ("std::tie", "tie")
+    ):
         forget(run, call, frame, written=value, told=owner is not None or _gives_reference(run, function))
 
 

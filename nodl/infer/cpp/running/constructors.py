@@ -25,7 +25,7 @@ from nodl.infer.cpp.running.contents import copied, elements_copied, handed_over
 from nodl.infer.cpp.running.foreign import unmodelled
 from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
 from nodl.infer.cpp.running.overloads import candidates
-from nodl.infer.cpp.running.references import as_referred_to, is_plain, keep_reference, leads_into
+from nodl.infer.cpp.running.references import as_referred_to, forget, is_plain, keep_reference, leads_into
 from nodl.infer.cpp.running.static_types import check_hidden, given_to, seen_class, seen_type
 from nodl.infer.cpp.running.values import (
     BOTTOM,
@@ -548,13 +548,15 @@ def _made_unseen(
 def _written_arguments(
     run: Machine, constructor: Function, arguments: Sequence[Value], inner: Frame, node: Node, frame: Frame
 ) -> None:
-    """Add a gap if a constructor writes to a text or list of its caller through a reference."""
+    """Add a gap if a constructor writes to a text or list of its caller through a reference; none of them is known."""
     for parameter, value in zip(constructor.parameters, arguments, strict=False):
         after = run.store.get((inner, parameter.name)) or BOTTOM
         changed = parameter.written_back and set(after) != set(value)
         if changed and any(isinstance(atom, Text | Seq | Map) for atom in (*value, *after)):
-            what = f"what the constructor of {constructor.name} writes to its argument {parameter.name}"
-            run.gap(node, frame, f"{what} is not followed")
+            why = f"what the constructor of {constructor.name} writes to its argument {parameter.name} is not followed"
+            run.gap(node, frame, why)
+            for each in given_to(node, frame) or [node]:
+                forget(run, each, frame, why, told=False)
 
 
 def _is_delegate(cls: Class, written: str) -> bool:

@@ -327,3 +327,18 @@ def test_a_variable_that_a_function_gets_twice_is_open(body: str, tmp_path: Path
     assert names(infer(tmp_path, in_class(use % body, before=both))) == ["?"]
     other = use % 'std::string u = "y"; std::string & r = u; both(t, r);'
     assert names(infer(tmp_path / "other", in_class(other, before=both))) == ["xyy"]
+
+
+BESIDES = {
+    "a constructor": "Acc a(t);",
+    "an object without a name": "Acc{t};",
+    "a method of what a method gives": 't.append("y").append(t, 0, 1);',
+    "a method of an element": "std::vector<std::string> v{t}; v.back().append(t, 0, 1); t = v.back();",
+}
+
+
+@pytest.mark.parametrize("body", BESIDES.values(), ids=BESIDES)
+def test_what_is_written_without_being_followed_is_not_the_text_before(body: str, tmp_path: Path) -> None:
+    before = 'struct Acc { Acc(std::string & a) { a += "y"; } };\n'
+    use = f'std::string t = "x", u = "u"; {body} create_publisher<std_msgs::msg::String>(t + u, 1);'
+    assert names(infer(tmp_path, in_class(use, before=before))) == ["?u"]
