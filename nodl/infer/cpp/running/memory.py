@@ -12,6 +12,7 @@ from nodl.infer.cpp.running.values import (
     NoteLog,
     Obj,
     Value,
+    add_note,
     bounded,
     hold,
     holds_callable,
@@ -84,7 +85,8 @@ class AbstractStore:
                 if value is not _ABSENT or not _is_new(cell):
                     kept[cell] = value
             if self.log.noted is not None:
-                self.log.noted.update({key: said for key, said in noted.items() if key not in self.log.noted})
+                for key, said in noted.items():
+                    add_note(self.log.noted, key, said)
         return Reads(kept, left(noted))
 
     def saw(self, reads: Reads) -> None:
@@ -93,7 +95,7 @@ class AbstractStore:
             for cell in reads.cells:
                 self._read(cell, self._since.get(cell, -1))
             for key, said in reads.noted.items():
-                self.log.noted.setdefault(key, said)
+                add_note(self.log.noted, key, said)
 
     def holds(self, reads: Reads, *, in_any_order: bool = False) -> bool:
         """Return whether all this says what it said; ``in_any_order``: alternatives may have changed places."""

@@ -30,7 +30,7 @@ BOTTOM: Value = ()
 
 Noted = dict[tuple["Notes", str], object]  # what was asked for, and the answer at the first time
 _ABSENT = object()
-_OWN = object()  # written before it was read: what was there before does not matter
+_WRITTEN, _OWN = object(), object()  # before it was read, if ever: what was there before does not matter
 
 
 class NoteLog:
@@ -49,7 +49,7 @@ class Notes:
 
     def get(self, name: str, default: Any = None) -> Any:
         if self._log is not None and self._log.noted is not None:
-            self._log.noted.setdefault((self, name), self._values.get(name, _ABSENT))
+            add_note(self._log.noted, (self, name), self._values.get(name, _ABSENT))
         return self._values.get(name, default)
 
     def __getitem__(self, name: str) -> Any:
@@ -57,7 +57,7 @@ class Notes:
 
     def __setitem__(self, name: str, value: Any) -> None:
         if self._log is not None and self._log.noted is not None:
-            self._log.noted.setdefault((self, name), _OWN)
+            add_note(self._log.noted, (self, name), _WRITTEN)
         self._values[name] = value
 
     def update(self, **values: Any) -> None:
@@ -70,11 +70,18 @@ class Notes:
         return iter(self._values)
 
 
+def add_note(noted: Noted, key: tuple[Notes, str], said: object) -> None:
+    """Add what a note says, unless it said something before; what was only written before is read now."""
+    if noted.setdefault(key, said) is _WRITTEN and said is not _WRITTEN:
+        noted[key] = _OWN
+
+
 def left(noted: Noted) -> Noted:
-    """Return the notes with what code left in those that it wrote before it read them."""
+    """Return the notes that code read, with what it left in those that it wrote before."""
     return {
         (notes, name): notes._values.get(name, _ABSENT) if said is _OWN else said
         for (notes, name), said in noted.items()
+        if said is not _WRITTEN
     }
 
 
