@@ -58,6 +58,8 @@ _PLAIN = re.compile(
 )
 
 
+_ENDS = re.compile(r"(?<![\w.>])(std\s*::\s*|::\s*)?(_?exit|quick_exit|_Exit|abort|terminate)\s*\(")
+"""Calls that end the program; not methods of an object: ``goal->abort()``."""
 _FRESH = r"(?:new\b(?!\s*\()|nullptr\b|NULL\b)"
 _POINTS_AT_NEW = rf"\s*(?:->|\[|[!=]=|=\s*{_FRESH}|[({{]\s*{_FRESH}|\)\s*\{{)"
 """Matches behind a pointer: a member access, a comparison, or an assignment of what ``new`` makes."""
@@ -243,6 +245,22 @@ class Names:
     def has_static_variables(self, function: Function) -> bool:
         """Return whether a function has static variables that are not constant."""
         return _STATIC.search(text(function.body)) is not None
+
+    @_once
+    def may_end_program(self, function: Function) -> bool:
+        """Return whether a function may end the program."""
+        return self.ends_program(function.node, function)
+
+    def ends_program(self, code: Node, function: Function | None) -> bool:
+        """Return whether code in ``function`` may end the program; what its class calls so does not: ``abort()``."""
+        return any(
+            each[1] or function is None or not self.has_method(function, each[2])
+            for each in _ENDS.finditer(text(code))
+        )
+
+    def has_method(self, function: Function, name: str) -> bool:
+        """Return whether ``name`` alone means a method of the class that ``function`` is in."""
+        return bool(self.find_methods(self._class_of_method(function), name))
 
     @_once
     def spoken_of(self, function: Function) -> frozenset[str]:

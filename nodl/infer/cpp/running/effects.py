@@ -27,8 +27,6 @@ _BEYOND_VARIABLES = re.compile(
 )
 """Words of code that does more than change variables: it declares parameters, keeps closures, runs callbacks or writes
 behind ``const``."""
-_ENDS = re.compile(r"(?<![\w.>])(?:std\s*::\s*|::\s*)?(?:_?exit|quick_exit|_Exit|abort|terminate)\s*\(")
-"""Calls that end the program; not methods of an object: ``goal->abort()``."""
 _PLAIN = re.compile(
     r"string|vector|double|float|bool|int|size_t|char|msg::|Msg|Eigen|Time|Duration|unsigned|long|Point|Pose"
 )
@@ -105,8 +103,11 @@ class CallEffects:
             and not any(map(_BEYOND_VARIABLES.fullmatch, self.words - own))
             and not self._may_init_ros
             and not any(self.leaving)
-            and not any(map(_ends, (each.node for each in self.functions)))
-            and (isinstance(self._of, Function) or not _ends(self._of.node))
+            and not any(map(self._run.names.may_end_program, self.functions))
+            and (
+                isinstance(self._of, Function)
+                or not self._run.names.ends_program(self._of.node, self._of.frame.function)
+            )
         )
 
     @property
@@ -191,12 +192,6 @@ def may_mean(run: Machine, owners: Owners, cell: Cell) -> bool:
         for each in every
         for written, base in run.names.bases(each)
     )
-
-
-@lru_cache(maxsize=50_000)
-def _ends(code: Node) -> bool:
-    """Return whether code may end the program."""
-    return _ENDS.search(text(code)) is not None
 
 
 def effects_of(run: Machine, of: Function | Lambda | Bound) -> CallEffects:

@@ -126,10 +126,14 @@ def expression_statement(run: Machine, node: Node, frame: Frame) -> int:
     """Evaluates it; leaves like a return where a call certainly throws or ends the program."""
     for child in children(node):
         run.evaluate(child, frame)
-        ends = child.type == "call_expression" and text(field_of(child, "function")) in _ENDS
-        if ends or run.left:
+        if run.left or (child.type == "call_expression" and _ends_program(run, child, frame)):
             return RETURN
     return NEXT
+
+
+def _ends_program(run: Machine, call: Node, frame: Frame) -> bool:
+    name, function = text(field_of(call, "function")), frame.function
+    return name in _ENDS and (function is None or not run.names.has_method(function, name))
 
 
 _ENDS = frozenset({"exit", "std::exit", "abort", "std::abort", "_exit", "std::terminate", "std::quick_exit"})

@@ -498,6 +498,12 @@ def test_a_write_that_the_parser_does_not_understand_is_a_gap(tmp_path: Path) ->
     assert (names(read), gaps(read)) == (["ab"], [])
 
 
+@pytest.mark.parametrize(("call", "made"), [("abort();", ["a"]), ("std::abort();", [])])
+def test_a_method_called_abort_does_not_end_the_program(call: str, made: list[str], tmp_path: Path) -> None:
+    source = in_class(f'{call} {PUB}("a", 1);', "void abort() {}")
+    assert names(infer(tmp_path, source)) == made
+
+
 GUARDED = """#ifdef DEMO_DEBUG
 #define GUARD(x) if (!(x)) abort()
 #else

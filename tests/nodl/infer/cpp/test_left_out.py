@@ -323,6 +323,10 @@ BESIDE = {
         "std::shared_ptr<rclcpp_action::ServerGoalHandle<int>> goal;", "void go() { goal->abort(); sum = 1; }", "go();",
         'void go() { topic = "b"; }',
     ),
+    "the own method abort() does not end the program": (
+        "", "void abort() { sum = 2; } void go() { abort(); sum = 1; }", "go();",
+        "void go() { abort(); sum = 1; } void abort() { topic = \"b\"; }",
+    ),
     "a pointer that is only set to what new makes leads to no variable": (
         "", f"{POINTER} void make() {{ cells = new std::vector<int>(); }} void go() {{ cells->push_back(1); }}",
         "make(); go();",
