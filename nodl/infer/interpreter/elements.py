@@ -20,6 +20,7 @@ from nodl.infer.values import (
     ABSENT,
     ANY,
     BOTTOM,
+    COMMAND_LINE,
     ITEMS,
     LAZY,
     MODULES,
@@ -89,7 +90,12 @@ def _element(run: Run, atom: object, key: Value, node: ast.Subscript, frame: Fra
         if atom.path.startswith(("typing.", "builtins.")) or atom.path.endswith(("[]", RESULT)):
             return (atom,)
         return external(f"{atom.path}[]")
+    if isinstance(atom, Unknown) and atom.why == COMMAND_LINE and isinstance(node.slice, ast.Slice):
+        return (atom,) if sole(key) in _WITHOUT_PROGRAM else unknown("a part of the command line")
     return (atom,) if isinstance(atom, Unknown) else ANY
+
+
+_WITHOUT_PROGRAM = (slice(1, None, None), slice(None, None, None))
 
 
 def dictionary_item(run: Run, obj: Dictionary, key: Value, node: ast.AST, frame: Frame) -> Value:

@@ -86,6 +86,8 @@ def _declare(parser: argparse.ArgumentParser, declared: DeclaredOption) -> str:
         settings.update(action="store_const", const=constant)
     elif declared.action == "count":
         settings["action"] = "count"
+    elif declared.action == external("argparse.BooleanOptionalAction")[0]:
+        settings["action"] = argparse.BooleanOptionalAction
     else:
         raise _Refused("an action that is not modelled")
     return parser.add_argument(*declared.flags, **settings).dest  # type: ignore[arg-type]
@@ -100,6 +102,8 @@ def _held(run: Run, declared: DeclaredOption, found: object, call: Call) -> Valu
         texts = tuple(atom for atom in default if isinstance(atom, str))
         others = tuple(atom for atom in default if not isinstance(atom, str))
         return join(_made(run, declared, texts, call) if texts else BOTTOM, others)
+    if isinstance(found, bool):
+        return (found,)
     if isinstance(found, int):
         start = sole(declared.default)
         return (found + (start or 0),) if start is None or type(start) is int else unknown("a counted option")

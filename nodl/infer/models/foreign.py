@@ -116,6 +116,8 @@ def call_external(run: Run, atom: External, call: Call) -> Value:
         return found
     if is_node_class(owner) or (owner == "builtins.object" and name.startswith("__")):
         return _unbound_method(run, owner, name, call)
+    if owner.rpartition(".")[2] in NODE_ENDPOINTS:
+        run.gap(call.node, call.frame, f"{name} of a method that makes interfaces is not analysed")
     if _is_exception(path):
         run.escape(call.args, opened=False, objects=False)
         return (Instance(External(path)),)
@@ -186,7 +188,10 @@ def is_node_class(path: str) -> bool:
 def _unbound_method(run: Run, path: str, name: str, call: Call) -> Value:
     """Call ``Node.__init__(self, 'name')``."""
     result: Value = ANY
-    for receiver in call.args.positional[0] if call.args.positional else ():
+    receivers = call.args.positional[0] if call.args.positional else ANY
+    if name in NODE_ENDPOINTS and not all(isinstance(each, Instance) for each in receivers):
+        run.gap(call.node, call.frame, f"{name}() is called for a node that is not known")
+    for receiver in receivers:
         if isinstance(receiver, Instance):
             shifted = Call(call.args.shifted(), call.node, call.frame)
             result = call_foreign_method(run, ForeignMethod(path, receiver, name), shifted)
@@ -225,7 +230,7 @@ def call_foreign_method(run: Run, method: ForeignMethod, call: Call) -> Value:
     assert isinstance(receiver, Instance)
     if name not in NODE_ENDPOINTS:
         run.understood.add(call.node)
-    if is_node_class(path):
+    if is_node_class(path) and name != "__getattribute__":
         return _call_node_method(run, receiver, path, name, call)
     model = stdlib.METHODS.get((path, name))
     if model is not None:

@@ -6,6 +6,7 @@ In a launch ``nodl/infer/models/command_line.py`` says what they hold.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import TypeGuard
 
 from nodl.infer.interpreter.run import Call, Run
 from nodl.infer.models.command_line import DeclaredOption, read_words
@@ -22,12 +23,12 @@ from nodl.infer.values import (
     Instance,
     Items,
     Key,
-    Sequence,
     Unknown,
     Value,
     constant_strings,
     join,
     join_all,
+    result_of,
     sole,
     unknown,
 )
@@ -142,7 +143,7 @@ def _parse_args(run: Run, parser: Instance, call: Call, others_too: bool = False
     namespace = run.library_object(call, NAMESPACE)
     run.state.store(namespace, "parser", (parser,))
     given = call.args.at(0, "args") or NONE
-    if any(isinstance(atom, Sequence) for atom in given):
+    if not _is_whole(given) and given != result_of("rclpy"):  # what remove_ros_args() leaves
         run.state.store(namespace, "[given]", given)
     elif run.launch.words is not None:
         whole = others_too and _is_whole(given)  # else words of ROS would end the program
@@ -189,16 +190,24 @@ def namespace_attribute(run: Run, namespace: Instance, name: str) -> Value:
     return found or unknown(f"the command line option {name}")
 
 
+def is_namespace(atom: object) -> TypeGuard[Instance]:
+    """Return True for what ``parse_args`` gives."""
+    return isinstance(atom, Instance) and isinstance(atom.cls, External) and atom.cls.path == NAMESPACE
+
+
 def as_dictionary(run: Run, namespace: Instance, call: Call) -> Value:
-    """Return ``vars(namespace)``: an entry for each option; any if which there are is not known."""
+    """Return what ``**vars(namespace)`` gives: an entry for each option; any if which there are is not known."""
     made = run.allocate(call.node, "options", Dictionary)
     parsers = [atom for atom in namespace.cells.get("parser", BOTTOM) if isinstance(atom, Instance)]
     if any(not isinstance(sole(parser.cells.get(_DECLARED)), tuple) for parser in parsers) or not parsers:
         run.state.store(made, OTHER, ANY)
-    for cell in (cell for parser in parsers for cell in list(parser.cells)):
-        if isinstance(cell, str) and cell.startswith("dest "):
-            name = cell.removeprefix("dest ")
-            run.state.store(made, Key(name), namespace_attribute(run, namespace, name))
+    cells = [cell for parser in parsers for cell in parser.cells if isinstance(cell, str)]
+    names = [cell.removeprefix("dest ") for cell in cells if cell.startswith("dest ")]
+    for name in (
+        *names,
+        *(cell for cell in namespace.cells if isinstance(cell, str) and cell.isidentifier()),
+    ):
+        run.state.store(made, Key(name), run.attribute((namespace,), name, call.node, call.frame))
     return (made,)
 
 

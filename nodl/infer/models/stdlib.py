@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import os.path
 from collections.abc import Callable
 from functools import partial
@@ -311,13 +312,16 @@ def import_dynamic(run: Run, call: Call) -> Value:
 def _variables(run: Run, call: Call) -> Value:
     """Model ``vars``, ``globals``, ``locals``."""
     given = sole(call.args.at(0))
-    if (
-        isinstance(given, Instance)
-        and isinstance(given.cls, External)
-        and given.cls.path == options.NAMESPACE
-    ):
+    if options.is_namespace(given) and call.node in _spread(call.frame.module.source.tree):
         return options.as_dictionary(run, given, call)
     return run.variables_of(call.node, call.frame)
+
+
+@functools.lru_cache(maxsize=64)
+def _spread(tree: ast.Module) -> frozenset[ast.AST]:
+    """Return what is handed over as keywords (``**``): nobody can change it there."""
+    keywords = (node for node in ast.walk(tree) if isinstance(node, ast.keyword))
+    return frozenset(node.value for node in keywords if node.arg is None)
 
 
 def _object_new(run: Run, call: Call) -> Value:

@@ -609,6 +609,7 @@ def test_an_option_is_read_as_argparse_reads_it(words: str, fast: bool, launch: 
 
 LISTS = """
 import argparse
+import sys
 import rclpy
 from rclpy.utilities import remove_ros_args
 from std_msgs.msg import String
@@ -655,6 +656,7 @@ def test_lists_of_words_of_the_command_line_are_names(
     [
         ("fromfile_prefix_chars='@'", "parse_known_args()"),
         ("", "parse_known_args(['a', 'b'])"),
+        ("", "parse_known_args(sys.argv[2:])"),
     ],
 )
 def test_words_that_are_not_only_the_launchs_are_gaps(
