@@ -16,6 +16,7 @@ from nodl.infer.cpp.libraries import (
     node_class,
     node_method,
 )
+from nodl.infer.cpp.running.contents import nodes_in
 from nodl.infer.cpp.running.launch_values import text_of
 from nodl.infer.cpp.running.machine import Machine
 from nodl.infer.cpp.running.values import (
@@ -167,6 +168,12 @@ def _lifecycle_node(run: Machine, call: Call) -> None:
 )  # fmt: skip
 def _self(run: Machine, call: Call) -> Value:
     return (call.this,)
+
+
+@library_class("rclcpp::node_interfaces::NodeInterfaces", "image_transport::RequiredInterfaces")
+def _interfaces(run: Machine, call: Call) -> Value | None:
+    """Return the node that the interfaces are of: they stand for it."""
+    return tuple(node for value in call.values for node in nodes_in(value)) or None
 
 
 def _says(what: str, run: Machine, call: Call) -> Value:

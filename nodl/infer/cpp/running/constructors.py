@@ -538,7 +538,8 @@ def _made_unseen(
         whom = f"the constructor of {cls.name}, whose source is not in reach"
         handed_over(run, whom, arguments, node, frame)
         run.calls.may_be_written(run, whom, arguments, given_to(node, frame), frame)
-        run.gap(node, frame, f"the source of the constructor of {cls.name} is not in reach")
+        if not is_harmless_class(cls.qualified):
+            run.gap(node, frame, f"the source of the constructor of {cls.name} is not in reach")
     elif len(arguments) > 1 or not all(isinstance(atom, Obj | Unknown) for atom in arguments[0]):
         why = f"how {cls.name} is made of what it is given is not known"
         run.gap(node, frame, why)

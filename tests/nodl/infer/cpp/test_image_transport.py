@@ -120,6 +120,19 @@ def test_the_topic_beside_an_image_is_open_and_leaves_the_image_as_it_is(tmp_pat
 
 
 @pytest.mark.parametrize(
+    "interfaces",
+    ["rclcpp::node_interfaces::NodeInterfaces<TopicsInterface>", "image_transport::RequiredInterfaces"],
+)
+def test_interfaces_of_a_node_stand_for_it(tmp_path: Path, interfaces: str) -> None:
+    made = f"""image_transport::create_subscription({interfaces}{{*this}}, "a", f, "raw");
+    {interfaces} these(*this); rclcpp::create_publisher<std_msgs::msg::String>(these, "b", 1);"""
+    found = infer(tmp_path, in_class(made))
+    assert (names(found), gaps(found)) == (["a", "b"], [])
+    nobody = infer(tmp_path / "nobody", in_class(made.replace("*this", "of_another")))
+    assert gaps(nobody)
+
+
+@pytest.mark.parametrize(
     "made",
     [
         'p_ = std::make_shared<image_transport::CameraPublisher>(image_transport::create_camera_publisher(this, "a"));',

@@ -361,6 +361,16 @@ def test_a_class_without_a_namespace_is_a_gap_unless_all_headers_that_may_have_i
     assert gaps(infer_paths([made])) == ([expected] if source else [])
 
 
+@pytest.mark.parametrize(("namespace", "is_gap"), [("ouster", False), ("rover", True)])
+def test_a_constructor_without_source_is_a_gap_unless_its_library_knows_nothing_of_ros(
+    namespace: str, is_gap: bool, tmp_path: Path
+) -> None:
+    header = f"namespace {namespace} {{ struct Client {{ explicit Client(int port); }}; }}\n"
+    source = in_class(f"{namespace}::Client client(1);", before=header)
+    expected = "the source of the constructor of Client is not in reach"
+    assert gaps(infer(tmp_path, source)) == ([expected] if is_gap else [])
+
+
 @pytest.mark.parametrize("header", ["grid_planner.hpp", "planners/GridPlanner.h"])
 def test_a_gap_names_the_header_that_is_called_as_the_class(header: str, tmp_path: Path) -> None:
     source = in_class(
