@@ -27,6 +27,7 @@ from nodl.infer.cpp.reading.type_names import split_type
 from nodl.infer.cpp.syntax import Node, children, field_of, line_of, parse, parse_expression, text, walk
 
 STRUCTURES = ("class_specifier", "struct_specifier", "union_specifier")
+_STRUCTURE = re.compile(rb"class|struct|union")
 _USING = re.compile(r"\busing\s+namespace\s+([\w:]+)\s*;")
 
 
@@ -268,7 +269,7 @@ class _Collector:
 
 def _local_classes(body: Node) -> Iterator[Node]:
     """Yield the classes with a name that are defined inside a function, without those inside of them."""
-    waiting = [body]
+    waiting = [body] if _STRUCTURE.search(body.text or b"") else []
     while waiting:
         each = waiting.pop()
         if each.type not in STRUCTURES:

@@ -72,6 +72,7 @@ class Workspace:
     prefixes: tuple[str, ...] = ()
     build_folders: tuple[str, ...] = ()
     _found: dict[tuple[str, str], str | None] = field(default_factory=dict)
+    _public: dict[str, str | None] = field(default_factory=dict)
 
     def package_of(self, file: str) -> SourcePackage | None:
         best: SourcePackage | None = None
@@ -100,9 +101,15 @@ class Workspace:
         return (
             _first_below((*own, *others), name)
             or (first.header(name) if first is not None else None)
-            or _first_below((*self._all_folders, *self._installed(name)), name)
+            or self._anywhere(name)
             or self._generated(name, package, first)
         )
+
+    def _anywhere(self, name: str) -> str | None:
+        """Return the header of that name in any package, else in a prefix: the same for whoever includes it."""
+        if name not in self._public:
+            self._public[name] = _first_below((*self._all_folders, *self._installed(name)), name)
+        return self._public[name]
 
     def _generated(self, name: str, *packages: SourcePackage | None) -> str | None:
         """Return the file of parameters that generate_parameter_library makes this header of."""
