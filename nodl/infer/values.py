@@ -26,6 +26,8 @@ MAX_ATOMS = 64
 CONSTANTS = (str, int, float, bool, bytes, type(None))
 TOO_MANY = "too many possible values"
 COMMAND_LINE = "command line arguments"
+WITHOUT_PROGRAM = "command line arguments behind the name of the program"
+WITHOUT_ROS = "command line arguments without those of ROS"
 OF_A_NODE = "an attribute of a node whose name is made at run time"
 
 NONE: Value = (None,)

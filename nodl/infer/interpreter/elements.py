@@ -29,6 +29,8 @@ from nodl.infer.values import (
     OTHER_KEYS,
     RESULT,
     TOO_MANY,
+    WITHOUT_PROGRAM,
+    WITHOUT_ROS,
     ClassValue,
     Dictionary,
     External,
@@ -44,6 +46,7 @@ from nodl.infer.values import (
     join,
     join_all,
     present,
+    result_of,
     sole,
     unknown,
 )
@@ -86,16 +89,21 @@ def _element(run: Run, atom: object, key: Value, node: ast.Subscript, frame: Fra
         return member_with_name(run, atom, key) if is_enumeration(atom) else (atom,)  # Generic[T]
     if isinstance(atom, External) and atom.path == "os.environ":
         return run.call(external("os.environ.get"), Arguments([key]), node, frame)
+    if sole(key) == _BEHIND_PROGRAM and (atom,) == unknown(COMMAND_LINE):
+        return unknown(WITHOUT_PROGRAM)
+    if sole(key) == _BEHIND_PROGRAM and (atom,) == result_of("rclpy"):  # what remove_ros_args() leaves
+        return unknown(WITHOUT_ROS)
     if isinstance(atom, External):
         if atom.path.startswith(("typing.", "builtins.")) or atom.path.endswith(("[]", RESULT)):
             return (atom,)
         return external(f"{atom.path}[]")
-    if isinstance(atom, Unknown) and atom.why == COMMAND_LINE and isinstance(node.slice, ast.Slice):
-        return (atom,) if sole(key) in _WITHOUT_PROGRAM else unknown("a part of the command line")
+    if isinstance(atom, Unknown) and atom.why in _WORDS and isinstance(node.slice, ast.Slice):
+        return (atom,) if sole(key) == slice(None) else unknown("a part of the command line")
     return (atom,) if isinstance(atom, Unknown) else ANY
 
 
-_WITHOUT_PROGRAM = (slice(1, None, None), slice(None, None, None))
+_BEHIND_PROGRAM = slice(1, None)
+_WORDS = (COMMAND_LINE, WITHOUT_PROGRAM, WITHOUT_ROS)
 
 
 def dictionary_item(run: Run, obj: Dictionary, key: Value, node: ast.AST, frame: Frame) -> Value:

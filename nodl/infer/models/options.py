@@ -18,12 +18,13 @@ from nodl.infer.values import (
     COMMAND_LINE,
     NONE,
     OTHER,
+    WITHOUT_PROGRAM,
+    WITHOUT_ROS,
     Dictionary,
     External,
     Instance,
     Items,
     Key,
-    Unknown,
     Value,
     constant_strings,
     join,
@@ -143,7 +144,9 @@ def _parse_args(run: Run, parser: Instance, call: Call, others_too: bool = False
     namespace = run.library_object(call, NAMESPACE)
     run.state.store(namespace, "parser", (parser,))
     given = call.args.at(0, "args") or NONE
-    if not _is_whole(given) and given != result_of("rclpy"):  # what remove_ros_args() leaves
+    left = result_of("rclpy")  # of remove_ros_args(), with the name of the program, as in sys.argv
+    takes_program = given in (unknown(COMMAND_LINE), left) and parser.cells.get(_COUNT) != (0,)
+    if takes_program or not (_is_whole(given) or given in (left, unknown(WITHOUT_ROS))):
         run.state.store(namespace, "[given]", given)
     elif run.launch.words is not None:
         whole = others_too and _is_whole(given)  # else words of ROS would end the program
@@ -156,7 +159,8 @@ def _parse_args(run: Run, parser: Instance, call: Call, others_too: bool = False
 
 
 def _is_whole(given: Value) -> bool:
-    return all(atom is None or (isinstance(atom, Unknown) and atom.why == COMMAND_LINE) for atom in given)
+    whole = (NONE, unknown(COMMAND_LINE), unknown(WITHOUT_PROGRAM))
+    return all((atom,) in whole for atom in given)
 
 
 def _add_subparsers(run: Run, parser: Instance, call: Call) -> Value:

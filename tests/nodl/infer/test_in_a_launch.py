@@ -651,12 +651,25 @@ def test_lists_of_words_of_the_command_line_are_names(
     assert own - {"/rosout", "/parameter_events"} == published
 
 
+@pytest.mark.parametrize("words", ["sys.argv[1:]", "sys.argv[:][1:]", "remove_ros_args(sys.argv)[1:]"])
+def test_the_command_line_without_the_name_of_the_program_is_the_launchs(
+    words: str, launch: Launch, prefix: Path
+) -> None:
+    install_program(prefix, PYTHON + LISTS.format(parser="", read=f"parse_known_args({words})"), "lists")
+    plan = launch('<launch><node pkg="demo" exec="lists" args="a"/></launch>')
+    assert ("publish", "/a") in permissions(plan)
+    assert not plan.problems
+
+
 @pytest.mark.parametrize(
     ("parser", "read"),
     [
         ("fromfile_prefix_chars='@'", "parse_known_args()"),
         ("", "parse_known_args(['a', 'b'])"),
         ("", "parse_known_args(sys.argv[2:])"),
+        ("", "parse_known_args(sys.argv)"),  # the first word of ``topics`` would be the program's own name
+        ("", "parse_known_args(remove_ros_args())"),
+        ("", "parse_known_args(remove_ros_args()[1:][1:])"),
     ],
 )
 def test_words_that_are_not_only_the_launchs_are_gaps(
