@@ -28,7 +28,7 @@ KNOWN_HEADERS = frozenset({
     "rviz_rendering", "rviz_ogre_vendor", "polyclipping", "backward_ros", "range", "magic_enum", "tl_expected",
     "SDL", "SDL2", "SDL3", "libusb-1.0", "lcm", "Poco", "thrust", "cub", "metavision",
     "GL", "GLFW", "X11", "experimental", "robin_hood", "tsl", "sensor_msgs", "rosbag2_cpp", "libavcodec", "libavformat",
-    "libavutil", "libswscale", "ecl", "kobuki_core", "create", "sick_safetyscanners_base",
+    "libavutil", "libswscale", "librealsense2-gl", "ecl", "kobuki_core", "create", "sick_safetyscanners_base",
 })  # fmt: skip
 
 
