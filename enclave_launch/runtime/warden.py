@@ -47,8 +47,6 @@ import time
 from collections.abc import Callable, Mapping
 from typing import Any
 
-TYPE_CHECKING = False  # ``typing`` costs start-up time and is not needed to run
-
 HEADER = struct.Struct("!I")
 PR_SET_PDEATHSIG = 1  # linux/prctl.h
 PR_SET_CHILD_SUBREAPER = 36

@@ -39,9 +39,8 @@ PARSER = "argparse.ArgumentParser"
 NAMESPACE = "argparse.Namespace"
 _COUNT = "positional arguments"
 _DECLARED = "declared arguments"
-_HARMLESS = frozenset(
-    {"prog", "usage", "description", "epilog", "formatter_class", "add_help"}
-)  # of a parser
+# Of a parser; they do not change what its arguments hold.
+_HARMLESS = frozenset({"prog", "usage", "description", "epilog", "formatter_class", "add_help"})
 _NOT_TOLD = unknown("which word of the command line it is")
 _TAKES_ROS_WORDS = "an option that ROS has, too"
 _ROS_WORDS = (

@@ -132,13 +132,12 @@ def _hinted(run: Machine, record: AllocatedNode, default: Value, parameter: Valu
     """
     found: list[Atom] = []
     for name in parameter_names(run, parameter):
-        declared = name is not None and name in record.parameters
-        found += () if declared else default
-        found += (
-            unknown("a transport")
-            if name is None
-            else (Param(record, name, known=() if declared else default),)
-        )
+        if name is None:
+            found += [*default, *unknown("a transport")]
+        elif name in record.parameters:
+            found.append(Param(record, name))
+        else:
+            found += [*default, Param(record, name, known=default)]
     return tuple(dict.fromkeys(found))
 
 
