@@ -307,8 +307,8 @@ def test_rviz_without_a_file_has_that_of_the_user_else_its_own_default(
     of_user.write_text(RVIZ.format(more=""))
     assert allowed(launch(without), "publish") == ["/goal"]
     assert allowed(launch(not_there), "publish") == default
-    told = "there is no file /missing-file.rviz: rviz2 takes its default configuration"
-    assert told in " ".join(each.text for each in launch(not_there).warnings)
+    warning = "the file /missing-file.rviz does not exist: rviz2 loads its default configuration"
+    assert warning in " ".join(each.text for each in launch(not_there).warnings)
     assert "rviz2 takes" not in " ".join(each.text for each in launch(without).warnings)
     of_missing_package = (
         '<node pkg="rviz2" exec="rviz2" args="-d /missing/my_robot/share/my_robot/view.rviz"/>'

@@ -38,10 +38,9 @@ def read_configuration(kind: str, file: str, situation: Situation, place: Source
         return of_arguments(situation.words, place)
     if kind == "ros2_control":
         return of_robot_description(situation.launched.robot_description, place, situation.distro)
+    requested = bool(file)
     if kind == "rviz" and not file:
         file = os.path.expanduser("~/.rviz2/default.rviz")  # rviz_common: visualization_frame.cpp
-        if not os.path.isfile(file):
-            return rviz.default(SourceRef(file))._replace(unused=())  # the launch asks for no file
     if not file:
         return Configured(
             gaps=(Gap(place, f"launch names no {kind} file, from which its topics would follow"),)
@@ -55,7 +54,7 @@ def read_configuration(kind: str, file: str, situation: Situation, place: Source
     text = situation.files.get(file)
     is_there = text is not None or os.path.isfile(file)
     if kind == "rviz" and not is_there and not file.startswith(f"{MISSING_PREFIX}/"):
-        return rviz.default(SourceRef(file))
+        return rviz.default(SourceRef(file), requested=requested)
     try:
         root = _read(file, text, last_counts=kind == "rviz")  # as rviz_common's YamlConfigReader does
     except InvalidNoDLError as error:

@@ -62,15 +62,17 @@ _SILENT_DISPLAYS = ("Axes", "Grid", "TF")  # /tf is the listener's, which every 
 _SILENT_TOOLS = ("FocusCamera", "Interact", "Measure", "MoveCamera", "Select")
 
 
-def default(place: SourceRef) -> Configured:
-    """Return what rviz2 needs for rviz_common/default.rviz, which it takes if the file that it is given does not exist.
+def default(place: SourceRef, *, requested: bool) -> Configured:
+    """Return what rviz2 needs for rviz_common/default.rviz, which it loads if its configuration file does not exist.
 
+    ``requested``: the launch names that file, so that the user expects it.
     Source: visualization_frame.cpp, ``loadDisplayConfig``.
     """
     note = f"the default configuration of rviz2, as {place.file} does not exist"
     made = (endpoint_named(_PUBLISH, name, kind, place, note) for name, kind in _TOPICS_OF_DEFAULT.items())
-    unused = f"there is no file {place.file}: rviz2 takes its default configuration"
-    return Configured(tuple(each for each in made if isinstance(each, Endpoint)), unused=(unused,))
+    missing = f"the file {place.file} does not exist: rviz2 loads its default configuration"
+    endpoints = tuple(each for each in made if isinstance(each, Endpoint))
+    return Configured(endpoints, unused=(missing,) if requested else ())
 
 
 def of_file(root: YamlValue, distro: str) -> Configured:

@@ -294,8 +294,8 @@ _UNMODELLED = frozenset({"unittest", "pytest", "tkinter"})  # whose objects hold
 def _patched(run: Run, owner: External, name: str, value: Value, node: ast.AST, frame: Frame) -> None:
     """Add a gap for a replaced attribute of a library's module or class, if its other users are modelled.
 
-    A setting of a library that is no part of Python (``torch.backends.cudnn.benchmark = True``) changes nothing of ROS,
-    nor does a type of Python that it has under its own name (``numpy.float = float``, which numpy 1.24 gave up).
+    A constant assigned in a third-party library (``torch.backends.cudnn.benchmark = True``) does not change ROS.
+    Neither does a built-in type under its own name (``numpy.float = float``, removed in numpy 1.24).
     """
     root = owner.path.partition(".")[0]
     own = (*external(f"builtins.{name}"), *(atom for atom in value if is_constant(atom)))
@@ -449,7 +449,7 @@ def _delete_item(run: Run, owner: object, key: Value, certain: bool) -> None:
 def change(run: Run, owner: Sequence, added: Value, taken: bool = True) -> None:
     """Let ``added`` come to the elements; in which order they are is not kept.
 
-    ``taken``: something was taken away, nobody knows what; a text or class among the elements may be the one.
+    ``taken``: an unknown element was removed; any text or class among the elements may be that one.
     """
     others = join(owner.items.any_element(), added)
     if taken and any(isinstance(atom, ClassValue) for atom in others):

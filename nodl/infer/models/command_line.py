@@ -1,11 +1,11 @@
-"""What the options of a program hold in a launch: argparse itself reads the words that the program gets."""
+"""Values of a program's options in a launch: argparse itself parses the command line that the process gets."""
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import NamedTuple, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 from nodl.infer.interpreter.run import Arguments, Call, Run
 from nodl.infer.values import (
@@ -38,7 +38,7 @@ class DeclaredOption(NamedTuple):
 
     @property
     def default(self) -> Value:
-        """What argparse takes where no word says otherwise; nothing for ``SUPPRESS``."""
+        """Return the value without a word on the command line; nothing for ``SUPPRESS``."""
         value = self.keywords.get("default", _WITHOUT_WORD.get(self.action, NONE))
         return BOTTOM if value == external("argparse.SUPPRESS") else value
 
@@ -75,7 +75,7 @@ def read_words(
 def _declare(parser: argparse.ArgumentParser, declared: DeclaredOption) -> str:
     """Declare the argument once more; return the attribute that has what it holds."""
     constant = _Word(declared, None)
-    settings = {
+    settings: dict[str, Any] = {
         name: sole(declared.keywords[name]) for name in ("nargs", "dest") if name in declared.keywords
     }
     if declared.action in _WITH_WORDS:
@@ -90,7 +90,7 @@ def _declare(parser: argparse.ArgumentParser, declared: DeclaredOption) -> str:
         settings["action"] = argparse.BooleanOptionalAction
     else:
         raise _Refused("an action that is not modelled")
-    return parser.add_argument(*declared.flags, **settings).dest  # type: ignore[arg-type]
+    return parser.add_argument(*declared.flags, **settings).dest
 
 
 def _held(run: Run, declared: DeclaredOption, found: object, call: Call) -> Value:

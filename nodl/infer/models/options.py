@@ -38,6 +38,7 @@ from nodl.ros_arguments import words_without_ros_arguments
 PARSER = "argparse.ArgumentParser"
 NAMESPACE = "argparse.Namespace"
 _COUNT = "positional arguments"
+_PARSER = "the parser"  # of a namespace; not an attribute of it
 _DECLARED = "declared arguments"
 # Of a parser; they do not change what its arguments hold.
 _HARMLESS = frozenset({"prog", "usage", "description", "epilog", "formatter_class", "add_help"})
@@ -141,7 +142,7 @@ def _set_defaults(run: Run, parser: Instance, call: Call) -> Value:
 
 def _parse_args(run: Run, parser: Instance, call: Call, others_too: bool = False) -> Value:
     namespace = run.library_object(call, NAMESPACE)
-    run.state.store(namespace, "parser", (parser,))
+    run.state.store(namespace, _PARSER, (parser,))
     given = call.args.at(0, "args") or NONE
     left = result_of("rclpy")  # of remove_ros_args(), with the name of the program, as in sys.argv
     takes_program = given in (unknown(COMMAND_LINE), left) and parser.cells.get(_COUNT) != (0,)
@@ -185,12 +186,15 @@ def namespace_attribute(run: Run, namespace: Instance, name: str) -> Value:
     """Return what ``args.<name>`` may be; anything if no parser declares it or the program passes the arguments."""
     if "dest " + name in namespace.cells:
         return namespace.cells["dest " + name] or unknown(f"the command line option {name}")
-    parsers = (atom for atom in namespace.cells.get("parser", BOTTOM) if isinstance(atom, Instance))
-    found = join_all(parser.cells.get("dest " + name, BOTTOM) for parser in parsers)
+    found = join_all(parser.cells.get("dest " + name, BOTTOM) for parser in _parsers_of(namespace))
     if "[given]" in namespace.cells:  # not what launch writes on the command line, but a list of the program
         known = tuple(atom for atom in found if not isinstance(atom, (str, Text)))
         return join(known, unknown(f"the option {name} in arguments that the program makes"))
     return found or unknown(f"the command line option {name}")
+
+
+def _parsers_of(namespace: Instance) -> list[Instance]:
+    return [atom for atom in namespace.cells.get(_PARSER, BOTTOM) if isinstance(atom, Instance)]
 
 
 def is_namespace(atom: object) -> TypeGuard[Instance]:
@@ -201,7 +205,7 @@ def is_namespace(atom: object) -> TypeGuard[Instance]:
 def as_dictionary(run: Run, namespace: Instance, call: Call) -> Value:
     """Return what ``**vars(namespace)`` gives: an entry for each option; any if which there are is not known."""
     made = run.allocate(call.node, "options", Dictionary)
-    parsers = [atom for atom in namespace.cells.get("parser", BOTTOM) if isinstance(atom, Instance)]
+    parsers = _parsers_of(namespace)
     if any(not isinstance(sole(parser.cells.get(_DECLARED)), tuple) for parser in parsers) or not parsers:
         run.state.store(made, OTHER, ANY)
     cells = [cell for parser in parsers for cell in parser.cells if isinstance(cell, str)]

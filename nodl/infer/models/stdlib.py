@@ -319,7 +319,7 @@ def _variables(run: Run, call: Call) -> Value:
 
 @functools.lru_cache(maxsize=64)
 def _spread(tree: ast.Module) -> frozenset[ast.AST]:
-    """Return what is handed over as keywords (``**``): nobody can change it there."""
+    """Return the expressions passed as ``**``. The call copies such a mapping, so that it cannot be changed."""
     keywords = (node for node in ast.walk(tree) if isinstance(node, ast.keyword))
     return frozenset(node.value for node in keywords if node.arg is None)
 

@@ -127,8 +127,9 @@ def _transports_of(run: Machine, record: AllocatedNode, call: Call, place: int) 
 
 
 def _hinted(run: Machine, record: AllocatedNode, default: Value, parameter: Value) -> Value:
-    """Return the transport that a parameter chooses; one that nobody declares does so only if the options of the node
-    declare what the launch sets, so that the default stays possible.
+    """Return the transport that a parameter selects, with the default if the program does not declare the parameter.
+
+    A parameter that is not declared has a value only if the node's options declare what the launch sets.
     """
     found: list[Atom] = []
     for name in parameter_names(run, parameter):
@@ -146,8 +147,9 @@ def _hints(run: Machine, call: Call) -> None:
     """Model image_transport/transport_hints.hpp: (node, default, name of the parameter)."""
     owner, texts = owner_in(call.values), texts_in(call.values)
     if owner is not None and owner.node is not None:
-        given = [*texts, *(literal(each) for each in ("raw", "image_transport")[len(texts) :])]
-        call.this.data["transport"] = _hinted(run, owner.node, *given[:2])
+        default = texts[0] if texts else literal("raw")
+        parameter = texts[1] if len(texts) > 1 else literal("image_transport")
+        call.this.data["transport"] = _hinted(run, owner.node, default, parameter)
 
 
 @library_method("image_transport::TransportHints", "getTransport")

@@ -463,9 +463,9 @@ class Names:
 
     @_once
     def unreviewed(self, scope: Scope, file: FileIndex) -> str:
-        """Return what a class without a namespace may come from, of what nobody reviewed; empty if there is nothing.
+        """Return a source of a class without a namespace that may make a node; empty if there is none.
 
-        That is a header, or a library for ROS whose namespace is used or written in.
+        It is a header that is neither in reach nor reviewed, or the namespace of a ROS library, used or reopened.
         """
         entered = [*self.used_namespaces(file.file), *scope[:1]]
         ours = next((each for each in entered if each.partition("::")[0] in ROS_LIBRARIES), "")

@@ -18,8 +18,8 @@ from nodl.infer.cpp.running.values import (
     holds_callable,
     join,
     join_in_doubt,
-    left,
     lost,
+    notes_read,
 )
 
 MEMORY_DEPTH = 20
@@ -87,7 +87,7 @@ class AbstractStore:
             if self.log.noted is not None:
                 for key, said in noted.items():
                     add_note(self.log.noted, key, said)
-        return Reads(kept, left(noted))
+        return Reads(kept, notes_read(noted))
 
     def saw(self, reads: Reads) -> None:
         """Tell who watches that all this was read."""

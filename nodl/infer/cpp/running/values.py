@@ -76,8 +76,8 @@ def add_note(noted: Noted, key: tuple[Notes, str], said: object) -> None:
         noted[key] = _OWN
 
 
-def left(noted: Noted) -> Noted:
-    """Return the notes that code read, with what it left in those that it wrote before."""
+def notes_read(noted: Noted) -> Noted:
+    """Return the notes that code read; of a note that it wrote first, with its last value."""
     return {
         (notes, name): notes._values.get(name, _ABSENT) if said is _OWN else said
         for (notes, name), said in noted.items()

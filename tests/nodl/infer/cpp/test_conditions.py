@@ -1,5 +1,4 @@
-"""What ``exact`` says of an interface under a condition: its name, in C++ as in Python; not that every run makes it.
-In C++ its note says so."""
+"""``exact`` means that the name of an interface is known, not that every run makes it. In C++ a note says so."""
 
 from __future__ import annotations
 

@@ -128,8 +128,8 @@ def test_interfaces_of_a_node_stand_for_it(tmp_path: Path, interfaces: str) -> N
     {interfaces} these(*this); rclcpp::create_publisher<std_msgs::msg::String>(these, "b", 1);"""
     found = infer(tmp_path, in_class(made))
     assert (names(found), gaps(found)) == (["a", "b"], [])
-    nobody = infer(tmp_path / "nobody", in_class(made.replace("*this", "of_another")))
-    assert gaps(nobody)
+    of_an_unknown_node = infer(tmp_path / "unknown", in_class(made.replace("*this", "of_another")))
+    assert gaps(of_an_unknown_node)
 
 
 @pytest.mark.parametrize(
