@@ -41,12 +41,17 @@ class Package(NamedTuple):
 
 def find_package(file: str) -> Package | None:
     """Return the package that ``file`` belongs to: the nearest folder above with a ``package.xml``."""
+    *_, last = manifest_places(file)
+    return read_package(str(last.parent)) if last.is_file() else None
+
+
+def manifest_places(file: str) -> Iterator[Path]:
+    """Return where the ``package.xml`` of ``file`` may be, nearest first, up to the one that is there."""
     for folder in Path(file).parents:
-        if (folder / "package.xml").is_file():
-            return read_package(str(folder))
-        if (folder / ".git").exists():
-            return None
-    return None
+        manifest = folder / "package.xml"
+        yield manifest
+        if manifest.is_file() or (folder / ".git").exists():
+            return
 
 
 @lru_cache(maxsize=512)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import NamedTuple, TypeVar
 
 from nodl.infer.analysis import analyse_rest, failure, start, without_collector
+from nodl.infer.answers.python import CachedAnswer
 from nodl.infer.interpreter.run import Run
 from nodl.infer.net import may_make_interfaces, unsettled_places
 from nodl.infer.packages import EntryPoint, Package, find_package, scripts_of
@@ -42,31 +43,54 @@ def infer_paths(paths: Iterable[str | Path]) -> InferredSystem:
     """
     found = list(dict.fromkeys(file for path in paths for file in _source_files(Path(path))))
     files = [file for file in found if file.endswith(".py") or not file.endswith(CPP_SUFFIXES)]
+    nodes, gaps = _python(files)
+    cpp_nodes, cpp_gaps = _cpp([file for file in found if file not in files])
+    # One may be found through several files of a program.
+    return InferredSystem(
+        tuple(dict.fromkeys([*nodes, *cpp_nodes])), (*dict.fromkeys(gaps), *cpp_gaps), tuple(found)
+    )
+
+
+def _python(files: list[str]) -> tuple[Iterable[NodeInterface], Iterable[Gap]]:
+    """Infer Python sources together: a file may use what another one makes. An earlier answer is taken if it holds."""
+    if not files:
+        return (), ()
     program = Program()
     for file in files:
         program.add_root(program.top_folder(file))
-    failed: list[Gap] = []
-    with without_collector():
-        runs: list[tuple[Run, LaunchKey]] = []
-        for file in files:
-            runs.extend(_attempted(partial(_runs, program, file), file, failed))
-        called = {node for run, _ in runs for node in run.called}
-        instantiated = {node for run, _ in runs for node in run.instantiated}
-        for run, _ in runs:
-            analyse_rest(run, called, instantiated)
-        everywhere = {node for run, _ in runs for node in run.entries}
-        instantiated.update(node for run, _ in runs for node in run.instantiated)
-        unsettled: list[Gap] = []
-        nodes: list[NodeInterface] = []
-        for run, origin in runs:
-            nodes.extend(_attempted(partial(interfaces_of, run.findings, origin), run.main.path, failed))
-            settle = partial(unsettled_places, run, everywhere, instantiated)
-            unsettled.extend(_attempted(settle, run.main.path, failed))
-    gaps = [*failed, *(Gap(source, why) for run, _ in runs for source, why in run.findings.gaps)]
-    cpp_nodes, cpp_gaps = _cpp([file for file in found if file not in files])
-    # One may be found through several files of a program.
-    distinct = tuple(dict.fromkeys([*nodes, *cpp_nodes]))
-    return InferredSystem(distinct, (*dict.fromkeys([*gaps, *unsettled]), *cpp_gaps), tuple(found))
+    starts = [_start_of(program, file) for file in files]
+    cached = CachedAnswer(program, starts)
+    answer: tuple[Iterable[NodeInterface], Iterable[Gap]] | None = cached.find()
+    if answer is None:
+        failed: list[Gap] = []
+        with without_collector():
+            nodes, gaps = _analysed(program, starts, failed)
+        answer = nodes, [*failed, *gaps]
+        if not failed:
+            cached.store(answer)
+    return answer
+
+
+def _analysed(
+    program: Program, starts: list[_Start], failed: list[Gap]
+) -> tuple[list[NodeInterface], list[Gap]]:
+    runs: list[tuple[Run, LaunchKey]] = []
+    for each in starts:
+        runs.extend(_attempted(partial(_runs, program, each), each.file, failed))
+    called = {node for run, _ in runs for node in run.called}
+    instantiated = {node for run, _ in runs for node in run.instantiated}
+    for run, _ in runs:
+        analyse_rest(run, called, instantiated)
+    everywhere = {node for run, _ in runs for node in run.entries}
+    instantiated.update(node for run, _ in runs for node in run.instantiated)
+    unsettled: list[Gap] = []
+    nodes: list[NodeInterface] = []
+    for run, origin in runs:
+        nodes.extend(_attempted(partial(interfaces_of, run.findings, origin), run.main.path, failed))
+        settle = partial(unsettled_places, run, everywhere, instantiated)
+        unsettled.extend(_attempted(settle, run.main.path, failed))
+    gaps = [Gap(source, why) for run, _ in runs for source, why in run.findings.gaps]
+    return nodes, [*gaps, *unsettled]
 
 
 def _attempted(analyse: Callable[[], Iterable[Found]], file: str, failed: list[Gap]) -> list[Found]:
@@ -92,15 +116,25 @@ def _cpp(files: list[str]) -> tuple[list[NodeInterface], list[Gap]]:
     return inferred.nodes, inferred.gaps
 
 
-def _runs(program: Program, file: str) -> Iterator[tuple[Run, LaunchKey]]:
-    module = program.load(file)
-    if not may_make_interfaces(program, module):
-        return
+class _Start(NamedTuple):
+    """``functions``: the entry points in ``file`` with which it starts; none for a script."""
+
+    file: str
+    origin: LaunchKey
+    functions: tuple[str, ...]
+
+
+def _start_of(program: Program, file: str) -> _Start:
     package = find_package(file)
-    entries = package.entry_points_of(module.name) if package else []
-    functions = [entry.function for entry in entries]
+    entries = package.entry_points_of(program.module_name(file)) if package else []
     origin = LaunchKey(package.name if package else None, _executable(entries, file, package))
-    yield start(program, module, functions), origin
+    return _Start(file, origin, tuple(entry.function for entry in entries))
+
+
+def _runs(program: Program, started: _Start) -> Iterator[tuple[Run, LaunchKey]]:
+    module = program.load(started.file)
+    if may_make_interfaces(program, module):
+        yield start(program, module, started.functions), started.origin
 
 
 def _executable(entries: list[EntryPoint], file: str, package: Package | None) -> str | None:

@@ -12,7 +12,7 @@ from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 from nodl.infer.findings import Findings, OptionDefaults
-from nodl.infer.packages import find_package
+from nodl.infer.packages import find_package, manifest_places
 from nodl.infer.program import Program, SourceModule
 from nodl.infer.start import NO_LAUNCH
 from nodl.infer.state import Allocations, ProgramState, Written
@@ -204,6 +204,8 @@ class Run(Allocations):
     @cached_property
     def dependencies(self) -> frozenset[str]:
         """Return what the program's package.xml says that it depends on."""
+        for manifest in manifest_places(self.main.path):
+            self.program.ask("file", str(manifest))
         package = find_package(self.main.path)
         return package.dependencies if package else frozenset()
 

@@ -22,6 +22,12 @@ def kept_answers(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.M
 
 
 @pytest.fixture
+def no_cache(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have every program analysed, also one that was analysed by another engine or under other limits before."""
+    monkeypatch.setenv("XDG_CACHE_HOME", "/dev/null")
+
+
+@pytest.fixture
 def infer(tmp_path: Path) -> Infer:
     """``infer(main, **{"helper.py": ...})``: writes the files into one folder and infers from it."""
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from nodl.infer import analysis, infer_executable
+from nodl.infer import analysis, infer_executable, infer_paths, packages, system
 from nodl.infer.answers.python import own_sources
 from nodl.infer.program import Program, ProgramTarget
 
@@ -142,3 +142,51 @@ def test_without_a_folder_every_launch_analyses(
     monkeypatch.setenv("XDG_CACHE_HOME", "/dev/null")
     assert _names(prefix) == _names(prefix)
     assert len(analyses) == 2
+
+
+def test_files_that_were_inferred_together_are_not_analysed_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "one.py").write_text("import rclpy\nrclpy.create_node('one')\n")
+    (tmp_path / "two.py").write_text("import rclpy\nfrom names import NAME\nrclpy.create_node(NAME)\n")
+    (tmp_path / "names.py").write_text("NAME = 'two'\n")
+    first = infer_paths([tmp_path])
+    assert {node.name for node in first.nodes} == {"one", "two"}
+    monkeypatch.setattr(system, "start", None)  # would fail
+    assert infer_paths([tmp_path]) == first
+    monkeypatch.undo()
+    (tmp_path / "names.py").write_text("NAME = 'three'\n")
+    assert {node.name for node in infer_paths([tmp_path]).nodes} == {"one", "three"}
+
+
+ASKS_A_LIBRARY = """\
+#!/usr/bin/python3
+import rclpy, some_library
+rclpy.create_node("n")
+some_library.Robot()
+"""
+
+
+def test_what_package_xml_says_of_a_library_is_part_of_an_answer(tmp_path: Path) -> None:
+    (tmp_path / "main.py").write_text(ASKS_A_LIBRARY)
+    _depend(tmp_path, "rclpy")
+    assert not any(node.gaps for node in infer_paths([tmp_path]).nodes)
+    _depend(tmp_path, "some_library")
+    found = infer_paths([tmp_path])
+    assert "some_library" in str([found.gaps, *(node.gaps for node in found.nodes)])
+
+
+def test_a_launch_sees_what_package_xml_says_of_a_library(prefix: Path) -> None:
+    program = prefix / "lib/demo/program"
+    program.write_text(ASKS_A_LIBRARY)
+    _depend(program.parent, "rclpy")
+    (known,) = infer_executable("demo", "program", prefixes=[str(prefix)]).interfaces
+    assert not known.gaps
+    _depend(program.parent, "some_library")
+    (asked,) = infer_executable("demo", "program", prefixes=[str(prefix)]).interfaces
+    assert "some_library" in str(asked.gaps)
+
+
+def _depend(folder: Path, library: str) -> None:
+    (folder / "package.xml").write_text(f"<package><name>demo</name><depend>{library}</depend></package>")
+    packages.read_package.cache_clear()  # the next run of the tool

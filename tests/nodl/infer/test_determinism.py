@@ -15,6 +15,8 @@ from nodl.infer import InferredSystem, infer_paths
 from nodl.infer.report.written import expand, to_json
 from nodl.name_template import UnknownPart
 
+pytestmark = pytest.mark.usefixtures("no_cache")
+
 # Each level of calls doubles the work: without a budget this would take minutes.
 _ENDLESS = "\n".join(
     (

@@ -9,6 +9,8 @@ import pytest
 from nodl.infer import InferredSystem, analysis
 from nodl.infer.values import ANY, FunctionValue, Value
 
+pytestmark = pytest.mark.usefixtures("no_cache")
+
 Infer = Callable[..., InferredSystem]
 PROGRAM = """
     import rclpy
