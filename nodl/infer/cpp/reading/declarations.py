@@ -19,9 +19,6 @@ Scope = tuple[str, ...]  # namespaces and classes around a declaration
 
 
 _MENTIONED = re.compile(r"\b(?:msg|srv|action)::\w+|[A-Za-z_]\w*\b(?!\s*::(?!\s*(?:make_|[Cc]reate|Make)))")
-_NUMBERS = frozenset({
-    "bool", "int", "double", "float", "size_t", "unsigned", "unsigned int", "std::size_t", "unsigned char",
-})  # fmt: skip
 
 
 @dataclass(eq=False, slots=True)
@@ -77,16 +74,6 @@ class Function:
             written = _LITERAL.sub("", source.decode("utf-8", "replace"))
             self._words = frozenset(_MENTIONED.findall(written))
         return self._words
-
-    @property
-    def only_computes(self) -> bool:
-        """Return True if it computes a number or condition from values that it cannot change, in many lines."""
-        declarator = function_declarator(self.node)
-        if declarator is None or self.body is None or self.body.end_byte - self.body.start_byte < 300:
-            return False
-        constant = any(text(child) == "const" for child in declarator.named_children)
-        changes = any(p.type.rstrip().endswith(("&", "*")) and "const" not in p.type for p in self.parameters)
-        return type_text(self.node) in _NUMBERS and not changes and (constant or not self.owner)
 
     @property
     def line(self) -> int:

@@ -99,7 +99,7 @@ def call_expression(run: Machine, node: Node, frame: Frame) -> Value:
         run.store.others_run()
     if _SPINS.search(name):
         run.spins_beside = run.spins_beside or bool(run.closures)
-        if run.spins_beside or not name.endswith("spin"):
+        if run.spins_beside or len(run.active) > 1 or _makes_more(run, node):
             run_meanwhile(run, frame)
     elif run.spins_beside and _WAITS.search(name):
         run_meanwhile(run, frame)
@@ -109,6 +109,24 @@ def call_expression(run: Machine, node: Node, frame: Frame) -> Value:
         return _named_call(run, callee_name(callee), site)
     values = site.values
     return call_values(run, run.evaluate(callee, frame), values, node, frame)
+
+
+_LOOPS = frozenset({"for_statement", "for_range_loop", "while_statement", "do_statement"})
+
+
+def _makes_more(run: Machine, call: Node) -> bool:
+    """Return whether something may make an interface behind ``call`` in its function: most programs only end there."""
+    each: Node | None = call
+    while each is not None and each.type not in ("function_definition", "lambda_expression"):
+        behind = each.next_named_sibling
+        while behind is not None:
+            if run.subtree_matters(behind):
+                return True
+            behind = behind.next_named_sibling
+        if each.type in _LOOPS and run.subtree_matters(each):
+            return True
+        each = each.parent
+    return False
 
 
 # --- by name --------------------------------------------------------------------------------------------------

@@ -356,8 +356,6 @@ def invoke(
         if run.makes_interfaces(function):
             run.gap(node, frame, f"{function} calls itself, deeper than is followed")
         return _too_deep(run, function, node, frame)
-    if function.only_computes and not run.makes_interfaces(function):
-        return unknown(f"the result of {function.name}()")
     if leave_out(run, function, values, node, frame):
         return unknown(f"the result of {function.name}()")
     values = _seen_once(run, function, this_object, function.parameters, values, node, frame)

@@ -142,3 +142,20 @@ def test_a_callback_that_makes_structures_in_a_loop_comes_to_an_end(tmp_path: Pa
     )
     system = infer(tmp_path, source)
     assert (names(system), gaps(system)) == (["a"], [])
+
+
+@pytest.mark.parametrize(
+    ("behind", "made"),
+    [("", ["a"]), ("n->make();", ["?", "a"])],
+    ids=["nothing is made behind spin", "something is"],
+)
+def test_what_callbacks_changed_is_seen_behind_spin(behind: str, made: list[str], tmp_path: Path) -> None:
+    source = f"""{HEAD}
+struct D : rclcpp::Node {{
+  D() : Node("n") {{ make(); s_ = create_subscription<{S}>("s", 1, [this](const {S} & m) {{ topic_ = m.data; }}); }}
+  void make() {{ create_publisher<{S}>(topic_, 1); }}
+  std::string topic_ = "a"; rclcpp::Subscription<{S}>::SharedPtr s_; }};
+int main(int argc, char ** argv) {{ rclcpp::init(argc, argv); auto n = std::make_shared<D>(); rclcpp::spin(n);
+  {behind} rclcpp::shutdown(); }}
+"""
+    assert names(infer(tmp_path, source)) == sorted([*made, "s"])
