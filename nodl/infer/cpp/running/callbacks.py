@@ -156,7 +156,7 @@ def _call(rounds: _Rounds, key: Key, atom: object, frame: Frame, certainly: bool
             return forgotten
 
     def go() -> int:
-        reads = run.store.watched(partial(_run, run, atom, frame))
+        reads = run.store.watched(partial(_run, run, atom, frame, key in run.conditional))
         rounds.last[key] = _Ran(reads, len(run.nodes))
         for cell in reads.cells:
             rounds.cells_read.setdefault(name_of(cell), set()).add(cell)
@@ -166,8 +166,8 @@ def _call(rounds: _Rounds, key: Key, atom: object, frame: Frame, certainly: bool
     return True
 
 
-def _run(run: Machine, atom: object, frame: Frame) -> None:
-    skips, run.skips = run.skips, 0
+def _run(run: Machine, atom: object, frame: Frame, conditional: bool) -> None:
+    skips, run.skips = run.skips, int(conditional)
     if isinstance(atom, Lambda):
         call_lambda(run, atom, [], atom.node, atom.frame)
     elif isinstance(atom, Bound):

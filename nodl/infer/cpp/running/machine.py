@@ -120,6 +120,7 @@ class Machine:
         self.objects: dict[object, Obj] = {}
         self.frames: dict[object, Frame] = {}
         self.callbacks: dict[tuple[object, object], tuple[Atom, Frame]] = {}
+        self.conditional: set[tuple[object, object]] = set()  # callbacks that a condition may leave out
         self.handled: dict[str, set[int]] = {}  # file -> first bytes of calls with a result
         self.resolved: dict[str, set[int]] = {}  # file -> first bytes of calls of what is not ours
         self.called: set[Function] = set()
@@ -365,10 +366,17 @@ class Machine:
         atoms = [*chain.from_iterable(values)]
         for atom in atoms:
             if isinstance(atom, Lambda):
-                self.callbacks.setdefault((atom.node.id, atom.frame.path), (atom, frame))
+                self._keep_callback((atom.node.id, atom.frame.path), atom, frame)
             elif isinstance(atom, Bound):
                 for each in self._with_objects(atom, atoms):
-                    self.callbacks.setdefault((each.function, each[1:]), (each, frame))
+                    self._keep_callback((each.function, each[1:]), each, frame)
+
+    def _keep_callback(self, key: tuple[object, object], atom: Atom, frame: Frame) -> None:
+        if not self.undecided and not self.skips:
+            self.conditional.discard(key)
+        elif key not in self.callbacks:
+            self.conditional.add(key)
+        self.callbacks.setdefault(key, (atom, frame))
 
     def _with_objects(self, atom: Bound, atoms: Sequence[Atom]) -> list[Bound]:
         """Bind a method that is handed over beside objects that have it to those."""

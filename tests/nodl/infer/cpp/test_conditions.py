@@ -29,6 +29,10 @@ UNDECIDED = {
         'for (int i = 0; i < 2; ++i) { if (std::rand() > 5) { continue; } pub("a"); }',
         {"a"},
     ),
+    "a callback under a condition": (
+        'if (std::rand() > 5) { create_wall_timer(1s, [this]() { pub("a"); }); }',
+        {"a"},
+    ),
     "a parameter": ('if (declare_parameter<bool>("on", true)) { pub("a"); }', {"a"}),
 }
 DECIDED = {
@@ -38,6 +42,10 @@ DECIDED = {
     "a known number of turns": ("for (int i = 0; i < 2; ++i) { pub(std::to_string(i)); }", {"0", "1"}),
     "once certainly": ('pub("a"); if (std::rand() > 5) { pub("a"); }', {"a"}),
     "a callback": ('create_wall_timer(1s, [this]() { pub("a"); });', {"a"}),
+    "a callback behind a condition": (
+        'if (std::rand() > 5) { std::rand(); } create_wall_timer(1s, [this]() { pub("a"); });',
+        {"a"},
+    ),
 }
 
 

@@ -392,8 +392,7 @@ def test_a_closure_that_compares_elements_is_none_of_them(
 def test_a_function_of_many_lines_that_gives_a_number_may_change_a_global(tmp_path: Path) -> None:
     """It was taken for one that only computes."""
     lines = "if (n > 1) { n = n * 2; } else { n = n + 1; } " * 10
-    before = (
-        'std::string topic = "a";\nstatic bool compute(int n) { %s topic += "b"; return n > 1; }\n' % lines
-    )
+    compute = f'static bool compute(int n) {{ {lines} topic += "b"; return n > 1; }}\n'
+    before = f'std::string topic = "a";\n{compute}'
     system = infer(tmp_path, in_class(f"if (compute(1)) {{ }} {MAKES}", before=before))
     assert (names(system), gaps(system)) == (["ab"], [])
