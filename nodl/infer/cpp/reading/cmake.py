@@ -1,8 +1,8 @@
 """Read from ``CMakeLists.txt`` what a package builds and installs.
 
-These are targets with sources, definitions and links, registered components, plugin descriptions, and scripts. Reads
-files below the package; runs nothing. Conditions are not decided, except tests (left out): both sides count, and what
-only one of them defines is open.
+These are targets with sources and links, registered components, plugin descriptions, and scripts. Reads files below the
+package; runs nothing. Conditions are not decided, except tests (left out): both sides count. What sources are compiled
+with is left to the build (``built``).
 """
 
 from __future__ import annotations
@@ -10,13 +10,12 @@ from __future__ import annotations
 import glob
 import os
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from enclave_common.files import read_text
-from nodl.infer.cpp.reading.built import Definitions
 from nodl.package_xml import read_package_xml
 
 SOURCES = (".cpp", ".cc", ".cxx", ".c++", ".C")
@@ -40,22 +39,8 @@ class Target:
     name: str
     executable: bool
     sources: list[str] = field(default_factory=list)
-    symbols: dict[str, str] = field(default_factory=dict)
-    open: set[str] = field(default_factory=set)  # symbols that a condition or an unknown variable decides
     links: list[str] = field(default_factory=list)
     automatic: bool = False  # ament_auto: links every library of the package
-
-    @property
-    def definitions(self) -> Definitions:
-        """Return what its sources are compiled with, as far as CMake's files say it."""
-        known = {name: value for name, value in self.symbols.items() if name not in self.open}
-        return Definitions(tuple(sorted(known.items())), open=tuple(sorted(self.open)))
-
-    def define(self, symbols: Mapping[str, str], doubtful: Iterable[str]) -> None:
-        """Add symbols of the command line; of one that is defined twice, differently, the value is not known."""
-        self.open |= {name for name, value in symbols.items() if self.symbols.get(name, value) != value}
-        self.open.update(doubtful)
-        self.symbols.update(symbols)
 
 
 @dataclass
@@ -96,10 +81,6 @@ class BuildReader:
         self.functions: dict[str, tuple[bool, list[str], list[Command]]] = {}
         self.steps = 0
         self.included: list[str] = []  # files and folders that are being read
-        self.everywhere = Target("", executable=False)  # what add_definitions() gives each target
-        self.undecided = 0  # how many conditions that are not known are around
-        self.doubtful = False  # whether the command that runs depends on one, or on a variable that does
-        self.doubtful_variables: set[str] = set()
 
     def read(self, folder: str, variables: dict[str, str]) -> None:
         try:
@@ -154,22 +135,16 @@ class BuildReader:
                 parts[-1][1].append(command)
         for condition, inside in parts:
             known = condition_state(condition)
-            self.undecided += known is None
             if known is not False:
                 self.run(inside, variables)
-            self.undecided -= known is None
             if known is True:
                 return
 
     def command(self, name: str, words: list[str], variables: dict[str, str]) -> None:
         given = expand(words, variables)
         used = {match for word in words for match in _VARIABLE.findall(word)}
-        self.doubtful = (
-            self.undecided > 0
-            or not used.isdisjoint(self.doubtful_variables)
-            or not variables.keys() >= used
-            or any("$<" in word for word in given)
-        )
+        if name == "project" and not variables.keys() >= used:
+            return  # a macro made the name of package.xml, which is what ament demands
         if name in self.functions:
             self._call(name, given, variables)
             return
@@ -185,8 +160,6 @@ class BuildReader:
         inner = dict(zip(parameters, given, strict=False))
         inner |= {"ARGN": ";".join(given[len(parameters) :]), "ARGV": ";".join(given)}
         inner |= {f"ARGV{index}": word for index, word in enumerate(given)}
-        for parameter in inner:
-            self._note_doubt(parameter)
         if own:
             variables = dict(variables)
         before = {parameter: variables.get(parameter, "") for parameter in inner}
@@ -205,7 +178,6 @@ class BuildReader:
             found = [glob.glob(f"{folder}/**/*{suffix}", recursive=True) for suffix in _SOURCE_SUFFIXES]
             words = [file for files in found for file in sorted(files)]
         self._sources(target, words, variables)
-        target.define(self.everywhere.symbols, self.everywhere.open)
 
     def _sources(self, target: Target, words: list[str], variables: dict[str, str]) -> None:
         for word in words:
@@ -220,24 +192,14 @@ class BuildReader:
             if file.endswith(_SOURCE_SUFFIXES) and file not in target.sources:
                 target.sources.append(file)
 
-    def _note_doubt(self, variable: str) -> None:
-        """Note whether the value that a variable gets here is certain."""
-        if self.doubtful:
-            self.doubtful_variables.add(variable)
-        elif not self.undecided:
-            self.doubtful_variables.discard(variable)
-
     # --- single commands --------------------------------------------------------------------------------
 
     def _do_set(self, given: list[str], variables: dict[str, str]) -> None:
         words = given[1 : given.index("CACHE")] if "CACHE" in given else given[1:]
         variables[given[0]] = ";".join(word for word in words if word != "PARENT_SCOPE")
-        self._note_doubt(given[0])
 
     def _do_list(self, given: list[str], variables: dict[str, str]) -> None:
         before = [variables[given[1]]] if len(given) > 1 and variables.get(given[1]) else []
-        if self.doubtful:
-            self.doubtful_variables.update(given[1:2])
         if given[0] == "APPEND" and len(given) > 1:
             variables[given[1]] = ";".join([*before, *given[2:]])
         elif given[0] in ("INSERT", "PREPEND") and len(given) > 2:
@@ -259,11 +221,9 @@ class BuildReader:
                 found[current].append(word)
         for name in words:
             variables[f"{prefix}_{name}"] = ";".join(found.get(name, []))
-            self._note_doubt(f"{prefix}_{name}")
 
     def _do_project(self, given: list[str], variables: dict[str, str]) -> None:
-        if not self.doubtful:  # else a macro made the name of package.xml, which is what ament demands
-            variables["PROJECT_NAME"] = variables["CMAKE_PROJECT_NAME"] = given[0]
+        variables["PROJECT_NAME"] = variables["CMAKE_PROJECT_NAME"] = given[0]
 
     def _do_file(self, given: list[str], variables: dict[str, str]) -> None:
         if given[0] in ("GLOB", "GLOB_RECURSE") and len(given) > 2:
@@ -283,23 +243,6 @@ class BuildReader:
     def _do_target_link_libraries(self, given: list[str], variables: dict[str, str]) -> None:
         if given[0] in self.build.targets:
             self.build.targets[given[0]].links += [w for w in given[1:] if w not in LINK_WORDS]
-
-    def _do_target_compile_definitions(self, given: list[str], variables: dict[str, str]) -> None:
-        if given[0] in self.build.targets:
-            self._define(self.build.targets[given[0]], compile_definitions(given[1:]))
-
-    _do_target_compile_options = _do_target_compile_definitions
-
-    def _do_add_definitions(self, given: list[str], variables: dict[str, str]) -> None:
-        self._define(self.everywhere, compile_definitions(given))
-
-    _do_add_compile_definitions = _do_add_definitions
-
-    def _do_remove_definitions(self, given: list[str], variables: dict[str, str]) -> None:
-        self.everywhere.open |= compile_definitions(given).keys()
-
-    def _define(self, target: Target, symbols: Mapping[str, str]) -> None:
-        target.define(symbols, symbols if self.doubtful else ())
 
     def _do_add_subdirectory(self, given: list[str], variables: dict[str, str]) -> None:
         folder = absolute(given[0], variables)
@@ -478,16 +421,3 @@ def recursive_pattern(pattern: str) -> str:
     """Return a pattern of ``GLOB_RECURSE`` with ``**`` before the file name."""
     folder, name = os.path.split(pattern)
     return os.path.join(folder.replace("**", "*"), "**", name)
-
-
-def compile_definitions(words: list[str]) -> dict[str, str]:
-    """Return macros with their values, ``1`` by default."""
-    found = {}
-    for word in words:
-        if word.startswith("-D"):
-            word = word[2:]
-        elif word.startswith(("-", "$")) or word in LINK_WORDS:
-            continue
-        name, _, value = word.partition("=")
-        found[name] = value.replace('\\"', '"') or "1"
-    return found

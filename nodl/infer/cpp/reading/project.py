@@ -10,7 +10,7 @@ from functools import cached_property
 from html import unescape
 
 from enclave_common.files import text_or_nothing
-from nodl.infer.cpp.reading.built import Definitions, built_targets, joined
+from nodl.infer.cpp.reading.built import UNBUILT, Definitions, built_targets, joined
 from nodl.infer.cpp.reading.cmake import SOURCES, Build, Target, read_build
 from nodl.package_xml import read_package_xml
 
@@ -149,7 +149,7 @@ class Workspace:
         return built_targets(self.build_folders)
 
     def definitions(self, package: SourcePackage, targets: Sequence[Target]) -> Definitions:
-        """Return what sources of one program are compiled with: as they were built, else as CMake's files say."""
+        """Return what sources of one program are compiled with: as they were built, else it is open."""
         own = self._definitions(package, targets)
         return own if self.within(package, own) == own else own._replace(package=package.name)
 
@@ -160,7 +160,7 @@ class Workspace:
 
     def _definitions(self, package: SourcePackage, targets: Iterable[Target]) -> Definitions:
         compiled = [each for each in targets if any(file.endswith(SOURCES) for file in each.sources)]
-        return joined(self._built.get((package.name, each.name), each.definitions) for each in compiled)
+        return joined(self._built.get((package.name, each.name), UNBUILT) for each in compiled)
 
 
 def find_packages(roots: Iterable[str]) -> dict[str, SourcePackage]:

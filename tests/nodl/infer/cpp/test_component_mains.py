@@ -116,19 +116,6 @@ def test_one_that_calls_another_constructor_than_a_container_does_is_a_program_o
     assert listed(executable(system)) == ["publisher alone"]
 
 
-def test_sources_that_it_is_compiled_with_otherwise_than_the_component_are_followed_again(
-    tmp_path: Path, runs: list[str]
-) -> None:
-    source = SOURCE.replace('"chatter"', "TOPIC").replace(
-        "demo::", '#ifdef ALONE\n#define TOPIC "alone"\n#else\n#define TOPIC "chatter"\n#endif\ndemo::', 1
-    )
-    files = {"src/main.cpp": MAIN, "src/talker.cpp": source, "include/talker.hpp": HEADER}
-    cmake = CMAKE + "target_compile_definitions(talker PRIVATE ALONE)\n"
-    system = infer_paths([package(tmp_path / "demo", files, cmake)])
-    assert sorted(runs) == ["main.cpp", "talker.cpp"]
-    assert listed(executable(system)) == ["publisher ?"]
-
-
 def test_an_edit_of_the_component_reaches_the_executable(tmp_path: Path) -> None:
     infer(tmp_path)
     assert listed(executable(infer(tmp_path, source=SOURCE.replace("chatter", "speech")))) == [
