@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import ctypes
-import math
 import operator
 import re
 from collections.abc import Callable
 from typing import Any
 
 from nodl.infer.cpp.running.values import (
-    END,
-    Const,
-    Group,
     Param,
     Text,
     Unknown,
@@ -42,7 +37,7 @@ _OF_INTEGERS: dict[str, Callable[[int, int], int]] = {
 
 def arithmetic(sign: str, left: object, right: object) -> Value:
     """Compute ``left sign right`` of two numbers."""
-    if not isinstance(left, int | float) or not isinstance(right, int | float):
+    if not isinstance(left, int) or not isinstance(right, int):
         return unknown("a computed value")
     found: int | float
     if sign in _ARITHMETIC:
@@ -63,12 +58,8 @@ def computed(sign: str, left: object, right: object) -> Value:
 
 
 def _same(left: object, right: object) -> bool | None:
-    if isinstance(left, int | float) and isinstance(right, int | float):
+    if isinstance(left, int) and isinstance(right, int):
         return left == right
-    if isinstance(left, Const) and isinstance(right, Const):
-        return left == right
-    if END in (left, right) and isinstance(left, Group) != isinstance(right, Group):  # what find() gives
-        return False
     first, second = plain(left), plain(right)
     return None if first is None or second is None else first == second
 
@@ -89,9 +80,9 @@ def _sum(left: object, right: object) -> Value:
 
 
 def _is_number(atom: object) -> bool:
-    """Return whether it is a number, an enumerator, or a parameter whose default is a number."""
+    """Return whether it is a number, or a parameter whose default is a number."""
     default = atom.default if isinstance(atom, Param) else ()
-    return any(isinstance(each, int | float | Const) for each in (atom, *default))
+    return any(isinstance(each, int) for each in (atom, *default))
 
 
 _INTEGER = re.compile(
@@ -101,39 +92,28 @@ _INTEGER = re.compile(
 
 def as_type(name: str, value: Value) -> Value:
     """Return ``value`` as a variable of this fundamental type holds it; of other types as it was."""
-    if name in ("double", "float"):
-        if any(isinstance(atom, Unknown | Text) for atom in value):
-            return unknown("a number")
-        exact = tuple(float(atom) if type(atom) is int else atom for atom in value)
-        return tuple(single(atom) if name == "float" and isinstance(atom, float) else atom for atom in exact)
+    if name in ("double", "float") and any(isinstance(atom, int | Text | Unknown) for atom in value):
+        return unknown("a fraction")
     if name == "bool":
         return join(*((_as_bool(atom),) for atom in value))
     match = _INTEGER.fullmatch(name)
     return value if match is None else join(*((_held(atom, match),) for atom in value))
 
 
-def single(value: float) -> float:
-    """Return a number as a ``float`` of 32 bits holds it."""
-    return ctypes.c_float(value).value
-
-
 def _as_bool(atom: object) -> object:
     """Return a number as a condition, a text as one that is not known."""
     if isinstance(atom, Text):
         return Unknown("a condition")
-    return bool(atom) if isinstance(atom, int | float) else atom
+    return bool(atom) if isinstance(atom, int) else atom
 
 
 def _held(atom: object, kind: re.Match[str]) -> object:
     """Return a number as an integer holds it; one that not every integer of the kind has is not known."""
     if isinstance(atom, Text):
         return Unknown("a letter as a number")
-    if isinstance(atom, Param) and any(isinstance(each, float) for each in atom.default):
-        return Unknown("a parameter as a whole number")
-    if not isinstance(atom, int | float):
+    if not isinstance(atom, int):
         return atom
     is_small = "short" in kind[0] or "char" in kind[0] or kind["bits"] in ("8", "16")
     is_signed = kind[0] in ("int", "long") or (kind["unsigned"] == "" and kind["bits"])
     least, most = -128 if is_signed else 0, 127 if is_small else LARGEST
-    whole = int(atom) if math.isfinite(atom) else -LARGEST
-    return whole if least <= whole <= most else Unknown(f"a number that {kind[0]} may not hold")
+    return int(atom) if least <= atom <= most else Unknown(f"a number that {kind[0]} may not hold")

@@ -18,6 +18,7 @@ from nodl.infer.cpp.running.references import (
     forget_everything,
     is_plain,
     leads_into,
+    set_through,
     through,
 )
 from nodl.infer.cpp.running.static_types import (
@@ -45,12 +46,10 @@ from nodl.infer.cpp.running.values import (
     join,
     lost,
     open_sequence,
-    plain,
     unknown,
 )
 from nodl.infer.cpp.running.variables import static_member
 from nodl.infer.cpp.syntax import Node, children, field_of, text, unwrapped
-from nodl.name_template import UnknownPart
 
 
 @expression("assignment_expression")
@@ -80,7 +79,7 @@ def assignment(run: Machine, node: Node, frame: Frame) -> Value:
             value = elements_copied(run, seen_type(run, left, frame), value, node, frame)
     elif operator == "+=":
         before = run.evaluate(left, frame)
-        if has_text(before) and any(isinstance(atom, int | float) for atom in value):
+        if has_text(before) and any(isinstance(atom, int) for atom in value):
             value = unknown("a text and a letter, or a text from some letter on")
         elif has_text(before):
             value = added(before, value)
@@ -103,8 +102,7 @@ def _points_elsewhere(run: Machine, name: Node, value: Value, frame: Frame) -> N
     """
     owner = frame.owner_of(text(name))
     is_bound = owner is not None and owner.types.get(text(name), "").endswith("&")
-    if owner is not None and text(name) in owner.aliases and not is_bound:
-        owner.aliases[text(name)] = None
+    if owner is not None and text(name) in owner.references and not is_bound:
         value = unknown(f"what {text(name)} points to")
     _assign_name(run, name, value, frame)
 
@@ -147,7 +145,7 @@ def _combined(operator: str, before: Value, value: Value) -> Value:
 
 def as_declared(run: Machine, left: Node, value: Value, frame: Frame) -> Value:
     """Return a number as the type of the variable holds it."""
-    if not any(isinstance(atom, int | float | Text | Unknown) for atom in value):
+    if not any(isinstance(atom, int | Text | Unknown) for atom in value):
         return value
     kind, pointer = declared_type(run, left, frame)
     return value if pointer else as_type(kind.name, value)
@@ -213,7 +211,7 @@ def _through_pointer(run: Machine, pointer: Node, value: Value, frame: Frame) ->
     name = text(pointer)
     before, owner = run.evaluate(pointer, frame), frame.owner_of(name)
     by_operator = any(run.methods_of(atom, "operator*") for atom in before)
-    iterates = owner is not None and name not in owner.aliases and leads_into(owner.initial.get(name))
+    iterates = owner is not None and name not in owner.references and leads_into(owner.initial.get(name))
     is_elsewhere = any(isinstance(atom, Seq) and atom.place for atom in before) or (
         owner is not None and "shared_ptr" in owner.types.get(name, "") and is_plain(value)
     )
@@ -237,12 +235,8 @@ def _may_be_shared(run: Machine, pointer: Node, frame: Frame) -> bool:
 def _assign_name(run: Machine, target: Node, value: Value, frame: Frame) -> None:
     name = text(target)
     owner = frame.owner_of(name)
-    if owner is not None and name in owner.aliases:
-        alias = owner.aliases[name]
-        if alias is not None:
-            assign(run, alias, value, owner)
-            return
-        forget(run, target, frame, written=value)
+    if owner is not None and name in owner.references:
+        set_through(run, target, value, frame)
     if owner is not None:
         run.store.set((owner, name), value)
         return
@@ -332,7 +326,7 @@ def _write_element(
         if run.methods_of(atom, "operator[]"):
             forget(run, node, frame, written=value)
         if isinstance(atom, Map) and keys:
-            found.append((with_entry(atom, keys[0], value),))
+            found.append((as_one_map((*atom.entries, (keys[0], value))),))
         elif isinstance(atom, Seq) and not atom.place:
             found.append((_with_item(atom, keys[0] if keys else BOTTOM, value),))
         elif isinstance(atom, Text | Param):
@@ -346,21 +340,6 @@ def _write_element(
 
 
 _ANYTHING = re.compile("")
-
-
-def with_entry(atom: Map, key: Value, value: Value) -> Map:
-    """Run ``map[key] = value``: of a key that is certainly the same the entry is replaced."""
-    certain = len(key) == 1 and not isinstance(key[0], Unknown) and _is_one_text(key[0])
-    kept = tuple(entry for entry in atom.entries if not (certain and entry[0] == key))
-    definite = len(key) == 1 and plain(key[0]) is not None
-    return as_one_map((*kept, (key, value)), atom.open or not definite)
-
-
-def _is_one_text(atom: object) -> bool:
-    """Return whether it has the same value wherever it stands: a literal, a parameter, a text of those."""
-    if isinstance(atom, Text):
-        return not any(isinstance(part, UnknownPart) for part in atom.parts)
-    return isinstance(atom, Param | bool | int | float)
 
 
 def _with_item(atom: Seq, key: Value, value: Value) -> Seq:

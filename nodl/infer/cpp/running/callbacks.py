@@ -223,13 +223,13 @@ def _settled(atom: object, before: Value) -> Value:
     """Replace a text or number that is new by one that is not known, also within a list or map."""
     if atom in before:
         return (atom,)
-    if isinstance(atom, Text | int | float):
+    if isinstance(atom, Text | int):
         return unknown("a value that callbacks change")
     if isinstance(atom, Seq):
         return (open_sequence(join(*(_settled(each, BOTTOM) for each in item)) for item in atom.items),)
     if isinstance(atom, Map):
         values = [_settled(each, BOTTOM) for _, value in atom.entries for each in value]
-        return (as_one_map([(unknown("one of many keys"), join(*values))], True),)
+        return (as_one_map([(unknown("one of many keys"), join(*values))]),)
     return (atom,)
 
 

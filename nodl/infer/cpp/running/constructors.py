@@ -223,7 +223,7 @@ def _moved_again(run: Machine, mark: int, steps: int) -> bool:
     found = False
     for cell, before, value in [*run.moved(mark, steps)]:
         is_outside = before != BOTTOM or not isinstance(cell[0], Obj)
-        if is_outside and any(isinstance(atom, Text | int | float) for atom in value):
+        if is_outside and any(isinstance(atom, Text | int) for atom in value):
             run.store.set(cell, unknown("a value that the constructor of each element changes"))
             found = True
     return found
@@ -240,7 +240,7 @@ def text_of(run: Machine, values: Sequence[Value]) -> Value:
     Two letters in braces look the same.
     """
     if len(values) == 1:
-        is_made = any(isinstance(atom, int | float | Seq) for atom in values[0])
+        is_made = any(isinstance(atom, int | Seq) for atom in values[0])
         return unknown("a made text") if is_made else values[0]
     return unknown("a text made of several values")
 

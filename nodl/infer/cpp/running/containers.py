@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Sequence
-from contextlib import suppress
+from collections.abc import Sequence
 from itertools import chain
 
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.arithmetic import added
-from nodl.infer.cpp.running.assignments import assign, with_entry
+from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.constructors import (
     ORDERED,
     construct,
@@ -31,7 +30,6 @@ from nodl.infer.cpp.running.values import (
     BOTTOM,
     END,
     MAX_ITEMS,
-    NPOS,
     Atom,
     Group,
     Map,
@@ -176,41 +174,26 @@ def _map_call(run: Machine, atom: Map, name: str, site: CallSite) -> Value:
 
     first = values[0] if values else BOTTOM
     if name in ("emplace", "insert_or_assign", "try_emplace") and len(values) >= 2:
-        key, value = _new_entry(run, site)
-        return becomes(
-            with_entry(atom, key, value) if name == "insert_or_assign" else _entered(atom, key, value)
-        )
+        return becomes(as_one_map((*atom.entries, _new_entry(run, site))))
     if name == "insert" and values:
         pairs = [each for each in first if isinstance(each, Group | Seq) and len(each.items) == 2]
         pairs += [Group(entry) for each in first if isinstance(each, Map) for entry in each.entries]
-        for pair in pairs:
-            atom = _entered(atom, pair.items[0], pair.items[1])
-        return becomes(atom if pairs else atom._replace(open=True))
+        inserted = [(pair.items[0], pair.items[1]) for pair in pairs] or [
+            (unknown("a key"), unknown("a value"))
+        ]
+        return becomes(as_one_map((*atom.entries, *inserted)))
     if name == "clear":
         return becomes(Map(()))
-    if name == "erase" and _has(atom, first) is not None:
-        return becomes(Map(tuple(entry for entry in atom.entries if entry[0] != first)))
     if name in _CHANGES:
         return becomes(_changed_by(atom, name, values)[0])
-    if name in ("at", "find", "count", "contains") and values:
-        found, has = element(run, atom, first), _has(atom, first)
-        if name == "find":
-            return (*(() if has else (END,)), *(() if has is False else (Group((first, found)),)))
-        return found if name == "at" else unknown("a condition") if has is None else (has,)
+    if name in ("at", "find") and values:
+        found = element(run, atom, first)
+        return found if name == "at" else (END, Group((first, found)))
     if name in ("end", "cend"):
         return (END,)
     if name in ("begin", "cbegin"):
-        is_open = atom.open or len(atom.entries) > 1  # entries stand as they were made, not by their keys
-        return (Seq(tuple((Group(entry),) for entry in atom.entries), is_open, place=True),)
+        return (Seq(tuple((Group(entry),) for entry in atom.entries), open=True, place=True),)
     return unknown(f"the result of {name}()")
-
-
-def _has(atom: Map, key: Value) -> bool | None:
-    """Return whether a map certainly has a key, or has it not."""
-    keys = (key, *(known for known, _ in atom.entries))
-    if atom.open or any(len(each) != 1 or plain(each[0]) is None for each in keys):
-        return None
-    return key in keys[1:]
 
 
 def _new_entry(run: Machine, site: CallSite) -> tuple[Value, Value]:
@@ -225,14 +208,6 @@ def _new_entry(run: Machine, site: CallSite) -> tuple[Value, Value]:
     if inner is None or cls is None or whole:
         return key, rest[0] if rest else BOTTOM
     return key, construct(run, inner, rest, site.node, site.frame)
-
-
-def _entered(atom: Map, key: Value, value: Value) -> Map:
-    """Enter a pair; a key that the map already has keeps its value."""
-    definite = len(key) == 1 and plain(key[0]) is not None
-    if definite and not atom.open and any(known == key for known, _ in atom.entries):
-        return atom
-    return as_one_map((*atom.entries, (key, value)), atom.open or not definite)
 
 
 _CHANGES = frozenset({
@@ -317,59 +292,28 @@ def _text_call(run: Machine, atom: Text | Param, name: str, site: CallSite) -> V
         return BOTTOM  # of its flags
     if name in _CHANGES_TEXT:
         adds = name in ("append", "push_back") and len(values) == 1
-        changed = literal("") if name == "clear" else computed_text(run, atom, name, values)
+        changed = literal("") if name == "clear" else unknown(f"what {name}() leaves of a text")
         found = added((atom,), values[0]) if adds else changed
         assign(run, site.receiver, found, site.frame)
         return found
     named = site.receiver.type in ("identifier", "field_expression")
-    if isinstance(atom, Text) and named and name not in _OF_TEXT and not _READS_TEXT.fullmatch(name):
+    if isinstance(atom, Text) and named and not _READS_TEXT.fullmatch(name):
         assign(run, site.receiver, unknown(f"what {name}() leaves of a text or stream"), site.frame)
-    return computed_text(run, atom, name, values)
+    return _measured(run, atom, name)
 
 
-def computed_text(run: Machine, atom: Text | Param, name: str, values: Sequence[Value]) -> Value:
-    """Return what a method gives, or leaves, of a text that is known in this run ([string.classes])."""
+def _measured(run: Machine, atom: Text | Param, name: str) -> Value:
+    """Return whether a text that this run knows is empty, its length and last letter; nothing else is followed."""
     written = settled_text(run, atom) if run.start is not None else plain(atom)
-    given = [settled_text(run, v[0]) if len(v) == 1 and isinstance(v[0], Text | Param) else v for v in values]
-    arguments = [
-        each if isinstance(each, str) else each[0] if each is not None and len(each) == 1 else None
-        for each in given
-    ]
-    method = _OF_TEXT.get(name)
-    with suppress(TypeError, IndexError):
-        if written is not None and written.isascii() and method is not None:
-            found = method(written, *arguments)
-            return literal(found) if isinstance(found, str) else (found if found != -1 else NPOS,)
-    return unknown(f"the result of {name}()")
-
-
-def _erased(written: str, start: int = 0, count: int = NPOS) -> str:
-    return written[:start] + written[start:][count:]
-
-
-def _letter(letters: str) -> str:
-    """Return the only letter; raises ``TypeError`` for a set of them, which is not followed."""
-    if len(letters) != 1:
-        raise TypeError
-    return letters
-
-
-_OF_TEXT: dict[str, Callable[..., str | int]] = {
-    "empty": lambda t: not t, "size": len, "length": len,
-    "front": lambda t: t[0], "back": lambda t: t[-1], "at": lambda t, i: t[i],
-    "substr": lambda t, i=0, n=NPOS: t[i:][:n],
-    "find": str.find, "rfind": lambda t, part: t.rfind(part), "contains": str.__contains__,
-    "find_first_of": lambda t, letters: t.find(_letter(letters)),
-    "find_last_of": lambda t, letters: t.rfind(_letter(letters)),
-    "starts_with": str.startswith, "ends_with": str.endswith,
-    "erase": _erased, "pop_back": lambda t: t[:-1], "assign": lambda t, other: "" + other,  # a number is a TypeError
-    "insert": lambda t, i, part: t[:i] + part + t[i:],
-    "replace": lambda t, i, n, part: t[:i] + part + t[i:][n:],
-}  # fmt: skip
+    if written is not None and name == "empty":
+        return (not written,)
+    if written is not None and written.isascii() and name in ("size", "length"):
+        return (len(written),)
+    return literal(written[-1]) if written and name == "back" else unknown(f"the result of {name}()")
 
 
 _READS_TEXT = re.compile(
-    r"good|fail|eof|bad|is_open|tell[pg]|rdstate|compare|capacity|reserve|shrink_to_fit|max_size|copy|hash\w*|c?r?(?:begin|end)|"
+    r"empty|size|length|front|back|at|substr|rfind|contains|(?:starts|ends)_with|good|fail|eof|bad|is_open|tell[pg]|rdstate|compare|capacity|reserve|shrink_to_fit|max_size|copy|hash\w*|c?r?(?:begin|end)|"
     r"find\w*|count|has_\w+|is_\w+|get_\w+|as_\w+|to_\w+|filename|stem|extension|\w+_path|native|(?:generic_)?\w*string"
 )
 """Further methods that leave a text, stream or path as it is."""

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 import re
 from contextlib import suppress
-from dataclasses import replace
 from functools import partial
 
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.reading.writes import FILLS
-from nodl.infer.cpp.running.arithmetic import added, computed, single
+from nodl.infer.cpp.running.arithmetic import added, computed
 from nodl.infer.cpp.running.assignments import as_declared, assign
-from nodl.infer.cpp.running.constructors import cast, construct, default_value, initial_value, made
+from nodl.infer.cpp.running.constructors import cast, construct, initial_value, made
 from nodl.infer.cpp.running.contents import copied, elements_copied, items_of
 from nodl.infer.cpp.running.invocation import by_operator, pointed_to
-from nodl.infer.cpp.running.launch_values import decided, in_doubt, settled, settled_text
+from nodl.infer.cpp.running.launch_values import decided, in_doubt, settled
 from nodl.infer.cpp.running.machine import NEXT, Frame, Machine, expression
 from nodl.infer.cpp.running.references import as_referred_to, is_plain, keep_reference
 from nodl.infer.cpp.running.static_types import (
@@ -22,7 +21,6 @@ from nodl.infer.cpp.running.static_types import (
     current_object,
     declared_type,
     is_pointer,
-    seen_type,
 )
 from nodl.infer.cpp.running.values import (
     BOTTOM,
@@ -33,7 +31,6 @@ from nodl.infer.cpp.running.values import (
     Obj,
     Param,
     Seq,
-    Text,
     Unknown,
     Value,
     as_one_map,
@@ -43,7 +40,6 @@ from nodl.infer.cpp.running.values import (
     join_in_doubt,
     literal,
     lost,
-    plain,
     unknown,
 )
 from nodl.infer.cpp.running.variables import member, variable
@@ -99,16 +95,12 @@ def character(run: Machine, node: Node, frame: Frame) -> Value:
 
 @expression("number_literal")
 def number(run: Machine, node: Node, frame: Frame) -> Value:
-    """Return an integer if the digits make one, else a float ([lex.icon], [lex.fcon]); unknown if they make neither."""
-    written = text(node).replace("'", "").lower()
-    digits, hexadecimal = written.rstrip("ulz"), written.startswith("0x")
+    """Return an integer if the digits make one ([lex.icon]); fractions are not known."""
+    digits = text(node).replace("'", "").lower().rstrip("ulz")
     octal = digits.isdigit() and digits.startswith("0")
     with suppress(ValueError):
         return (int(digits, 8 if octal else 0),)
-    with suppress(ValueError):
-        found = float.fromhex(written) if hexadecimal else float(written.rstrip("fl"))
-        return (single(found) if written.endswith("f") and not hexadecimal else found,)
-    return unknown("a number")
+    return unknown("a fraction")
 
 
 @expression("true", "false")
@@ -158,7 +150,7 @@ def comma(run: Machine, node: Node, frame: Frame) -> Value:
 
 @expression("identifier", "field_identifier", "namespace_identifier", "type_identifier")
 def identifier(run: Machine, node: Node, frame: Frame) -> Value:
-    """Look up a variable, member, constant, enumerator or function; unknown if none of that name is in reach."""
+    """Look up a variable, member, constant or function; unknown if none of that name is in reach."""
     return variable(run, text(node), frame)
 
 
@@ -345,7 +337,9 @@ def binary(run: Machine, node: Node, frame: Frame) -> Value:
             assign(run, right_node, unknown("a word that is read from a stream"), frame)
         return unknown("a stream")
     if operator == "<<" and not (len(left) == 1 and isinstance(left[0], int)):
-        return _streamed(run, left_node, left, right_node, right, frame)
+        if has_text(left):
+            _write_stream(run, left_node, unknown("what is written to a stream"), frame)
+        return left or unknown("a stream")
     if operator == "+" and (has_text(left) or has_text(right)):
         return added(left, right)
     if len(left) == 1 and len(right) == 1:
@@ -373,39 +367,6 @@ def _logical(run: Machine, either: bool, left: Value, right_node: Node | None, f
     return (either,) if right is either else unknown("a condition")
 
 
-_MANIPULATORS = re.compile(
-    r"std::(?:hex|oct|fixed|scientific|setw|setfill|setprecision|setbase|boolalpha|(?:no)?show\w+|(?:no)?uppercase|left|right|"
-    r"internal|put_\w+)\b"
-)
-
-
-def _streamed(
-    run: Machine, target: Node | None, left: Value, written: Node | None, right: Value, frame: Frame
-) -> Value:
-    """Evaluate ``stream << text``; the stream is a text that grows, until something changes how it writes."""
-    if not has_text(left):
-        return left or unknown("a stream")
-    if written is not None and _MANIPULATORS.match(text(written)):
-        found = unknown("a stream that writes in a way of its own")
-    elif any(type(atom) is int for atom in right) and _is_letter(run, written, frame):
-        found = concatenated(left, unknown("the letter of a number"))
-    else:
-        pieces = tuple(literal(f"{atom:g}")[0] if isinstance(atom, float) else atom for atom in right)
-        found = concatenated(left, pieces) if right else left
-    _write_stream(run, target, found, frame)
-    return found
-
-
-def _is_letter(run: Machine, written: Node | None, frame: Frame) -> bool:
-    """Return whether a number is one of 8 bits, which a stream writes as a letter."""
-    return _LETTER.fullmatch(seen_type(run, written, frame).name) is not None or (
-        re.search(r"\b(?:u?int8_t|char)\b", text(written)) is not None
-    )
-
-
-_LETTER = re.compile(r"(?:std::)?u?int8_t|(?:un)?signed char|char")
-
-
 def _write_stream(run: Machine, target: Node | None, written: Value, frame: Frame) -> None:
     """Write to the stream at the beginning of ``s << a << b``."""
     inner = target
@@ -426,7 +387,7 @@ def unary(run: Machine, node: Node, frame: Frame) -> Value:
     if operator in ("!", "not"):
         known = decided(run, value)
         return unknown("a condition") if known is None else (not known,)
-    if operator == "-" and len(value) == 1 and isinstance(value[0], int | float):
+    if operator == "-" and len(value) == 1 and isinstance(value[0], int):
         return (-value[0],)
     return value if operator == "+" else unknown("a computed value")
 
@@ -529,8 +490,10 @@ def subscript(run: Machine, node: Node, frame: Frame) -> Value:
         return own
     if container is not None and has_text(held) and _is_pointer_to_text(run, container, frame):
         return unknown("a text behind a pointer")
-    if container is not None and keys and any(isinstance(atom, Map) for atom in held):
-        held = _with_new_entries(run, held, keys[0], container, node, frame)
+    after = tuple(_with_entry_of(atom, keys[0]) for atom in held) if keys else held
+    if container is not None and after != held:
+        assign(run, container, after, frame)
+        held = after
     found = [element(run, atom, keys[0] if keys else BOTTOM) for atom in held]
     result = join(*found) if found else BOTTOM
     return result or unknown(f"the value of {text(node)[:60]}")
@@ -542,33 +505,14 @@ def _is_pointer_to_text(run: Machine, container: Node, frame: Frame) -> bool:
     return marked and kind.last == "string" and is_pointer(run, container, frame)
 
 
-def _with_new_entries(
-    run: Machine, held: Value, key: Value, container: Node, node: Node, frame: Frame
-) -> Value:
-    """Return the maps after ``map[key]``, which makes an entry if there is none under the key ([map.access]).
-
-    Entries of plain values are made for keys that are known alone.
+def _with_entry_of(atom: object, key: Value) -> object:
+    """Return a map after ``map[key]``, which makes an entry if there is none under the key ([map.access]): its value is
+    not known.
     """
-    kind = seen_type(run, container, frame)
-    inner = kind.arguments[1] if len(kind.arguments) > 1 else None
-    written = plain(key[0]) if len(key) == 1 else None
-    after: list[object] = []
-    if inner is None or (written is None and run.held_class(inner, frame) is None):
-        after = [a._replace(open=True) if isinstance(a, Map) and written is None else a for a in held]
-        assign(run, container, tuple(after), frame)
-        return held
-    for atom in held:
-        known = isinstance(atom, Map) and any(entry[0] == key for entry in atom.entries)
-        if isinstance(atom, Map) and not known:
-            run.repeated += written is None
-            place = replace(frame, path=(*frame.path, written))
-            made = BOTTOM if inner.pointer else default_value(run, node, inner, place)
-            run.repeated -= written is None
-            atom = as_one_map((*atom.entries, (key, made)), atom.open or written is None)
-        after.append(atom)
-    if after != list(held):
-        assign(run, container, tuple(after), frame)
-    return tuple(after)
+    if not isinstance(atom, Map) or any(known == key for known, _ in atom.entries):
+        return atom
+    made = unknown("an entry that a map makes for a key that it did not have")
+    return as_one_map((*atom.entries, (key, made)))
 
 
 def element(run: Machine, atom: object, key: Value) -> Value:
@@ -576,9 +520,6 @@ def element(run: Machine, atom: object, key: Value) -> Value:
     if isinstance(atom, Param):
         (atom,) = settled(run, (atom,))
     if isinstance(atom, Map):
-        definite = [value for known, value in atom.entries if len(key) == 1 and known == key]
-        if definite and not atom.open:
-            return definite[-1]
         return join(*(value for _, value in atom.entries), unknown("an element of a map"))
     if isinstance(atom, Seq | Group | Param):
         items, exact = items_of(run, atom)
@@ -586,9 +527,4 @@ def element(run: Machine, atom: object, key: Value) -> Value:
             return items[key[0]]
         which = "an element of a list, which of them is not known"
         return join_in_doubt(items, which) if items else unknown(which)
-    if isinstance(atom, Unknown):
-        return (atom,)
-    written = settled_text(run, atom) if isinstance(atom, Text) else None
-    if written is not None and len(key) == 1 and isinstance(key[0], int) and 0 <= key[0] < len(written):
-        return literal(written[key[0]])
-    return unknown("an element of something that is not known")
+    return (atom,) if isinstance(atom, Unknown) else unknown("an element of something that is not known")

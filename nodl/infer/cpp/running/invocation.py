@@ -22,7 +22,7 @@ from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame
 from nodl.infer.cpp.running.memory import MEMORY_DEPTH, CallOutcome, Changes
 from nodl.infer.cpp.running.overloads import candidates, chosen
 from nodl.infer.cpp.running.references import forget, forget_everything, is_plain, through
-from nodl.infer.cpp.running.static_types import declared_type, given_to
+from nodl.infer.cpp.running.static_types import given_to
 from nodl.infer.cpp.running.unknown_calls import may_be_written as may_be_written
 from nodl.infer.cpp.running.unknown_calls import unknown_call
 from nodl.infer.cpp.running.values import (
@@ -45,7 +45,6 @@ from nodl.infer.cpp.syntax import (
     field_of,
     template_arguments,
     text,
-    unwrapped,
     words_in,
 )
 
@@ -310,36 +309,15 @@ def call_methods(
         return unknown_call(run, name, values, node, [], frame)
     if len(fitting) > MAX_OVERLOADS and not any(map(run.makes_interfaces, fitting)):
         return _one_of_many(run, fitting, node, frame)
-    if this_object is not None and not exactly and len(values) < len(fitting[0].parameters):
-        values = _with_defaults(run, fitting[0], this_object, values)
+    left_out = fitting[0].parameters[len(values) :] if fitting[0].virtual and not exactly else ()
+    if left_out:  # those of the class that the object is seen as ([dcl.fct.default]/10)
+        why = f"the default arguments of {fitting[0].name}(), which is virtual"
+        values = [*values, *(unknown(why) for _ in left_out)]
 
     def call(each: Function) -> Value:
         return invoke(run, each, this_object, values, node, frame, types, bindings)
 
     return _any_of(run, fitting, call, node, frame)
-
-
-def _with_defaults(run: Machine, function: Function, this: Obj, values: Sequence[Value]) -> Sequence[Value]:
-    """Add unknowns for defaults in which classes differ: a virtual method gets those of the class that its object is
-    seen as ([dcl.fct.default]/10).
-    """
-    if this.cls is None or not function.virtual:
-        return values
-    given = len(values)
-    named = [
-        each
-        for cls in run.names.ancestry(this.cls)
-        for each in (
-            *run.names.methods.get(cls, {}).get(function.name, ()),
-            *cls.declared.get(function.name, ()),
-        )
-        if len(each.parameters) == len(function.parameters)
-    ]
-    written = {tuple(text(p.default) for p in each.parameters[given:]) for each in named}
-    if len(written - {("",) * (len(function.parameters) - given)}) < 2:
-        return values
-    why = f"the default arguments of {function.name}(): classes differ"
-    return [*values, *(unknown(why) for _ in function.parameters[given:])]
 
 
 def invoke(
@@ -367,8 +345,7 @@ def invoke(
     inner = run.frame((function, this_object, inner.path), inner)
     if this_object is not None:
         inner.bindings = {**_class_bindings(function, this_object), **(bindings or {})}
-    deduced = {**_element_types(run, function, node, frame), **_deduced(function, values, types)}
-    inner.bindings = {**inner.bindings, **deduced}
+    inner.bindings = {**inner.bindings, **dict(zip(function.templates, types, strict=False))}
     given = (tuple(values), inner.bindings, inner.conditions, len(run.nodes))
     key = (function, this_object, inner.path)
     outcome = _outcome(run, key, given, inner.depth, lambda: _run_body(run, function, values, inner))
@@ -412,10 +389,9 @@ def _seen_once(
 
 
 def _aliased(argument: Node | None, frame: Frame) -> Node | None:
-    """Return the variable that an argument is, or is a reference to."""
-    while (target := frame.aliases.get(text(argument))) is not None:
-        argument = target
-    return argument
+    """Return the variable that an argument is, or what it was made a reference to."""
+    is_reference = text(argument) in frame.references
+    return addressed(frame.initial.get(text(argument))) if is_reference else argument
 
 
 _ELEMENT = re.compile(r"\[|[.>](?:at|front|back|data|begin)\(")
@@ -504,39 +480,6 @@ def _class_bindings(function: Function, this_object: Obj) -> dict[str, Type]:
     return {}
 
 
-def _element_types(run: Machine, function: Function, node: Node, frame: Frame) -> dict[str, Type]:
-    """Return ``T`` of a parameter ``std::list<T> &``, from the container that is given."""
-    bound: dict[str, Type] = {}
-    given = children(field_of(node, "arguments")) if function.templates else []
-    for parameter, argument in zip(function.parameters, given, strict=False):
-        match = re.search(r"<\s*(\w+)\s*>", parameter.type)
-        target = unwrapped(argument)
-        if target is not None and target.type == "pointer_expression":
-            target = field_of(target, "argument")
-        if match is None or match[1] not in function.templates or target is None:
-            continue
-        kind, _ = declared_type(run, target, frame)
-        if kind.arguments:
-            bound[match[1]] = kind.arguments[0]
-    return bound
-
-
-def _deduced(function: Function, values: Sequence[Value], types: Sequence[Type]) -> dict[str, Type]:
-    """Return template parameters: as given, else from the types of the arguments."""
-    if not function.templates:
-        return {}
-    bound = dict(zip(function.templates, types, strict=False))
-    for parameter, value in zip(function.parameters, values, strict=False):
-        name = re.sub(r"\b(?:const|typename)\b|[&*\s]", "", parameter.type)
-        inner = re.fullmatch(r"std::(?:shared_ptr|unique_ptr|weak_ptr)<(\w+)>", name)
-        name = inner[1] if inner else name
-        if name in function.templates and name not in bound:
-            kinds = [atom.type for atom in value if isinstance(atom, Obj)]
-            if kinds:
-                bound[name] = kinds[0]
-    return bound
-
-
 _WRITTEN_BACK = frozenset({
     "identifier", "field_expression", "subscript_expression", "call_expression", "pointer_expression",
 })  # fmt: skip
@@ -568,7 +511,7 @@ def write_back(
         if target.type not in _WRITTEN_BACK or (target.type == "call_expression" and not _is_element(target)):
             if not all(isinstance(atom, Obj) for atom in value):
                 forget(run, target, frame, told=False)
-        elif value != run.evaluate(target, frame):
+        elif value != run.evaluate(target, frame) or text(target) in frame.references:
             if "**" in parameter.type.replace(" ", "") and is_plain(value):
                 through(run, target, frame)  # it points elsewhere now
             assign(run, target, value, frame)

@@ -72,7 +72,7 @@ def _settled_parameter(run: Machine, param: Param) -> Atom:
         value = value[param.item] if isinstance(value, list | tuple) and param.item < len(value) else None
     if isinstance(value, str):
         return literal(value)[0]
-    if isinstance(value, bool | int | float):
+    if isinstance(value, bool | int):
         return value
     found = param.default if value is None else ()
     return found[0] if len(found) == 1 and plain(found[0]) is not None else param

@@ -193,7 +193,7 @@ def _decides(run: Machine, cell: Cell, value: Value) -> bool:
 
 def _is_of_numbers(run: Machine, atom: Atom) -> bool:
     """Return whether it is a number, a structure of such that makes no interfaces, as a point is, or a list of such."""
-    if isinstance(atom, int | float | Unknown):
+    if isinstance(atom, int | Unknown):
         return True
     if isinstance(atom, Seq):
         return all(_is_of_numbers(run, inner) for item in atom.items for inner in item)

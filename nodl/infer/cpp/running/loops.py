@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import partial
 
 from nodl.infer.cpp.reading.declarations import type_text
@@ -29,7 +29,6 @@ from nodl.infer.cpp.running.values import (
     join,
     lost,
     may_name,
-    plain,
     unknown,
 )
 from nodl.infer.cpp.syntax import Node, children, field_of, text, walk, words_in
@@ -50,11 +49,6 @@ def for_range_loop(run: Machine, node: Node, frame: Frame) -> int:
     if run.left:
         return RETURN
     items, exact = iterated(run, subject)
-    kind = seen_type(run, right, frame)
-    ordered = True
-    if kind.last == "map":
-        items, ordered = _by_key(items, len(kind.arguments) > 2)
-    exact = exact and (len(items) < 2 or (ordered and not kind.last.startswith("unordered")))
     declarator, written = field_of(node, "declarator"), type_text(node)
     parts = list(walk(declarator)) if declarator is not None else []
     names = [text(part) for part in parts if part.type == "identifier"]
@@ -79,17 +73,6 @@ def for_range_loop(run: Machine, node: Node, frame: Frame) -> int:
     if right is not None and is_plain_one:
         forget(run, right, frame, "what a loop writes to the elements")
     return outcome
-
-
-def _by_key(entries: Sequence[Value], is_own: bool) -> tuple[list[Value], bool]:
-    """Return the entries of a map in the order of their keys, and whether that is known; ``is_own``: one of its own."""
-    keys = [atom.items[0] for entry in entries for atom in entry if isinstance(atom, Group)]
-    known = [key[0] if type(key[0]) is int else plain(key[0]) for key in keys if len(key) == 1]
-    kind = int if any(type(each) is int for each in known) else str
-    in_order = {key: entry for key, entry in zip(known, entries, strict=False) if type(key) is kind}
-    if is_own or len(in_order) != len(entries):
-        return list(entries), False
-    return [in_order[key] for key in sorted(in_order)], True
 
 
 def _hold_pointers(run: Machine, right: Node | None, frame: Frame) -> bool:
@@ -154,7 +137,7 @@ def _forget_counted(run: Machine, body: Node | None, frame: Frame) -> None:
     for name in {text(target).removeprefix("this->") for target in targets}:
         owner = frame.owner_of(name) or this
         held = run.store.get((owner, name)) or BOTTOM if owner is not None else BOTTOM
-        if any(isinstance(atom, Text | int | float) for atom in held):
+        if any(isinstance(atom, Text | int) for atom in held):
             run.store.set((owner, name), lost(held, "a value that a loop in any order changes"))
 
 
@@ -170,8 +153,8 @@ def _forget_order(run: Machine, body: Node | None, loop: Loop) -> bool:
     found, kept = False, body is not None and run.subtree_matters(body)
     for cell, before, value in [*run.moved(loop.start, loop.steps)]:
         both = (*before, *value)
-        if before != BOTTOM and any(isinstance(atom, Text | int | float) for atom in both):
-            rest = tuple(atom for atom in both if not isinstance(atom, Text | int | float))
+        if before != BOTTOM and any(isinstance(atom, Text | int) for atom in both):
+            rest = tuple(atom for atom in both if not isinstance(atom, Text | int))
             run.store.set(cell, join(rest, unknown("a value that a loop in any order changes")))
             found = True
         elif before != BOTTOM and any(isinstance(atom, Seq | Map | Group) for atom in value):

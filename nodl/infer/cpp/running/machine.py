@@ -28,11 +28,12 @@ from nodl.infer.cpp.running.values import (
     Text,
     Value,
     concatenated,
+    lost,
     plain,
     unknown,
     without_covered,
 )
-from nodl.infer.cpp.syntax import Node, line_of, text, walk, words_in
+from nodl.infer.cpp.syntax import Node, line_of, words_in
 from nodl.infer.start import Start
 from nodl.name_template import UnknownPart
 from nodl.node_interface import EndpointKind
@@ -252,22 +253,15 @@ class Machine:
     def local(self, frame: Frame, name: str, value: Value, written_type: str = "") -> None:
         if frame.blocks and name not in frame.blocks[-1]:
             before = self.store.get((frame, name)) or BOTTOM
-            alias = frame.aliases.get(name)
-            frame.blocks[-1][name] = (name in frame.names, before, frame.types.get(name), alias)
-        if frame.aliases:
-            self._forget_shadowed(name, frame)
+            if frame.references and name in frame.names:  # one of them may lead to it
+                before = lost(before, f"what is written to {name} while another one hides it")
+            refers = name in frame.references
+            frame.blocks[-1][name] = (name in frame.names, before, frame.types.get(name), refers)
+        frame.references.discard(name)
         frame.names.add(name)
         if written_type:
             frame.types[name] = written_type
         self.store.set((frame, name), value)
-
-    def _forget_shadowed(self, name: str, frame: Frame) -> None:
-        """Give each alias for another variable of this name the value that this variable has now."""
-        frame.aliases.pop(name, None)
-        for alias, target in list(frame.aliases.items()):
-            if target is not None and any(text(each) == name for each in walk(target)):
-                self.store.set((frame, alias), self.evaluate(target, frame))
-                frame.aliases[alias] = None
 
     def type_of(self, written: str, frame: Frame) -> Type:
         return self.names.resolve(written, frame.scope, frame.file, frame.bindings)
@@ -453,12 +447,12 @@ class Frame:
     mark: int = 0
     started: int = 0  # the step that it began at
     loops: list[Loop] = field(default_factory=list)
-    blocks: list[dict[str, tuple[bool, Value, str | None, Node | None]]] = field(default_factory=list)
+    blocks: list[dict[str, tuple[bool, Value, str | None, bool]]] = field(default_factory=list)
     """For each block that runs: what names that it declares stood for before."""
     # Of a lambda: what it captured of blocks that may have ended.
     kept: dict[str, Frame] = field(default_factory=dict)
-    aliases: dict[str, Node | None] = field(default_factory=dict)
-    """References and pointers to plain values: the expression that each stands for, ``None`` if not known."""
+    references: set[str] = field(default_factory=set)
+    """Variables that are references or pointers through which another variable may be written."""
     depth: int = 0
     lasts: bool = False  # holds a static variable, from call to call
     finished: bool = False  # nobody can see its variables any more

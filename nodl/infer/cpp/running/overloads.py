@@ -62,9 +62,14 @@ def _likeness(parameter: FunctionParameter, value: Value, templates: Sequence[st
         )
     if isinstance(atom, bool):
         return 3 if "bool" in kind else (1 if is_generic else -2)
-    if isinstance(atom, int | float):
-        own = r"double|float" if isinstance(atom, float) else r"int|size_t|long"
-        return 3 if re.search(own, kind) else 2 if _NUMBER.search(kind) else (1 if is_generic else -2)
+    if isinstance(atom, int):
+        return (
+            3
+            if re.search(r"int|size_t|long", kind)
+            else 2
+            if _NUMBER.search(kind)
+            else (1 if is_generic else -2)
+        )
     if isinstance(atom, Lambda | Bound):
         return 2 if "function" in kind or "allback" in kind else (1 if is_generic else -2)
     if isinstance(atom, Seq | Map):

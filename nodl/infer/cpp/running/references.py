@@ -1,8 +1,7 @@
 """References, pointers and iterators to texts, numbers and containers: who writes through one changes another variable.
 
-Objects are the same ones wherever they are seen; plain values lie in the cells of their variables. A local reference
-stands for the expression that it was made of, if that means one variable. What is written through any other makes what
-it may lead to unknown; where that cannot be said it is a gap.
+Objects are the same ones wherever they are seen; plain values lie in the cells of their variables. What is written
+through a reference or pointer makes what it may lead to unknown; where that cannot be said it is a gap.
 """
 
 from __future__ import annotations
@@ -29,6 +28,7 @@ from nodl.infer.cpp.running.values import (
     Text,
     Unknown,
     Value,
+    join,
     lost,
 )
 from nodl.infer.cpp.syntax import Node, children, field_of, last_name, text, unwrapped, words_in
@@ -36,7 +36,7 @@ from nodl.infer.cpp.syntax import Node, children, field_of, last_name, text, unw
 
 def is_plain(value: Value) -> bool:
     """Return whether a text, number or container is among the alternatives."""
-    return any(isinstance(atom, Text | Seq | Map | Group | Param | Const | int | float) for atom in value)
+    return any(isinstance(atom, Text | Seq | Map | Group | Param | Const | int) for atom in value)
 
 
 REFERRED_TO = ReferredTo("what a reference or pointer stands for")
@@ -50,23 +50,20 @@ def as_referred_to(value: Value) -> Value:
 def bind_reference(run: Machine, name: str, kind: str, initial: Node | None, frame: Frame) -> None:
     """Bind ``T & name = initial`` or ``T * name = &initial``, which was declared and has its value.
 
-    What a view, an iterator or a reference to an element shows is not known if the function changes what is behind it.
+    What a view, an iterator, a reference or a pointer shows is not known if the function changes what is behind it.
     """
     target, value = unwrapped(initial), run.store.get((frame, name)) or BOTTOM
-    if target is not None and kind.endswith("&") and _is_fixed(target) and is_address(run, target, frame):
-        frame.aliases[name] = target  # of a pointer: who sets the one sets the other
-        return
-    if target is None or not (is_plain(value) or any(isinstance(atom, Unknown) for atom in value)):
-        return
-    if kind.endswith("*"):
-        target = unwrapped(field_of(target, "argument")) if target.type == "pointer_expression" else None
     refers = kind.endswith(("&", "*"))
-    if refers and target is not None and _is_fixed(target):
-        frame.aliases[name] = target
-    elif (refers or leads_into(initial) or _VIEW.search(kind)) and _changes_behind(run, initial, frame):
-        run.store.set((frame, name), lost(value, f"what {name} shows later"))
-    if refers and name not in frame.aliases and "const" not in _written_type(initial):
-        frame.aliases[name] = None
+    if target is None:
+        return
+    if is_plain(value) or any(isinstance(atom, Unknown) for atom in value):
+        shows = refers or leads_into(initial) or _VIEW.search(kind)
+        if shows and _changes_behind(run, initial, frame):
+            run.store.set((frame, name), lost(value, f"what {name} shows later"))
+    elif not (kind.endswith("&") and is_address(run, target, frame)):
+        return
+    if refers and "const" not in _written_type(initial):
+        frame.references.add(name)
 
 
 _VIEW = re.compile(r"\b(?:string_view|span)\b")
@@ -104,20 +101,6 @@ def _changes_behind(run: Machine, initial: Node | None, frame: Frame) -> bool:
     return False
 
 
-def _is_fixed(target: Node) -> bool:
-    """Return whether an expression means the same variable wherever it stands."""
-    if target.type == "subscript_expression":
-        listed = children(field_of(target, "indices"))
-        inner = field_of(target, "argument")
-        return (
-            all(each.type.endswith("_literal") for each in listed) and inner is not None and _is_fixed(inner)
-        )
-    if target.type == "field_expression":
-        inner = field_of(target, "argument")
-        return inner is not None and (inner.type == "this" or _is_fixed(inner))
-    return target.type in ("identifier", "qualified_identifier")
-
-
 def forget(
     run: Machine, what: Node, frame: Frame, why: str = "", written: Value = BOTTOM, told: bool = True
 ) -> None:
@@ -145,6 +128,14 @@ def forget(
             run.store.set(cell, lost(held, why, written))
     if (told and not cells) or (iterators and iterators == len(cells)):
         through(run, what, frame)
+
+
+def set_through(run: Machine, what: Node, value: Value, frame: Frame) -> None:
+    """Run ``reference = value``: what the reference may stand for is not known then, a pointer may show the objects."""
+    objects = tuple(atom for atom in value if isinstance(atom, Obj))
+    for cell in dict.fromkeys(_behind(run, what, frame, set())) if objects else ():
+        run.store.set(cell, join(run.store.get(cell) or BOTTOM, objects))
+    forget(run, what, frame, written=value)
 
 
 def keep_reference(run: Machine, what: Node, frame: Frame) -> None:

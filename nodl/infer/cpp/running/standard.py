@@ -78,19 +78,6 @@ def _to_string(run: Machine, values: Sequence[Value], node: Node, frame: Frame) 
     return concatenated(values[0]) if values else unknown("a text")
 
 
-@_standard("std::format", "fmt::format")
-def _format(run: Machine, values: Sequence[Value], node: Node, frame: Frame) -> Value:
-    """Fill the fields ``{}`` of a text with texts and whole numbers; any other field is not known."""
-    pieces = (plain(values[0][0]) or "{?").split("{}") if values and len(values[0]) == 1 else []
-    given = [
-        literal("") if not at else values[at] if at < len(values) else BOTTOM for at in range(len(pieces))
-    ]
-    is_known = all(isinstance(atom, Text) or type(atom) is int for value in given for atom in value)
-    if not pieces or not is_known or any("{" in each or "}" in each for each in pieces):
-        return unknown("a text in a format of its own")
-    return concatenated(*chain.from_iterable(zip(given, map(literal, pieces), strict=True)))
-
-
 @_standard(
     "std::make_pair", "std::pair", "std::make_tuple", "std::tuple", "std::tie", "std::forward_as_tuple"
 )

@@ -12,7 +12,7 @@ from nodl.infer.cpp.reading.declarations import type_text
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.constructors import declared_value, fields_of
-from nodl.infer.cpp.running.launch_values import decided, in_doubt, settled
+from nodl.infer.cpp.running.launch_values import decided, in_doubt
 from nodl.infer.cpp.running.left_out import forget_writes
 from nodl.infer.cpp.running.machine import (
     BREAK,
@@ -29,14 +29,11 @@ from nodl.infer.cpp.running.memory import Changes
 from nodl.infer.cpp.running.references import bind_reference
 from nodl.infer.cpp.running.values import (
     BOTTOM,
-    Const,
     Group,
     Obj,
     Seq,
-    Text,
     Value,
     join,
-    plain,
     unknown,
 )
 from nodl.infer.cpp.running.variables import member
@@ -52,10 +49,10 @@ def in_a_block(handler: StatementHandler) -> StatementHandler:
         frame.blocks.append({})
         outcome = handler(run, node, frame)
         frame.bindings = bindings
-        for name, (existed, value, written, alias) in frame.blocks.pop().items():
-            frame.aliases.pop(name, None)
-            if alias is not None:
-                frame.aliases[name] = alias
+        for name, (existed, value, written, refers) in frame.blocks.pop().items():
+            frame.references.discard(name)
+            if refers:
+                frame.references.add(name)
             if not existed:
                 frame.names.discard(name)
                 continue
@@ -229,59 +226,30 @@ def preprocessor_branches(run: Machine, node: Node, frame: Frame) -> int:
 @statement("switch_statement")
 @in_a_block
 def switch_statement(run: Machine, node: Node, frame: Frame) -> int:
-    """Run the case that is chosen and those it falls through to; any of the cases if that is not decided."""
+    """Run any of the cases, with those it falls through to: which is chosen is not followed."""
     condition = field_of(node, "condition")
-    subject = settled(run, run.evaluate(field_of(condition, "value") or unwrapped(condition), frame))
+    run.evaluate(field_of(condition, "value") or unwrapped(condition), frame)
     if run.left:
         return RETURN
     cases = [c for c in children(field_of(node, "body")) if c.type == "case_statement"]
-    chosen = _chosen_case(run, node, cases, subject, frame)
     loop = _Switch(run.store.mark(), run.steps)
     frame.loops.append(loop)
-    starts = range(len(cases)) if chosen is None else chosen
-    certain = chosen is not None
-    sides: list[Callable[[], int]] = [partial(_falling, run, cases[at:], certain, frame) for at in starts]
-    if not sides or (chosen is None and all(field_of(case, "value") is not None for case in cases)):
+    sides: list[Callable[[], int]] = [partial(_falling, run, cases[at:], frame) for at in range(len(cases))]
+    if all(field_of(case, "value") is not None for case in cases):
         sides.append(lambda: NEXT)
-    outcome = run.branches(sides, tested=len(sides) > 1)
+    outcome = run.branches(sides, tested=True)
     frame.loops.pop()
     run.settle(loop.start, loop.breaks, bool(outcome & NEXT))
-    if outcome & BREAK:
-        outcome = (outcome & ~BREAK) | NEXT
-    for case in cases[: min(chosen, default=0)] if chosen is not None else ():
-        run.kill(case, frame, "the switch never takes this case")
-    return outcome
+    return (outcome & ~BREAK) | NEXT if outcome & BREAK else outcome
 
 
-def _chosen_case(
-    run: Machine, switch: Node, cases: list[Node], subject: Value, frame: Frame
-) -> list[int] | None:
-    """Return the case of this enumerator or number, none if there is none; ``None`` if that is not decided."""
-    listed = [each for each in walk(switch) if each.type == "case_statement"]
-    default = [index for index, case in enumerate(cases) if field_of(case, "value") is None]
-    labels = [run.evaluate(field_of(case, "value"), frame) for case in cases]
-    known = [subject, *(label for index, label in enumerate(labels) if index not in default)]
-    if len(listed) != len(cases) or not all(len(v) == 1 and _is_label(v[0]) for v in known):
-        return None
-    if len({type(value[0]) for value in known}) > 1:
-        return None
-    return ([index for index, label in enumerate(labels) if label == subject] or default)[:1]
-
-
-def _is_label(atom: object) -> bool:
-    """Return whether it is an enumerator, a number or a letter."""
-    return isinstance(atom, Const | int) or (isinstance(atom, Text) and plain(atom) is not None)
-
-
-def _falling(run: Machine, cases: list[Node], certain: bool, frame: Frame) -> int:
+def _falling(run: Machine, cases: list[Node], frame: Frame) -> int:
     outcome = NEXT
-    for index, case in enumerate(cases):
+    for case in cases:
         value = field_of(case, "value")
         result = sequence(run, [child for child in children(case) if child != value], frame)
         outcome = (outcome & ~NEXT) | result
         if not result & NEXT:
-            for rest in cases[index + 1 :] if certain else ():
-                run.kill(rest, frame, "the switch never takes this case")
             break
     return outcome
 
@@ -325,8 +293,6 @@ def declaration(run: Machine, node: Node, frame: Frame) -> int:
         for name in names:
             frame.initial[name], frame.types[name] = structured[1], kind
             bind_reference(run, name, kind, structured[1], frame)
-            if name in frame.aliases:
-                frame.aliases[name] = None  # a part of it
         return RETURN if run.left else NEXT
     path = frame.path
     for name, value, pointer, written in declared_names(node):
@@ -418,8 +384,7 @@ def nothing(run: Machine, node: Node, frame: Frame) -> int:
     _local_class(node, frame)
     if node.type == "enum_specifier":
         for each in children(field_of(node, "body")):
-            name = text(field_of(each, "name"))
-            run.local(frame, name, (Const(f"{name} in line {node.start_point[0] + 1}"),))
+            run.local(frame, text(field_of(each, "name")), unknown("an enumerator"))
     return NEXT
 
 

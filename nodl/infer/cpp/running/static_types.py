@@ -163,8 +163,6 @@ def is_address(run: Machine, node: Node, frame: Frame) -> bool:
     """Return whether a variable, member or element is a pointer: other than an optional it holds no object itself."""
     name = text(field_of(node, "field") or node)
     holder = frame.owner_of(name) if node.type == "identifier" else None
-    if holder is not None and (shown := holder.aliases.get(name)) is not None:
-        return is_address(run, shown, holder)
     this = current_object(frame)
     around = this.cls if this is not None else None
     argument = field_of(node, "argument") if node.type == "field_expression" else None

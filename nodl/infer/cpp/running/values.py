@@ -130,14 +130,12 @@ class ReferredTo(Unknown):
 
 
 class Const(NamedTuple):
-    """An enumerator, by its qualified name."""
+    """What is equal to itself alone."""
 
     name: str
 
 
 END = Const("the end of a container")
-NPOS = 2**64 - 1
-"""``std::string::npos``."""
 
 
 class Param(NamedTuple):
@@ -169,10 +167,9 @@ class Seq(NamedTuple):
 
 
 class Map(NamedTuple):
-    """Entries of key and value. ``open``: it may hold others, or lack some."""
+    """Entries of key and value, in any order: of a map that is not empty it is not known which of them it has."""
 
     entries: tuple[tuple[Value, Value], ...]
-    open: bool = False
 
 
 class Group(NamedTuple):
@@ -288,8 +285,6 @@ def join(*values: Value) -> Value:
                 unknown_one = unknown_one or atom
                 atom = unknown_one
             every[atom] = None
-    if unknown_one is not None:
-        every = {atom: None for atom in every if not isinstance(atom, float)}
     found = tuple(every)
     if len(found) > MAX_SEQUENCES:
         found = _one_container(found)
@@ -307,7 +302,7 @@ def join_in_doubt(values: Sequence[Value], why: str) -> Value:
     common = set(values[0]).intersection(*values[1:]) if values else set()
     return join(
         *(
-            unknown(why) if isinstance(atom, Text | Param | int | float) and atom not in common else (atom,)
+            unknown(why) if isinstance(atom, Text | Param | int) and atom not in common else (atom,)
             for atom in found
         )
     )
@@ -326,20 +321,19 @@ def in_any_order(atoms: Value) -> Value:
     if lists:
         found.append(open_sequence(item for atom in lists for item in atom.items))
     if maps:
-        found.append(as_one_map([entry for atom in maps for entry in atom.entries], True))
+        found.append(as_one_map(entry for atom in maps for entry in atom.entries))
     return tuple(found)
 
 
-def as_one_map(entries: Iterable[tuple[Value, Value]], is_open: bool) -> Map:
-    """Merge entries of equal keys; if a key is not known, or they are too many, all to one that is not known."""
+def as_one_map(entries: Iterable[tuple[Value, Value]]) -> Map:
+    """Merge entries of equal keys, of which one counts; if a key is not known, or they are too many, all entries."""
     found: dict[Value, Value] = {}
     for key, value in entries:
-        found[key] = join(found[key], value) if key in found else value
+        found[key] = join_in_doubt([found[key], value], "which value a key has") if key in found else value
     strange = next((key for key in found if any(isinstance(atom, Unknown) for atom in key)), None)
     if strange is not None or len(found) > MAX_ITEMS:
         found = {strange or unknown("one of many keys"): join(*found.values())}
-        is_open = True
-    return Map(tuple(found.items()), is_open)
+    return Map(tuple(found.items()))
 
 
 def open_sequence(items: Iterable[Value]) -> Seq:
@@ -363,7 +357,7 @@ def _lost(atom: Atom, why: str, written: Value) -> Atom:
         return Seq((lost(join(*atom.items, more, unknown(why)), why, written),), True, atom.place)
     if isinstance(atom, Map):
         items = (lost(value, why, written) for _, value in atom.entries)
-        return Map(((unknown(why), join(*items, unknown(why))),), True)
+        return Map(((unknown(why), join(*items, unknown(why))),))
     if isinstance(atom, Group):
         return Group(tuple(lost(item, why, written) for item in atom.items))
     return atom if isinstance(atom, Obj | Lambda | Bound) or atom == END else Unknown(why)
@@ -387,8 +381,6 @@ def as_parts(atom: Atom) -> tuple[Part | NodeNamePart, ...]:
         return ("1" if atom else "0",)
     if isinstance(atom, int):
         return (str(atom),)
-    if isinstance(atom, float):
-        return (f"{atom:f}",)
     if isinstance(atom, Param):
         return _parameter_parts(atom)
     if isinstance(atom, Unknown):
@@ -449,7 +441,7 @@ def plain(atom: Atom) -> str | None:
         return "".join(str(part) for part in atom.parts)
     if isinstance(atom, bool):
         return "true" if atom else "false"
-    if isinstance(atom, int | float):
+    if isinstance(atom, int):
         return str(atom)
     return None
 
@@ -461,7 +453,7 @@ def truth(value: Value) -> bool | None:
 
 
 def _truth(atom: Atom) -> bool | None:
-    if isinstance(atom, bool | int | float):
+    if isinstance(atom, bool | int):
         return bool(atom)
     if isinstance(atom, Lambda | Bound):
         return True

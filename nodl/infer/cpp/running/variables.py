@@ -6,16 +6,15 @@ from nodl.infer.cpp.reading.declarations import Class
 from nodl.infer.cpp.running.constructors import default_value, made
 from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.static_types import current_object, static_by_name
-from nodl.infer.cpp.running.values import BOTTOM, NPOS, Bound, Const, Obj, Value, unknown
+from nodl.infer.cpp.running.values import BOTTOM, Bound, Obj, Value, unknown
 from nodl.infer.cpp.syntax import Node, children, text
 
 
 def variable(run: Machine, name: str, frame: Frame) -> Value:
-    """Return the local variable, member, constant, enumerator or function of that name."""
+    """Return the local variable, member, constant or function of that name."""
     owner = frame.owner_of(name)
     if owner is not None:
-        target = owner.aliases.get(name)
-        return run.evaluate(target, owner) if target is not None else run.store.get((owner, name)) or BOTTOM
+        return run.store.get((owner, name)) or BOTTOM
     if name in frame.bindings:
         given = frame.bindings[name].name
         return (int(given),) if given.isdigit() else unknown(f"the argument {name} of a template")
@@ -78,9 +77,7 @@ def _initial(run: Machine, value: Node | None, written: str, frame: Frame) -> Va
 
 
 def constant(run: Machine, name: str, frame: Frame) -> Value | None:
-    """Return the global, static member, enumerator or functions of that name; ``None`` if none is found."""
-    if name.endswith("string::npos"):
-        return (NPOS,)
+    """Return the global, static member or functions of that name; ``None`` if none is found."""
     static = static_by_name(run, name, frame)
     if static is not None:
         return static_member(run, *static)
@@ -104,11 +101,6 @@ def constant(run: Machine, name: str, frame: Frame) -> Value | None:
                 )
             run.store.set(cell, known)
         return known
-    head, separator, last = name.rpartition("::")
-    for key in (name, f"{head.rpartition('::')[2]}::{last}" if separator else name):
-        full = run.names.enumerators.get(key)
-        if full is not None:
-            return (Const(full),)
     function = run.names.find_functions(name, frame.scope, frame.file)
     if function:
         return tuple(Bound(each, None) for each in function)

@@ -87,26 +87,18 @@ FOUND = {
         f"std::string s = \"a-b\"; std::replace(s.begin(), s.end(), '-', '_'); {PUB}(s, 1);", "", ["?"]
     ),
     "a text by snprintf": (f'char b[32] = "old"; snprintf(b, sizeof(b), "t%02d", 3); {PUB}(b, 1);', "", ["?"]),
-    "a text by fmt": (f'{PUB}("a/" + fmt::format("{{}}", 2), 1);', "", ["a/2"]),
+    "a text by fmt": (f'{PUB}("a/" + fmt::format("{{}}", 2), 1);', "", ["a/?"]),
     "a word from a stream": (
         f'std::string w = "old"; std::istringstream s("a b"); s >> w; {PUB}(w, 1);', "", ["?"]
     ),
-    "a text that is edited": (f'std::string s = "ab"; s.erase(0, 1); {PUB}(s, 1);', "", ["b"]),
-    "a part of a text": (f'{PUB}(std::string("ab").substr(1), 1);', "", ["b"]),
-    "a part behind a letter": (
+    "a part behind a letter is not followed": (
         f'std::string s = "a/b"; auto at = s.rfind("/"); '
         f"if (at != std::string::npos) {{ {PUB}(s.substr(at + 1), 1); }}",
-        "", ["b"],
+        "", ["?"],
     ),
-    "a letter that is there": (
-        f"std::string s = \"/a\"; if (s.front() == '/') {{ {PUB}(s.substr(1), 1); }}", "", ["a"]
-    ),
-    "a letter that is not there": (
-        f'std::string s = "a"; if (s.find(":") != std::string::npos) {{ s = "b"; }} {PUB}(s, 1);', "", ["a"]
-    ),
-    "an entry that is not there": (
+    "an entry that is not there may be": (
         f'std::map<std::string, int> m{{{{"a", 1}}}}; if (m.find("b") != m.end() || m.count("b")) {{ {PUB}("b", 1); }}',
-        "", [],
+        "", ["b"],
     ),
     "a list that loses its last": (
         f'std::vector<std::string> v{{"a", "b"}}; v.pop_back(); for (auto & e : v) {{ {PUB}(e, 1); }}', "", ["?"]
@@ -123,11 +115,11 @@ FOUND = {
         ["t3"],
     ),
     "whole numbers that are divided": (f'{PUB}("t" + std::to_string(7 / 2 + 7 % 4), 1);', "", ["t6"]),
-    "an enumeration of a function": (
-        f'enum Mode {{ On, Off }}; Mode m = Off; {PUB}(m == On ? "on" : "off", 1);', "", ["off"]
+    "any enumerator": (
+        f'enum Mode {{ On, Off }}; Mode m = Off; {PUB}(m == On ? "on" : "off", 1);', "", ["off", "on"]
     ),
-    "a case for a letter": (
-        f"char c = 'b'; switch (c) {{ case 'a': {PUB}(\"a\", 1); break; case 'b': {PUB}(\"b\", 1); }}", "", ["b"]
+    "any case": (
+        f"char c = 'b'; switch (c) {{ case 'a': {PUB}(\"a\", 1); break; case 'b': {PUB}(\"b\", 1); }}", "", ["a", "b"]
     ),
     "texts that are swapped": (f'std::string a = "a", b = "b"; a.swap(b); {PUB}(b + "_b", 1);', "", ["?_b"]),
     "pointers to objects": (
@@ -149,7 +141,7 @@ FOUND = {
     "an element by at": (
         f'std::vector<std::string> v{{"a", "b"}}; v.at(1) = "c"; std::map<std::string, std::string> m{{{{"k", "d"}}}}; '
         f'm.at("k") = "e"; {PUB}(v[0], 1); {PUB}(v[1], 1); {PUB}(m["k"], 1);',
-        "", ["a", "c", "e"],
+        "", ["?", "a", "c"],
     ),
     "structures and macros of POSIX": (
         f'sockaddr_in address; fd_set set; FD_ZERO(&set);\nFD_SET(1, &set);\n{PUB}("a", 1);', "struct sockaddr_in a_;",
@@ -172,8 +164,7 @@ def test_a_name_is_known(body: str, members: str, made: list[str], tmp_path: Pat
 def test_a_header_may_bring_in_the_names_of_std(tmp_path: Path) -> None:
     body = f'stringstream s; s << "a" << 1; {PUB}(s.str(), 1); vector<string> v{{"b"}}; for (auto & e : v) {PUB}(e, 1);'
     source = '#include "all.hpp"\n' + in_class(body)
-    assert names(infer(tmp_path, source, src__all_hpp="using namespace std;\n")) == ["a1", "b"]
-    assert "a1" not in names(infer(tmp_path / "without", source, src__all_hpp=""))
+    assert names(infer(tmp_path, source, src__all_hpp="using namespace std;\n")) == ["?", "b"]
 
 
 def test_a_class_of_a_known_library_may_be_named_without_its_namespace(tmp_path: Path) -> None:
@@ -187,15 +178,6 @@ def test_a_class_of_a_known_library_may_be_named_without_its_namespace(tmp_path:
     assert any(
         "Strange is not in reach" in why for why in gaps(infer(tmp_path, in_class(f"{body} new Strange(1);")))
     )
-
-
-def test_texts_that_the_build_defines_are_known(tmp_path: Path) -> None:
-    cmake = (
-        'add_executable(node src/main.cpp)\ntarget_compile_definitions(node PRIVATE A="x" "B=\\"y\\"")\n'
-        'add_definitions(-DC="z")'
-    )
-    source = in_class(f'{PUB}(A, 1); {PUB}(B "/b", 1);')
-    assert names(infer_paths([package(tmp_path / "demo", {"src/main.cpp": source}, cmake)])) == ["x", "y/b"]
 
 
 MODULE = "macro(robot_node name)\n  add_executable(${name} ${ARGN})\nendmacro()\n"
@@ -408,8 +390,6 @@ COPIES = {
         "b[0].t",
     ),
     "a list in a structure": ("Box a; a.list.push_back(Item()); Box b = a;", "a.list[0].t", "b.list[0].t"),
-    "a map in a structure": ('Box a; a.m["k"] = Item(); Box b(a);', 'a.m["k"].t', 'b.m["k"].t'),
-    "two keys of a map": ("Box a;", 'a.m["k"].t', 'a.m["l"].t'),
 }
 
 
@@ -427,9 +407,9 @@ def test_pointers_in_a_list_that_is_copied_point_to_the_same(made: str, tmp_path
     assert names(infer(tmp_path, in_class(body, f"{ITEM} Item item_;"))) == ["b"]
 
 
-def test_a_key_that_a_map_does_not_have_makes_an_entry(tmp_path: Path) -> None:
+def test_a_key_that_a_map_does_not_have_makes_an_entry_that_is_not_known(tmp_path: Path) -> None:
     body = f'm_["k"].t = "a"; m_["l"].t = "b"; for (auto & [k, item] : m_) {{ {PUB}(item.t, 1); }}'
-    assert names(infer(tmp_path, in_class(body, f"{ITEM} std::map<std::string, Item> m_;"))) == ["a", "b"]
+    assert names(infer(tmp_path, in_class(body, f"{ITEM} std::map<std::string, Item> m_;"))) == ["?"]
 
 
 def test_a_key_that_is_only_read_is_in_the_map_afterwards(tmp_path: Path) -> None:

@@ -238,7 +238,7 @@ public:
     get_parameter("legs", legs);
     for (int i = 0; i < legs; ++i) { pub("leg" + std::to_string(i)); }
     const auto mode = declare_parameter<std::string>("mode", "");
-    pub(mode.size() && mode[0] == 'f' ? "fast" : "slow");
+    pub(mode.size() && mode == "fast" ? "fast" : "slow");
     declare_parameter("spare", false);
     set_parameter(rclcpp::Parameter("spare", true));
     if (get_parameter("spare").as_bool()) { pub("spare"); }
@@ -255,7 +255,7 @@ int main(int argc, char ** argv) {
 """
 )
 PARAMETERS = (
-    '<param name="camera" value="false"/><param name="legs" value="3"/><param name="mode" value="flat"/>'
+    '<param name="camera" value="false"/><param name="legs" value="3"/><param name="mode" value="fast"/>'
 )
 
 

@@ -235,11 +235,6 @@ NOT_MADE = {
     "in a branch that is never taken": in_class(
         'if (false) { create_publisher<std_msgs::msg::String>("a", 1); }'
     ),
-    "behind a constant of another value": in_class(
-        'if (mode_ == Mode::B) { create_publisher<std_msgs::msg::String>("a", 1); }',
-        "Mode mode_ = Mode::A;",
-        before="enum class Mode { A, B };\n",
-    ),
     "in a method that nobody calls": in_class(
         "", 'void unused() { create_publisher<std_msgs::msg::String>("a", 1); }'
     ),
@@ -287,16 +282,6 @@ def test_what_both_sides_of_such_a_branch_make_is_certain(tmp_path: Path) -> Non
     )
     system = infer(tmp_path, source)
     assert set(names(system)) == {"a"}
-    assert gaps(system) == []
-
-
-def test_a_definition_of_the_target_decides_the_branch(tmp_path: Path) -> None:
-    from nodl.infer import infer_paths
-
-    source = in_class('\n#ifdef WITH_DEBUG\ncreate_publisher<std_msgs::msg::String>("a", 1);\n#endif\n')
-    cmake = "add_executable(node src/main.cpp)\ntarget_compile_definitions(node PRIVATE WITH_DEBUG)"
-    system = infer_paths([package(tmp_path / "demo", {"src/main.cpp": source}, cmake)])
-    assert names(system) == ["a"]
     assert gaps(system) == []
 
 
