@@ -116,25 +116,10 @@ def _decorated(run: Run, value: Value, function: FunctionValue, decorator: ast.e
     return run.call(callee, Arguments([value]), decorator, frame)
 
 
-def _installed(run: Run, base: Value) -> object:
-    """Return the class of ROS for which others only stand in where ROS is not installed: those make no interfaces."""
-    others = [atom for atom in base if not run.tables.creates(atom)]
-    left = [atom for atom in base if atom not in others]
-    return sole(tuple(left) if left and all(map(_stands_in, others)) else base)
-
-
-def _stands_in(atom: object) -> bool:
-    """Return whether a class that derives from ``atom`` gets nothing from it."""
-    if isinstance(atom, ClassValue):
-        body = atom.node.body
-        return not atom.node.bases and all(isinstance(each, ast.Pass | ast.Expr) for each in body)
-    return atom is None or (isinstance(atom, External) and atom.path == "builtins.object")
-
-
 def define_class(run: Run, node: ast.ClassDef, frame: Frame) -> bool:
     """Run ``class``: run the body, complete the class, apply the decorators last to first, bind the name."""
     values = [run.evaluate(base, frame) for base in node.bases if not isinstance(base, ast.Starred)]
-    bases = (_installed(run, values[0]),) if len(values) == 1 else tuple(map(sole, values))
+    bases = tuple(map(sole, values))
     keywords = {each.arg: run.evaluate(each.value, frame) for each in node.keywords if each.arg is not None}
     if any(isinstance(base, ast.Starred) for base in node.bases) or len(keywords) < len(node.keywords):
         run.gap(node, frame, f"the bases of class {node.name} are made at run time")

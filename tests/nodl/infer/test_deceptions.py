@@ -174,8 +174,6 @@ def test_the_way_that_a_launch_takes_says_the_same(title: str, tmp_path: Path) -
 @pytest.mark.parametrize(
     "title",
     [
-        "data_model: an empty class stands in for the class of a node where ROS is not installed",
-        "data_model: object stands in for the class of a node where ROS is not installed",
         "data_model: object.__setattr__ sets what a frozen dataclass keeps",
         "language: a list is edited after it was added",
         "language: lists added",
