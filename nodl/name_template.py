@@ -6,15 +6,9 @@ import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
-from nodl.names import InvalidNameError, expand_name
-
 Edit = tuple[str, tuple[str, ...]]
-"""A method of ``str`` with its arguments: ``("strip", ("/",))``."""
-
-EDITS = frozenset(
-    {"strip", "lstrip", "rstrip", "lower", "upper", "replace", "removeprefix", "removesuffix", "title"}
-)
-
+"""A condition with its arguments: ``("only if equal", ("auto",))``. Or ``("given", ("True", "False"))``: what a flag
+holds where it is there, and where it is not."""
 
 CONDITIONS: dict[str, Callable[..., bool]] = {
     "only if equal": lambda text, other: text == other,
@@ -23,18 +17,8 @@ CONDITIONS: dict[str, Callable[..., bool]] = {
     "only if false": lambda text: text.lower() != "true",
     "only if among": lambda text, *others: text in others,
     "only if not among": lambda text, *others: text not in others,
-    "only if above": lambda text, bound: is_whole_number(text) and int(text) > int(bound),
-    "only if not above": lambda text, bound: not is_whole_number(text) or int(text) <= int(bound),
-    "only if starting": lambda text, *heads: text.startswith(heads),
-    "only if not starting": lambda text, *heads: not text.startswith(heads),
-    "only if ending": lambda text, *tails: text.endswith(tails),
-    "only if not ending": lambda text, *tails: not text.endswith(tails),
 }
 """Edits that keep a name where they hold and drop it elsewhere."""
-
-ONLY_IF_UNSET: Edit = ("only if unset", ())
-"""The same for a parameter that launch does not set: the name is made of what the code takes then."""
-
 
 PARAMETER_REFERENCE = re.compile(r"\$\(param ([^ ()$]+)(?: ([^ ()$]*))?\)")
 """``$(param NAME)`` or ``$(param NAME DEFAULT)`` in the text of a template."""
@@ -45,7 +29,7 @@ class ParameterPart(NamedTuple):
 
     ``item``: the parameter is a list and this is its element at an index, or ``"each"`` of them.
     ``*`` in ``name`` stands for one part between dots: the names are the values of all such parameters.
-    ``edits``: what the code does to the value before it uses it. Names that no ROS parameter can have stand
+    ``edits``: a condition on the value, which then is no part of the name. Names that no ROS parameter can have stand
     for other inputs of the program: ``--option`` and ``<argument>`` of its command line, ``$VARIABLE`` of
     its environment.
     """
@@ -59,37 +43,32 @@ class ParameterPart(NamedTuple):
         """Return what this part may stand for: normally one text; none if it has no value."""
         values: Sequence[object] = () if self.default is None else (self.default,)
         given = self._given(parameters)
-        if self.edits[:1] == (ONLY_IF_UNSET,):
-            return () if given else ("",)
         if self.edits and self.edits[0][0] == "given":  # of a flag it counts only whether it is there
             values = [self.edits[0][1][0 if given else 1]]
         elif given:
             values = [value for each in given for value in self._items(each)]
         if not values and not given and self.is_condition:
             return ("",)  # what is not known may hold
-        return tuple(dict.fromkeys(text for value in values for text in self._edited(str(value))))
+        if self.is_condition:
+            test, arguments = self.edits[-1]
+            return ("",) if any(CONDITIONS[test](str(value), *arguments) for value in values) else ()
+        return tuple(dict.fromkeys(map(str, values)))
 
     @property
     def is_condition(self) -> bool:
         """Return True if it adds nothing to the name, which only exists if the parameter has a certain value."""
-        return bool(self.edits) and (self.edits[-1][0] in CONDITIONS or self.edits[-1] == ONLY_IF_UNSET)
+        return bool(self.edits) and self.edits[-1][0] in CONDITIONS
 
     def may_be_none(self, parameters: Mapping[str, object]) -> bool:
         """Return whether it certainly stands for no text at all: an empty list, a condition that does not hold."""
-        listed = self.item == "each" or any(
-            method in ("split", "part", "range", "unless empty") for method, _ in self.edits
-        )
-        if any(method == "only if set" for method, _ in self.edits):
-            return True
         known = self.name in parameters or self.default is not None
-        return self.is_condition or self.name.endswith(".**") or (listed and known)
+        return self.is_condition or (self.item == "each" and known)
 
     def _given(self, parameters: Mapping[str, object]) -> list[object]:
         if "*" not in self.name:
             return [parameters[self.name]] if self.name in parameters else []
-        pattern = re.escape(self.name).replace(r"\*\*", ".+").replace(r"\*", "[^.]+")
-        found = [name for name in sorted(parameters) if re.fullmatch(pattern, name)]
-        return [*found] if self.edits and self.edits[0][0] == "key" else [parameters[name] for name in found]
+        pattern = re.escape(self.name).replace(r"\*", "[^.]+")
+        return [parameters[name] for name in sorted(parameters) if re.fullmatch(pattern, name)]
 
     def _items(self, value: object) -> Sequence[object]:
         if self.item is None:
@@ -99,56 +78,6 @@ class ParameterPart(NamedTuple):
         if not isinstance(self.item, int):
             return tuple(value)
         return tuple(value[self.item : self.item + 1] if self.item >= 0 else value[self.item :][:1])
-
-    def _edited(self, text: str) -> list[str]:
-        texts = [text]
-        for method, arguments in self.edits:
-            texts = [result for each in texts for result in _edit(each, method, arguments)]
-        return texts
-
-
-def _edit(text: str, method: str, arguments: tuple[str, ...]) -> Sequence[str]:
-    """Apply one edit: normally one text, several from ``split`` and ``range``, perhaps none from a condition."""
-    if method in EDITS:
-        return (getattr(text, method)(*arguments),)
-    if method == "split":
-        return text.split(arguments[0] if arguments else None)
-    if method == "part":
-        index, parts = int(arguments[0]), text.split(arguments[1] if len(arguments) > 1 else None)
-        return (parts[index],) if -len(parts) <= index < len(parts) else ()
-    if method == "after":
-        return (text.partition(arguments[0])[2],)
-    if method == "range":
-        first = int(arguments[0]) if arguments else 0
-        return [str(number) for number in range(first, int(text))] if is_whole_number(text) else ()
-    if method == "plus":
-        return (str(int(text) + int(arguments[0])),) if is_whole_number(text) else ()
-    if method == "unless empty":
-        return (text,) if text else ()  # the default is an empty list
-    if method == "key":
-        return (text.removeprefix(arguments[0]),)
-    if method == "where":  # of several texts, those of which a condition holds
-        return (text,) if CONDITIONS[arguments[0]](text, *arguments[1:]) else ()
-    if method in CONDITIONS:
-        return ("",) if CONDITIONS[method](text, *arguments) else ()
-    return (_remapped(text, *arguments),) if method == "remapped" else (text,)
-
-
-def is_whole_number(text: str) -> bool:
-    """Return True for a number of at most five digits: so many names are made of it at most."""
-    return re.fullmatch(r"-?[0-9]{1,5}", text) is not None
-
-
-def _remapped(text: str, namespace: str, node: str, *pairs: str) -> str:
-    """Apply remap rules (matches and replacements in turn) that the program gives to its node to ``text``."""
-    try:
-        full = expand_name(text, namespace=namespace, node=node)
-        for match, replacement in zip(pairs[::2], pairs[1::2], strict=True):
-            if expand_name(match, namespace=namespace, node=node) == full:
-                return replacement
-    except InvalidNameError:
-        return text
-    return text
 
 
 class UnknownPart(NamedTuple):

@@ -67,9 +67,6 @@ class OptionDefaults:
     def declare(self, name: str, default: Value) -> None:
         self._defaults[name] = join(self._defaults.get(name, BOTTOM), default)
 
-    def replace(self, name: str, default: Value) -> None:
-        self._defaults[name] = default
-
     def default(self, name: str) -> Value:
         return self._defaults.get(name, BOTTOM)
 

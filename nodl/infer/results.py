@@ -8,7 +8,7 @@ from __future__ import annotations
 from nodl.infer.findings import Findings, FoundEndpoint, NodeRecord, OptionDefaults
 from nodl.infer.start import LaunchKey
 from nodl.infer.text import Hole, Input, NodePart, Piece, Text, is_condition, is_of_inputs, text_of
-from nodl.infer.values import Sequence, Unknown, Value
+from nodl.infer.values import Unknown, Value
 from nodl.name_template import NameTemplate, ParameterPart, Part, UnknownPart, melted
 from nodl.node_interface import Certainty, ClientLibrary, Endpoint, Gap, NodeInterface
 from nodl.ros_arguments import parse_ros_arguments
@@ -166,23 +166,14 @@ def _parts(piece: Piece, first: bool) -> list[Part]:
 def _input_parts(piece: Input) -> list[Part]:
     """Return the symbolic part once per default."""
     assert isinstance(piece.owner, (NodeRecord, OptionDefaults))
-    declared = piece.owner.default(piece.name)
-    if piece.item == "each" and declared and all(_is_empty_list(atom) for atom in declared):
-        return [ParameterPart(piece.name, "", piece.item, (("unless empty", ()), *piece.edits))]
-    defaults = _default_texts(declared, piece.item) or [None]
-    return [ParameterPart(piece.name, default, piece.item, piece.edits) for default in defaults]
+    defaults = _default_texts(piece.owner.default(piece.name)) or [None]
+    return [ParameterPart(piece.name, default, None, piece.edits) for default in defaults]
 
 
-def _is_empty_list(atom: object) -> bool:
-    return isinstance(atom, Sequence) and atom.items.exact == ()
-
-
-def _default_texts(value: Value, item: int | str | None) -> list[str | None]:
+def _default_texts(value: Value) -> list[str | None]:
     texts: list[str | None] = []
     for atom in value:
-        if item is not None:
-            texts.extend(_default_items(atom, item))
-        elif isinstance(atom, (str, int, float)):
+        if isinstance(atom, (str, int, float)):
             texts.append(str(atom))
         elif isinstance(atom, Text) and not is_of_inputs(atom):
             texts.extend(_plain_texts((atom,)) or [None])
@@ -190,15 +181,6 @@ def _default_texts(value: Value, item: int | str | None) -> list[str | None]:
             texts.append(None)
     found = list(dict.fromkeys(texts))
     return found if len(found) <= MAX_ALTERNATIVES else [None]
-
-
-def _default_items(atom: object, item: int | str) -> list[str | None]:
-    exact = atom.items.exact if isinstance(atom, Sequence) else None
-    if exact is None:
-        return [None]
-    at = slice(item, item + 1) if isinstance(item, int) and item >= 0 else slice(0)
-    chosen = exact if item == "each" else exact[at]
-    return [text for element in chosen for text in _default_texts(element, None)]
 
 
 # --- arguments in code --------------------------------------------------------------------------------------

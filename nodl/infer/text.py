@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
-from nodl.name_template import EDITS, Edit
+from nodl.name_template import Edit
 
 MAX_PARTS = 24
 MAX_PRODUCT = 64
@@ -18,11 +18,10 @@ MAX_LENGTH = 4096  # characters of a known text; no name is longer
 
 
 class Input(NamedTuple):
-    """The value of a named input of the program. ``item``: an index, or ``"each"`` element of a list."""
+    """The value of a named input of the program; ``edits``: conditions on it, or whether a flag is there."""
 
     name: str
     owner: object
-    item: int | str | None = None
     edits: tuple[Edit, ...] = ()
 
 
@@ -110,10 +109,6 @@ def text_of(pieces: Iterable[Piece]) -> TextAtom:
         if not (type(piece) is Hole and type(last) is Hole):
             merged.append(piece)
             last = piece
-    several = [piece for piece in merged if type(piece) is Input and is_one_of_several(piece)]
-    for index, piece in enumerate(several):
-        if any(each._replace(edits=()) == piece._replace(edits=()) for each in several[:index]):
-            merged = [Hole("which parts go together") if each is piece else each for each in merged]
     if not merged:
         return ""
     if len(merged) == 1 and isinstance(merged[0], str):
@@ -121,12 +116,6 @@ def text_of(pieces: Iterable[Piece]) -> TextAtom:
     if len(merged) > MAX_PARTS:
         merged = [merged[0], Hole("a very long text"), merged[-1]]
     return Text(tuple(merged))
-
-
-def is_one_of_several(piece: Input) -> bool:
-    """Return True if it stands for several texts: an element of a list, a part of a text, a name below a prefix."""
-    several = any(method in ("split", "key") for method, _ in piece.edits)
-    return (piece.item == "each" or several) and not is_condition(piece)
 
 
 def pieces_of(text: TextAtom) -> tuple[Piece, ...]:
@@ -141,11 +130,7 @@ def concatenate(left: TextAtom, right: TextAtom) -> TextAtom:
     if not left or not right:
         return left or right
     head, tail = pieces_of(left), pieces_of(right)
-    melts = (
-        any(type(piece) is Input and is_one_of_several(piece) for piece in tail)
-        or len(head) + len(tail) > MAX_PARTS
-        or type(head[-1]) is type(tail[0])
-    )
+    melts = len(head) + len(tail) > MAX_PARTS or type(head[-1]) is type(tail[0])
     if melts or _is_long(left) or _is_long(right):
         return text_of((*head, *tail))
     return Text((*head, *tail))
@@ -202,19 +187,6 @@ def _literal_end(text: TextAtom, index: int) -> str:
     return piece if isinstance(piece, str) else ""
 
 
-def edited(text: Text, method: str, arguments: tuple[str, ...]) -> TextAtom | None:
-    """Compute ``text.method(*arguments)`` if it can be said symbolically, else ``None``."""
-    if method not in EDITS:
-        return None
-    pieces = text.pieces
-    if len(pieces) == 1:
-        piece = pieces[0]
-        return (
-            with_edit(piece, method, arguments) if isinstance(piece, Input) and len(piece.edits) < 8 else None
-        )
-    return None
-
-
 def constant_text(atom: object) -> object:
     """Return the ``str`` of a text that is known but for the conditions under which it is meant; else ``atom``."""
     if not isinstance(atom, Text):
@@ -232,18 +204,12 @@ def is_of_inputs(text: Text) -> bool:
 
 def is_condition(piece: Input) -> bool:
     """Return True if the input is not part of the text, but decides whether it is meant."""
-    last = piece.edits[-1][0] if piece.edits else ""
-    return last.startswith("only if ") and last != "only if set"
+    return bool(piece.edits) and piece.edits[-1][0] != "given"
 
 
 def input_of(text: object) -> Input | None:
-    """Return the input that ``text`` is as a whole."""
+    """Return the input whose value ``text`` is as a whole."""
     if not isinstance(text, Text) or len(text.pieces) != 1:
         return None
     piece = text.pieces[0]
-    return piece if isinstance(piece, Input) else None
-
-
-def with_edit(piece: Input, method: str, arguments: tuple[str, ...]) -> Text:
-    """Return the input after one more edit."""
-    return Text((piece._replace(edits=(*piece.edits, (method, arguments))),))
+    return piece if isinstance(piece, Input) and not is_condition(piece) else None

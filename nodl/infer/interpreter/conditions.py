@@ -23,7 +23,6 @@ from nodl.infer.text import (
     TextAtom,
     constant_text,
     input_of,
-    is_one_of_several,
     pieces_of,
 )
 from nodl.infer.values import (
@@ -46,7 +45,6 @@ from nodl.infer.values import (
     join_all,
     sole,
 )
-from nodl.name_template import EDITS
 
 T = TypeVar("T")
 
@@ -54,8 +52,6 @@ _OPPOSITE = {
     "only if true": "only if false", "only if false": "only if true",
     "only if equal": "only if different", "only if different": "only if equal",
     "only if among": "only if not among", "only if not among": "only if among",
-    "only if starting": "only if not starting", "only if not starting": "only if starting",
-    "only if ending": "only if not ending", "only if not ending": "only if ending",
 }  # fmt: skip
 
 
@@ -139,8 +135,6 @@ def condition_of(run: Run, test: ast.expr, frame: Frame) -> Guard | None:
         return None
     if isinstance(test, ast.Compare):
         return _comparison(run, test, frame) if len(test.ops) == 1 else None
-    if isinstance(test, ast.Call) and isinstance(test.func, ast.Attribute) and test.func.attr in _AFFIXES:
-        return _of_affix(run, test, test.func, frame)
     asked, defaults = _asked(run, test, frame)
     if asked is None:
         return None
@@ -151,24 +145,9 @@ def condition_of(run: Run, test: ast.expr, frame: Frame) -> Guard | None:
     return None
 
 
-_AFFIXES = {"startswith": "only if starting", "endswith": "only if ending"}
-
-
-def _of_affix(run: Run, test: ast.Call, method: ast.Attribute, frame: Frame) -> Guard | None:
-    if not (isinstance(method.value, ast.Call) or _only_reads(method.value)) or len(test.args) != 1:
-        return None
-    asked, defaults = _asked(run, method.value, frame)
-    affix = test.args[0].value if isinstance(test.args[0], ast.Constant) else None
-    if asked is None or not isinstance(affix, str) or not all(type(each) is str for each in defaults):
-        return None
-    return Guard(asked, _AFFIXES[method.attr], (affix,))
-
-
 def opposite(condition: Guard | None) -> Guard | None:
-    """Return the condition that holds where ``condition`` does not; ``None``: what no element of a list is."""
-    if condition is None or condition.asked.item is not None:
-        return None
-    return condition._replace(edit=_OPPOSITE[condition.edit])
+    """Return the condition that holds where ``condition`` does not."""
+    return None if condition is None else condition._replace(edit=_OPPOSITE[condition.edit])
 
 
 def conditions_of(run: Run, test: ast.expr, holds: bool, frame: Frame) -> tuple[Guard, ...]:
@@ -187,7 +166,7 @@ def conditions_of(run: Run, test: ast.expr, holds: bool, frame: Frame) -> tuple[
 
 
 def _certain(condition: Guard | None) -> tuple[Guard, ...]:
-    return () if condition is None or is_one_of_several(condition.asked) else (condition,)
+    return () if condition is None else (condition,)
 
 
 def under(run: Run, conditions: tuple[Guard, ...], action: Callable[[], T]) -> T:
@@ -211,8 +190,8 @@ def sides_of(
     if condition is None and isinstance(test, ast.BoolOp | ast.UnaryOp):
         held = {holds: conditions_of(run, test, holds, frame) for holds in (True, False)}
     read = [] if all(held.values()) else [*filter(is_of_launch, _read_in(run, test, frame))]
-    asks = not all(map(_is_only_if_set, read))  # the names that such a text makes say so themselves
-    run.asks_launch = run.asks_launch or bool(read)
+    asks = bool(read)
+    run.asks_launch = run.asks_launch or asks
 
     def side(holds: bool) -> T:
         made = run.findings.made
@@ -224,18 +203,6 @@ def sides_of(
 
     joined = partial(either, run, condition) if condition or asks else None
     return joined, [partial(side, True), partial(side, False)]
-
-
-def _is_only_if_set(text: object) -> bool:
-    """Return whether a text is a parameter that a program uses only if launch sets it: else it has no value."""
-    asked = input_of(text)
-    return asked is not None and any(method == "only if set" for method, _ in asked.edits)
-
-
-def reads_one_of_several(run: Run, test: ast.expr, frame: Frame) -> bool:
-    """Return whether a variable, a field or a call in ``test`` gives one of the elements of a parameter."""
-    inputs = map(input_of, _read_in(run, test, frame))
-    return any(asked is not None and is_one_of_several(asked) for asked in inputs)
 
 
 def _read_in(run: Run, test: ast.expr, frame: Frame) -> Iterator[object]:
@@ -354,22 +321,13 @@ def _truth_again(run: Run, part: ast.expr, frame: Frame) -> bool | None:
 def _asked(run: Run, node: ast.expr, frame: Frame) -> tuple[Input | None, Value]:
     value = _answer(run, node, frame)
     asked = input_of(value[0]) if len(value) == 1 else None
-    if asked is None or not is_parameter(asked) or not isinstance(asked.owner, (NodeRecord, OptionDefaults)):
+    if asked is None or not isinstance(asked.owner, (NodeRecord, OptionDefaults)):
         return None, ()
     defaults = asked.owner.default(asked.name)
-    if asked.item is not None:
-        lists = [atom.items.any_element() for atom in defaults if isinstance(atom, Sequence)]
-        defaults = join_all(lists) if len(lists) == len(defaults) else ()
     return (asked, defaults) if defaults else (None, ())
 
 
-def is_parameter(asked: Input) -> bool:
-    """Return True if it is a parameter, an option or a part of one, with its default as far as the code gives one."""
-    edited = any(method in ("unless empty", "only if set", "key") for method, _ in asked.edits)
-    return not edited and type(asked.item) is not int
-
-
-_READS = EDITS | {"get_parameter", "get_parameter_value", "declare_parameter"}
+_READS = frozenset({"get_parameter", "get_parameter_value", "declare_parameter"})
 
 
 @functools.lru_cache(maxsize=8192)

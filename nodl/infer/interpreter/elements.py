@@ -15,7 +15,7 @@ from nodl.infer.interpreter.define import (
     setter_of,
 )
 from nodl.infer.interpreter.run import Arguments, Run
-from nodl.infer.text import Input, Text, constant_text, input_of
+from nodl.infer.text import Text, constant_text
 from nodl.infer.values import (
     ABSENT,
     ANY,
@@ -80,11 +80,7 @@ def _element(run: Run, atom: object, key: Value, node: ast.Subscript, frame: Fra
     if isinstance(atom, str):
         return _character(atom, key)
     if isinstance(atom, Text):
-        piece = atom.pieces[0]
-        index = key[0] if len(key) == 1 else None
-        if len(atom.pieces) == 1 and isinstance(piece, Input) and piece.item is None and type(index) is int:
-            return (Text((Input(piece.name, piece.owner, index, piece.edits),)),)
-        return unknown("a part of a text that is not known")
+        return OF_LAUNCH if is_of_launch(atom) else unknown("a part of a text that is not known")
     if isinstance(atom, ClassValue):
         return member_with_name(run, atom, key) if is_enumeration(atom) else (atom,)  # Generic[T]
     if isinstance(atom, External) and atom.path == "os.environ":
@@ -139,8 +135,6 @@ def _sequence_item(run: Run, sequence: Sequence, key: Value) -> Value:
     items = sequence.items
     if items.exact is None:
         found = items.any_element()
-        if len(key) == 1 and type(key[0]) is int:
-            found = _part(found, key[0])
         one_of_several = len(found) > 1 and all(type(index) is int for index in key)
         return join(found, ANY) if one_of_several else found or ANY
     if all(isinstance(index, int) for index in key):
@@ -159,15 +153,6 @@ def chosen_by_launch(run: Run, key: Value, found: Value) -> Value:
         return found
     run.asks_launch = True
     return join(found, OF_LAUNCH)
-
-
-def _part(value: Value, index: int) -> Value:
-    """Return what stands at ``index``, if ``value`` is any part of a text that is split."""
-    asked = input_of(value[0]) if len(value) == 1 else None
-    if asked is None or not asked.edits or asked.edits[-1][0] != "split":
-        return value
-    part = ("part", (str(index), *asked.edits[-1][1]))
-    return (Text((asked._replace(edits=(*asked.edits[:-1], part)),)),)
 
 
 def _sliced(run: Run, sequence: Sequence, bounds: slice | None, node: ast.AST) -> Value:
@@ -204,18 +189,10 @@ def _elements_of(run: Run, atom: object, node: ast.AST, frame: Frame) -> Items:
     if isinstance(atom, str):
         return Items(tuple((character,) for character in atom)) if len(atom) <= 256 else Items(None, ANY)
     if isinstance(atom, Text):
-        return Items(None, _input_items(atom))
+        return Items(None, OF_LAUNCH if is_of_launch(atom) else unknown("the characters of a text"))
     if isinstance(atom, ClassValue) and is_enumeration(atom):
         return Items(tuple((member,) for member in enumeration_members(run, atom)))
     return Items(None, (atom,) if isinstance(atom, Unknown) else ANY)
-
-
-def _input_items(text: Text) -> Value:
-    """Return each element of a parameter that holds a list."""
-    piece = text.pieces[0]
-    if len(text.pieces) == 1 and isinstance(piece, Input) and piece.item is None and not piece.edits:
-        return (Text((Input(piece.name, piece.owner, "each"),)),)
-    return unknown("the characters of a text that is not known")
 
 
 def keys_of(obj: Dictionary) -> Items:
@@ -408,11 +385,11 @@ def _unpack(run: Run, targets: list[ast.expr], value: Value, frame: Frame) -> No
     element = items.any_element() or ANY
     if exact is not None:
         element = _any_of(element)
-    for index, target in enumerate(targets):
+    for target in targets:
         if isinstance(target, ast.Starred):
             assign(run, target, run.sequence(target, "list", Items(None, element)), frame)
         else:
-            assign(run, target, element if starred else _part(element, index), frame)
+            assign(run, target, element, frame)
 
 
 def delete(run: Run, target: ast.expr, frame: Frame) -> None:

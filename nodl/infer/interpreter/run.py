@@ -199,7 +199,6 @@ class Run(Allocations):
         self.gave_up = False
         self.called_back: dict[tuple[object, int | None], Called] = {}
         self.running: set[FunctionValue] = set()  # functions that ran since the latest callback began
-        self.without_value = 0  # inside bodies whose handlers catch a parameter that has no value
 
     @cached_property
     def dependencies(self) -> frozenset[str]:

@@ -10,7 +10,6 @@ from nodl.infer.interpreter import imports, loops
 from nodl.infer.interpreter.conditions import (
     decide,
     only_if,
-    reads_one_of_several,
     sides_of,
     where_either,
 )
@@ -102,8 +101,6 @@ def _if(run: Run, node: ast.If, frame: Frame) -> bool:
         passes = run.execute(node.body if holds else node.orelse, frame)
         if passes:
             passing.append(run.guards_at_end)
-        elif _leaves_turn(node, holds) and reads_one_of_several(run, node.test, frame):
-            run.gap(node, frame, "which elements of a parameter come to this is not known")
         return passes
 
     joined, sides = sides_of(run, node.test, frame, side)
@@ -111,15 +108,6 @@ def _if(run: Run, node: ast.If, frame: Frame) -> bool:
     if passing:
         run.guards = where_either(passing[0], passing[-1])  # to the end of this block
     return passes
-
-
-@cache
-def _leaves_turn(node: ast.If, holds: bool) -> bool:
-    """Return True if this side of a test may end the turn of the loop around it, or the loop."""
-    body = node.body if holds else node.orelse
-    return any(
-        isinstance(each, (ast.Return, ast.Break, ast.Continue)) for part in body for each in ast.walk(part)
-    )
 
 
 def _return(run: Run, node: ast.Return, frame: Frame) -> bool:
@@ -248,11 +236,8 @@ def _delete(run: Run, node: ast.Delete, frame: Frame) -> bool:
 def run_try(run: Run, node: Any, frame: Frame) -> bool:
     """Run each handler after any part of the body; it sees every value written on the way, as ``finally`` does."""
     mark, returned = run.state.mark(), frame.returned
-    without_value = any(map(_catches_no_value, node.handlers))
     run.state.depth += 1
-    run.without_value += without_value
     passes = run.execute(node.body, frame)
-    run.without_value -= without_value
     run.state.depth -= 1
     if node.handlers:
         passes = _perhaps_handled(run, node, passes, mark, frame)
@@ -287,16 +272,6 @@ def _perhaps_handled(run: Run, node: Any, passes: bool, mark: int, frame: Frame)
         frame.early = True
     handled = [partial(handle, handler) for handler in node.handlers]
     return run.state.branches([*handled, lambda: passes and run.execute(node.orelse, frame)])
-
-
-def _catches_no_value(handler: ast.ExceptHandler) -> bool:
-    """Return True if a parameter that was declared without a value, and got none, ends in ``handler``."""
-    kinds = handler.type.elts if isinstance(handler.type, ast.Tuple) else [handler.type]
-    return any(kind is None or ast.unparse(kind).rpartition(".")[2] in _NO_VALUE for kind in kinds)
-
-
-_NO_VALUE = frozenset({"ParameterUninitializedException", "ParameterException", "Exception", "BaseException"})
-"""What rclpy's ``get_parameter`` raises then, and what it is derived from (rclpy/exceptions.py)."""
 
 
 def run_with(run: Run, node: ast.With | ast.AsyncWith, frame: Frame) -> bool:

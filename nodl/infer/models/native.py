@@ -16,14 +16,14 @@ from nodl.infer.interpreter.elements import (
 from nodl.infer.interpreter.formatting import joined, str_format, text_value
 from nodl.infer.interpreter.run import Call, Run
 from nodl.infer.models.stdlib import call_each, fill
-from nodl.infer.text import MAX_LENGTH, Text, TextAtom, constant_text, edited, input_of, with_edit
+from nodl.infer.text import MAX_LENGTH, Input, Text, TextAtom, constant_text
 from nodl.infer.values import (
     ABSENT,
     ANY,
-    BOOLEAN,
     BOTTOM,
     LAZY,
     NONE,
+    OF_LAUNCH,
     OTHER_KEYS,
     Dictionary,
     Items,
@@ -82,14 +82,8 @@ def _text_method(run: Run, text: TextAtom, name: str, call: Call) -> Value:
         return unknown(f"the result of str.{name}()")
     if isinstance(text, str):
         return _constant_method(run, text, name, arguments, call)
-    if name in ("startswith", "endswith", "isdigit", "isalpha"):
-        return BOOLEAN
-    divided = input_of(text)
-    if name == "split" and divided is not None and all(isinstance(each, str) for each in arguments):
-        part = with_edit(divided, "split", tuple(str(each) for each in arguments))
-        return run.sequence(call.node, "list", Items(None, (part,)))
-    symbolic = edited(text, name, tuple(argument for argument in arguments if isinstance(argument, str)))
-    return unknown(f"the result of str.{name}()") if symbolic is None else (symbolic,)
+    asks = any(isinstance(piece, Input) for piece in text.pieces)
+    return OF_LAUNCH if asks else unknown(f"the result of str.{name}()")
 
 
 def _constant_method(run: Run, text: str, name: str, arguments: tuple[object, ...], call: Call) -> Value:

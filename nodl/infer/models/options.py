@@ -10,7 +10,7 @@ from typing import TypeGuard
 
 from nodl.infer.interpreter.run import Call, Run
 from nodl.infer.models.command_line import DeclaredOption, read_words
-from nodl.infer.text import Input, Text, input_of
+from nodl.infer.text import Input, Text
 from nodl.infer.values import (
     ANY,
     BOOLEAN,
@@ -37,12 +37,10 @@ from nodl.ros_arguments import words_without_ros_arguments
 
 PARSER = "argparse.ArgumentParser"
 NAMESPACE = "argparse.Namespace"
-_COUNT = "positional arguments"
 _PARSER = "the parser"  # of a namespace; not an attribute of it
 _DECLARED = "declared arguments"
 # Of a parser; they do not change what its arguments hold.
 _HARMLESS = frozenset({"prog", "usage", "description", "epilog", "formatter_class", "add_help"})
-_NOT_TOLD = unknown("which word of the command line it is")
 _TAKES_ROS_WORDS = "an option that ROS has, too"
 _ROS_WORDS = (
     "--ros-args",
@@ -62,15 +60,13 @@ _KEEP_TEXT = frozenset({"builtins.str", "builtins.int"})  # types that leave a w
 def made_parser(run: Run, call: Call) -> Value:
     """Model ``ArgumentParser(...)``: the object that collects the options declared on it."""
     parser = run.library_object(call, PARSER)
-    inherits = "parents" in call.args.keywords
-    run.state.store(parser, _COUNT, unknown("positional arguments of parents") if inherits else (0,))
     run.state.store(parser, _DECLARED, ((),) if _HARMLESS.issuperset(call.args.keywords) else ANY)
     return (parser,)
 
 
 def _add_argument(run: Run, parser: Instance, call: Call) -> Value:
     flags = [flag for value in call.args.positional for flag in constant_strings(value)]
-    known = len(flags) == len(call.args.positional) and not call.args.more
+    known = bool(flags) and len(flags) == len(call.args.positional) and not call.args.more
     if not known or any(flag.startswith(_ROS_WORDS) for flag in flags):
         run.state.store(parser, _TAKES_ROS_WORDS, (True,))
     before = sole(parser.cells.get(_DECLARED))
@@ -84,45 +80,27 @@ def _add_argument(run: Run, parser: Instance, call: Call) -> Value:
     long = next((flag for flag in flags if flag.startswith("--")), flags[0])
     dest = sole(call.args.keywords.get("dest", (long.lstrip("-").replace("-", "_"),)))
     default = call.args.keywords.get("default", BOTTOM)
-    name = long if long.startswith("-") else _place(run, parser, long, call)
-    run.options.declare(name, tuple(atom for atom in default if atom is not None))
+    run.options.declare(long, tuple(atom for atom in default if atom is not None))
     if isinstance(dest, str):
-        parsed, earlier = _parsed(run, name, call), parser.cells.get("dest " + dest)
+        parsed, earlier = _parsed(run, long, call), parser.cells.get("dest " + dest)
         run.state.store(parser, "dest " + dest, parsed if earlier in (None, parsed) else ANY)
     return ANY
 
 
-def _place(run: Run, parser: Instance, name: str, call: Call) -> str:
-    """Return ``<1>`` for the first word of the command line, or ``<name>`` where its place is not certain.
-
-    argparse gives each positional argument one word in turn; an optional one takes its word only after all others have
-    theirs, and so is certain only at the end.
-    """
-    before = sole(parser.cells.get(_COUNT, BOTTOM))
-    nargs = sole(call.args.keywords.get("nargs", NONE))
-    if type(before) is not int:
-        run.gap(
-            call.node, call.frame, "which word of the command line a positional argument takes is not known"
-        )
-    elif nargs in (None, "?"):
-        run.state.store(parser, _COUNT, (before + 1,) if nargs is None else _NOT_TOLD)
-        return f"<{before + 1}>"
-    run.state.store(parser, _COUNT, _NOT_TOLD)
-    return f"<{name}>"
-
-
 def _parsed(run: Run, name: str, call: Call) -> Value:
-    """Return what the option holds: its text, or whether a flag is there; unknown if it is made into anything else."""
+    """Return the text of an option, or whether a flag is there; until a launch says what they hold, a word without an
+    option and what is made into anything else are open.
+    """
     given = call.args.keywords
     action, nargs = sole(given.get("action", ("store",))), sole(given.get("nargs", NONE))
     if action in ("store_true", "store_false"):
         there = action == "store_true"
         default = sole(given.get("default", (not there,)))
         run.options.declare(name, (default,))
-        flag = Input(name, run.options, None, (("given", (str(there), str(default))),))
+        flag = Input(name, run.options, (("given", (str(there), str(default))),))
         return (Text((flag,)),) if isinstance(default, bool) else BOOLEAN
     kept = all(isinstance(atom, External) and atom.path in _KEEP_TEXT for atom in given.get("type", BOTTOM))
-    if action == "store" and nargs in (None, "?") and kept:
+    if action == "store" and nargs in (None, "?") and kept and name.startswith("-"):
         return (Text((Input(name, run.options),)),)
     run.asks_launch = True
     return unknown(f"what is made of the command line option {name}")
@@ -130,13 +108,8 @@ def _parsed(run: Run, name: str, call: Call) -> Value:
 
 def _set_defaults(run: Run, parser: Instance, call: Call) -> Value:
     run.state.store(parser, _DECLARED, ANY)
-    for dest, value in call.args.keywords.items():
-        cell = "dest " + dest
-        option = input_of(sole(parser.cells.get(cell)))
-        if option is not None and not option.edits:
-            (run.options.declare if run.state.forks else run.options.replace)(option.name, value)
-            continue
-        run.state.store(parser, cell, join(parser.cells.get(cell, BOTTOM), value))
+    for dest in call.args.keywords:
+        run.state.store(parser, "dest " + dest, unknown(f"a default of the option {dest} that is set later"))
     return NONE
 
 
@@ -145,7 +118,7 @@ def _parse_args(run: Run, parser: Instance, call: Call, others_too: bool = False
     run.state.store(namespace, _PARSER, (parser,))
     given = call.args.at(0, "args") or NONE
     left = result_of("rclpy")  # of remove_ros_args(), with the name of the program, as in sys.argv
-    takes_program = given in (unknown(COMMAND_LINE), left) and parser.cells.get(_COUNT) != (0,)
+    takes_program = given in (unknown(COMMAND_LINE), left) and _takes_words(parser)
     if takes_program or not (_is_whole(given) or given in (left, unknown(WITHOUT_ROS))):
         run.state.store(namespace, "[given]", given)
     elif run.launch.words is not None:
@@ -163,8 +136,13 @@ def _is_whole(given: Value) -> bool:
     return all((atom,) in whole for atom in given)
 
 
+def _takes_words(parser: Instance) -> bool:
+    """Return whether a word of the command line may be taken that belongs to no option."""
+    declared = sole(parser.cells.get(_DECLARED))
+    return not isinstance(declared, tuple) or any(not each.flags[0].startswith("-") for each in declared)
+
+
 def _add_subparsers(run: Run, parser: Instance, call: Call) -> Value:
-    run.state.store(parser, _COUNT, _NOT_TOLD)
     run.state.store(parser, _DECLARED, ANY)
     return unknown("the sub-commands of a command line")
 
@@ -177,7 +155,7 @@ def _parse_known_args(run: Run, parser: Instance, call: Call) -> Value:
     namespace = _parse_args(run, parser, call, others_too=True)
     rest = unknown(COMMAND_LINE)
     whole = _is_whole(call.args.at(0, "args") or NONE)
-    if not whole or parser.cells.get(_COUNT) != (0,) or _TAKES_ROS_WORDS in parser.cells:
+    if not whole or _takes_words(parser) or _TAKES_ROS_WORDS in parser.cells:
         rest = run.sequence(call.node, "list", Items(None, rest))
     return run.tuple_of((namespace, rest))
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from nodl.builtin_interfaces import LOGGER_SERVICES, PARAMETER_SERVICES
 from nodl.infer.findings import NodeRecord
-from nodl.infer.interpreter.conditions import only_if, truth
+from nodl.infer.interpreter.conditions import truth
 from nodl.infer.interpreter.elements import elements
 from nodl.infer.interpreter.formatting import as_texts, text_value
 from nodl.infer.interpreter.run import Call, Run
@@ -28,15 +28,12 @@ from nodl.infer.models.signatures import (
 )
 from nodl.infer.start import LaunchedNode
 from nodl.infer.text import (
-    Guard,
     Input,
     NodePart,
     Text,
     concatenate,
     constant_text,
-    is_of_inputs,
     pieces_of,
-    with_edit,
 )
 from nodl.infer.values import (
     ABSENT,
@@ -44,8 +41,7 @@ from nodl.infer.values import (
     BOTTOM,
     CONSTANTS,
     NONE,
-    OTHER,
-    OTHER_KEYS,
+    OF_LAUNCH,
     RESULT,
     Dictionary,
     External,
@@ -63,7 +59,6 @@ from nodl.infer.values import (
     sole,
     unknown,
 )
-from nodl.name_template import ONLY_IF_UNSET
 from nodl.node_interface import EndpointKind, QosPolicies
 
 NODE_CLASS = "rclpy.node.Node"
@@ -421,14 +416,7 @@ def _inputs(run: Run, record: NodeRecord, names: list[str], call: Call) -> Value
         if settled:
             result = join(result, settled)
         else:
-            asked, declared = Input(name, record), record.default(name)
-            unset = Guard(asked, *ONLY_IF_UNSET)
-            others = [
-                only_if(unset, each) for each in declared if isinstance(each, Text) and is_of_inputs(each)
-            ]
-            only_set = others or (run.without_value and not declared)
-            text = with_edit(asked, "only if set", ()) if only_set else Text((asked,))
-            result = join(result, (text, *others))
+            result = join(result, (Text((Input(name, record),)),))
     return result
 
 
@@ -504,20 +492,18 @@ def _get_parameters(run: Run, record: NodeRecord, call: Call) -> Value:
 
 
 def _get_parameters_by_prefix(run: Run, record: NodeRecord, call: Call) -> Value:
-    """Return a dictionary of the parameters below a prefix, under the rest of their names."""
+    """Return a dictionary of the parameters below a prefix, under the rest of their names; only a launch says which."""
+    launched = _launched(run, record)
+    prefix = sole(call.args.at(0, "prefix"))
+    if launched is None or not isinstance(prefix, str):
+        return OF_LAUNCH
     found = run.allocate(call.node, "by prefix", Dictionary)
-    for prefix in constant_strings(call.args.at(0, "prefix") or ANY):
-        start = f"{prefix}." if prefix else ""
-        everything = Input(f"{start}**", record)
-        value = parameter_object(run, call, ANY, (Text((everything,)),), f"below {prefix}")
-        keys: Value = (with_edit(everything, "key", (start,)),)
-        run.state.store(found, OTHER, join(found.cells.get(OTHER, BOTTOM), value))
-        run.state.store(found, OTHER_KEYS, join(found.cells.get(OTHER_KEYS, BOTTOM), keys))
-        for name in record.parameters:
-            if name.startswith(start):
-                held = parameter_object(run, call, (name,), _inputs(run, record, [name], call), name)
-                run.state.store(found, Key(name.removeprefix(start)), held)
-    return (found,) if OTHER in found.cells else unknown("parameters below a prefix that is not known")
+    start = f"{prefix}." if prefix else ""
+    for name in dict.fromkeys((*record.parameters, *launched.parameters)):
+        if name.startswith(start):
+            held = parameter_object(run, call, (name,), _inputs(run, record, [name], call), name)
+            run.state.store(found, Key(name.removeprefix(start)), held)
+    return (found,)
 
 
 def _get_parameter_or(run: Run, record: NodeRecord, call: Call) -> Value:

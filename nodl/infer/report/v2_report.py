@@ -239,8 +239,8 @@ def _conditions(template: NameTemplate) -> tuple[tuple[str, str], ...] | None:
         return None
     found: list[tuple[str, str]] = []
     for part in parts:
-        edit, given = part.edits[-1]
-        if len(part.edits) > 1 or part.item is not None or not _PARAMETER.match(part.name):
+        (edit, given), *others = part.edits
+        if others or not _PARAMETER.match(part.name):
             return None
         listed = "[" + ", ".join(map(_quoted, given)) + "]"
         test = {
@@ -261,7 +261,7 @@ def _written(template: NameTemplate) -> tuple[str, str] | None:
     """Return the template in the words of docs/library.md, and the list whose entries it repeats for."""
     parameters = [part for part in template.parts if isinstance(part, ParameterPart)]
     lists = [part for part in parameters if part.item is not None]
-    if any(part.edits or not _PARAMETER.match(part.name) for part in parameters) or len(lists) > 1:
+    if not all(_PARAMETER.match(part.name) for part in parameters) or len(lists) > 1:
         return None
     pieces = [part if isinstance(part, str) else _piece(part, len(template.parts) == 1) for part in template.parts
               if isinstance(part, str | ParameterPart)]  # fmt: skip

@@ -158,15 +158,10 @@ CASES: dict[str, tuple[str, list[str]]] = {
         "self.P(p.parse_args().topic)",
         ["param:--topic"],
     ),
-    "first word of argparse": (POSITIONAL.format("'topic'"), ["param:<1>"]),
-    "an optional word of argparse": (POSITIONAL.format("'topic', nargs='?', default='a'"), ["param:<1>"]),
-    "the next word of argparse": (POSITIONAL.format("'n', type=int)\np.add_argument('topic'"), ["param:<2>"]),
-    "a word after several": (POSITIONAL.format("'n', nargs='*')\np.add_argument('topic'"), ["param:<topic>"]),
-    "a word that may be the second": (
-        "import argparse\np = argparse.ArgumentParser()\nif self.flag:\n    p.add_argument('n')\n"
-        "p.add_argument('topic')\nself.P(p.parse_args().topic)",
-        ["param:<topic>"],
-    ),
+    "a word of argparse": (POSITIONAL.format("'topic'"), ["?"]),
+    "a part of a parameter": ("self.P(self.declare_parameter('x', 'a/b').value.split('/')[0])", ["?"]),
+    "an element of a parameter": ("self.P(self.declare_parameter('x', ['a']).value[0] + '/b')", ["?/b"]),
+    "an edited parameter": ("self.P(self.declare_parameter('x', 'A').value.lower())", ["?"]),
     "a whole number": (NUMBER.format("1", "f'r{n}/a'"), ["rparam:n/a"]),
     "a whole number that is formatted": (NUMBER.format("1", "'r%d/a' % n"), ["r?/a"]),
     "environment": ("import os\nself.P(os.environ.get('TOPIC', 'a'))", ["param:$TOPIC"]),
@@ -180,22 +175,6 @@ CASES: dict[str, tuple[str, list[str]]] = {
 def test_names_flow(case: str, node_body: NodeBody) -> None:
     body, expected = CASES[case]
     assert node_body(body) == expected
-
-
-@pytest.mark.parametrize(("count", "known"), [(20, True), (64, True), (65, False)])
-def test_a_long_list_of_defaults_is_kept_whole_or_is_a_gap(count: int, known: bool, infer: Infer) -> None:
-    topics = [f"t{number}" for number in range(count)]
-    system = infer(
-        f"""
-        import rclpy
-        from std_msgs.msg import String
-        node = rclpy.create_node('n')
-        for topic in [str(each).strip() for each in node.declare_parameter('x', {topics}).value if str(each).strip()]:
-            node.create_publisher(String, topic + '/a', 1)
-        """
-    )
-    names = sorted(each.name.fill({}).text for each in system.nodes[0].endpoints)
-    assert names == (sorted(f"{topic}/a" for topic in topics) if known else ["*/a"])
 
 
 def test_default_of_an_option_is_kept(infer: Callable[..., object], node_body: NodeBody) -> None:
@@ -353,20 +332,6 @@ def test_a_library_that_may_be_missing_leaves_both_outcomes(line: str, names: No
     assert names(program) == ["with_it", "without"]
 
 
-def test_an_optional_word_of_argparse_before_another_is_a_gap(infer: Infer) -> None:
-    program = """
-        import argparse, rclpy
-        from std_msgs.msg import String
-        parser = argparse.ArgumentParser()
-        {words}
-        rclpy.create_node("n").create_publisher(String, parser.parse_args().topic, 10)
-        """
-    first, second = "parser.add_argument('topic', nargs='?')", "parser.add_argument('n')"
-    (gap,) = infer(program.format(words=f"{first}; {second}")).gaps
-    assert "which word of the command line" in gap.why
-    assert not infer(program.format(words=f"{second}; {first}")).gaps
-
-
 @pytest.mark.parametrize(
     ("option", "parsed", "reads_launch"),
     [
@@ -450,10 +415,3 @@ def test_a_metaclass_that_only_gives_missing_attributes_is_followed(
     assert [str(each.name) for each in node.endpoints] == ["a"]
     found = [gap.why for gap in (*system.gaps, *node.gaps)]
     assert found == ["class C has a metaclass, which is not analysed"] * gaps
-
-
-def test_parts_of_an_element_that_may_not_go_together_are_a_pattern(node_body: NodeBody) -> None:
-    entries = "self.declare_parameter('l', ['motor:left', 'arm:right']).value"
-    body = f"for each in {entries}:\n    first, last = each.split(':')\n    self.P(first + '/' + last)"
-    assert node_body(body) == ["param:l/?"]
-    assert node_body(body.replace(entries, "['motor:left', 'arm:right']")) == ["arm/right", "motor/left"]

@@ -437,6 +437,39 @@ def test_parameters_of_the_launch_decide_for_a_node_that_listens_to_it(
     assert (("publish", "/fast") in permissions(plan)) is (fast is not False)
 
 
+BELOW = """
+import rclpy
+from std_msgs.msg import String
+node = rclpy.create_node("below", automatically_declare_parameters_from_overrides=True)
+node.declare_parameter("topics.scan", "scan")
+for name, parameter in node.get_parameters_by_prefix("topics").items():
+    node.create_publisher(String, f"{name}/{parameter.value.strip('/')}", 10)
+for pair in node.declare_parameter("pairs", ["a:b"]).value:
+    robot, topic = pair.split(":")
+    node.create_publisher(String, f"{robot}/{topic}", 10)
+rclpy.spin(node)
+"""
+
+
+@pytest.mark.parametrize(
+    ("given", "published"),
+    [
+        ({}, {"/scan/scan", "/a/b"}),
+        ({"topics.scan": "/laser/", "topics.image": "camera"}, {"/scan/laser", "/image/camera", "/a/b"}),
+        ({"pairs": "[c:d, e:f]"}, {"/scan/scan", "/c/d", "/e/f"}),
+    ],
+)
+def test_parameters_below_a_prefix_and_parts_of_elements_are_the_launchs(
+    given: dict[str, str], published: set[str], launch: Launch, prefix: Path
+) -> None:
+    install_program(prefix, PYTHON + BELOW, "below")
+    params = "".join(f'<param name="{name}" value="{value}"/>' for name, value in given.items())
+    plan = launch(f'<launch><node pkg="demo" exec="below">{params}</node></launch>')
+    assert [str(problem) for problem in plan.problems] == []
+    own = {name for operation, name in permissions(plan) if operation == "publish"}
+    assert own - {"/rosout", "/parameter_events"} == published
+
+
 CHOSEN = """
 from enum import Enum
 import rclpy
