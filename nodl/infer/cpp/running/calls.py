@@ -25,7 +25,7 @@ from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.callbacks import run_meanwhile
 from nodl.infer.cpp.running.constructors import cast, construct, is_plain_type, made
 from nodl.infer.cpp.running.containers import CONTAINER_METHODS, container_call, is_standard
-from nodl.infer.cpp.running.contents import handed_over
+from nodl.infer.cpp.running.contents import copied, handed_over
 from nodl.infer.cpp.running.invocation import CallSite, call_functions, call_values, pointed_to
 from nodl.infer.cpp.running.left_out import forget_writes
 from nodl.infer.cpp.running.machine import Frame, Machine, expression
@@ -63,7 +63,7 @@ from nodl.infer.cpp.running.values import (
     unknown,
 )
 from nodl.infer.cpp.running.variables import member, variable
-from nodl.infer.cpp.syntax import Node, callee_name, field_of, text, unwrapped
+from nodl.infer.cpp.syntax import Node, callee_name, field_of, template_arguments, text, unwrapped
 
 _NAMES = frozenset({
     "identifier", "qualified_identifier", "template_function", "type_identifier", "template_type", "primitive_type",
@@ -165,7 +165,12 @@ def _cast(run: Machine, name: str, site: CallSite) -> Value:
         return _cast_down(run, site.types[0], value, site.frame)
     if name == "std::any_cast":  # to another type it gives nothing, or throws
         return join(lost(value, "what a std::any holds"), unknown("what a std::any holds"))
-    return cast(run, site.types[0], value) if name == "static_cast" else value
+    if name != "static_cast":
+        return value
+    cls = run.class_of(site.types[0], site.frame)
+    if cls is not None and not text(template_arguments(site.callee)[0]).endswith(("&", "*")):
+        value = copied(run, value, site.node, site.frame, cls)
+    return cast(run, site.types[0], value)
 
 
 def _cast_down(run: Machine, kind: Type, value: Value, frame: Frame) -> Value:

@@ -118,6 +118,7 @@ class Machine:
         self.size = Notes(self.store.log)  # how many nodes and classes the program has, so far
         self.nodes: dict[Obj, AllocatedNode] = {}
         self.gaps: dict[tuple[SourceRef, str], None] = {}
+        self.initial: dict[Cell, Value] = {}  # what globals and static members held before main
         self.objects: dict[object, Obj] = {}
         self.frames: dict[object, Frame] = {}
         self.callbacks: dict[tuple[object, object], tuple[Atom, Frame]] = {}

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 from nodl.infer.cpp.reading.declarations import Class
-from nodl.infer.cpp.running.constructors import default_value, made
+from nodl.infer.cpp.running.constructors import declared_value
 from nodl.infer.cpp.running.machine import Frame, Machine
+from nodl.infer.cpp.running.memory import Cell
 from nodl.infer.cpp.running.static_types import current_object, static_by_name
 from nodl.infer.cpp.running.values import BOTTOM, Bound, Obj, Value, unknown
-from nodl.infer.cpp.syntax import Node, children, text
+from nodl.infer.cpp.syntax import text
 
 
 def variable(run: Machine, name: str, frame: Frame) -> Value:
@@ -59,21 +62,31 @@ def static_member(run: Machine, cls: object, name: str) -> Value:
     outside = defined[0] if defined else None
     if any(each.specialises for each in defined) or cls.qualified in run.names.doubts:
         found = unknown(f"the value of {name}, which several specialisations have")
-    elif declared.default is not None:
-        found = _initial(run, declared.default, declared.type, frame)
-    elif outside is not None:
-        found = _initial(run, outside.value, declared.type, Frame(outside.file, cls.scope))
     else:
-        kind = run.names.resolve(declared.type, cls.scope, cls.file)
-        found = BOTTOM if declared.pointer or kind.pointer else default_value(run, declared.node, kind, frame)
+        value = declared.default
+        if value is None and outside is not None:
+            value, frame = outside.value, Frame(outside.file, cls.scope)
+        found = _before_main(
+            run,
+            cell,
+            lambda: declared_value(run, declared.node, declared.type, value, declared.pointer, frame),
+        )
     run.store.set(cell, found)
     return found
 
 
-def _initial(run: Machine, value: Node | None, written: str, frame: Frame) -> Value:
-    if value is not None and value.type in ("initializer_list", "argument_list"):
-        return made(run, value, run.type_of(written, frame), children(value), frame)
-    return run.evaluate(value, frame)
+def _before_main(run: Machine, cell: Cell, made: Callable[[], Value]) -> Value:
+    """Return the initial value of a global or static member, which is made here when it is read first.
+
+    C++ made it before ``main``: nothing is known of it if it is made of variables that changed since.
+    """
+    found: list[Value] = []
+    reads = run.store.watched(lambda: found.append(made()))
+    (value,) = found
+    if any(held != run.initial.get(other, held) for other, held in reads.cells.items()):
+        value = unknown("a variable that was made before main of one that changed since")
+    run.initial[cell] = value
+    return value
 
 
 def constant(run: Machine, name: str, frame: Frame) -> Value | None:
@@ -90,15 +103,13 @@ def constant(run: Machine, name: str, frame: Frame) -> Value | None:
         if known is None:
             inner = Frame(cell_owner.file, cell_owner.scope, path=(name,))
             run.store.set(cell, BOTTOM)
-            kind = run.names.resolve(cell_owner.type, cell_owner.scope, cell_owner.file)
-            if cell_owner.value is not None:
-                known = _initial(run, cell_owner.value, cell_owner.type, inner)
-            else:
-                known = (
-                    BOTTOM
-                    if cell_owner.pointer or kind.pointer
-                    else default_value(run, cell_owner.node, kind, inner)
-                )
+            known = _before_main(
+                run,
+                cell,
+                lambda: declared_value(
+                    run, cell_owner.node, cell_owner.type, cell_owner.value, cell_owner.pointer, inner
+                ),
+            )
             run.store.set(cell, known)
         return known
     function = run.names.find_functions(name, frame.scope, frame.file)

@@ -140,6 +140,20 @@ PROGRAMS: dict[str, tuple[str, str, str, set[str], set[str]]] = {
         'struct Derived : Base { using Base::Base; void go() override { make("derived"); } };\n',
         {"base"}, {"derived"},
     ),
+    "a global and a cast are of the class that is written there": (
+        "D d; pub(made.text()); pub(S::held.text()); pub(static_cast<B>(d).text() + \"_c\");"
+        "pub(static_cast<const B &>(d).text() + \"_r\");", "",
+        'struct B { virtual std::string text() const { return "base"; } };\n'
+        'struct D : B { std::string text() const override { return "derived"; } };\n'
+        "struct S { static B held; }; B S::held = D(); static B made = D();\n",
+        {"base", "base_c", "derived_r"}, {"derived", "derived_c"},
+    ),
+    "a global is made before main of what others held then": (
+        'first = "later"; pub(second); pub(S::held); pub(kept); pub(same_);', 'std::string same_ = first;',
+        'std::string first = "first", second = first, other = "other", kept = other + "_k";\n'
+        "struct S { inline static std::string held = first; };\n",
+        {"other_k", "first"}, {"later"},
+    ),
     "changes of a text in a row": (
         'std::string t = "a"; t.append("b").append("c"); pub(t); t.append("d").insert(0, "x"); pub(t + "_e");',
         "", "", set(), {"a", "ab", "abcd_e"},
