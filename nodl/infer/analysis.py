@@ -28,7 +28,7 @@ from nodl.infer.interpreter.run import Arguments, BudgetExceeded, Call, Called, 
 from nodl.infer.interpreter.statements import STATEMENTS
 from nodl.infer.models import foreign
 from nodl.infer.models.foreign import is_node_class
-from nodl.infer.net import changed_meanwhile, unsettled_places, words_read
+from nodl.infer.net import unsettled_places, words_read
 from nodl.infer.program import Program, ProgramTarget, SourceModule
 from nodl.infer.results import interfaces_of
 from nodl.infer.start import NO_LAUNCH, InferredProgram, LaunchKey, ProgramLaunch
@@ -105,7 +105,6 @@ CALLABLES: dict[type, Caller] = {
 
 TABLES = Tables(
     EXPRESSIONS, STATEMENTS, CALLABLES, ATTRIBUTES, foreign.keeps_off, foreign.lets_through, foreign.creates,
-    changed_meanwhile,
 )  # fmt: skip
 
 
@@ -114,6 +113,7 @@ def new_run(program: Program, main: SourceModule) -> Run:
     return Run(program, TABLES, main)
 
 
+MAX_RUNS = 5
 MAX_ROUNDS = 12
 WIDEN_TEXTS_FROM = 4
 
@@ -187,6 +187,9 @@ def _call_back(run: Run, callback: object, arity: int | None, widen_texts: bool)
     stamp, looked_into = run.state.now(), HeapObject.looked_into
     written = run.state.repeatedly(_called_from_outside(run, callback, arity), widen_texts)
     run.called_back[callback, arity] = Called(stamp, run.running, looked_into, written)
+    if callback in run.at_any_time:
+        for outcome in written:
+            run.changes_at_any_time(outcome)
     for made in run.born:
         made.summary = True
 
@@ -290,9 +293,17 @@ def start_function(
 def _followed(
     program: Program, main: SourceModule, launch: ProgramLaunch, body: Callable[[Run], None]
 ) -> Run:
-    run = new_run(program, main)
-    run.launch = launch
-    _guarded(run, lambda: body(run))
+    """Run until it is known from the start on what code that runs at any time changes."""
+    changed = set[str | int]()
+    for _ in range(MAX_RUNS):
+        run = new_run(program, main)
+        run.launch = launch
+        run.state.changed_meanwhile = changed
+        _guarded(run, functools.partial(body, run))
+        if run.gave_up or run.meanwhile <= changed:
+            return run
+        changed |= run.meanwhile
+    run.findings.gap(SourceRef(main.path), "what code changes that runs at any time is not known")
     return run
 
 

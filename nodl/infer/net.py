@@ -14,7 +14,6 @@ here. What it cannot see: a wrong value, and creation behind names that do not s
 from __future__ import annotations
 
 import ast
-import collections
 import functools
 import itertools
 import re
@@ -22,11 +21,10 @@ from collections.abc import Callable, Iterable, Iterator, Mapping
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from nodl.infer.interpreter.calls import SPECIAL_FOLLOWED, has_yield
 from nodl.infer.interpreter.imports import absolute_name
 from nodl.infer.interpreter.run import Run
 from nodl.infer.models import ros
-from nodl.infer.models.signatures import COMMON_CALLBACKS, NODE_CALLBACKS, NODE_ENDPOINTS
+from nodl.infer.models.signatures import NODE_ENDPOINTS
 from nodl.infer.program import Program, SourceModule
 from nodl.infer.values import FunctionEntry
 from nodl.node_interface import Gap
@@ -36,8 +34,6 @@ Function = ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda
 _NAMED = (ast.FunctionDef, ast.AsyncFunctionDef)
 Import = ast.Import | ast.ImportFrom
 CREATING_NAMES = frozenset(NODE_ENDPOINTS) | ros.CREATING_NAMES
-_SCHEDULING = CREATING_NAMES | COMMON_CALLBACKS.keys() | NODE_CALLBACKS.keys()
-"""Calls whose functions rclpy runs while it spins."""
 _CREATING_TEXT = re.compile("|".join(sorted(map(re.escape, CREATING_NAMES))))
 _ELSEWHERE = re.compile(r"rclpy|\b(?:importlib|__import__|eval|exec|runpy|pickle)\b")
 _LOST = "may be called from somewhere that the analysis did not follow, and would create interfaces"
@@ -110,7 +106,6 @@ class FunctionText:
         self.stored: set[str] = set()  # variables
         self.set: set[str] = set()  # attributes, which may be properties
         self.may_leave = False  # before what is read next
-        self.scheduled: set[str] = set()  # what rclpy is handed, and calls while it spins
         self.imports: list[Import] = []
 
     @property
@@ -153,41 +148,6 @@ def _text_of(module: SourceModule) -> _Text:
 def words_read(module: SourceModule) -> dict[ast.AST | None, frozenset[str]]:
     """Return what each function of a module reads or calls, by the last names in its text."""
     return {scope.node: scope.bare | scope.dotted for scope in _text_of(module).scopes}
-
-
-@functools.lru_cache(maxsize=256)
-def changed_meanwhile(module: SourceModule) -> frozenset[str]:
-    """Return the attributes and globals that code which runs at any time sets, and other code too.
-
-    At any time run generators, coroutines, special methods and functions that are handed to anything but rclpy, with
-    all that these call by name.
-    """
-    scopes = _text_of(module).scopes
-    named: dict[str, list[FunctionText]] = {}
-    for scope in scopes:
-        named.setdefault(scope.name, []).append(scope)
-    handed = {name for scope in scopes for name in scope.attributes | scope.names}
-    handed -= {name for scope in scopes for name in scope.scheduled}
-    handed -= {
-        scope.name for scope in scopes if getattr(scope.node, "decorator_list", ())
-    }  # such as properties
-    left = [each for each in scopes if each.name in handed or _runs_at_any_time(each, module)]
-    found = set(left)
-    while left:
-        for place in left.pop().calls:
-            more = [scope for scope in named.get(place.name, ()) if scope not in found]
-            found.update(more)
-            left += more
-    setting = collections.Counter(name for scope in scopes for name in scope.set)
-    setting.update(scopes[0].stored)
-    return frozenset(name for scope in found for name in scope.set if setting[name] > 1)
-
-
-def _runs_at_any_time(scope: FunctionText, module: SourceModule) -> bool:
-    """Return True for a generator, a coroutine and a special method that does not run where it is named."""
-    special = scope.cls is not None and scope.name.startswith("__") and scope.name.endswith("__")
-    later = isinstance(scope.node, ast.AsyncFunctionDef) or (module.has_yield and has_yield(scope.node))
-    return later or (special and scope.name not in SPECIAL_FOLLOWED)
 
 
 class _Reader:
@@ -252,8 +212,6 @@ class _Reader:
         certain = not scope.may_leave and not any(isinstance(each, _CONDITIONAL) for each in around)
         scope.calls.append(CallPlace(node, name, around, certain))
         scope.may_leave = scope.may_leave or name in _ENDS
-        if name in _SCHEDULING:
-            scope.scheduled.update(_names_among(node))
         if name in ("isinstance", "issubclass"):
             self._each(node.args[:1], scope, around)
             return
@@ -353,15 +311,6 @@ def last_name(node: ast.AST) -> str:
     if isinstance(node, ast.Call):
         return last_name(node.func)
     return node.id if isinstance(node, ast.Name) else ""
-
-
-def _names_among(node: ast.Call) -> Iterator[str]:
-    """Return the last names of what a call is given, and of what a ``partial`` among it is."""
-    for each in (*node.args, *(keyword.value for keyword in node.keywords)):
-        if isinstance(each, (ast.Attribute, ast.Name)):
-            yield last_name(each)
-        elif isinstance(each, ast.Call) and last_name(each) == "partial":
-            yield from _names_among(each)
 
 
 # --- what the run made of it --------------------------------------------------------------------------------

@@ -23,6 +23,7 @@ from nodl.infer.values import (
     OTHER_KEYS,
     Cells,
     ContentCells,
+    Dictionary,
     FieldCells,
     HeapObject,
     Items,
@@ -52,19 +53,18 @@ class ProgramState:
         # Stamps of the latest writes that stay, and of those taken back, the last one at the end: by name of a global
         # or field, and by ``id`` of the cells of a container or of a function whose variables inner functions share.
         self.changed: dict[str | int, int] = {}
-        # Names of variables that code which runs at any time sets, too.
-        self.changed_meanwhile: set[str] = set()
+        # What code that runs at any time changes, too: variables by name, containers by where they are made.
+        self.changed_meanwhile: set[str | int] = set()
         self.base = sys.maxsize  # how many undecided branches surround a write that stays
-        self.fresh: set[int] = (
-            set()
-        )  # cells of objects made by the running callback: no other one has read them
+        # Cells of objects made by the running callback: no other one has read them.
+        self.fresh: set[int] = set()
         self.work = 0  # trail entries looked at
         self.depth = 0  # how many branches or loops surround the current point
         self.forks = 0  # how many of them are undecided: what happens there may not happen
 
     def write(self, cells: Cells, key: object, value: Value, local: bool = False) -> None:
         """Update strongly. ``local``: only the running function can see the cell (no new stamp)."""
-        if key in self.changed_meanwhile and type(cells) is not LocalCells:
+        if key in self.changed_meanwhile and (type(cells) is not LocalCells or cells.shared):
             value = unsettled(value)
         old = cells.get(key)
         if old is value or (old is not None and _same(old, value)):
@@ -347,7 +347,7 @@ class Allocations:
         self._context_ids = itertools.count(1)
         self._tuples: dict[object, Value] = {}
         self.captured_cells: dict[tuple[object, ...], LocalCells] = {}
-        self._allocated: dict[tuple[object, ...], Any] = {}
+        self._allocated: dict[tuple[int, int, str], Any] = {}
         self.born: list[HeapObject] = []  # since the running callback began
 
     def enter(self, key: object) -> int:
@@ -368,9 +368,15 @@ class Allocations:
             found = self._allocated[key] = make()
             self.born.append(found)
             self.state.fresh.add(id(found.cells))
+            if id(node) in self.state.changed_meanwhile and isinstance(found, (Sequence, Dictionary)):
+                self.state.open(found)
         else:
             found.summary = True  # what was stored before is still there: weak updates only add to it
         return found
+
+    def made_at(self, cells: Cells) -> set[int]:
+        """Return where the object with these cells is made."""
+        return {place for (_, place, _), made in self._allocated.items() if made.cells is cells}
 
     def tuple_of(self, parts: tuple[Value, ...]) -> Value:
         """Return a tuple; it never changes, so equal ones are one object and need no allocation site."""

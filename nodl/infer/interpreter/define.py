@@ -49,6 +49,8 @@ def make_function(run: Run, node: FunctionNode, name: str, frame: Frame) -> Func
     closure = frame.closure if frame.is_class else frame
     if not frame.is_class:
         frame.capture()
+        for changed in run.state.changed_meanwhile & frame.cells.keys():
+            run.state.write(frame.cells, changed, frame.cells[changed])
     owner = frame.cells.get("[class]") if frame.is_class else None
     owner_class = owner[0] if owner and isinstance(owner[0], ClassValue) else None
     key = (run.context, id(node), "function")
@@ -109,7 +111,7 @@ def _decorated(run: Run, value: Value, function: FunctionValue, decorator: ast.e
     if isinstance(decorator, ast.Call):
         callee = run.evaluate(decorator, frame)
     if isinstance(atom, External):
-        run.register_callback(value, None)
+        run.register_callback(value, None, run.state.mark())
         if path.startswith("functools.single"):
             return unknown(f"what {path} gives")
         return value

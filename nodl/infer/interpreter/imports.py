@@ -113,7 +113,6 @@ def execute_module(run: Run, source: SourceModule, name: str) -> ModuleValue:
     if source.error:
         run.findings.gap(SourceRef(source.path, source.error_line), f"the file {source.error}")
         return module
-    run.state.changed_meanwhile |= run.tables.changed_meanwhile(source)
     body = Frame(module, module.cells, None, run.state.depth)
     body.forks = body.loop_forks = run.state.forks
     previous = run.enter(("module", name))

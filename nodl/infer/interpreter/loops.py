@@ -175,6 +175,7 @@ def comprehension(run: Run, node: ast.ListComp | ast.SetComp | ast.GeneratorExp,
     _leave(inner)
     run.state.depth -= lazy
     if lazy:
+        run.changes_at_any_time(run.state.written(mark), certainly=True)
         run.state.join_seen(mark, mixed=True)  # it may be asked for some of its elements only
     kind = {ast.SetComp: "set", ast.GeneratorExp: LAZY}.get(type(node), "list")
     return run.sequence(node, kind, Items(tuple(collected)) if exact else Items(None, join_all(collected)))

@@ -20,6 +20,10 @@ from nodl.infer.text import Guard, Text
 from nodl.infer.values import (
     ANY,
     BOTTOM,
+    ITEMS,
+    OTHER,
+    OTHER_KEYS,
+    Absent,
     BoundMethod,
     ClassMethod,
     ClassValue,
@@ -142,7 +146,6 @@ class Tables(NamedTuple):
     keeps_off: Callable[[str], bool]  # whether a library leaves the program's classes and objects alone
     lets_through: Callable[[str], bool]  # whether exceptions pass the library's context managers
     creates: Callable[[object], bool]  # whether calling this function of a library makes an interface
-    changed_meanwhile: Callable[[SourceModule], frozenset[str]]  # variables of a file that change at any time
 
 
 class Run(Allocations):
@@ -164,9 +167,10 @@ class Run(Allocations):
         self.escaped: dict[ClassValue | Instance, int] = {}
         self.handed: dict[Instance, SourceRef] = {}  # objects that code which is not analysed got, and where
         self.callbacks: dict[object, int | None] = {}  # callable -> number of arguments, if known
-        self.at_any_time: dict[
-            object, int
-        ] = {}  # those that do not wait for a spin, with the mark of the state then
+        # Those that do not wait for a spin, with the mark of the state then.
+        self.at_any_time: dict[object, int] = {}
+        # What code that runs at any time was found to change: variables by name, containers by where they are made.
+        self.meanwhile: set[str | int] = set()
         self.called: dict[ast.AST, None] = {}  # functions analysed so far
         self.instantiated: dict[ast.AST, None] = {}  # classes of which an object was made
         self.with_metaclass: set[ast.AST] = set()
@@ -314,6 +318,22 @@ class Run(Allocations):
                     self.callbacks[atom] = arity
                 elif self.callbacks[atom] != arity:
                     self.callbacks[atom] = None
+
+    def changes_at_any_time(self, written: Written, certainly: bool = False) -> None:
+        """Note the variables and containers in which code that runs at any time puts texts or numbers, beside others.
+
+        ``certainly``: other code will do so.
+        """
+        for cells, key, _ in written.values():
+            held = cells.get(key, BOTTOM)
+            if held and isinstance(held[0], Items):
+                held = join(held[0].any_element(), ANY)
+            atoms = [atom for atom in held if atom is not None and type(atom) is not Absent]
+            several = certainly or len(atoms) > 1
+            if not several or not any(isinstance(atom, (str, Text, int, float)) for atom in atoms):
+                continue
+            variable = isinstance(key, str) and key not in (ITEMS, OTHER, OTHER_KEYS)
+            self.meanwhile |= {str(key)} if variable else self.made_at(cells)
 
     def escape(self, args: Arguments, opened: bool = True, objects: bool = True) -> None:
         """Hand all of ``args`` to code that is not analysed: it may call callables and fill containers.

@@ -47,6 +47,7 @@ from nodl.infer.values import (
     external,
     join,
     join_all,
+    mixed_with_unknown,
     present,
     result_of,
     sole,
@@ -132,6 +133,14 @@ def _made(kind: str) -> Model:
     return lambda run, call: run.sequence(call.node, kind, _items(run, call))
 
 
+def _iter(run: Run, call: Call) -> Value:
+    """Return an iterator; one that calls a function is unknown."""
+    if len(call.args.positional) > 1:
+        run.escape(call.args)
+        return ANY
+    return run.sequence(call.node, LAZY, _items(run, call))
+
+
 def _enumerate(run: Run, call: Call) -> Value:
     """Return a list of pairs; one pair stands for all if the length or the start is not known."""
     items = _items(run, call)
@@ -189,7 +198,10 @@ def _map(run: Run, call: Call) -> Value:
     """Call the function for any of the elements."""
     given = [_items(run, call, index).any_element() or ANY for index in range(1, len(call.args.positional))]
     arguments = Arguments(given, more=call.args.more)
+    mark = run.state.mark()
     element = run.call(call.args.at(0) or ANY, arguments, call.node, call.frame)
+    run.changes_at_any_time(run.state.written(mark), certainly=True)
+    run.state.join_seen(mark, mixed=True)
     return run.sequence(call.node, LAZY, Items(None, element))
 
 
@@ -349,7 +361,7 @@ _BUILT_IN: dict[str, Callable[[Run, Call], Value]] = {
         "list": _made("list"),
         "tuple": _made("tuple"),
         **dict.fromkeys(("set", "frozenset"), _set),
-        "iter": _made(LAZY),
+        "iter": _iter,
         "reversed": lambda run, call: run.sequence(
             call.node, LAZY, Items(None, _items(run, call).any_element())
         ),
@@ -358,7 +370,7 @@ _BUILT_IN: dict[str, Callable[[Run, Call], Value]] = {
         "zip": _zip,
         "map": _map,
         "dict": _dict,
-        "next": chosen,
+        "next": lambda run, call: mixed_with_unknown(chosen(run, call)),
         "getattr": _getattr,
         "setattr": _setattr,
         "type": _type,

@@ -174,6 +174,7 @@ def test_the_way_that_a_launch_takes_says_the_same(title: str, tmp_path: Path) -
 @pytest.mark.parametrize(
     "title",
     [
+        "at_any_time: a partial that the program calls itself",
         "data_model: object.__setattr__ sets what a frozen dataclass keeps",
         "language: a list is edited after it was added",
         "language: lists added",
