@@ -23,7 +23,7 @@ from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.arithmetic import as_type
 from nodl.infer.cpp.running.contents import copied, elements_copied, handed_over, items_of, takes_another
 from nodl.infer.cpp.running.foreign import unmodelled
-from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
+from nodl.infer.cpp.running.machine import MAX_DEPTH, NEXT, Frame, Machine
 from nodl.infer.cpp.running.overloads import candidates
 from nodl.infer.cpp.running.references import as_referred_to, forget, is_plain, keep_reference, leads_into
 from nodl.infer.cpp.running.static_types import check_hidden, given_to, seen_class, seen_type
@@ -488,7 +488,7 @@ def construct_class(
         (cls, this, path), Frame(cls.file, cls.scope, None, this, this.bindings[cls], path=frame.path)
     )
     if constructor is not None:
-        if run.active.count(constructor) > MAX_RECURSION:
+        if constructor in run.active:
             run.gap(node, frame, f"the constructor of {cls.name} calls itself")
             return
         inner.function, inner.file, inner.scope = constructor, constructor.file, constructor.scope

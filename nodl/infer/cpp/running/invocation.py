@@ -18,7 +18,7 @@ from nodl.infer.cpp.running.constructors import as_parameter, bind_parameters
 from nodl.infer.cpp.running.contents import copied, handed_over
 from nodl.infer.cpp.running.effects import effects_of, looked_at
 from nodl.infer.cpp.running.left_out import forget_writes, leave_out
-from nodl.infer.cpp.running.machine import MAX_DEPTH, MAX_RECURSION, NEXT, Frame, Machine
+from nodl.infer.cpp.running.machine import MAX_DEPTH, NEXT, Frame, Machine
 from nodl.infer.cpp.running.memory import MEMORY_DEPTH, CallOutcome, Changes
 from nodl.infer.cpp.running.overloads import candidates, chosen
 from nodl.infer.cpp.running.references import forget, forget_everything, is_plain, through
@@ -330,9 +330,9 @@ def invoke(
         return BOTTOM
     run.handle(node, frame)
     run.called.add(function)
-    if run.active.count(function) > MAX_RECURSION or frame.depth > MAX_DEPTH:
+    if function in run.active or frame.depth > MAX_DEPTH:
         if run.makes_interfaces(function):
-            run.gap(node, frame, f"{function} calls itself, deeper than is followed")
+            run.gap(node, frame, f"{function} calls itself, or is called deeper than is followed")
         return _too_deep(run, function, node, frame)
     if leave_out(run, function, values, node, frame):
         return unknown(f"the result of {function.name}()")

@@ -34,6 +34,8 @@ from nodl.infer.cpp.syntax import Node, addressed, children, field_of
 
 LEAST_SIZE = 400
 """Bytes of source, with everything that it may call, from which on leaving a call out is worth its look."""
+_LOOKED_AT_IN_A_STEP = 4
+"""Variables that are looked at for what a call may change, while an expression is evaluated elsewhere."""
 _NUMBERS = re.compile(
     r"(?:const\s+)?(?:void|bool|int|double|float|(?:std::)?size_t|unsigned|unsigned int|unsigned char|u?int\d+_t)"
 )
@@ -148,6 +150,7 @@ def _changes(run: Machine, effects: CallEffects, certainly: bool = False) -> dic
         for cell in store.named(name)
         if may_mean(run, effects.owners, cell)
     ]
+    run.count(len(waiting) // _LOOKED_AT_IN_A_STEP)
     done: set[Cell] = set()
     while waiting:
         cell, name, is_assigned, is_changed = waiting.pop()
@@ -228,6 +231,7 @@ def _never_set(run: Machine, names: frozenset[str]) -> Iterator[Cell]:
     for name in names:
         cells += [(cls, name) for cls in static.get(name, ())]
         cells += [(each, "") for each in run.names.globals.get(name, ())]
+    run.count(len(cells) // _LOOKED_AT_IN_A_STEP)
     yield from (cell for cell in cells if run.store.get(cell) is None)
 
 

@@ -48,7 +48,6 @@ NEXT, RETURN, BREAK, CONTINUE = 1, 2, 4, 8
 
 MAX_DEPTH = 60
 MAX_STEPS = 800_000
-MAX_RECURSION = 2
 
 Key = TypeVar("Key")
 Handler = TypeVar("Handler")
