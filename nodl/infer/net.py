@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import ast
 import functools
-import itertools
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from types import MappingProxyType
@@ -75,15 +74,21 @@ def _imported(node: ast.AST, module: SourceModule) -> Iterator[str]:
 # --- what stands in the text --------------------------------------------------------------------------------
 
 
+Outcome = tuple[ast.expr | None, bool]
+"""A test, and what it must have given for control to come to a place; ``None``: what only values decide."""
+Outcomes = tuple[Outcome, ...]
+_UNDECIDED: Outcome = (None, True)
+
+
 class CallPlace(NamedTuple):
-    """A call by name, with what surrounds it inside of its function, from outside in.
+    """A call by name, with the tests around it inside of its function.
 
     ``certain``: each run of the function gets there.
     """
 
     node: ast.Call
     name: str
-    around: tuple[ast.AST, ...]
+    around: Outcomes
     certain: bool
 
     @property
@@ -158,25 +163,26 @@ class _Reader:
         self.scopes: list[FunctionText] = []
         self.classes: dict[str, list[ast.ClassDef]] = {}
         self.imported: set[str] = set()
+        self._class: ast.ClassDef | None = None  # whose body is read, outside of its methods
 
-    def block(self, body: list[ast.stmt], scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
+    def block(self, body: list[ast.stmt], scope: FunctionText, around: Outcomes) -> None:
         """Read statements in order, up to one that control cannot pass."""
         for index, statement in enumerate(body):
             self.visit(statement, scope, around)
             if isinstance(statement, ast.If) and not statement.orelse and _leaves(statement.body):
-                rest = ast.If(statement.test, statement.body, body[index + 1 :])
-                self.block(rest.orelse, scope, (*around, rest))
+                self.block(body[index + 1 :], scope, (*around, (statement.test, False)))
                 return
             if isinstance(statement, _LEAVING):
                 scope.may_leave = True
                 return
 
-    def visit(self, node: ast.AST, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
+    def visit(self, node: ast.AST, scope: FunctionText, around: Outcomes) -> None:
         _VISITORS.get(type(node), _Reader.inside)(self, node, scope, around)
 
-    def inside(self, node: ast.AST, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
+    def inside(self, node: ast.AST, scope: FunctionText, around: Outcomes) -> None:
         """Read what ``node`` consists of."""
-        around = (*around, node)
+        if isinstance(node, _CONDITIONAL):
+            around = (*around, _UNDECIDED)
         for field in node._fields:
             value = getattr(node, field, None)
             if isinstance(value, list) and value and isinstance(value[0], ast.stmt):
@@ -186,31 +192,29 @@ class _Reader:
             elif isinstance(value, ast.AST) and value._fields:
                 self.visit(value, scope, around)
 
-    def name(self, node: ast.Name, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
+    def name(self, node: ast.Name, scope: FunctionText, around: Outcomes) -> None:
         if isinstance(node.ctx, ast.Load):
             scope.names.add(node.id)
         else:
             scope.stored.add(node.id)
 
-    def attribute(self, node: ast.Attribute, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
+    def attribute(self, node: ast.Attribute, scope: FunctionText, around: Outcomes) -> None:
         (scope.attributes if isinstance(node.ctx, ast.Load) else scope.set).add(node.attr)
-        self.visit(node.value, scope, (*around, node))
+        self.visit(node.value, scope, around)
 
-    def constant(self, node: ast.Constant, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
+    def constant(self, node: ast.Constant, scope: FunctionText, around: Outcomes) -> None:
         if isinstance(node.value, str) and node.value.isidentifier():
             scope.attributes.add(node.value)
 
-    def imports(self, node: Import, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
+    def imports(self, node: Import, scope: FunctionText, around: Outcomes) -> None:
         scope.imports.append(node)
         if isinstance(node, ast.ImportFrom):
             scope.attributes.update(alias.name for alias in node.names if alias.asname)
             self.imported.update(alias.name for alias in node.names)
 
-    def call(self, node: ast.Call, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
-        around = (*around, node)
+    def call(self, node: ast.Call, scope: FunctionText, around: Outcomes) -> None:
         name = last_name(node.func)
-        certain = not scope.may_leave and not any(isinstance(each, _CONDITIONAL) for each in around)
-        scope.calls.append(CallPlace(node, name, around, certain))
+        scope.calls.append(CallPlace(node, name, around, not scope.may_leave and not around))
         scope.may_leave = scope.may_leave or name in _ENDS
         if name in ("isinstance", "issubclass"):
             self._each(node.args[:1], scope, around)
@@ -220,56 +224,73 @@ class _Reader:
         self._each(node.args, scope, around)
         self._each(node.keywords, scope, around)
 
-    def global_names(self, node: ast.Global, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
+    def global_names(self, node: ast.Global, scope: FunctionText, around: Outcomes) -> None:
         scope.set.update(node.names)
 
-    def outer_names(self, node: ast.Nonlocal, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
+    def outer_names(self, node: ast.Nonlocal, scope: FunctionText, around: Outcomes) -> None:
         for each in self.scopes:  # one of them is meant
             each.stored.update(node.names)
 
-    def assignment(self, node: ast.Assign, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
+    def assignment(self, node: ast.Assign, scope: FunctionText, around: Outcomes) -> None:
         if not any(last_name(each) == "__all__" for each in node.targets):
             self.inside(node, scope, around)
 
-    def addition(self, node: ast.AugAssign, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
+    def addition(self, node: ast.AugAssign, scope: FunctionText, around: Outcomes) -> None:
         scope.attributes.add(last_name(node.target))
         self.inside(node, scope, around)
 
-    def annotated(self, node: ast.AnnAssign, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
-        self._each([node.target, *([node.value] if node.value else [])], scope, (*around, node))
+    def annotated(self, node: ast.AnnAssign, scope: FunctionText, around: Outcomes) -> None:
+        self._each([node.target, *([node.value] if node.value else [])], scope, around)
 
-    def test(self, node: ast.If, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
-        if last_name(node.test) == "TYPE_CHECKING":
-            self.block(node.orelse, scope, (*around, node))
+    def branches(self, node: ast.If | ast.IfExp | ast.While, scope: FunctionText, around: Outcomes) -> None:
+        if last_name(node.test) != "TYPE_CHECKING":
+            self.visit(node.test, scope, (*around, _UNDECIDED))
+            self._side(node.body, scope, (*around, (node.test, True)))
+        otherwise = _UNDECIDED if isinstance(node, ast.While) else (node.test, False)
+        self._side(node.orelse, scope, (*around, otherwise))
+
+    def _side(self, side: ast.expr | list[ast.stmt], scope: FunctionText, around: Outcomes) -> None:
+        if isinstance(side, list):
+            self.block(side, scope, around)
         else:
-            self.inside(node, scope, around)
+            self.visit(side, scope, around)
 
-    def _each(self, nodes: Iterable[ast.AST], scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
+    def connection(self, node: ast.BoolOp, scope: FunctionText, around: Outcomes) -> None:
+        around = (*around, _UNDECIDED)
+        for value in node.values:
+            self.visit(value, scope, around)
+            around = (*around, (value, isinstance(node.op, ast.And)))
+
+    def _each(self, nodes: Iterable[ast.AST], scope: FunctionText, around: Outcomes) -> None:
         for node in nodes:
             self.visit(node, scope, around)
 
-    def function(self, node: Function, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
-        cls = around[-1] if around and isinstance(around[-1], ast.ClassDef) else None
-        inner = FunctionText(node, cls if isinstance(cls, ast.ClassDef) else None, self.module.path)
+    def function(self, node: Function, scope: FunctionText, around: Outcomes) -> None:
+        cls, self._class = self._class, None
+        inner = FunctionText(node, cls, self.module.path)
         self.scopes.append(inner)
         defaults = [*node.args.defaults, *(each for each in node.args.kw_defaults if each is not None)]
         if isinstance(node, ast.Lambda):
             scope.inner.append(inner)
             self._each(defaults, scope, around)
             self.visit(node.body, inner, ())
+            self._class = cls
             return
         self._each([*defaults, *node.decorator_list], scope, around)
         if any(last_name(each) not in _PLAIN_DECORATORS for each in node.decorator_list):
             scope.inner.append(inner)
         self.block(node.body, inner, ())
+        self._class = cls
 
-    def class_body(self, node: ast.ClassDef, scope: FunctionText, around: tuple[ast.AST, ...]) -> None:
+    def class_body(self, node: ast.ClassDef, scope: FunctionText, around: Outcomes) -> None:
         self.classes.setdefault(node.name, []).append(node)
         self._each(node.decorator_list, scope, around)
-        self.block(node.body, scope, (*around, node))
+        outer, self._class = self._class, node
+        self.block(node.body, scope, around)
+        self._class = outer
 
 
-_VISITORS: dict[type, Callable[[_Reader, Any, FunctionText, tuple[ast.AST, ...]], None]] = {
+_VISITORS: dict[type, Callable[[_Reader, Any, FunctionText, Outcomes], None]] = {
     ast.Name: _Reader.name,
     ast.Attribute: _Reader.attribute,
     ast.Constant: _Reader.constant,
@@ -282,7 +303,8 @@ _VISITORS: dict[type, Callable[[_Reader, Any, FunctionText, tuple[ast.AST, ...]]
     ast.Assign: _Reader.assignment,
     ast.AugAssign: _Reader.addition,
     ast.AnnAssign: _Reader.annotated,
-    ast.If: _Reader.test,
+    **dict.fromkeys((ast.If, ast.IfExp, ast.While), _Reader.branches),
+    ast.BoolOp: _Reader.connection,
 }
 
 _LEAVING = (ast.Return, ast.Raise, ast.Continue, ast.Break)
@@ -294,8 +316,8 @@ def _leaves(body: list[ast.stmt]) -> bool:
 
 
 _CONDITIONAL = (
-    ast.If, ast.IfExp, ast.BoolOp, ast.For, ast.AsyncFor, ast.While, ast.Try, ast.Match, ast.comprehension, ast.Assert,
-    ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp,
+    ast.For, ast.AsyncFor, ast.Try, ast.Match, ast.comprehension, ast.Assert, ast.ListComp, ast.SetComp, ast.DictComp,
+    ast.GeneratorExp,
 )  # fmt: skip
 _ENDS = frozenset({"exit", "_exit", "quit"})
 _PLAIN_DECORATORS = frozenset({
@@ -519,23 +541,11 @@ _CONSTRUCTORS = frozenset({"__init__", "__new__", "__post_init__"})
 Literals = Mapping[str, object]  # by parameter
 
 
-def is_dead(around: tuple[ast.AST, ...], module: str, literals: Literals = MappingProxyType({})) -> bool:
-    """Return True if a test of literals, or of the ``module``'s name, keeps control from the last of ``around``."""
-    for outer, inner in itertools.pairwise(around):
-        if isinstance(outer, (ast.If, ast.While, ast.IfExp)):
-            outcome = _decided(outer.test, module, literals)
-            body = outer.body if isinstance(outer.body, list) else [outer.body]
-            orelse = outer.orelse if isinstance(outer.orelse, list) else [outer.orelse]
-            if (outcome is False and inner in body) or (
-                outcome and not isinstance(outer, ast.While) and inner in orelse
-            ):
-                return True
-        if isinstance(outer, ast.BoolOp) and inner in outer.values:
-            stops = isinstance(outer.op, ast.Or)
-            before = outer.values[: outer.values.index(inner)]
-            if any(_decided(each, module, literals) is stops for each in before):
-                return True
-    return False
+def is_dead(around: Outcomes, module: str, literals: Literals = MappingProxyType({})) -> bool:
+    """Return True if a test of literals, or of the ``module``'s name, does not have the outcome that it must have."""
+    return any(
+        test is not None and _decided(test, module, literals) is (not outcome) for test, outcome in around
+    )
 
 
 def _decided(test: ast.expr, module: str, literals: Literals) -> bool | None:
