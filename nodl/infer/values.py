@@ -9,7 +9,7 @@ Heap objects keep their contents in ``cells``; only ``state.State`` writes there
 from __future__ import annotations
 
 import ast
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, ClassVar, NamedTuple, TypeAlias
 
 from nodl.infer.text import Guard, Text, common_text, constant_text
@@ -286,7 +286,7 @@ class Frame:
     """The variables of a running function, class body or module."""
 
     __slots__ = (
-        "again", "cells", "closure", "depth", "early", "entry", "forks", "function", "globals",
+"again", "cells", "closure", "depth", "early", "element", "entry", "forks", "function", "globals",
         "guards", "is_class", "is_comprehension", "jump", "loop_forks", "module", "nonlocals",
         "returned", "unsettled", "yielded",
     )  # fmt: skip
@@ -307,6 +307,7 @@ class Frame:
         self.loop_forks = 0
         self.guards = 0  # how many conditions held when the frame was entered
         self.again = False  # the cells also hold an earlier call, whose inner functions live on
+        self.element: Callable[[], None] | None = None  # of a comprehension: makes the next one
         self.is_class = False
         self.is_comprehension = False
         self.globals: set[str] = set()

@@ -5,9 +5,8 @@ from __future__ import annotations
 import ast
 import functools
 from collections.abc import Callable
-from functools import partial
 
-from nodl.infer.interpreter.conditions import conditions_of, decide, narrowed, under
+from nodl.infer.interpreter.conditions import decide, narrowed
 from nodl.infer.interpreter.elements import assign, elements, store_item
 from nodl.infer.interpreter.run import Run
 from nodl.infer.values import LAZY, Dictionary, Frame, Items, LocalCells, Value, join_all
@@ -19,6 +18,7 @@ WIDEN_TEXTS_FROM = 3
 
 For = ast.For | ast.AsyncFor
 Loop = ast.For | ast.AsyncFor | ast.While
+Comprehension = ast.ListComp | ast.SetComp | ast.GeneratorExp | ast.DictComp
 
 
 def run_for(run: Run, node: For, frame: Frame) -> bool:
@@ -157,22 +157,57 @@ def fixpoint(run: Run, frame: Frame, turn: Callable[[], bool]) -> None:
         run.state.join_seen(start, mixed=True)
 
 
-Emit = Callable[[], None]
+class Element(ast.stmt):
+    """Stands in the innermost loop that a comprehension is read as, for what an element is made of."""
+
+
+@functools.cache
+def _as_loop(node: Comprehension) -> ast.For:
+    """Return the loops and tests that a comprehension stands for (language reference, 6.2.4)."""
+    body: list[ast.stmt] = [Element()]
+    for generator in reversed(node.generators):
+        for test in reversed(generator.ifs):
+            body = [ast.If(test, body, [])]
+        body = [ast.For(generator.target, generator.iter, body, [])]
+    loop = ast.fix_missing_locations(ast.copy_location(body[0], node))
+    assert isinstance(loop, ast.For)
+    return loop
+
+
+def _each_element(run: Run, node: Comprehension, frame: Frame, make: Callable[[Frame], None]) -> bool:
+    """Call ``make`` for each element, in the frame of the comprehension. True: exactly these, in this order."""
+    inner = _inner_frame(run, frame)
+    forks, exact = run.state.forks, True
+
+    def element() -> None:
+        nonlocal exact
+        exact = exact and run.state.forks == forks
+        run.spend(1)
+        make(inner)
+
+    inner.element = element
+    loop = _as_loop(node)
+    iterated = run.evaluate(loop.iter, frame)
+    _looped(run, loop, inner, lambda: _for(run, loop, iterated, inner))
+    if type(inner.cells) is LocalCells and not inner.cells.shared:
+        inner.cells.dead = True  # no function made in it lives on
+    return exact
+
+
+def run_element(run: Run, node: Element, frame: Frame) -> bool:
+    """Make one element of the comprehension that ``frame`` belongs to."""
+    assert frame.element is not None
+    frame.element()
+    return True
 
 
 def comprehension(run: Run, node: ast.ListComp | ast.SetComp | ast.GeneratorExp, frame: Frame) -> Value:
     """Return a list (a set for a set comprehension), exact only where iterables and conditions are decided."""
     lazy = isinstance(node, ast.GeneratorExp)
     run.state.depth += lazy
-    inner = _inner_frame(run, frame)
     collected: list[Value] = []
     mark = run.state.mark()
-
-    def emit() -> None:
-        collected.append(run.evaluate(node.elt, inner))
-
-    exact = _generate(run, node.generators, inner, emit, frame)
-    _leave(inner)
+    exact = _each_element(run, node, frame, lambda inner: collected.append(run.evaluate(node.elt, inner)))
     run.state.depth -= lazy
     if lazy:
         run.changes_at_any_time(run.state.written(mark), certainly=True)
@@ -183,16 +218,11 @@ def comprehension(run: Run, node: ast.ListComp | ast.SetComp | ast.GeneratorExp,
 
 def dict_comprehension(run: Run, node: ast.DictComp, frame: Frame) -> Value:
     """Return a dictionary with the entries of all turns whose conditions are not certainly false."""
-    inner = _inner_frame(run, frame)
     result = run.allocate(node, "dict", Dictionary)
-
-    def add() -> None:
-        key = run.evaluate(node.key, inner)
-        value = run.evaluate(node.value, inner)
-        store_item(run, result, key, value)
-
-    _generate(run, node.generators, inner, add, frame)
-    _leave(inner)
+    _each_element(
+        run, node, frame,
+        lambda inner: store_item(run, result, run.evaluate(node.key, inner), run.evaluate(node.value, inner)),
+    )  # fmt: skip
     return (result,)
 
 
@@ -204,70 +234,3 @@ def _inner_frame(run: Run, frame: Frame) -> Frame:
     inner.entry = frame.entry
     inner.is_comprehension = True
     return inner
-
-
-def _leave(inner: Frame) -> None:
-    """Drop the variables of a comprehension, unless a function made in it lives on."""
-    if type(inner.cells) is LocalCells and not inner.cells.shared:
-        inner.cells.dead = True
-
-
-def _generate(
-    run: Run, generators: list[ast.comprehension], frame: Frame, emit: Emit, around: Frame | None = None
-) -> bool:
-    """Bind the targets for every combination and ``emit``. True: exactly the emitted elements, in order.
-
-    ``around``: where the first of all iterables is evaluated.
-    """
-    if not generators:
-        emit()
-        return True
-    generator = generators[0]
-
-    def one(element: Value) -> bool:
-        run.spend(1)
-        assign(run, generator.target, element, frame)
-        return _where(run, generators[1:], generator.ifs, frame, emit)
-
-    iterated = run.evaluate(generator.iter, around or frame)
-    items = elements(run, iterated, generator.iter, frame)
-    if items.exact is None or not may_unroll(run, len(items.exact)):
-        run.repeated += 1
-        for _ in range(2):  # the second time with what the first one left behind
-            element = elements(run, iterated, generator.iter, frame).any_element()
-            if element:
-                run.state.maybe(partial(_surely, one, element))
-        run.repeated -= 1
-        return False
-    exact = True
-    for turn, element in enumerate(items.exact):
-        previous = run.enter((id(generator), turn))
-        exact = one(element) and exact
-        run.context = previous
-    return exact
-
-
-def _surely(one: Callable[[Value], bool], element: Value) -> bool:
-    one(element)
-    return True
-
-
-def _where(
-    run: Run, generators: list[ast.comprehension], tests: list[ast.expr], frame: Frame, emit: Emit
-) -> bool:
-    """Run the inner ``generators`` where all ``tests`` hold; what an undecided one lets through may be there or not."""
-    if not tests:
-        return _generate(run, generators, frame, emit)
-    outcome = decide(run, tests[0], frame)
-    if outcome is False:
-        return True
-
-    def go_on() -> bool:
-        narrowed(run, tests[0], True, frame)
-        return _where(run, generators, tests[1:], frame, emit)
-
-    if outcome is True:
-        return go_on()
-    held = conditions_of(run, tests[0], True, frame)
-    run.state.maybe(lambda: under(run, held, go_on) or True)
-    return False

@@ -349,6 +349,7 @@ STATEMENTS: dict[type, Executor] = {
     ast.FunctionDef: define_function,
     ast.AsyncFunctionDef: define_function,
     ast.ClassDef: define_class,
+    loops.Element: loops.run_element,
     ast.Import: imports.run_import,
     ast.ImportFrom: imports.run_import_from,
 }
