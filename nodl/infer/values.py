@@ -288,7 +288,7 @@ class Frame:
     __slots__ = (
 "again", "cells", "closure", "depth", "early", "element", "entry", "forks", "function", "globals",
         "guards", "is_class", "is_comprehension", "jump", "loop_forks", "module", "nonlocals",
-        "returned", "unsettled", "yielded",
+        "returned", "unsettled",
     )  # fmt: skip
 
     def __init__(self, module: ModuleValue, cells: dict[object, Value], closure: Frame | None, depth: int):
@@ -299,7 +299,6 @@ class Frame:
         self.function: FunctionValue | None = None
         self.entry: FunctionEntry | None = None
         self.returned: Value = BOTTOM
-        self.yielded: Value | None = None
         self.early = False  # some path left before the end
         self.unsettled = ""  # the break or continue that may have happened, since the loop asked last
         self.jump = ""  # the break or continue that certainly ended the latest statement

@@ -43,7 +43,7 @@ from nodl.infer.values import (
 
 MISSING = unknown("an argument that the caller does not give")
 EARLIER = unknown("what a cached function gave before")
-LATER = unknown("what a generator gives later")
+GIVEN = unknown("what a generator gives")
 
 
 def call_function(run: Run, function: FunctionValue, call: Call) -> Value:
@@ -73,7 +73,7 @@ def call_function(run: Run, function: FunctionValue, call: Call) -> Value:
         run.register_callback((later,), 0, mark)
         run.state.join_seen(mark, mixed=True)
     if is_generator(function):
-        result = run.sequence(call.node, "generator", Items(None, join(result, LATER)))
+        result = GIVEN
     return join(result, EARLIER) if function.cached else result
 
 
@@ -140,8 +140,6 @@ def _run_body(run: Run, function: FunctionValue, cells: LocalCells, call: Call) 
         cells.dead = True
     run.stack.pop()
     run.context = previous
-    if frame.yielded is not None:
-        return frame.yielded or ANY
     return frame.returned  # nothing, if no path comes back
 
 

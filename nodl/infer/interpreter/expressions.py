@@ -38,7 +38,6 @@ from nodl.infer.text import (
 from nodl.infer.values import (
     ANY,
     BOTTOM,
-    NONE,
     OF_LAUNCH,
     OTHER,
     ClassValue,
@@ -373,15 +372,10 @@ def _inner(run: Run, node: ast.Await | ast.Starred, frame: Frame) -> Value:
     return run.evaluate(node.value, frame)
 
 
-def _yield(run: Run, node: ast.Yield, frame: Frame) -> Value:
-    value = NONE if node.value is None else run.evaluate(node.value, frame)
-    frame.yielded = join(frame.yielded or BOTTOM, value)
-    return join(NONE, ANY)
-
-
-def _yield_from(run: Run, node: ast.YieldFrom, frame: Frame) -> Value:
-    items = elements(run, run.evaluate(node.value, frame), node, frame)
-    frame.yielded = join(frame.yielded or BOTTOM, items.any_element())
+def _yield(run: Run, node: ast.Yield | ast.YieldFrom, frame: Frame) -> Value:
+    """Hand a value to whoever iterates, which is not followed."""
+    if node.value is not None:
+        run.escape_value(run.evaluate(node.value, frame))
     return ANY
 
 
@@ -409,6 +403,6 @@ EXPRESSIONS: dict[type, Evaluator] = {
     ast.NamedExpr: _walrus,
     ast.Await: _inner,
     ast.Yield: _yield,
-    ast.YieldFrom: _yield_from,
+    ast.YieldFrom: _yield,
     ast.Starred: _inner,
 }

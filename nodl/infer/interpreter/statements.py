@@ -312,8 +312,6 @@ def _entered(run: Run, manager: Value, node: ast.AST, frame: Frame) -> Value:
         if isinstance(atom, Instance) and _enters(atom):
             enter = run.attribute((atom,), "__enter__", node, frame)
             result = join(result, run.call(enter, Arguments(), node, frame))
-        elif isinstance(atom, Sequence):  # of what a generator under ``contextmanager`` yields
-            result = join(result, atom.items.any_element())
         else:
             result = join(result, ANY)
     return result or ANY
