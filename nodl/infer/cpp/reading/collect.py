@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from typing import NamedTuple
 
 from nodl.infer.cpp.reading.declarations import (
@@ -27,7 +26,6 @@ from nodl.infer.cpp.reading.type_names import split_type
 from nodl.infer.cpp.syntax import Node, children, field_of, line_of, parse, parse_expression, text, walk
 
 STRUCTURES = ("class_specifier", "struct_specifier", "union_specifier")
-_STRUCTURE = re.compile(rb"class|struct|union")
 _USING = re.compile(r"\busing\s+namespace\s+([\w:]+)\s*;")
 
 
@@ -132,8 +130,6 @@ class _Collector:
                     _initialiser(item) for item in children(child) if item.type == "field_initializer"
                 ]
         self.index.all_functions.append(made)
-        for each in _local_classes(made.body):
-            self.class_(each, local_scope(made, each), [])
         if cls is not None:
             cls.methods.setdefault(made.name, []).append(made)
         else:
@@ -250,22 +246,6 @@ class _Collector:
         inner = children(node)
         if len(inner) >= 2:
             self.index.aliases["::".join((*scope, text(inner[0])))] = (text(inner[-1]), scope)
-
-
-def _local_classes(body: Node) -> Iterator[Node]:
-    """Yield the classes with a name that are defined inside a function, without those inside of them."""
-    waiting = [body] if _STRUCTURE.search(body.text or b"") else []
-    while waiting:
-        each = waiting.pop()
-        if each.type not in STRUCTURES:
-            waiting += each.named_children
-        elif field_of(each, "name") is not None and field_of(each, "body") is not None:
-            yield each
-
-
-def local_scope(function: Function, node: Node) -> Scope:
-    """Return the scope of a function's own class: no other class of this name has it."""
-    return (*function.scope, f"{function.name}()@{node.start_byte}")
 
 
 def _specialised(name: str, templates: list[str]) -> tuple[str, ...] | None:

@@ -7,9 +7,8 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 from nodl.infer.cpp.libraries import is_harmless_class
-from nodl.infer.cpp.reading.collect import STRUCTURES, declared_names, local_scope
+from nodl.infer.cpp.reading.collect import declared_names
 from nodl.infer.cpp.reading.declarations import type_text
-from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.constructors import declared_value, fields_of
 from nodl.infer.cpp.running.launch_values import decided, in_doubt
@@ -280,7 +279,6 @@ def _caught(run: Machine, clause: Node, held: Changes, doubt: str, frame: Frame)
 @statement("declaration")
 def declaration(run: Machine, node: Node, frame: Frame) -> int:
     """Set the variables, also static ones, structured bindings and ``Foo f(a);`` read as a function."""
-    _local_class(field_of(node, "type"), frame)
     declarators = node.children_by_field_name("declarator")
     functions = [declarator for declarator in declarators if declarator.type == "function_declarator"]
     for declarator in functions:
@@ -381,21 +379,10 @@ def nothing(run: Machine, node: Node, frame: Frame) -> int:
     """Runs nothing; ``using``, aliases and typedefs change what names of types mean from here on."""
     if node.type in ("using_declaration", "alias_declaration", "type_definition"):
         _local_alias(run, node, frame)
-    _local_class(node, frame)
     if node.type == "enum_specifier":
         for each in children(field_of(node, "body")):
             run.local(frame, text(field_of(each, "name")), unknown("an enumerator"))
     return NEXT
-
-
-def _local_class(node: Node | None, frame: Frame) -> None:
-    """Know a class of the function's own by its name from here on."""
-    if node is None or node.type not in STRUCTURES or field_of(node, "body") is None:
-        return
-    name = text(field_of(node, "name"))
-    if name and frame.function is not None:
-        bound = Type("::".join((*local_scope(frame.function, node), name)))
-        frame.bindings = {**frame.bindings, name: bound}
 
 
 def _local_alias(run: Machine, node: Node, frame: Frame) -> None:
