@@ -247,13 +247,13 @@ class Names:
     @_once
     def may_end_program(self, function: Function) -> bool:
         """Return whether a function may end the program."""
-        return self.ends_program(function.node, function)
+        return self.ends_program(text(function.node), function)
 
-    def ends_program(self, code: Node, function: Function | None) -> bool:
+    def ends_program(self, code: str, function: Function | None) -> bool:
         """Return whether code in ``function`` may end the program; what its class calls so does not: ``abort()``."""
         return any(
             each[1] or function is None or not self.has_method(function, each[2])
-            for each in _ENDS.finditer(text(code))
+            for each in _ENDS.finditer(code)
         )
 
     def has_method(self, function: Function, name: str) -> bool:

@@ -106,7 +106,7 @@ class CallEffects:
             and not any(map(self._run.names.may_end_program, self.functions))
             and (
                 isinstance(self._of, Function)
-                or not self._run.names.ends_program(self._of.node, self._of.frame.function)
+                or not self._run.names.ends_program(text(self._of.node), self._of.frame.function)
             )
         )
 

@@ -128,11 +128,7 @@ def expression_statement(run: Machine, node: Node, frame: Frame) -> int:
 
 
 def _ends_program(run: Machine, call: Node, frame: Frame) -> bool:
-    name, function = text(field_of(call, "function")), frame.function
-    return name in _ENDS and (function is None or not run.names.has_method(function, name))
-
-
-_ENDS = frozenset({"exit", "std::exit", "abort", "std::abort", "_exit", "std::terminate", "std::quick_exit"})
+    return run.names.ends_program(f"{text(field_of(call, 'function'))}(", frame.function)
 
 
 @statement("return_statement", "co_return_statement")
