@@ -5,16 +5,17 @@ Run until nothing changes. A callback that makes no interface runs too when it m
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Set
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import partial
 
 from nodl.infer.cpp.reading.declarations import Class
-from nodl.infer.cpp.running.effects import effects_of, looked_at, may_mean
+from nodl.infer.cpp.running.effects import effects_of, may_mean
 from nodl.infer.cpp.running.invocation import HOOKS, call_lambda, invoke
 from nodl.infer.cpp.running.left_out import forget_writes
 from nodl.infer.cpp.running.machine import NEXT, Frame, Machine
 from nodl.infer.cpp.running.memory import Cell, Reads, name_of
+from nodl.infer.cpp.running.references import forget_everything
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     Bound,
@@ -52,7 +53,6 @@ class _Ran:
 class _Rounds:
     run: Machine
     last: dict[Key, _Ran] = field(default_factory=dict)
-    names_read: Set[str] = frozenset()  # by code that goes on behind them
     cells_read: dict[str, set[Cell]] = field(default_factory=dict)  # by callbacks, by their names
 
 
@@ -81,27 +81,12 @@ def run_callbacks(run: Machine) -> None:
     run.gap_at(SourceRef(place), "callbacks change variables for more rounds than are followed")
 
 
-def run_meanwhile(run: Machine, frame: Frame) -> None:
-    """Run callbacks where the program spins and goes on: those that change what it, or code that makes interfaces,
-    may look at afterwards.
-    """
-    if run.calls_back:
-        return
-    words = frame.function.words if frame.function is not None else frozenset[str]()
-    read = looked_at(run).keys() | words
-    run.calls_back = True
-    rounds = _Rounds(run, names_read=read)
-    for number in range(PATIENCE):
-        mark, steps = run.store.mark(), run.steps
-        if not _round(rounds, partial(_changes_one_of, run, read)):
-            break
-        _widen(run, mark, steps, number == PATIENCE - 1)
-    run.calls_back = False
-
-
-def _changes_one_of(run: Machine, names: Set[str], atom: object) -> bool:
-    written = (effects_of(run, each).written for each in _with_held(run, atom))
-    return any(not names.isdisjoint(each.assigned | each.changed) for each in written)
+def run_meanwhile(run: Machine) -> None:
+    """Know nothing of what callbacks may write, which run where the program spins and goes on."""
+    registered = [] if run.calls_back else [atom for atom, _ in run.callbacks.values()]
+    for code in dict.fromkeys(each for atom in registered for each in _with_held(run, atom)):
+        if forget_writes(run, code.function if isinstance(code, Bound) else code) is None:
+            forget_everything(run, "what a callback may have written meanwhile")
 
 
 def _with_held(run: Machine, atom: object) -> Iterator[Lambda | Bound]:
@@ -122,16 +107,11 @@ def _with_held(run: Machine, atom: object) -> Iterator[Lambda | Bound]:
                     waiting.append(other)
 
 
-def _round(rounds: _Rounds, takes_part: Callable[[object], bool] = lambda atom: True) -> bool:
-    """Run each callback that ``takes_part`` once, without those that would do what they did before.
-
-    Returns:
-        Whether any ran.
-    """
+def _round(rounds: _Rounds) -> bool:
+    """Run each callback once, without those that would do what they did before; return whether any ran."""
     ran = False
     for key, (atom, frame) in list(rounds.run.callbacks.items()):
-        if takes_part(atom):
-            ran |= _call(rounds, key, atom, frame)
+        ran |= _call(rounds, key, atom, frame)
     return ran
 
 
@@ -185,7 +165,6 @@ def _matters(rounds: _Rounds, atom: object) -> bool:
             _makes(rounds.run, each)
             or effects.leaving.gives_node
             or effects.leaving.makes_node
-            or not rounds.names_read.isdisjoint(written)
             or any(
                 may_mean(rounds.run, effects.owners, cell)
                 for name in written & rounds.cells_read.keys()

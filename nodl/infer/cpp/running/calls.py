@@ -100,9 +100,9 @@ def call_expression(run: Machine, node: Node, frame: Frame) -> Value:
     if _SPINS.search(name):
         run.spins_beside = run.spins_beside or bool(run.closures)
         if run.spins_beside or len(run.active) > 1 or _makes_more(run, node):
-            run_meanwhile(run, frame)
+            run_meanwhile(run)
     elif run.spins_beside and _WAITS.search(name):
-        run_meanwhile(run, frame)
+        run_meanwhile(run)
     if callee.type == "field_expression":
         return method_call(run, site)
     if callee.type in _NAMES:

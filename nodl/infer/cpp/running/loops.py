@@ -208,7 +208,7 @@ def _counted(run: Machine, node: Node, frame: Frame) -> int:
 
     for index in range(MAX_UNROLLED):
         if run.spins_beside:
-            run_meanwhile(run, frame)
+            run_meanwhile(run)
         holds: bool | None = True
         if condition is not None and (index > 0 or node.type != "do_statement"):
             seen = run.store.watched(test)
@@ -296,7 +296,7 @@ def _repeated(
             if outcome & NEXT:
                 run.evaluate(update, frame)
             if run.spins_beside:
-                run_meanwhile(run, frame)
+                run_meanwhile(run)
             condition_of(run, condition, frame)
             return outcome
 
