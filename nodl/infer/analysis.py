@@ -187,9 +187,6 @@ def _call_back(run: Run, callback: object, arity: int | None, widen_texts: bool)
     stamp, looked_into = run.state.now(), HeapObject.looked_into
     written = run.state.repeatedly(_called_from_outside(run, callback, arity), widen_texts)
     run.called_back[callback, arity] = Called(stamp, run.running, looked_into, written)
-    if callback in run.at_any_time:
-        for outcome in written:
-            run.changes_at_any_time(outcome)
     for made in run.born:
         made.summary = True
 
@@ -223,7 +220,10 @@ def _called_from_outside(run: Run, callback: object, arity: int | None) -> Calla
     module = next(iter(run.modules.values()))
 
     def call() -> bool:
+        mark = run.state.mark()
         made = call_from_outside(run, module, callback, args)
+        if callback in run.at_any_time:
+            run.changes_at_any_time(run.state.seen(mark))
         if isinstance(callback, ClassValue):
             run.escape_value(made)
         return True

@@ -222,6 +222,14 @@ class ProgramState:
 
         ``mixed``: which of them is meant depends on when other code runs, see ``mixed_with_unknown``.
         """
+        for cells, key, value in self.seen(mark, own).values():
+            if mixed:
+                value = mixed_with_unknown(value)
+            if value:
+                self.write(cells, key, value)
+
+    def seen(self, mark: int, own: Cells | None = None) -> Written:
+        """Return every value that each cell written since ``mark`` (except in ``own``) held since then."""
         seen: Written = {}
         self.work += len(self._trail) - mark
         for cells, key, old in self._trail[mark:]:
@@ -233,11 +241,7 @@ class ProgramState:
                 entry = (cells, key, cells.get(key, BOTTOM))
             entry = (cells, key, join(entry[2], _absent(cells) if old is None else old))
             seen[place] = entry
-        for cells, key, value in seen.values():
-            if mixed:
-                value = mixed_with_unknown(value)
-            if value:
-                self.write(cells, key, value)
+        return seen
 
     def changed_since(self, mark: int) -> bool:
         """Return True if a cell held something since ``mark`` that it does not hold now; None does not count."""

@@ -424,15 +424,13 @@ def sole(value: Value | None) -> object:
 
 
 def unsettled(value: Value) -> Value:
-    """Return ``value`` with unknown in place of its texts and numbers, and either truth in place of one."""
+    """Return ``value`` with unknown in place of its texts and numbers and beside the rest; a truth is either."""
     if value and isinstance(value[0], Items):
         return (Items(None, join(value[0].any_element(), CHANGES_MEANWHILE)),)
-    left = tuple(atom for atom in value if not isinstance(atom, (str, Text, int, float)))
-    if len(left) == len(value):
-        return value
-    truths = tuple(atom for atom in value if type(atom) is bool)
-    known = len(left) + len(truths) == len(value)
-    return join(join(left, (True, False) if truths else BOTTOM), BOTTOM if known else CHANGES_MEANWHILE)
+    if all(type(atom) is bool for atom in value):
+        return (True, False)
+    others = tuple(atom for atom in value if not isinstance(atom, (str, Text, int, float)))
+    return join(others, CHANGES_MEANWHILE)
 
 
 def mixed_with_unknown(value: Value) -> Value:

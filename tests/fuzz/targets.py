@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import json
+import os
+import tempfile
+import zlib
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
+from unittest.mock import patch
 
 import yaml
 
@@ -44,6 +48,7 @@ from nodl.remap import InvalidRemapRuleError, parse_rule
 from nodl.ros_arguments import parse_ros_arguments
 from tests.graph.made import one_node
 from tests.graph.test_discovery_info import encoded
+from tests.nodl.infer.random_programs import random_program, silently_missing
 
 FIXTURES = Path(__file__).parents[2] / "fixtures/demo_ws/share/demo_nodes"
 GOLDEN = Path(__file__).parents[1] / "keystore/golden_permissions"
@@ -88,6 +93,14 @@ def template(data: str) -> None:
 
 def words(*listed: str) -> tuple[bytes, ...]:
     return tuple(word.encode() for word in listed)
+
+
+def random_python(data: bytes) -> None:
+    """Run and infer the program whose seed these bytes are."""
+    seed = zlib.crc32(data)
+    with tempfile.TemporaryDirectory() as folder, patch.dict(os.environ, {"XDG_CACHE_HOME": folder}):
+        missing = silently_missing(seed, Path(folder))
+    assert not missing, f"{missing} of this program:\n{random_program(seed)}"
 
 
 def observed_document() -> dict[str, object]:
@@ -161,8 +174,6 @@ _DOCUMENTS: dict[str, bytes] = {}
 def documents() -> dict[str, bytes]:
     """A small keystore's files, made once: documents as they are signed."""
     if not _DOCUMENTS:
-        import tempfile
-
         from tests.keystore.kit import filled
 
         with tempfile.TemporaryDirectory() as folder:
@@ -310,6 +321,7 @@ def targets() -> dict[str, Target]:
             (json.dumps(observed_document()).encode(),),
             words("[", "]", "{", "}", "null", "true", '"', "1e999", ","),
         ),
+        "inference-python": Target(random_python, (), (b"0",), words("1", "2", "3")),
         "domains": Target(text(Domains.parse), refused, (b"0-10,42", b"all"), words("-", ",", "9")),
         "enclave-name": Target(
             text(validate_enclave_name), refused, (b"/a/b",), words("/", "..", "//", "\n")

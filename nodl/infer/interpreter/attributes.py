@@ -145,6 +145,8 @@ def _of_class(run: Run, cls: ClassValue, name: str, node: ast.AST, frame: Frame)
             return result or ANY
         if isinstance(base, External) and base.path not in ("builtins.object", "abc.ABC", "typing.Generic"):
             return external(f"{base.path}.{name}")
+    if name in ("__subclasses__", "__bases__", "__base__", "__mro__", "mro"):
+        run.gap(node, frame, f"classes are found through {name}, which is not followed")
     return unknown(f"attribute {name} of class {cls.name}")
 
 
@@ -206,6 +208,7 @@ def _of_native(run: Run, atom: object, name: str, node: ast.AST, frame: Frame) -
 def _of_function(run: Run, atom: FunctionValue, name: str, node: ast.AST, frame: Frame) -> Value:
     if name in ("__name__", "__qualname__"):
         return (atom.name,) if atom.name else unknown("the name of a wrapped function")
+    run.escape_value((atom,))  # ``__call__``, ``__get__`` and their like lead to it
     return unknown(f"attribute {name} of a function")
 
 

@@ -38,6 +38,7 @@ from nodl.infer.values import (
     Partial,
     Value,
     join,
+    sole,
     unknown,
 )
 
@@ -64,6 +65,12 @@ def call_function(run: Run, function: FunctionValue, call: Call) -> Value:
     mark, born = run.state.mark(), len(run.born)
     result = _run_body(run, function, cells, call)
     if node in run.recursive:  # nobody knows what the inner calls changed
+        run.state.unsettle(mark)
+        objects = [
+            each if isinstance(sole(each), (Instance, ClassValue)) else ANY for each in call.args.positional
+        ]
+        inner = bind(run, function, Call(Arguments(objects, more_keywords=ANY), call.node, call.frame))
+        result = join(result, run.state.perhaps(lambda: _run_body(run, function, inner, call)))
         run.recursive.discard(node)
         run.state.unsettle(mark)
         for made in run.born[born:]:
@@ -202,6 +209,7 @@ def instantiate(run: Run, cls: ClassValue, call: Call) -> Value:
     for base in program_classes(cls):
         run.instantiated.setdefault(base.node)
     if is_enumeration(cls):
+        run.register_callback(run.attribute((cls,), "_missing_", call.node, call.frame), 1, run.state.mark())
         value = call.args.at(0, "value") or ANY
         return OF_LAUNCH if any(map(is_of_launch, value)) else member_with_value(run, cls, value)
     instance = new_instance(run, cls, call)

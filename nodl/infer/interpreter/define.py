@@ -307,6 +307,8 @@ def methods_in(held: Value, receiver: object, cls: ClassValue) -> Value:
         elif isinstance(atom, ClassMethod):
             functions = [each for each in atom.function if isinstance(each, FunctionValue)]
             bound.extend(functions if atom.static else [BoundMethod(each, cls) for each in functions])
+        elif isinstance(atom, PropertyValue):
+            bound.extend(methods_in((*atom.getter, *atom.setter), receiver, cls))
     return tuple(bound)
 
 

@@ -235,11 +235,11 @@ def arguments_of(run: Run, node: ast.Call, frame: Frame) -> Arguments:
         if keyword.arg is not None:
             args.keywords[keyword.arg] = value
         else:
-            _add_keywords(args, value)
+            _add_keywords(run, args, value)
     return args
 
 
-def _add_keywords(args: Arguments, value: Value) -> None:
+def _add_keywords(run: Run, args: Arguments, value: Value) -> None:
     for atom in value:
         if isinstance(atom, Dictionary):
             for cell, held, _ in atom.entries():
@@ -247,8 +247,9 @@ def _add_keywords(args: Arguments, value: Value) -> None:
                     args.keywords[cell.constant] = join(held, ANY) if atom.escaped else held
             if atom.is_open:
                 args.more_keywords = join(args.more_keywords, present(atom.cells.get(OTHER, ANY)))
-        elif isinstance(atom, Unknown):
-            args.more_keywords = join(args.more_keywords, (atom,))
+        else:
+            run.escape_value((atom,))  # ``keys`` of an object is called
+            args.more_keywords = join(args.more_keywords, (atom,) if isinstance(atom, Unknown) else ANY)
 
 
 def _super(run: Run, node: ast.Call, frame: Frame) -> Value:

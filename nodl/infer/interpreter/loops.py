@@ -45,6 +45,8 @@ def _looped(run: Run, node: Loop, frame: Frame, turns: Callable[[], bool]) -> bo
     passes = turns()
     frame.unsettled, frame.loop_forks = before, loop_forks
     frame.jump = ""
+    if passes and node.orelse and not _breaks(node):
+        return run.execute(node.orelse, frame)
     if passes and node.orelse:
         run.state.maybe(lambda: run.execute(node.orelse, frame))
     return passes
@@ -210,7 +212,7 @@ def comprehension(run: Run, node: ast.ListComp | ast.SetComp | ast.GeneratorExp,
     exact = _each_element(run, node, frame, lambda inner: collected.append(run.evaluate(node.elt, inner)))
     run.state.depth -= lazy
     if lazy:
-        run.changes_at_any_time(run.state.written(mark), certainly=True)
+        run.changes_at_any_time(run.state.seen(mark), certainly=True)
         run.state.join_seen(mark, mixed=True)  # it may be asked for some of its elements only
     kind = {ast.SetComp: "set", ast.GeneratorExp: LAZY}.get(type(node), "list")
     return run.sequence(node, kind, Items(tuple(collected)) if exact else Items(None, join_all(collected)))

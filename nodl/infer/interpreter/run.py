@@ -290,7 +290,7 @@ class Run(Allocations):
         readers = self.tables.attributes
         if len(owner) == 1:
             reader = readers.get(type(owner[0]))
-            result = reader(self, owner[0], name, node, frame) if reader else ANY
+            result = reader(self, owner[0], name, node, frame) if reader else self._unread(owner[0])
             self.steps += len(result)
             return result or ANY
         result = BOTTOM
@@ -298,9 +298,15 @@ class Run(Allocations):
             if atom is None:
                 continue  # an attribute of None is an error, not a value
             reader = readers.get(type(atom))
-            result = join(result, reader(self, atom, name, node, frame) if reader else ANY)
+            result = join(result, reader(self, atom, name, node, frame) if reader else self._unread(atom))
             self.steps += len(result)
         return result or ANY
+
+    def _unread(self, atom: object) -> Value:
+        """Return the attribute of what has none that is followed: through it, a function may be called."""
+        if isinstance(atom, tuple):
+            self.escape_value((atom, *getattr(atom, "getter", ()), *getattr(atom, "setter", ())))
+        return ANY
 
     # --- the world outside ------------------------------------------------------------------------------
 
@@ -319,21 +325,15 @@ class Run(Allocations):
                 elif self.callbacks[atom] != arity:
                     self.callbacks[atom] = None
 
-    def changes_at_any_time(self, written: Written, certainly: bool = False) -> None:
-        """Note the variables and containers in which code that runs at any time puts texts or numbers, beside others.
+    def changes_at_any_time(self, seen: Written, certainly: bool = False) -> None:
+        """Note the variables and containers that code which runs at any time changes.
 
-        ``certainly``: other code will do so.
+        A variable that never holds anything else is known, unless ``certainly``: other code will change it.
         """
-        for cells, key, _ in written.values():
-            held = cells.get(key, BOTTOM)
-            if held and isinstance(held[0], Items):
-                held = join(held[0].any_element(), ANY)
-            atoms = [atom for atom in held if atom is not None and type(atom) is not Absent]
-            several = certainly or len(atoms) > 1
-            if not several or not any(isinstance(atom, (str, Text, int, float)) for atom in atoms):
-                continue
-            variable = isinstance(key, str) and key not in (ITEMS, OTHER, OTHER_KEYS)
-            self.meanwhile |= {str(key)} if variable else self.made_at(cells)
+        for cells, key, held in seen.values():
+            if certainly or isinstance(held[0], Items) or sum(type(atom) is not Absent for atom in held) > 1:
+                variable = isinstance(key, str) and key not in (ITEMS, OTHER, OTHER_KEYS)
+                self.meanwhile |= {str(key)} if variable else self.made_at(cells)
 
     def escape(self, args: Arguments, opened: bool = True, objects: bool = True) -> None:
         """Hand all of ``args`` to code that is not analysed: it may call callables and fill containers.

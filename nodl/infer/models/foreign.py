@@ -72,8 +72,6 @@ _ASKS_FOR_TEXT = frozenset({
     "info", "warn", "warning", "error", "exception", "critical", "log", "getLogger", "basicConfig", "sleep", "pprint",
     "pformat", "dumps",
 })  # fmt: skip
-# Of Python's library: what these are handed they call before they return.
-_CALLS_NOW = frozenset({"functools", "re", "itertools", "builtins", "bisect", "heapq", "json", "operator"})
 # While these run, callbacks do.
 _WAITS = frozenset({
     "spin", "spin_once", "spin_until_future_complete", "spin_once_until_future_complete", "sleep", "wait_for_message",
@@ -131,8 +129,6 @@ def call_external(run: Run, atom: External, call: Call) -> Value:
     if not ros.interface_type(path) and not keeps_off(path):
         _note_unknown_package(run, path, call)
     _hand_over(run, path, call)
-    if path.partition(".")[0] in _CALLS_NOW:
-        stdlib.call_now(run, call)
     if ros.interface_type(path):
         return external(path + "()")
     if keeps_off(path):

@@ -15,7 +15,7 @@ from nodl.infer.interpreter.elements import (
 )
 from nodl.infer.interpreter.formatting import joined, str_format, text_value
 from nodl.infer.interpreter.run import Call, Run
-from nodl.infer.models.stdlib import call_each, fill
+from nodl.infer.models.stdlib import fill
 from nodl.infer.text import MAX_LENGTH, Input, Text, TextAtom, constant_text
 from nodl.infer.values import (
     ABSENT,
@@ -132,7 +132,7 @@ def _index(run: Run, owner: Sequence, call: Call) -> Value:
 
 def _edited(run: Run, owner: Sequence, call: Call) -> Value:
     """Handle ``insert``, ``remove``, ``sort`` ...: what is left, in which order, is not known."""
-    call_each(run, call.args.keywords.get("key", NONE), owner.items.any_element(), call)
+    run.escape_value(call.args.keywords.get("key", NONE))
     change(run, owner, join_all(call.args.positional))
     return NONE
 

@@ -91,6 +91,7 @@ def _parsed(run: Run, name: str, call: Call) -> Value:
     """Return the text of an option, or whether a flag is there; until a launch says what they hold, a word without an
     option and what is made into anything else are open.
     """
+    run.escape(call.args, opened=False)  # a type or an action is called when the command line is read
     given = call.args.keywords
     action, nargs = sole(given.get("action", ("store",))), sole(given.get("nargs", NONE))
     if action in ("store_true", "store_false"):

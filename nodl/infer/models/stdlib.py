@@ -29,11 +29,9 @@ from nodl.infer.values import (
     OF_A_NODE,
     OF_LAUNCH,
     OTHER,
-    BoundMethod,
     ClassValue,
     Dictionary,
     External,
-    FunctionValue,
     HeapObject,
     Instance,
     Items,
@@ -165,29 +163,8 @@ def _zip(run: Run, call: Call) -> Value:
 def _sorted(run: Run, call: Call) -> Value:
     """Return a list of any of the elements, in any order."""
     element = _items(run, call).any_element()
-    call_each(run, call.args.keywords.get("key", NONE), element, call)
+    run.escape_value(call.args.keywords.get("key", NONE))
     return run.sequence(call.node, "list", Items(None, element))
-
-
-def call_now(run: Run, call: Call) -> None:
-    """Call each function among the arguments, with anything, as a library may do before it returns."""
-    given = Arguments(more=unknown("an argument given by code that is not analysed"))
-    for value in call.args.all_values():
-        functions = tuple(atom for atom in value if isinstance(atom, (FunctionValue, BoundMethod, Partial)))
-        if functions:
-            _perhaps_called(run, functions, given, call)
-
-
-def call_each(run: Run, function: Value, element: Value, call: Call) -> None:
-    """Call ``function`` for any of the elements, of which there may be none."""
-    _perhaps_called(run, function, Arguments([element or ANY]), call)
-
-
-def _perhaps_called(run: Run, function: Value, given: Arguments, call: Call) -> None:
-    """Call ``function`` as a library may do, or not: what it changes is then not known."""
-    mark = run.state.mark()
-    run.state.perhaps(partial(run.call, function, given, call.node, call.frame))
-    run.state.join_seen(mark, mixed=True)
 
 
 def _set(run: Run, call: Call) -> Value:
@@ -200,7 +177,7 @@ def _map(run: Run, call: Call) -> Value:
     arguments = Arguments(given, more=call.args.more)
     mark = run.state.mark()
     element = run.call(call.args.at(0) or ANY, arguments, call.node, call.frame)
-    run.changes_at_any_time(run.state.written(mark), certainly=True)
+    run.changes_at_any_time(run.state.seen(mark), certainly=True)
     run.state.join_seen(mark, mixed=True)
     return run.sequence(call.node, LAZY, Items(None, element))
 
@@ -266,6 +243,13 @@ def _has_attribute(atom: object, name: object) -> bool:
     body = [statement for cls in program_classes(atom.cls) for statement in cls.node.body]
     methods = (each for each in body if isinstance(each, ast.FunctionDef | ast.AsyncFunctionDef))
     return any(method.name == name for method in methods)
+
+
+def _hasattr(run: Run, call: Call) -> Value:
+    """Look the attribute up, which may run a property; whether there is one stays open."""
+    for name in constant_strings(call.args.at(1) or ANY):
+        run.state.perhaps(partial(run.attribute, call.args.at(0) or ANY, name, call.node, call.frame))
+    return BOOLEAN
 
 
 def _setattr(run: Run, call: Call) -> Value:
@@ -366,7 +350,8 @@ _BUILT_IN: dict[str, Callable[[Run, Call], Value]] = {
         "getattr": _getattr,
         "setattr": _setattr,
         "type": _type,
-        **dict.fromkeys(("any", "all", "callable", "hasattr"), lambda run, call: BOOLEAN),
+        **dict.fromkeys(("any", "all", "callable"), lambda run, call: BOOLEAN),
+        "hasattr": _hasattr,
         "isinstance": _isinstance,
         **dict.fromkeys(("eval", "exec", "compile"), _dynamic_code),
         "__import__": import_dynamic,

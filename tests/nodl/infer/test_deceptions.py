@@ -152,6 +152,7 @@ UNDECIDED = {
     "language: a truth that counts": {"/empty2", "/full"},
     "records: a namedtuple is a tuple": {"/is_not"},
     "records: a text that is equal to nothing": {"/equal"},
+    "relatives: a flag that a recursion sets": {"/flat"},
 }
 
 

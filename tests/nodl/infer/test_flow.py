@@ -101,7 +101,7 @@ CASES: dict[str, tuple[str, list[str]]] = {
     "closure": ("x = 'a'\ndef f():\n    return x + '/b'\nself.P(f())", ["a/b"]),
     "nonlocal": ("x = 'a'\ndef f():\n    nonlocal x\n    x = 'b'\nf()\nself.P(x)", ["b"]),
     "default argument": ("def f(y='a'):\n    return y\nself.P(f())\nself.P(f('b'))", ["a", "b"]),
-    "recursion": ("def f(n):\n    return 'a' if n == 0 else f(n - 1)\nself.P(f(3))", ["?"]),
+    "recursion": ("def f(n):\n    return 'a' if n == 0 else f(n - 1)\nself.P(f(3))", ["?", "a"]),
     "generator": ("def f():\n    yield 'a'\n    yield 'b'\nfor x in f():\n    self.P(x)", ["?"]),
     "getattr": ("self.a = 'x'\nself.P(getattr(self, 'a'))", ["x"]),
     "a class without bases by type()": (
