@@ -185,11 +185,12 @@ def sides_of(
 
     What is made where a launch decides in a way that no condition says is a gap, until a launch decides.
     """
-    condition = condition_of(run, test, frame)
+    condition = condition_of(run, test, frame) if run.has_inputs else None
     held = {True: _certain(condition), False: _certain(opposite(condition))}
-    if condition is None and isinstance(test, ast.BoolOp | ast.UnaryOp):
+    if run.has_inputs and condition is None and isinstance(test, ast.BoolOp | ast.UnaryOp):
         held = {holds: conditions_of(run, test, holds, frame) for holds in (True, False)}
-    read = [] if all(held.values()) else [*filter(is_of_launch, _read_in(run, test, frame))]
+    open_ = run.has_inputs and not all(held.values())
+    read = [*filter(is_of_launch, _read_in(run, test, frame))] if open_ else []
     asks = bool(read)
     run.asks_launch = run.asks_launch or asks
 

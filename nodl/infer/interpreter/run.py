@@ -16,7 +16,7 @@ from nodl.infer.packages import find_package, manifest_places
 from nodl.infer.program import Program, SourceModule
 from nodl.infer.start import NO_LAUNCH
 from nodl.infer.state import Allocations, ProgramState, Written
-from nodl.infer.text import Guard, Text
+from nodl.infer.text import Guard, Input, NodePart, Text
 from nodl.infer.values import (
     ANY,
     BOTTOM,
@@ -189,6 +189,7 @@ class Run(Allocations):
         self.recursive: set[ast.AST] = set()  # functions that called themselves in the running call
         self.options = OptionDefaults()
         self.launch = NO_LAUNCH  # with its values inputs do not stay open
+        self.has_inputs = False  # a value may be of the launch
         self.asks_launch = False  # the value of a parameter decides more than conditions on names can say
         self.settle: Callable[[Run], None] = lambda run: None  # runs the callbacks; set by who drives the run
         self.guards: tuple[Guard, ...] = ()  # of parameters, that hold at the current point
@@ -393,6 +394,11 @@ class Run(Allocations):
 
     def gap(self, node: ast.AST, frame: Frame, why: str) -> None:
         self.findings.gap(SourceRef(frame.module.source.path, getattr(node, "lineno", 0)), why)
+
+    def of_launch(self, piece: Input | NodePart) -> Value:
+        """Return the text of an input or of the node's name, on which tests may depend from now on."""
+        self.has_inputs = True
+        return (Text((piece,)),)
 
     def variables_of(self, node: ast.AST, frame: Frame) -> Value:
         """Evaluate ``vars(x)``, ``x.__dict__``, ``globals()``: a gap, for what is done with this dictionary is not

@@ -99,10 +99,10 @@ def _parsed(run: Run, name: str, call: Call) -> Value:
         default = sole(given.get("default", (not there,)))
         run.options.declare(name, (default,))
         flag = Input(name, run.options, (("given", (str(there), str(default))),))
-        return (Text((flag,)),) if isinstance(default, bool) else BOOLEAN
+        return run.of_launch(flag) if isinstance(default, bool) else BOOLEAN
     kept = all(isinstance(atom, External) and atom.path in _KEEP_TEXT for atom in given.get("type", BOTTOM))
     if action == "store" and nargs in (None, "?") and kept and name.startswith("-"):
-        return (Text((Input(name, run.options),)),)
+        return run.of_launch(Input(name, run.options))
     run.asks_launch = True
     return unknown(f"what is made of the command line option {name}")
 

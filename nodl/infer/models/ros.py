@@ -337,7 +337,7 @@ def _own_name(what: str) -> NodeMethod:
             or launched.namespace is None
             or record.namespaces != NONE
         ):
-            return (Text((NodePart(what),)),)
+            return run.of_launch(NodePart(what))
         full = f"{launched.namespace.rstrip('/')}/{launched.name}"
         return ({"name": launched.name, "namespace": launched.namespace}.get(what, full),)
 
@@ -416,7 +416,7 @@ def _inputs(run: Run, record: NodeRecord, names: list[str], call: Call) -> Value
         if settled:
             result = join(result, settled)
         else:
-            result = join(result, (Text((Input(name, record),)),))
+            result = join(result, run.of_launch(Input(name, record)))
     return result
 
 
@@ -496,6 +496,7 @@ def _get_parameters_by_prefix(run: Run, record: NodeRecord, call: Call) -> Value
     launched = _launched(run, record)
     prefix = sole(call.args.at(0, "prefix"))
     if launched is None or not isinstance(prefix, str):
+        run.has_inputs = True
         return OF_LAUNCH
     found = run.allocate(call.node, "by prefix", Dictionary)
     start = f"{prefix}." if prefix else ""

@@ -17,7 +17,7 @@ from nodl.infer.interpreter.imports import import_module
 from nodl.infer.interpreter.run import Arguments, Call, Model, Run
 from nodl.infer.models import options
 from nodl.infer.start import NO_LAUNCH
-from nodl.infer.text import Input, Text, concatenations, constant_text
+from nodl.infer.text import Input, concatenations, constant_text
 from nodl.infer.values import (
     ABSENT,
     ANY,
@@ -383,7 +383,7 @@ def _environment(run: Run, call: Call) -> Value:
         if settled is not None or ("$" + name in run.launch.inputs and default):
             result = join(result, default if settled is None else (settled,))
             continue
-        result = join(result, (Text((Input("$" + name, run.options),)),))
+        result = join(result, run.of_launch(Input("$" + name, run.options)))
     return result or unknown("an environment variable")
 
 
