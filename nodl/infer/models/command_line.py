@@ -81,7 +81,7 @@ def _declare(parser: argparse.ArgumentParser, declared: DeclaredOption) -> str:
     if declared.action in _WITH_WORDS:
         settings.update(action=declared.action, type=partial(_Word, declared))
         if settings.get("nargs") == "?":
-            settings["const"] = constant
+            settings.update(const=constant, default=None)  # it would make a word of SUPPRESS
     elif declared.action in _WITH_CONSTANT:
         settings.update(action="store_const", const=constant)
     elif declared.action == "count":

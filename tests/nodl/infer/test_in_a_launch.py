@@ -684,6 +684,27 @@ def test_lists_of_words_of_the_command_line_are_names(
     assert own - {"/rosout", "/parameter_events"} == published
 
 
+@pytest.mark.parametrize(("words", "published"), [("", "/chatter"), ('args="speech"', "/speech")])
+def test_a_word_that_may_be_left_out_has_its_default(
+    words: str, published: str, launch: Launch, prefix: Path
+) -> None:
+    program = """
+import argparse
+import rclpy
+from std_msgs.msg import String
+parser = argparse.ArgumentParser()
+parser.add_argument("topic", nargs="?", default="chatter")
+given, _ = parser.parse_known_args()
+rclpy.init()
+rclpy.create_node("one").create_publisher(String, given.topic, 10)
+"""
+    install_program(prefix, PYTHON + program, "one")
+    plan = launch(f'<launch><node pkg="demo" exec="one" {words}/></launch>')
+    assert [str(problem) for problem in plan.problems] == []
+    own = {name for operation, name in permissions(plan) if operation == "publish"}
+    assert own - {"/rosout", "/parameter_events"} == {published}
+
+
 @pytest.mark.parametrize("words", ["sys.argv[1:]", "sys.argv[:][1:]", "remove_ros_args(sys.argv)[1:]"])
 def test_the_command_line_without_the_name_of_the_program_is_the_launchs(
     words: str, launch: Launch, prefix: Path
