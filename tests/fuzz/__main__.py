@@ -1,7 +1,8 @@
 """``./dev fuzz [TARGET [MINUTES]]``: every target, or one, in turn until the time is over (default: 10 minutes).
 
 The first input at which a parser does something else than give a value or refuse is printed, made as small as possible;
-the exit status is then 1.
+the exit status is then 1. ``cpp-programs`` compiles and runs random programs and prints the first of which inference
+says something false, or misses something silently.
 """
 
 from __future__ import annotations
@@ -9,38 +10,54 @@ from __future__ import annotations
 import contextlib
 import random
 import sys
+import tempfile
 import time
+from pathlib import Path
 
 from hypothesis import HealthCheck, given, seed, settings
 
 from tests.fuzz.inputs import damaged
 from tests.fuzz.targets import Target, targets
+from tests.nodl.infer.cpp.random_programs.generator import program
+from tests.nodl.infer.cpp.random_programs.judge import judged, runs
 
+PROGRAMS, BATCH = "cpp-programs", 30
 ROUND = 1_000  # inputs of one target before it is another one's turn
 
 
 def main(arguments: list[str]) -> int:
     known = targets()
-    chosen = arguments[:1] or list(known)
-    if chosen[0] not in known:
-        print(f"no target {chosen[0]!r}; there are: {' '.join(known)}", file=sys.stderr)
+    names = [*known, PROGRAMS]
+    chosen = arguments[:1] or names
+    if chosen[0] not in names:
+        print(f"no target {chosen[0]!r}; there are: {' '.join(names)}", file=sys.stderr)
         return 2
     until = time.monotonic() + 60 * float(arguments[1] if len(arguments) > 1 else 10)
     count = 0
     while time.monotonic() < until:
         for name in chosen:
             try:
-                one_round(known[name])
+                count += random_programs() if name == PROGRAMS else one_round(known[name])
             except Exception as error:  # whatever it is, it is what we look for
                 print(f"{name}: {type(error).__name__}: {error}", file=sys.stderr)
                 raise
-            count += ROUND
             print(f"\r{count} inputs, last {name:20}", end="", file=sys.stderr, flush=True)
     print(f"\n{count} inputs, no fault", file=sys.stderr)
     return 0
 
 
-def one_round(target: Target) -> None:
+def random_programs() -> int:
+    """Judge some programs; ``AssertionError`` with the source of the first that is wrong."""
+    seeds = [random.randrange(2**32) for _ in range(BATCH)]
+    programs = [program(each) for each in seeds]
+    with tempfile.TemporaryDirectory() as folder:
+        for each, one, made in zip(seeds, programs, runs(programs, Path(folder), range(40)), strict=True):
+            verdict = judged(one, made, Path(folder) / str(each))
+            assert not verdict.silent and not verdict.false, f"{each}: {verdict}\n{one.files}"
+    return BATCH
+
+
+def one_round(target: Target) -> int:
     @seed(random.randrange(2**32))
     @settings(max_examples=ROUND, deadline=None, database=None, suppress_health_check=list(HealthCheck))
     @given(damaged(target.seeds, target.words))
@@ -49,6 +66,7 @@ def one_round(target: Target) -> None:
             target.run(document)
 
     run()
+    return ROUND
 
 
 if __name__ == "__main__":
