@@ -115,7 +115,7 @@ def _several(run: Machine, call: Call) -> Value:
     items = [item for atom in call.value(0) if isinstance(atom, Seq) for item in atom.items]
     if items:
         return (Seq(tuple(read(run, call.record, item) for item in items)),)
-    _write(run, call, (Map(((unknown("a parameter"), unknown("its value")),)),))
+    _write(run, call, (Map((), open=True),))
     return unknown("parameters below a prefix")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from nodl.infer.cpp.reading.declarations import (
@@ -78,7 +79,7 @@ class _Collector:
         ):
             self.alias(child, scope, cls)
         elif kind == "enum_specifier":
-            self.index.enums.add(text(field_of(child, "name")))
+            self.enum(child, scope)
         elif kind in ("declaration", "field_declaration"):
             self.declaration(child, scope, templates, cls)
         elif kind == "friend_declaration":
@@ -108,6 +109,20 @@ class _Collector:
                 made.virtual_base = any(b.type == "virtual" for b in child.children)
         self.index.classes.setdefault(name, []).append(made)
         self.collect(body, inner, [], made)
+
+    def enum(self, node: Node, scope: Scope) -> None:
+        name = text(field_of(node, "name"))
+        body = field_of(node, "body")
+        prefix = "::".join((*scope, *([name] if name else [])))
+        self.index.enums.add(name)
+        listed = [child for child in children(body) if child.type == "enumerator"]
+        if not _all_differ([text(field_of(each, "value")) for each in listed]):
+            return
+        for child in listed:
+            constant = text(field_of(child, "name"))
+            full = f"{prefix}::{constant}" if prefix else constant
+            for key in (constant, f"{name}::{constant}", full):
+                self.index.enumerators.setdefault(key, full)
 
     # --- functions --------------------------------------------------------------------------------------
 
@@ -178,7 +193,7 @@ class _Collector:
         if kind is not None and kind.type in STRUCTURES:
             self.class_(kind, scope, templates)
         elif kind is not None and kind.type == "enum_specifier":
-            self.index.enums.add(text(field_of(kind, "name")))
+            self.enum(kind, scope)
         if function_declarator(node) is not None and not _is_variable(node):
             made = self._function(node, scope, templates, cls)
             if made is not None:
@@ -238,7 +253,8 @@ class _Collector:
                     return
                 kind = field_of(kind, "name") or kind
             if kind is not None and kind.type == "enum_specifier":
-                self.index.enums |= {text(name) for name in (field_of(kind, "name"), *names)}
+                self.enum(kind, scope)
+                self.index.enums |= {text(name) for name in names}
                 return
             if names and kind is not None:
                 self.index.aliases["::".join((*scope, text(names[-1])))] = (text(kind), scope)
@@ -281,6 +297,13 @@ def _plain_name(name: str) -> str:
         if depth == 0 and character != ">":
             out.append(character)
     return re.sub(r"\s+", "", "".join(out))
+
+
+def _all_differ(numbers: Sequence[str]) -> bool:
+    """Return whether enumerators with these numbers, as written, are certainly all different."""
+    return not any(numbers[1:]) or (
+        all(map(str.isdecimal, numbers)) and len({*map(int, numbers)}) == len(numbers)
+    )
 
 
 def _initialiser(item: Node) -> tuple[str, Node]:

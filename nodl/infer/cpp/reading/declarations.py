@@ -157,6 +157,7 @@ class FileIndex:
     aliases: dict[str, tuple[str, Scope]] = field(default_factory=dict)
     using: list[str] = field(default_factory=list)  # using namespace
     enums: set[str] = field(default_factory=set)
+    enumerators: dict[str, str] = field(default_factory=dict)  # qualified and last name -> qualified
     errors: list[tuple[int, int, str]] = field(default_factory=list)  # first byte, line, text
     all_functions: list[Function] = field(default_factory=list)
     sites: tuple[Site, ...] | None = None  # where it may make interfaces, when asked

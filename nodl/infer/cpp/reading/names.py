@@ -94,6 +94,7 @@ class Names:
         self.declared: dict[str, list[Function]] = {}
         self.globals: dict[str, list[Global]] = {}
         self.aliases: dict[str, list[Alias]] = {}
+        self.enumerators: dict[str, str] = {}
         self.enums: set[str] = set()
         self._bases: dict[str, tuple[str, ...]] = {}
         self.hidden: dict[Class, frozenset[str]] = {}  # what ``inheritance.hidden`` found
@@ -118,6 +119,7 @@ class Names:
         for qualified, (target, scope) in index.aliases.items():
             last = qualified.rpartition("::")[2]
             self.aliases.setdefault(last, []).append(Alias(qualified, target, scope, index))
+        self.enumerators.update(index.enumerators)
         self.enums |= index.enums
 
     def _attach(self) -> None:

@@ -8,6 +8,9 @@ from collections.abc import Callable
 from typing import Any
 
 from nodl.infer.cpp.running.values import (
+    END,
+    Const,
+    Group,
     Param,
     Text,
     Unknown,
@@ -60,6 +63,10 @@ def computed(sign: str, left: object, right: object) -> Value:
 def _same(left: object, right: object) -> bool | None:
     if isinstance(left, int) and isinstance(right, int):
         return left == right
+    if isinstance(left, Const) and isinstance(right, Const):
+        return left == right
+    if END in (left, right) and isinstance(left, Group) != isinstance(right, Group):  # what find() gives
+        return False
     first, second = plain(left), plain(right)
     return None if first is None or second is None else first == second
 
@@ -80,9 +87,9 @@ def _sum(left: object, right: object) -> Value:
 
 
 def _is_number(atom: object) -> bool:
-    """Return whether it is a number, or a parameter whose default is a number."""
+    """Return whether it is a number, an enumerator, or a parameter whose default is a number."""
     default = atom.default if isinstance(atom, Param) else ()
-    return any(isinstance(each, int) for each in (atom, *default))
+    return any(isinstance(each, int | float | Const) for each in (atom, *default))
 
 
 _INTEGER = re.compile(

@@ -46,10 +46,12 @@ from nodl.infer.cpp.running.values import (
     join,
     lost,
     open_sequence,
+    plain,
     unknown,
 )
 from nodl.infer.cpp.running.variables import static_member
 from nodl.infer.cpp.syntax import Node, children, field_of, text, unwrapped
+from nodl.name_template import UnknownPart
 
 
 @expression("assignment_expression")
@@ -326,7 +328,7 @@ def _write_element(
         if run.methods_of(atom, "operator[]"):
             forget(run, node, frame, written=value)
         if isinstance(atom, Map) and keys:
-            found.append((as_one_map((*atom.entries, (keys[0], value))),))
+            found.append((with_entry(atom, keys[0], value),))
         elif isinstance(atom, Seq) and not atom.place:
             found.append((_with_item(atom, keys[0] if keys else BOTTOM, value),))
         elif isinstance(atom, Text | Param):
@@ -340,6 +342,21 @@ def _write_element(
 
 
 _ANYTHING = re.compile("")
+
+
+def with_entry(atom: Map, key: Value, value: Value) -> Map:
+    """Run ``map[key] = value``: of a key that is certainly the same the entry is replaced."""
+    certain = len(key) == 1 and not isinstance(key[0], Unknown) and _is_one_text(key[0])
+    kept = tuple(entry for entry in atom.entries if not (certain and entry[0] == key))
+    definite = len(key) == 1 and plain(key[0]) is not None
+    return as_one_map((*kept, (key, value)), atom.open or not definite)
+
+
+def _is_one_text(atom: object) -> bool:
+    """Return whether it has the same value wherever it stands: a literal, a parameter, a text of those."""
+    if isinstance(atom, Text):
+        return not any(isinstance(part, UnknownPart) for part in atom.parts)
+    return isinstance(atom, Param | bool | int)
 
 
 def _with_item(atom: Seq, key: Value, value: Value) -> Seq:

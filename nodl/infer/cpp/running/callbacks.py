@@ -208,7 +208,7 @@ def _settled(atom: object, before: Value) -> Value:
         return (open_sequence(join(*(_settled(each, BOTTOM) for each in item)) for item in atom.items),)
     if isinstance(atom, Map):
         values = [_settled(each, BOTTOM) for _, value in atom.entries for each in value]
-        return (as_one_map([(unknown("one of many keys"), join(*values))]),)
+        return (as_one_map([(unknown("one of many keys"), join(*values))], True),)
     return (atom,)
 
 

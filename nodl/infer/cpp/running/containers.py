@@ -9,7 +9,7 @@ from itertools import chain
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.arithmetic import added
-from nodl.infer.cpp.running.assignments import assign
+from nodl.infer.cpp.running.assignments import assign, with_entry
 from nodl.infer.cpp.running.constructors import (
     ORDERED,
     construct,
@@ -174,26 +174,41 @@ def _map_call(run: Machine, atom: Map, name: str, site: CallSite) -> Value:
 
     first = values[0] if values else BOTTOM
     if name in ("emplace", "insert_or_assign", "try_emplace") and len(values) >= 2:
-        return becomes(as_one_map((*atom.entries, _new_entry(run, site))))
+        key, value = _new_entry(run, site)
+        return becomes(
+            with_entry(atom, key, value) if name == "insert_or_assign" else _entered(atom, key, value)
+        )
     if name == "insert" and values:
         pairs = [each for each in first if isinstance(each, Group | Seq) and len(each.items) == 2]
         pairs += [Group(entry) for each in first if isinstance(each, Map) for entry in each.entries]
-        inserted = [(pair.items[0], pair.items[1]) for pair in pairs] or [
-            (unknown("a key"), unknown("a value"))
-        ]
-        return becomes(as_one_map((*atom.entries, *inserted)))
+        for pair in pairs:
+            atom = _entered(atom, pair.items[0], pair.items[1])
+        return becomes(atom if pairs else atom._replace(open=True))
     if name == "clear":
         return becomes(Map(()))
+    if name == "erase" and _has(atom, first) is not None:
+        return becomes(Map(tuple(entry for entry in atom.entries if entry[0] != first)))
     if name in _CHANGES:
         return becomes(_changed_by(atom, name, values)[0])
-    if name in ("at", "find") and values:
-        found = element(run, atom, first)
-        return found if name == "at" else (END, Group((first, found)))
+    if name in ("at", "find", "count", "contains") and values:
+        found, has = element(run, atom, first), _has(atom, first)
+        if name == "find":
+            return (*(() if has else (END,)), *(() if has is False else (Group((first, found)),)))
+        return found if name == "at" else unknown("a condition") if has is None else (has,)
     if name in ("end", "cend"):
         return (END,)
     if name in ("begin", "cbegin"):
-        return (Seq(tuple((Group(entry),) for entry in atom.entries), open=True, place=True),)
+        is_open = atom.open or len(atom.entries) > 1  # entries stand as they were made, not by their keys
+        return (Seq(tuple((Group(entry),) for entry in atom.entries), is_open, place=True),)
     return unknown(f"the result of {name}()")
+
+
+def _has(atom: Map, key: Value) -> bool | None:
+    """Return whether a map certainly has a key, or has it not."""
+    keys = (key, *(known for known, _ in atom.entries))
+    if atom.open or any(len(each) != 1 or plain(each[0]) is None for each in keys):
+        return None
+    return key in keys[1:]
 
 
 def _new_entry(run: Machine, site: CallSite) -> tuple[Value, Value]:
@@ -208,6 +223,14 @@ def _new_entry(run: Machine, site: CallSite) -> tuple[Value, Value]:
     if inner is None or cls is None or whole:
         return key, rest[0] if rest else BOTTOM
     return key, construct(run, inner, rest, site.node, site.frame)
+
+
+def _entered(atom: Map, key: Value, value: Value) -> Map:
+    """Enter a pair; a key that the map already has keeps its value."""
+    definite = len(key) == 1 and plain(key[0]) is not None
+    if definite and not atom.open and any(known == key for known, _ in atom.entries):
+        return atom
+    return as_one_map((*atom.entries, (key, value)), atom.open or not definite)
 
 
 _CHANGES = frozenset({

@@ -130,7 +130,7 @@ def _elements_copied(run: Machine, atom: object, node: Node, frame: Frame) -> ob
     if isinstance(atom, Seq):
         return Seq(tuple(copied(run, item, node, frame) for item in atom.items), atom.open)
     if isinstance(atom, Map):
-        return Map(tuple((key, copied(run, item, node, frame)) for key, item in atom.entries))
+        return Map(tuple((key, copied(run, item, node, frame)) for key, item in atom.entries), atom.open)
     return atom
 
 
@@ -171,7 +171,8 @@ def items_of(run: Machine, atom: object) -> tuple[list[Value], bool]:
     if isinstance(atom, Seq):
         return list(atom.items), not atom.open
     if isinstance(atom, Map):
-        return [(Group(entry),) for entry in atom.entries], not atom.entries
+        # They stand as they were made, not by their keys.
+        return [(Group(entry),) for entry in atom.entries], not atom.open and len(atom.entries) < 2
     if isinstance(atom, Group):
         return list(atom.items), True
     if isinstance(atom, Param):

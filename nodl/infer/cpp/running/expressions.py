@@ -40,6 +40,7 @@ from nodl.infer.cpp.running.values import (
     join_in_doubt,
     literal,
     lost,
+    plain,
     unknown,
 )
 from nodl.infer.cpp.running.variables import member, variable
@@ -512,7 +513,8 @@ def _with_entry_of(atom: object, key: Value) -> object:
     if not isinstance(atom, Map) or any(known == key for known, _ in atom.entries):
         return atom
     made = unknown("an entry that a map makes for a key that it did not have")
-    return as_one_map((*atom.entries, (key, made)))
+    is_known = len(key) == 1 and plain(key[0]) is not None
+    return as_one_map((*atom.entries, (key, made)), atom.open or not is_known)
 
 
 def element(run: Machine, atom: object, key: Value) -> Value:
@@ -520,6 +522,9 @@ def element(run: Machine, atom: object, key: Value) -> Value:
     if isinstance(atom, Param):
         (atom,) = settled(run, (atom,))
     if isinstance(atom, Map):
+        definite = [value for known, value in atom.entries if len(key) == 1 and known == key]
+        if definite and not atom.open:
+            return definite[-1]
         return join(*(value for _, value in atom.entries), unknown("an element of a map"))
     if isinstance(atom, Seq | Group | Param):
         items, exact = items_of(run, atom)

@@ -28,6 +28,7 @@ from nodl.infer.cpp.running.memory import Changes
 from nodl.infer.cpp.running.references import bind_reference
 from nodl.infer.cpp.running.values import (
     BOTTOM,
+    Const,
     Group,
     Obj,
     Seq,
@@ -377,7 +378,8 @@ def nothing(run: Machine, node: Node, frame: Frame) -> int:
         _local_alias(run, node, frame)
     if node.type == "enum_specifier":
         for each in children(field_of(node, "body")):
-            run.local(frame, text(field_of(each, "name")), unknown("an enumerator"))
+            name = text(field_of(each, "name"))
+            run.local(frame, name, (Const(f"{name} in line {node.start_point[0] + 1}"),))
     return NEXT
 
 

@@ -130,7 +130,7 @@ class ReferredTo(Unknown):
 
 
 class Const(NamedTuple):
-    """What is equal to itself alone."""
+    """An enumerator, by its qualified name."""
 
     name: str
 
@@ -167,9 +167,10 @@ class Seq(NamedTuple):
 
 
 class Map(NamedTuple):
-    """Entries of key and value, in any order: of a map that is not empty it is not known which of them it has."""
+    """Entries of key and value. ``open``: it may hold others, or lack some."""
 
     entries: tuple[tuple[Value, Value], ...]
+    open: bool = False
 
 
 class Group(NamedTuple):
@@ -321,19 +322,20 @@ def in_any_order(atoms: Value) -> Value:
     if lists:
         found.append(open_sequence(item for atom in lists for item in atom.items))
     if maps:
-        found.append(as_one_map(entry for atom in maps for entry in atom.entries))
+        found.append(as_one_map([entry for atom in maps for entry in atom.entries], True))
     return tuple(found)
 
 
-def as_one_map(entries: Iterable[tuple[Value, Value]]) -> Map:
-    """Merge entries of equal keys, of which one counts; if a key is not known, or they are too many, all entries."""
+def as_one_map(entries: Iterable[tuple[Value, Value]], is_open: bool) -> Map:
+    """Merge entries of equal keys; if a key is not known, or they are too many, all to one that is not known."""
     found: dict[Value, Value] = {}
     for key, value in entries:
         found[key] = join_in_doubt([found[key], value], "which value a key has") if key in found else value
     strange = next((key for key in found if any(isinstance(atom, Unknown) for atom in key)), None)
     if strange is not None or len(found) > MAX_ITEMS:
         found = {strange or unknown("one of many keys"): join(*found.values())}
-    return Map(tuple(found.items()))
+        is_open = True
+    return Map(tuple(found.items()), is_open)
 
 
 def open_sequence(items: Iterable[Value]) -> Seq:
@@ -357,7 +359,7 @@ def _lost(atom: Atom, why: str, written: Value) -> Atom:
         return Seq((lost(join(*atom.items, more, unknown(why)), why, written),), True, atom.place)
     if isinstance(atom, Map):
         items = (lost(value, why, written) for _, value in atom.entries)
-        return Map(((unknown(why), join(*items, unknown(why))),))
+        return Map(((unknown(why), join(*items, unknown(why))),), True)
     if isinstance(atom, Group):
         return Group(tuple(lost(item, why, written) for item in atom.items))
     return atom if isinstance(atom, Obj | Lambda | Bound) or atom == END else Unknown(why)

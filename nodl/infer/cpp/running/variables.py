@@ -9,12 +9,12 @@ from nodl.infer.cpp.running.constructors import declared_value
 from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.memory import Cell
 from nodl.infer.cpp.running.static_types import current_object, static_by_name
-from nodl.infer.cpp.running.values import BOTTOM, Bound, Obj, Value, unknown
+from nodl.infer.cpp.running.values import BOTTOM, Bound, Const, Obj, Value, unknown
 from nodl.infer.cpp.syntax import text
 
 
 def variable(run: Machine, name: str, frame: Frame) -> Value:
-    """Return the local variable, member, constant or function of that name."""
+    """Return the local variable, member, constant, enumerator or function of that name."""
     owner = frame.owner_of(name)
     if owner is not None:
         return run.store.get((owner, name)) or BOTTOM
@@ -90,7 +90,7 @@ def _before_main(run: Machine, cell: Cell, made: Callable[[], Value]) -> Value:
 
 
 def constant(run: Machine, name: str, frame: Frame) -> Value | None:
-    """Return the global, static member or functions of that name; ``None`` if none is found."""
+    """Return the global, static member, enumerator or functions of that name; ``None`` if none is found."""
     static = static_by_name(run, name, frame)
     if static is not None:
         return static_member(run, *static)
@@ -112,6 +112,11 @@ def constant(run: Machine, name: str, frame: Frame) -> Value | None:
             )
             run.store.set(cell, known)
         return known
+    head, separator, last = name.rpartition("::")
+    for key in (name, f"{head.rpartition('::')[2]}::{last}" if separator else name):
+        full = run.names.enumerators.get(key)
+        if full is not None:
+            return (Const(full),)
     function = run.names.find_functions(name, frame.scope, frame.file)
     if function:
         return tuple(Bound(each, None) for each in function)

@@ -96,9 +96,9 @@ FOUND = {
         f"if (at != std::string::npos) {{ {PUB}(s.substr(at + 1), 1); }}",
         "", ["?"],
     ),
-    "an entry that is not there may be": (
+    "an entry that is not there": (
         f'std::map<std::string, int> m{{{{"a", 1}}}}; if (m.find("b") != m.end() || m.count("b")) {{ {PUB}("b", 1); }}',
-        "", ["b"],
+        "", [],
     ),
     "a list that loses its last": (
         f'std::vector<std::string> v{{"a", "b"}}; v.pop_back(); for (auto & e : v) {{ {PUB}(e, 1); }}', "", ["?"]
@@ -115,8 +115,8 @@ FOUND = {
         ["t3"],
     ),
     "whole numbers that are divided": (f'{PUB}("t" + std::to_string(7 / 2 + 7 % 4), 1);', "", ["t6"]),
-    "any enumerator": (
-        f'enum Mode {{ On, Off }}; Mode m = Off; {PUB}(m == On ? "on" : "off", 1);', "", ["off", "on"]
+    "an enumeration of a function": (
+        f'enum Mode {{ On, Off }}; Mode m = Off; {PUB}(m == On ? "on" : "off", 1);', "", ["off"]
     ),
     "any case": (
         f"char c = 'b'; switch (c) {{ case 'a': {PUB}(\"a\", 1); break; case 'b': {PUB}(\"b\", 1); }}", "", ["a", "b"]
@@ -141,7 +141,7 @@ FOUND = {
     "an element by at": (
         f'std::vector<std::string> v{{"a", "b"}}; v.at(1) = "c"; std::map<std::string, std::string> m{{{{"k", "d"}}}}; '
         f'm.at("k") = "e"; {PUB}(v[0], 1); {PUB}(v[1], 1); {PUB}(m["k"], 1);',
-        "", ["?", "a", "c"],
+        "", ["a", "c", "e"],
     ),
     "structures and macros of POSIX": (
         f'sockaddr_in address; fd_set set; FD_ZERO(&set);\nFD_SET(1, &set);\n{PUB}("a", 1);', "struct sockaddr_in a_;",

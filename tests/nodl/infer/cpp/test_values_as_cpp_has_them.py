@@ -123,10 +123,10 @@ PROGRAMS: dict[str, tuple[str, str, str, set[str], set[str]]] = {
         'struct C { std::string t; int n = 0; }; const C cfg[2] = {{"c0"}, {"c1", 2}};',
         'static const char * names[] = {"n0", "n1"};\n', {"n0", "n1", "n1_1", "c0", "c1"}, {"n", "0"},
     ),
-    "of enumerators it is not known which are equal": (
+    "enumerators of one enumeration differ, unless one is another": (
         'Side s = Side::Left; if (s == Side::Right) pub("right"); Twin t = Same; if (t == One) pub("one");'
         'pub("p" + std::to_string(One));',
-        "", "enum class Side { Left, Right }; enum Twin { One = 1, Same = One };\n", {"one", "right"}, {"p1"},
+        "", "enum class Side { Left, Right }; enum Twin { One = 1, Same = One };\n", {"one"}, {"right", "p1"},
     ),
     "a switch may take any of its cases": (
         'switch (Side::Right) { case Side::Left: pub("left"); break; default: pub("right"); }'
@@ -202,10 +202,10 @@ PROGRAMS: dict[str, tuple[str, str, str, set[str], set[str]]] = {
         'std::vector<S> v{S(), S()}; v[1].t = "b"; std::swap(v[0], v[1]); pub(v[0].t + "_0"); pub(v[1].t + "_1");', "",
         'struct S { std::string t = "a"; };\n', set(), {"a_0", "b_1"},
     ),
-    "which entries are left is not known": (
+    "an entry that is erased by its name is gone": (
         'std::map<std::string, std::string> m{{"a", "one"}, {"b", "two"}}; m.erase("a");'
         "for (auto & [k, v] : m) { pub(v); }",
-        "", "", set(), {"one", "two"},
+        "", "", {"two"}, {"one"},
     ),
     "nothing follows a call that only throws": (
         'try { fail(); pub("dead"); } catch (...) { pub("caught"); }',
