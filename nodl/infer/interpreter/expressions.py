@@ -327,8 +327,11 @@ def _boolean(run: Run, node: ast.BoolOp, frame: Frame) -> Value:
     stops_at = isinstance(node.op, ast.Or)
     result: Value = BOTTOM
     for index, operand in enumerate(node.values):
-        evaluate = partial(_after, run, operand, node.values[:index], not stops_at, frame)
-        value = run.state.perhaps(evaluate) if index and type(operand) is not ast.Constant else evaluate()
+        before = (
+            node.values[:index] if type(operand) is not ast.Constant else []
+        )  # which narrow what they test
+        evaluate = partial(_after, run, operand, before, not stops_at, frame)
+        value = run.state.perhaps(evaluate) if before else evaluate()
         if index == len(node.values) - 1 or truth(value) is stops_at:
             return join(result, value)
         if any(map(is_of_launch, value)):
