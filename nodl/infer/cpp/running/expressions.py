@@ -21,6 +21,7 @@ from nodl.infer.cpp.running.static_types import (
     current_object,
     declared_type,
     is_pointer,
+    seen_type,
 )
 from nodl.infer.cpp.running.values import (
     BOTTOM,
@@ -338,9 +339,7 @@ def binary(run: Machine, node: Node, frame: Frame) -> Value:
             assign(run, right_node, unknown("a word that is read from a stream"), frame)
         return unknown("a stream")
     if operator == "<<" and not (len(left) == 1 and isinstance(left[0], int)):
-        if has_text(left):
-            _write_stream(run, left_node, unknown("what is written to a stream"), frame)
-        return left or unknown("a stream")
+        return _streamed(run, left_node, left, right_node, right, frame)
     if operator == "+" and (has_text(left) or has_text(right)):
         return added(left, right)
     if len(left) == 1 and len(right) == 1:
@@ -366,6 +365,38 @@ def _logical(run: Machine, either: bool, left: Value, right_node: Node | None, f
     run.branches([second, lambda: NEXT], tested=True)
     right = decided(run, found[0])
     return (either,) if right is either else unknown("a condition")
+
+
+_MANIPULATORS = re.compile(
+    r"std::(?:hex|oct|fixed|scientific|setw|setfill|setprecision|setbase|boolalpha|(?:no)?show\w+|(?:no)?uppercase|left|right|"
+    r"internal|put_\w+)\b"
+)
+
+
+def _streamed(
+    run: Machine, target: Node | None, left: Value, written: Node | None, right: Value, frame: Frame
+) -> Value:
+    """Evaluate ``stream << text``; the stream is a text that grows, until something changes how it writes."""
+    if not has_text(left):
+        return left or unknown("a stream")
+    if written is not None and _MANIPULATORS.match(text(written)):
+        found = unknown("a stream that writes in a way of its own")
+    elif any(type(atom) is int for atom in right) and _is_letter(run, written, frame):
+        found = concatenated(left, unknown("the letter of a number"))
+    else:
+        found = concatenated(left, right) if right else left
+    _write_stream(run, target, found, frame)
+    return found
+
+
+def _is_letter(run: Machine, written: Node | None, frame: Frame) -> bool:
+    """Return whether a number is one of 8 bits, which a stream writes as a letter."""
+    return _LETTER.fullmatch(seen_type(run, written, frame).name) is not None or (
+        re.search(r"\b(?:u?int8_t|char)\b", text(written)) is not None
+    )
+
+
+_LETTER = re.compile(r"(?:std::)?u?int8_t|(?:un)?signed char|char")
 
 
 def _write_stream(run: Machine, target: Node | None, written: Value, frame: Frame) -> None:

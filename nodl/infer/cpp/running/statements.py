@@ -11,7 +11,7 @@ from nodl.infer.cpp.reading.collect import declared_names
 from nodl.infer.cpp.reading.declarations import type_text
 from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.constructors import declared_value, fields_of
-from nodl.infer.cpp.running.launch_values import decided, in_doubt
+from nodl.infer.cpp.running.launch_values import decided, in_doubt, settled
 from nodl.infer.cpp.running.left_out import forget_writes
 from nodl.infer.cpp.running.machine import (
     BREAK,
@@ -32,8 +32,10 @@ from nodl.infer.cpp.running.values import (
     Group,
     Obj,
     Seq,
+    Text,
     Value,
     join,
+    plain,
     unknown,
 )
 from nodl.infer.cpp.running.variables import member
@@ -222,30 +224,59 @@ def preprocessor_branches(run: Machine, node: Node, frame: Frame) -> int:
 @statement("switch_statement")
 @in_a_block
 def switch_statement(run: Machine, node: Node, frame: Frame) -> int:
-    """Run any of the cases, with those it falls through to: which is chosen is not followed."""
+    """Run the case that is chosen and those it falls through to; any of the cases if that is not decided."""
     condition = field_of(node, "condition")
-    run.evaluate(field_of(condition, "value") or unwrapped(condition), frame)
+    subject = settled(run, run.evaluate(field_of(condition, "value") or unwrapped(condition), frame))
     if run.left:
         return RETURN
     cases = [c for c in children(field_of(node, "body")) if c.type == "case_statement"]
+    chosen = _chosen_case(run, node, cases, subject, frame)
     loop = _Switch(run.store.mark(), run.steps)
     frame.loops.append(loop)
-    sides: list[Callable[[], int]] = [partial(_falling, run, cases[at:], frame) for at in range(len(cases))]
-    if all(field_of(case, "value") is not None for case in cases):
+    starts = range(len(cases)) if chosen is None else chosen
+    certain = chosen is not None
+    sides: list[Callable[[], int]] = [partial(_falling, run, cases[at:], certain, frame) for at in starts]
+    if not sides or (chosen is None and all(field_of(case, "value") is not None for case in cases)):
         sides.append(lambda: NEXT)
-    outcome = run.branches(sides, tested=True)
+    outcome = run.branches(sides, tested=len(sides) > 1)
     frame.loops.pop()
     run.settle(loop.start, loop.breaks, bool(outcome & NEXT))
-    return (outcome & ~BREAK) | NEXT if outcome & BREAK else outcome
+    if outcome & BREAK:
+        outcome = (outcome & ~BREAK) | NEXT
+    for case in cases[: min(chosen, default=0)] if chosen is not None else ():
+        run.kill(case, frame, "the switch never takes this case")
+    return outcome
 
 
-def _falling(run: Machine, cases: list[Node], frame: Frame) -> int:
+def _chosen_case(
+    run: Machine, switch: Node, cases: list[Node], subject: Value, frame: Frame
+) -> list[int] | None:
+    """Return the case of this enumerator or number, none if there is none; ``None`` if that is not decided."""
+    listed = [each for each in walk(switch) if each.type == "case_statement"]
+    default = [index for index, case in enumerate(cases) if field_of(case, "value") is None]
+    labels = [run.evaluate(field_of(case, "value"), frame) for case in cases]
+    known = [subject, *(label for index, label in enumerate(labels) if index not in default)]
+    if len(listed) != len(cases) or not all(len(v) == 1 and _is_label(v[0]) for v in known):
+        return None
+    if len({type(value[0]) for value in known}) > 1:
+        return None
+    return ([index for index, label in enumerate(labels) if label == subject] or default)[:1]
+
+
+def _is_label(atom: object) -> bool:
+    """Return whether it is an enumerator, a number or a letter."""
+    return isinstance(atom, Const | int) or (isinstance(atom, Text) and plain(atom) is not None)
+
+
+def _falling(run: Machine, cases: list[Node], certain: bool, frame: Frame) -> int:
     outcome = NEXT
-    for case in cases:
+    for index, case in enumerate(cases):
         value = field_of(case, "value")
         result = sequence(run, [child for child in children(case) if child != value], frame)
         outcome = (outcome & ~NEXT) | result
         if not result & NEXT:
+            for rest in cases[index + 1 :] if certain else ():
+                run.kill(rest, frame, "the switch never takes this case")
             break
     return outcome
 

@@ -235,6 +235,11 @@ NOT_MADE = {
     "in a branch that is never taken": in_class(
         'if (false) { create_publisher<std_msgs::msg::String>("a", 1); }'
     ),
+    "behind a constant of another value": in_class(
+        'if (mode_ == Mode::B) { create_publisher<std_msgs::msg::String>("a", 1); }',
+        "Mode mode_ = Mode::A;",
+        before="enum class Mode { A, B };\n",
+    ),
     "in a method that nobody calls": in_class(
         "", 'void unused() { create_publisher<std_msgs::msg::String>("a", 1); }'
     ),

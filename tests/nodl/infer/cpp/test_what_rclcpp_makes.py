@@ -161,7 +161,7 @@ NAMES = {
     "a macro": ("create_publisher<M>(TOPIC, 1);", "a"),
     "a static member": ("create_publisher<M>(kMember, 1);", "a"),
     "joined texts": ('create_publisher<M>(std::string("x/") + names::kTopic, 1);', "x/a"),
-    "a stream": ('std::stringstream s; s << "x" << 3; create_publisher<M>(s.str(), 1);', "?"),
+    "a stream": ('std::stringstream s; s << "x" << 3; create_publisher<M>(s.str(), 1);', "x3"),
     "a number": ('create_publisher<M>("x" + std::to_string(2), 1);', "x2"),
     "a format": ('create_publisher<M>(std::format("{}/x{}", "a", 3), 1);', "?"),
     "a format that is not known": ("create_publisher<M>(fmt::format(get_name(), 1), 1);", "?"),
