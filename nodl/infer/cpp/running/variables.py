@@ -81,9 +81,10 @@ def _before_main(run: Machine, cell: Cell, made: Callable[[], Value]) -> Value:
     C++ made it before ``main``: nothing is known of it if it is made of variables that changed since.
     """
     found: list[Value] = []
+    earlier = set(run.initial)  # the others are made meanwhile
     reads = run.store.watched(lambda: found.append(made()))
     (value,) = found
-    if any(held != run.initial.get(other, held) for other, held in reads.cells.items()):
+    if any(other in earlier and held != run.initial[other] for other, held in reads.cells.items()):
         value = unknown("a variable that was made before main of one that changed since")
     run.initial[cell] = value
     return value

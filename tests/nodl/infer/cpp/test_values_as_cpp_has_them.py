@@ -149,10 +149,10 @@ PROGRAMS: dict[str, tuple[str, str, str, set[str], set[str]]] = {
         {"base", "base_c", "derived_r"}, {"derived", "derived_c"},
     ),
     "a global is made before main of what others held then": (
-        'first = "later"; pub(second); pub(S::held); pub(kept); pub(same_);', 'std::string same_ = first;',
+        'first = "later"; pub(second); pub(S::held); pub(S::own); pub(kept); pub(same_);', 'std::string same_ = first;',
         'std::string first = "first", second = first, other = "other", kept = other + "_k";\n'
-        "struct S { inline static std::string held = first; };\n",
-        {"other_k", "first"}, {"later"},
+        'struct S { inline static std::string held = first, w = "w"; inline static std::string own = w + "_o"; };',
+        {"other_k", "first", "w_o"}, {"later"},
     ),
     "changes of a text in a row": (
         'std::string t = "a"; t.append("b").append("c"); pub(t); t.append("d").insert(0, "x"); pub(t + "_e");',
