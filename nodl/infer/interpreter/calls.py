@@ -8,6 +8,7 @@ import functools
 from nodl.infer.interpreter.conditions import is_of_launch, under
 from nodl.infer.interpreter.define import (
     foreign_bases,
+    functions_of,
     is_enumeration,
     linearized,
     member_with_value,
@@ -212,9 +213,25 @@ def instantiate(run: Run, cls: ClassValue, call: Call) -> Value:
         run.register_callback(run.attribute((cls,), "_missing_", call.node, call.frame), 1, run.state.mark())
         value = call.args.at(0, "value") or ANY
         return OF_LAUNCH if any(map(is_of_launch, value)) else member_with_value(run, cls, value)
+    made = _made_by_new(run, cls, call)
+    if made is not None:
+        return made
     instance = new_instance(run, cls, call)
     initialise(run, cls, instance, call)
     return (instance,)
+
+
+def _made_by_new(run: Run, cls: ClassValue, call: Call) -> Value | None:
+    """Return what the program's own ``__new__`` gives, initialised where it is an object of the class."""
+    for base in program_classes(cls):
+        if "__new__" in base.cells:
+            constructors = functions_of(base.cells["__new__"])
+            made = run.call(constructors, call.args.preceded((cls,)), call.node, call.frame)
+            for atom in (each for each in made if isinstance(each, Instance)):
+                if isinstance(atom.cls, ClassValue) and cls in linearized(atom.cls):
+                    initialise(run, atom.cls, atom, call)
+            return made
+    return None
 
 
 def initialise(run: Run, cls: ClassValue, instance: Instance, call: Call) -> None:

@@ -35,6 +35,7 @@ _TRANSPARENT = frozenset({
 })  # fmt: skip
 _PROPERTIES = frozenset({"builtins.property", "abc.abstractproperty"})
 _PLAIN_METACLASSES = frozenset({"abc.ABCMeta", "enum.EnumMeta", "enum.EnumType", "builtins.type"})
+_OPEN_NAMES = frozenset({"[class]", "__doc__", "__module__", "__qualname__", "__getattr__"})
 _PLAIN_DECORATORS = frozenset(
     {"functools.total_ordering", "typing.final", "typing.runtime_checkable", "enum.unique"}
 )
@@ -145,13 +146,17 @@ def define_class(run: Run, node: ast.ClassDef, frame: Frame) -> bool:
 
 
 _HOOKS = frozenset({
-    "__new__", "__setattr__", "__getattribute__", "__delattr__", "__get__", "__set__", "__set_name__",
+    "__setattr__", "__getattribute__", "__delattr__", "__get__", "__set__", "__set_name__",
     "__init_subclass__", "__class_getitem__", "__prepare__", "__instancecheck__",
 })  # fmt: skip
 
 
 def _is_plain(metaclass: object) -> bool:
-    """Return True if its classes are made as by ``type``."""
+    """Return True if its classes are made as by ``type``: what ``__getattr__`` gives is open, as any attribute that no
+    class has."""
+    if isinstance(metaclass, ClassValue):
+        named = {name for base in program_classes(metaclass) for name in base.cells if isinstance(name, str)}
+        return named <= _OPEN_NAMES and all(map(_is_plain, linearized(metaclass)[1:]))
     return isinstance(metaclass, External) and metaclass.path in _PLAIN_METACLASSES
 
 
@@ -169,6 +174,13 @@ def _made_otherwise(
         run.escape_value((cls,))
     if any(isinstance(base, Unknown) for base in linearized(cls)):
         run.escape_value((cls,))
+
+
+def functions_of(value: Value) -> Value:
+    """Return ``value`` with the functions themselves in place of class and static methods."""
+    return tuple(
+        each for atom in value for each in (atom.function if isinstance(atom, ClassMethod) else (atom,))
+    )
 
 
 def _decorated_class(run: Run, value: Value, cls: ClassValue, decorator: ast.expr, frame: Frame) -> Value:
@@ -272,7 +284,7 @@ def member_with_value(run: Run, cls: ClassValue, value: Value) -> Value:
     wanted = constant_text(value[0]) if len(value) == 1 else None
     members = enumeration_members(run, cls)
     values = [sole(member.cells["value"]) for member in members]
-    own = any("__init__" in base.cells for base in program_classes(cls))
+    own = any(name in base.cells for base in program_classes(cls) for name in ("__new__", "__init__"))
     if isinstance(wanted, (str, int)) and wanted in values and not own and all(map(is_constant, values)):
         return (members[values.index(wanted)],)
     return unknown("a member of an enumeration that is looked up by its value")

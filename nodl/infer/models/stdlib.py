@@ -10,7 +10,7 @@ from functools import partial
 from typing import Any
 
 from nodl.infer.interpreter.conditions import is_instance, is_of_launch, truth
-from nodl.infer.interpreter.define import expect_methods, program_classes
+from nodl.infer.interpreter.define import expect_methods, new_instance, program_classes
 from nodl.infer.interpreter.elements import copy_dictionary, elements, store_attribute
 from nodl.infer.interpreter.formatting import as_texts, text_value
 from nodl.infer.interpreter.imports import import_module
@@ -291,11 +291,6 @@ def _isinstance(run: Run, call: Call) -> Value:
     return OF_LAUNCH if outcome is None and any(map(is_of_launch, value)) else boolean(outcome)
 
 
-def _object_new(run: Run, call: Call) -> Value:
-    run.gap(call.node, call.frame, "an object is made without its constructor, which is not followed")
-    return unknown("an object whose constructor has not run")
-
-
 def _dynamic_code(run: Run, call: Call) -> Value:
     run.gap(call.node, call.frame, "code made at run time (eval, exec) is not analysed")
     return unknown("the result of code made at run time")
@@ -323,6 +318,19 @@ def _spread(tree: ast.Module) -> frozenset[ast.AST]:
     """Return the expressions passed as ``**``. The call copies such a mapping, so that it cannot be changed."""
     keywords = (node for node in ast.walk(tree) if isinstance(node, ast.keyword))
     return frozenset(node.value for node in keywords if node.arg is None)
+
+
+def _object_new(run: Run, call: Call) -> Value:
+    """Model ``object.__new__(cls)``: an object whose constructor has not run."""
+    made: list[object] = []
+    for atom in call.args.at(0) or ANY:
+        if isinstance(atom, ClassValue):
+            for base in program_classes(atom):
+                run.instantiated.setdefault(base.node)
+            made.append(new_instance(run, atom, call))
+        else:
+            made.append(unknown("an object of a class that is not known")[0])
+    return tuple(made)
 
 
 _BUILT_IN: dict[str, Callable[[Run, Call], Value]] = {
