@@ -415,3 +415,25 @@ def test_a_metaclass_that_only_gives_missing_attributes_is_followed(
     assert [str(each.name) for each in node.endpoints] == ["a"]
     found = [gap.why for gap in (*system.gaps, *node.gaps)]
     assert found == ["class C has a metaclass, which is not analysed"] * gaps
+
+
+def test_a_singleton_makes_its_interfaces_in_new(infer: Infer) -> None:
+    """As the spawner of ros2_control calls its services."""
+    system = infer(
+        """
+        import rclpy
+        from std_srvs.srv import Empty
+        class Caller:
+            _clients = {}
+            def __new__(cls, node, name):
+                if name not in cls._clients:
+                    cls._clients[name] = node.create_client(Empty, name)
+                return super().__new__(cls)
+        node = rclpy.create_node('n')
+        Caller(node, 'load')
+        Caller(node, 'switch')
+        """
+    )
+    (node,) = system.nodes
+    assert sorted(str(each.name) for each in node.endpoints) == ["load", "switch"]
+    assert not system.gaps and not node.gaps
