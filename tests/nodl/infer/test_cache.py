@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from nodl.infer import analysis, infer_executable, infer_paths, packages, system
+from nodl.infer import analysis, infer_executable, infer_paths, packages
 from nodl.infer.answers.python import own_sources
 from nodl.infer.program import Program, ProgramTarget
 
@@ -144,19 +144,23 @@ def test_without_a_folder_every_launch_analyses(
     assert len(analyses) == 2
 
 
-def test_files_that_were_inferred_together_are_not_analysed_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_files_that_were_inferred_together_are_not_analysed_again(tmp_path: Path, kept_answers: Path) -> None:
     (tmp_path / "one.py").write_text("import rclpy\nrclpy.create_node('one')\n")
     (tmp_path / "two.py").write_text("import rclpy\nfrom names import NAME\nrclpy.create_node(NAME)\n")
     (tmp_path / "names.py").write_text("NAME = 'two'\n")
     first = infer_paths([tmp_path])
     assert {node.name for node in first.nodes} == {"one", "two"}
-    monkeypatch.setattr(system, "start", None)  # would fail
+    written = _written(kept_answers)
     assert infer_paths([tmp_path]) == first
-    monkeypatch.undo()
+    assert _written(kept_answers) == written
     (tmp_path / "names.py").write_text("NAME = 'three'\n")
     assert {node.name for node in infer_paths([tmp_path]).nodes} == {"one", "three"}
+    assert _written(kept_answers) != written
+
+
+def _written(folder: Path) -> dict[Path, int]:
+    """Return when each answer was written: an analysis writes its answer."""
+    return {path: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
 
 
 ASKS_A_LIBRARY = """\

@@ -376,6 +376,15 @@ rclpy.spin(Decided())
 """
 
 
+def published_with(parameters: dict[str, str], launch: Launch, program: str) -> set[str]:
+    """Return what ``program`` may publish in a launch that sets ``parameters``, without what every node publishes."""
+    params = "".join(f'<param name="{name}" value="{value}"/>' for name, value in parameters.items())
+    plan = launch(f'<launch><node pkg="demo" exec="{program}">{params}</node></launch>')
+    assert [str(problem) for problem in plan.problems] == []
+    own = {name for operation, name in permissions(plan) if operation == "publish"}
+    return own - {"/rosout", "/parameter_events"}
+
+
 @pytest.mark.parametrize(
     ("given", "published"),
     [
@@ -463,11 +472,7 @@ def test_parameters_below_a_prefix_and_parts_of_elements_are_the_launchs(
     given: dict[str, str], published: set[str], launch: Launch, prefix: Path
 ) -> None:
     install_program(prefix, PYTHON + BELOW, "below")
-    params = "".join(f'<param name="{name}" value="{value}"/>' for name, value in given.items())
-    plan = launch(f'<launch><node pkg="demo" exec="below">{params}</node></launch>')
-    assert [str(problem) for problem in plan.problems] == []
-    own = {name for operation, name in permissions(plan) if operation == "publish"}
-    assert own - {"/rosout", "/parameter_events"} == published
+    assert published_with(given, launch, "below") == published
 
 
 CHOSEN = """
@@ -514,11 +519,7 @@ def test_functions_lists_members_and_remainders_that_a_parameter_chooses_are_dec
     given: dict[str, str], published: set[str], launch: Launch, prefix: Path
 ) -> None:
     install_program(prefix, PYTHON + CHOSEN, "chosen")
-    params = "".join(f'<param name="{name}" value="{value}"/>' for name, value in given.items())
-    plan = launch(f'<launch><node pkg="demo" exec="chosen">{params}</node></launch>')
-    assert not plan.problems
-    own = {name for operation, name in permissions(plan) if operation == "publish"}
-    assert own - {"/rosout", "/parameter_events"} == published
+    assert published_with(given, launch, "chosen") == published
 
 
 MEMBERS = """

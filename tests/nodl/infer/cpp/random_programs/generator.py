@@ -230,7 +230,10 @@ BLOCK_ROWS = [line.strip() for line in BLOCKS.strip().splitlines()]
 
 
 class Variable(NamedTuple):
-    """What an expression may name. ``root``: the variable in whose memory it lies."""
+    """A variable, or a part of one, that an expression may name.
+
+    ``root``: the variable that owns its memory.
+    """
 
     text: str
     kind: str
@@ -244,8 +247,10 @@ class Variable(NamedTuple):
 
 
 class Function(NamedTuple):
-    """``parameters``: kinds, each with how it is passed; ``changes``: roots that a call may resize; ``pure``: it
-    writes nothing that others see; ``node``: it takes the node first.
+    """A function that the program defines.
+
+    ``parameters``: the kind of each, with how it is passed. ``changes``: roots that a call may resize. ``pure``: it
+    writes nothing that other code reads. ``node``: its first parameter is the node.
     """
 
     name: str
@@ -258,7 +263,10 @@ class Function(NamedTuple):
 
 
 class Generator:
-    """``nasty``, from 0 to 1: how large the share of the features is that a program has."""
+    """Write one random program.
+
+    ``nasty``: from 0 to 1, how many of the features a program uses.
+    """
 
     def __init__(self, seed: int, nasty: float) -> None:
         self.random = random.Random(seed)
@@ -315,7 +323,7 @@ class Generator:
 
     @contextmanager
     def block(self, **state: object) -> Iterator[None]:
-        """What is declared in here ends here; ``state``: attributes that are others meanwhile."""
+        """Open a block: drop its variables at the end. ``state``: attributes to change in between."""
         before = {name: getattr(self, name) for name in ("frozen", "depth", "scope", "here", *state)}
         self.scope, self.frozen, self.depth, self.here = (
             list(self.scope),
@@ -396,7 +404,7 @@ class Generator:
         return re.sub(r"\$[a-zA-Z]|@\w+", part, template)
 
     def kept_value(self, kind: str) -> str:
-        """What a member may hold as long as the node lives: an address, or a closure that calls no other one."""
+        """Return a value that stays valid while the node lives: an address, or a closure that calls no other."""
         if kind == "pointer":
             found = [
                 v for v in self.scope if v.kind == "text" and v.lasts and v.text == v.root and not v.constant
@@ -414,7 +422,7 @@ class Generator:
 
     @contextmanager
     def in_kept_closure(self, callback: bool = False) -> Iterator[None]:
-        """A closure sees what lasts. Of a callback nobody waits for the end: it may resize and call what it likes."""
+        """Let a closure use only variables that outlive it. A callback may also resize containers."""
         seen = [
             v for v in self.scope if v.text.startswith("g_") or (v.text.endswith("_") and self.node == "")
         ]
