@@ -219,8 +219,7 @@ def seen_type(run: Machine, node: Node | None, frame: Frame) -> Type:
 
 
 TEXTS = re.compile(r"^(?!const\b).*\bstring\b")
-WHOLE_NUMBERS = re.compile(r"^(?!const\b).*\b(?:char|u?int\w*|bool|size_t|long)\b")
-"""Types of which a pointer or reference can be written through; fractions decide nothing."""
+"""Types of text that a pointer or reference can write."""
 
 
 def points_to_plain(run: Machine, node: Node, frame: Frame, what: re.Pattern[str]) -> bool:
