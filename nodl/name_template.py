@@ -29,8 +29,8 @@ class ParameterPart(NamedTuple):
 
     ``item``: the parameter is a list and this is its element at an index, or ``"each"`` of them.
     ``*`` in ``name`` stands for one part between dots: the names are the values of all such parameters.
-    ``edits``: a condition on the value, which then is no part of the name. Names that no ROS parameter can have stand
-    for other inputs of the program: ``--option`` and ``<argument>`` of its command line, ``$VARIABLE`` of
+    ``edits``: a condition on the value; the value is then not part of the name. Names that no ROS parameter can have
+    are other inputs of the program: ``--option`` and ``<argument>`` of its command line, ``$VARIABLE`` of
     its environment.
     """
 

@@ -117,7 +117,7 @@ def _cpp(files: list[str]) -> tuple[list[NodeInterface], list[Gap]]:
 
 
 class _Start(NamedTuple):
-    """``functions``: the entry points in ``file`` with which it starts; none for a script."""
+    """How one file is started: as a script, or by the ``functions`` that are its entry points."""
 
     file: str
     origin: LaunchKey
