@@ -18,6 +18,7 @@ from nodl.infer.values import (
     ABSENT,
     ANY,
     BOTTOM,
+    BUILTINS,
     ITEMS,
     OTHER,
     OTHER_KEYS,
@@ -29,9 +30,11 @@ from nodl.infer.values import (
     Items,
     Key,
     LocalCells,
+    ModuleCells,
     Sequence,
     Value,
     contains,
+    external,
     join,
     mixed_with_unknown,
     unsettled,
@@ -129,7 +132,7 @@ class ProgramState:
         if joined and len(outcomes) == 2:
             first, second = outcomes
             for place, (cells, key, _) in {**first, **second}.items():
-                before = (cells, key, cells.get(key, _absent(cells)))
+                before = (cells, key, cells.get(key, _absent(cells, key)))
                 value = joined(first.get(place, before)[2], second.get(place, before)[2])
                 first[place] = second[place] = cells, key, value
         if outcomes:
@@ -178,7 +181,7 @@ class ProgramState:
             for cells, key, value in outcome.values():
                 before = cells.get(key)
                 if before is None:
-                    self.write(cells, key, join(_absent(cells), value))
+                    self.write(cells, key, join(_absent(cells, key), value))
                 else:
                     self.write(cells, key, widen(before, value, widen_texts))
 
@@ -239,7 +242,7 @@ class ProgramState:
             entry = seen.get(place)
             if entry is None:
                 entry = (cells, key, cells.get(key, BOTTOM))
-            entry = (cells, key, join(entry[2], _absent(cells) if old is None else old))
+            entry = (cells, key, join(entry[2], _absent(cells, key) if old is None else old))
             seen[place] = entry
         return seen
 
@@ -266,8 +269,7 @@ class ProgramState:
                 current = BOTTOM
             if old is None:
                 stable = stable and not current
-                if isinstance(cells, FieldCells):
-                    self.write(cells, key, join(current, ABSENT))
+                self.write(cells, key, join(current, _absent(cells, key)))
                 continue
             joined = widen(old, current, widen_texts)
             if joined is not old and joined != old:
@@ -315,7 +317,7 @@ class ProgramState:
         for place, (cells, key, _) in places.items():
             before = cells.get(key)
             if before is None:
-                before = _absent(cells)
+                before = _absent(cells, key)
             partial = any(place not in outcome for outcome in outcomes)
             value: Value = before if partial else BOTTOM
             for outcome in outcomes:
@@ -333,8 +335,10 @@ def _same(old: Value, new: Value) -> bool:
     return all(contains(old, atom) for atom in new)
 
 
-def _absent(cells: Cells) -> Value:
+def _absent(cells: Cells, key: object) -> Value:
     """Return what a cell that was never written holds: a field may then be found in the class."""
+    if type(cells) is ModuleCells and key in BUILTINS:
+        return external(f"builtins.{key}")
     return ABSENT if isinstance(cells, FieldCells) else BOTTOM
 
 

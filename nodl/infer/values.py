@@ -9,6 +9,7 @@ Heap objects keep their contents in ``cells``; only ``state.State`` writes there
 from __future__ import annotations
 
 import ast
+import builtins
 from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING, ClassVar, NamedTuple, TypeAlias
 
@@ -63,14 +64,14 @@ OF_LAUNCH: Value = unknown("what only a launch decides")
 
 
 class Absent:
-    """In a field: it may not have been set, so that the class is asked."""
+    """In a field, or in a class: it may not have been set, so that the class, or its base, is asked."""
 
 
 ABSENT: Value = (Absent(),)
 
 
 class FieldCells(dict[object, Value]):
-    """The cells of an instance; the state notes when one may be absent."""
+    """The cells of an instance or class; the state notes when one may be absent."""
 
 
 class ContentCells(FieldCells):
@@ -89,6 +90,7 @@ class External:
         return f"External({self.path})"
 
 
+BUILTINS = frozenset(dir(builtins))
 _externals: dict[str, Value] = {}
 
 
@@ -106,6 +108,10 @@ RESULT = ".()"
 def result_of(path: str) -> Value:
     """Return what a library gives that keeps its hands off the program's objects: one value for each such library."""
     return external(path.partition(".")[0] + RESULT)
+
+
+class ModuleCells(dict[object, Value]):
+    """The global variables of a module; one that may not have been set is the built-in of its name, if there is one."""
 
 
 class LocalCells(dict[object, Value]):
@@ -217,6 +223,7 @@ class ModuleValue(HeapObject):
 
     def __init__(self, source: SourceModule):
         super().__init__()
+        self.cells = ModuleCells()
         self.source = source
         self.stars: list[str] = []  # foreign modules whose names were imported with *
 
@@ -253,6 +260,7 @@ class ClassValue(HeapObject):
 
     def __init__(self, node: ast.ClassDef, name: str, module: ModuleValue, bases: Value):
         super().__init__()
+        self.cells = FieldCells()
         self.node = node
         self.name = name
         self.module = module

@@ -48,25 +48,24 @@ def _of_instance(run: Run, obj: Instance, name: str, node: ast.AST, frame: Frame
     if isinstance(obj.cls, External):
         HeapObject.looked_into.add(id(obj.cells))
         return present(foreign.instance_attribute(run, obj, obj.cls.path, name) if held is None else held)
-    if held is not None:
-        if not obj.summary and ABSENT[0] not in held:
-            return held
-        held = tuple(atom for atom in held if atom is not ABSENT[0])
-        in_class = _class_attribute(run, obj, linearized(obj.cls), name, node, frame) or BOTTOM
+    if held is None:
+        held = BOTTOM
+    elif not obj.summary and ABSENT[0] not in held:
+        return held
+    held = present(held)
+    if name == "__class__":
+        return held or (obj.cls,)
+    in_class = _class_attribute(run, obj, linearized(obj.cls), name, node, frame)
+    if in_class is not None:
         if held and any(map(_is_of_a_node, in_class)) and name not in foreign.NODE_METHODS:
             return held  # rclpy's node has no attribute of this name: read too early, it is an error
-        return join(held, in_class) or ANY
-    if name == "__class__":
-        return (obj.cls,)
-    found = _class_attribute(run, obj, linearized(obj.cls), name, node, frame)
-    if found is not None:
-        return found
+        return join(held, in_class)
     getter = next(
         (c.cells["__getattr__"] for c in program_classes(obj.cls) if "__getattr__" in c.cells), BOTTOM
     )
     if getter:
-        return run.call(getter, Arguments([(obj,), (name,)]), node, frame)
-    return unknown(f"attribute {name}, which nothing analysed sets")
+        return join(held, run.call(getter, Arguments([(obj,), (name,)]), node, frame))
+    return held or unknown(f"attribute {name}, which nothing analysed sets")
 
 
 def _is_of_a_node(atom: object) -> bool:
@@ -81,7 +80,12 @@ def _class_attribute(
         if isinstance(base, ClassValue):
             value = base.cells.get(name)
             if value:
-                return _bound(run, obj, value, node, frame)
+                bound = _bound(run, obj, present(value), node, frame)
+                if ABSENT[0] in value:
+                    bound = join(
+                        bound, _class_attribute(run, obj, order[index + 1 :], name, node, frame) or ANY
+                    )
+                return bound
         elif isinstance(base, External):
             found = foreign.inherited(obj, base.path, name)
             if found is None:
@@ -128,23 +132,27 @@ def _of_class(run: Run, cls: ClassValue, name: str, node: ast.AST, frame: Frame)
         return run.variables_of(node, frame)
     if name == "__module__":
         return cls.module.cells.get("__name__", ANY)
-    order = linearized(cls)
-    for base in order:
+    result: Value = BOTTOM
+    for base in linearized(cls):
         if isinstance(base, ClassValue):
             value = base.cells.get(name)
             if value is None:
                 continue
-            if is_enumeration(cls) and not isinstance(value[0], (FunctionValue, ClassMethod, PropertyValue)):
+            if is_enumeration(cls) and not isinstance(
+                present(value)[0], (FunctionValue, ClassMethod, PropertyValue)
+            ):
                 return (enumeration_member(run, base, name),)
-            result: Value = BOTTOM
-            for atom in value:
+            for atom in present(value):
                 found: Value = (atom,)
                 if isinstance(atom, ClassMethod):
                     found = _bound_class_method(atom, cls)
                 result = join(result, found)
-            return result or ANY
+            if ABSENT[0] not in value:
+                return result or ANY
         if isinstance(base, External) and base.path not in ("builtins.object", "abc.ABC", "typing.Generic"):
-            return external(f"{base.path}.{name}")
+            return join(result, external(f"{base.path}.{name}"))
+    if result:
+        return result
     if name in ("__subclasses__", "__bases__", "__base__", "__mro__", "mro"):
         run.gap(node, frame, f"classes are found through {name}, which is not followed")
     return unknown(f"attribute {name} of class {cls.name}")

@@ -7,6 +7,7 @@ import ast
 from nodl.infer.interpreter.run import Arguments, Call, Run
 from nodl.infer.text import constant_text
 from nodl.infer.values import (
+    ABSENT,
     BoundMethod,
     ClassMethod,
     ClassValue,
@@ -19,6 +20,7 @@ from nodl.infer.values import (
     Value,
     external,
     join,
+    present,
     sole,
     unknown,
 )
@@ -169,9 +171,11 @@ def _made_otherwise(
         run.with_metaclass.add(cls.node)
         run.gap(node, frame, f"class {cls.name} has a metaclass, which is not analysed")
         run.escape_value((cls,))
-    for name in sorted(name for name in cls.cells if isinstance(name, str) and name in _HOOKS):
-        run.gap(node, frame, f"class {cls.name} defines {name}, which is not analysed")
-        run.escape_value((cls,))
+    for name in sorted(name for name in cls.cells if isinstance(name, str) and name.startswith("__")):
+        if name in _HOOKS or ABSENT[0] in cls.cells[name]:
+            perhaps = "" if name in _HOOKS else " under a condition"
+            run.gap(node, frame, f"class {cls.name} defines {name}{perhaps}, which is not analysed")
+            run.escape_value((cls,))
     if any(isinstance(base, Unknown) for base in linearized(cls)):
         run.escape_value((cls,))
 
@@ -256,19 +260,19 @@ def enumeration_member(run: Run, cls: ClassValue, name: str) -> Instance:
 
     A second name of one value is another name of the first member.
     """
-    value = cls.cells[name]
+    value = present(cls.cells[name])
     if len(value) == 1 and is_constant(value[0]):
         name = next((each for each in _names_of_members(cls) if cls.cells[each] == value), name)
     member = run.members.get((cls, name))
     if member is None:
         member = run.members[cls, name] = Instance(cls)
-        member.cells.update({"name": (name,), "value": cls.cells[name]})
+        member.cells.update({"name": (name,), "value": value})
     return member
 
 
 def _names_of_members(cls: ClassValue) -> list[str]:
     names = [name for name in cls.cells if isinstance(name, str) and not name.startswith(("_", "["))]
-    return [name for name in names if not isinstance(cls.cells[name][0], _NO_MEMBERS)]
+    return [name for name in names if not isinstance(present(cls.cells[name])[0], _NO_MEMBERS)]
 
 
 _NO_MEMBERS = (FunctionValue, ClassMethod, PropertyValue)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ast
-import builtins
 import operator
 from collections.abc import Callable
 from functools import partial
@@ -36,8 +35,10 @@ from nodl.infer.text import (
     concatenations,
 )
 from nodl.infer.values import (
+    ABSENT,
     ANY,
     BOTTOM,
+    BUILTINS,
     OF_LAUNCH,
     OTHER,
     ClassValue,
@@ -159,9 +160,6 @@ def _added_sequences(run: Run, node: ast.AST, left: Value, right: Value, sequenc
     return run.sequence(node, sequences[0].kind, Items(None, element))
 
 
-_BUILTINS = frozenset(dir(builtins))
-
-
 def _constant(run: Run, node: ast.Constant, frame: Frame) -> Value:
     return ANY if node.value is ... else (node.value,)
 
@@ -170,7 +168,12 @@ def _name(run: Run, node: ast.Name, frame: Frame) -> Value:
     name = node.id
     value = frame.cells.get(name)
     if value:
-        return value
+        certain = not frame.is_class or ABSENT[0] not in value
+        return value if certain else join(present(value), _outer_name(frame, name))
+    return _outer_name(frame, name)
+
+
+def _outer_name(frame: Frame, name: str) -> Value:
     outer = frame.closure
     while outer is not None:
         value = outer.cells.get(name)
@@ -181,7 +184,7 @@ def _name(run: Run, node: ast.Name, frame: Frame) -> Value:
     value = module.cells.get(name)
     if value:
         return value
-    if name in _BUILTINS:
+    if name in BUILTINS:
         return external("builtins." + name)
     if module.stars:
         return join_all(external(f"{star}.{name}") for star in module.stars)

@@ -176,6 +176,8 @@ def test_the_way_that_a_launch_takes_says_the_same(title: str, tmp_path: Path) -
     "title",
     [
         "at_any_time: a partial that the program calls itself",
+        "data_model: a class may have an attribute of its own; else its base has it",
+        "data_model: a field may not be set, so that __getattr__ gives it",
         "data_model: object.__setattr__ sets what a frozen dataclass keeps",
         "language: a list is edited after it was added",
         "language: lists added",
