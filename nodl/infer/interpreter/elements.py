@@ -160,7 +160,7 @@ def _sliced(run: Run, sequence: Sequence, bounds: slice | None, node: ast.AST) -
     exact = sequence.items.exact
     if exact is not None and bounds is not None:
         return run.sequence(node, sequence.kind, Items(exact[bounds]))
-    return run.sequence(node, sequence.kind, Items(None, _any_of(sequence.items.any_element())))
+    return run.sequence(node, sequence.kind, Items(None, any_of(sequence.items.any_element())))
 
 
 def _character(text: str, key: Value) -> Value:
@@ -384,7 +384,7 @@ def _unpack(run: Run, targets: list[ast.expr], value: Value, frame: Frame) -> No
         return
     element = items.any_element() or ANY
     if exact is not None:
-        element = _any_of(element)
+        element = any_of(element)
     for target in targets:
         if isinstance(target, ast.Starred):
             assign(run, target, run.sequence(target, "list", Items(None, element)), frame)
@@ -436,7 +436,7 @@ def change(run: Run, owner: Sequence, added: Value, taken: bool = True) -> None:
     run.state.store(owner, ITEMS, (Items(None, others),))
 
 
-def _any_of(found: Value) -> Value:
+def any_of(found: Value) -> Value:
     """Return one of several elements, nobody knows which: of texts nothing is known then."""
     if len(found) < 2:
         return found

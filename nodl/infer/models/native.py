@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 from nodl.infer.interpreter.define import is_constant
 from nodl.infer.interpreter.elements import (
+    any_of,
     change,
     chosen_by_launch,
     elements,
@@ -21,6 +23,7 @@ from nodl.infer.values import (
     ABSENT,
     ANY,
     BOTTOM,
+    ITEMS,
     LAZY,
     NONE,
     OF_LAUNCH,
@@ -115,8 +118,14 @@ def _extend(run: Run, owner: Sequence, call: Call) -> Value:
     return NONE
 
 
-def _pop(run: Run, owner: Sequence, call: Call) -> Value:
-    element = owner.items.any_element()
+def _pop(run: Run, owner: Sequence, call: Call, index: int = -1) -> Value:
+    place, left = sole(call.args.at(0) or (index,)), list(owner.items.exact or ())
+    certain = owner.kind != "set" and not owner.summary
+    if certain and isinstance(place, int) and -len(left) <= place < len(left):
+        taken = left.pop(place)
+        run.state.write(owner.cells, ITEMS, (Items(tuple(left)),))
+        return taken
+    element = any_of(owner.items.any_element())
     change(run, owner, BOTTOM)
     return element or ANY
 
@@ -142,7 +151,8 @@ _SEQUENCE: dict[str, SequenceMethod] = {
     **dict.fromkeys(("append", "add", "appendleft"), _append),
     **dict.fromkeys(("extend", "update"), _extend),
     **dict.fromkeys(("insert", "remove", "discard", "sort", "reverse", "clear"), _edited),
-    **dict.fromkeys(("pop", "popleft"), _pop),
+    "pop": _pop,
+    "popleft": partial(_pop, index=0),
     "index": _index,
 }
 

@@ -377,22 +377,21 @@ def parameter_object(
     return (instance,)
 
 
-def _names(call: Call) -> list[str]:
-    return constant_strings(call.args.at(0, "name") or ANY)
+def _name(call: Call) -> Value:
+    return call.args.at(0, "name") or ANY
 
 
 def _declare_parameter(run: Run, record: NodeRecord, call: Call) -> Value:
-    names = _names(call)
     default = _default_value(call.args.at(1, "value"))
     ignored = truth(call.args.at(3, "ignore_override") or (False,))
-    for name in names:
+    for name in constant_strings(_name(call)):
         record.declare(name, default)
         if call.args.at(2, "descriptor"):  # it may ask for dynamic typing
             record.loose.add(name)
         if ignored is not False:  # what launch says does not count, or perhaps not
             record.assigned[name] = default
             run.state.write(record.cells, name, join(default or NONE, BOTTOM if ignored else ABSENT))
-    return parameter_object(run, call, call.args.at(0, "name") or ANY, _inputs(run, record, names, call))
+    return parameter_object(run, call, _name(call), _inputs(run, record, _name(call), call))
 
 
 def _default_value(default: Value | None) -> Value:
@@ -402,12 +401,14 @@ def _default_value(default: Value | None) -> Value:
     return tuple(atom for atom in default if atom is not None)
 
 
-def _inputs(run: Run, record: NodeRecord, names: list[str], call: Call) -> Value:
+_UNNAMED = unknown("a parameter whose name is not known")
+
+
+def _inputs(run: Run, record: NodeRecord, names: Value, call: Call) -> Value:
     """Return the values of parameters: what the program set them to, else what launch and the defaults say."""
-    if not names:
-        return unknown("a parameter whose name is not known")
-    result: Value = BOTTOM
-    for name in names:
+    known = constant_strings(names)
+    result = _UNNAMED if len(known) < len(names) else BOTTOM
+    for name in known:
         held = record.cells.get(name, ABSENT)
         result = join(result, present(held))
         if ABSENT[0] not in held:
@@ -445,10 +446,11 @@ def _settled(run: Run, record: NodeRecord, name: str, call: Call) -> Value:
 
 
 def _declare_parameters(run: Run, record: NodeRecord, call: Call) -> Value:
-    prefixes = constant_strings(call.args.at(0, "namespace") or ANY) or [""]
+    namespace = call.args.at(0, "namespace") or ANY
+    prefixes = constant_strings(namespace)
     listed = call.args.at(1, "parameters") or ANY
-    found: list[Value] = []
-    known = len(prefixes) == 1
+    known = len(prefixes) == len(namespace) == 1
+    found: list[Value] = [] if len(prefixes) == len(namespace) else [_UNNAMED]
     for entry in _entries(run, listed, call):
         parts = elements(run, entry, call.node, call.frame)
         if parts.exact is None or not parts.exact:
@@ -457,10 +459,12 @@ def _declare_parameters(run: Run, record: NodeRecord, call: Call) -> Value:
             continue
         default = parts.exact[1] if len(parts.exact) > 1 else None
         names = constant_strings(parts.exact[0])
-        known = known and len(names) == 1
+        known = known and len(names) == len(parts.exact[0]) == 1
+        if len(names) < len(parts.exact[0]):
+            found.append(_UNNAMED)
         for full in (f"{prefix}.{name}" if prefix else name for name in names for prefix in prefixes):
             record.declare(full, _default_value(default))
-            value = _inputs(run, record, [full], call)
+            value = _inputs(run, record, (full,), call)
             found.append(parameter_object(run, call, (full,), value, full))
     exact = known and elements(run, listed, call.node, call.frame).exact is not None
     items = Items(tuple(found)) if exact else Items(None, join_all(found) or ANY)
@@ -473,9 +477,7 @@ def _entries(run: Run, value: Value, call: Call) -> list[Value]:
 
 
 def _get_parameter(run: Run, record: NodeRecord, call: Call) -> Value:
-    return parameter_object(
-        run, call, call.args.at(0, "name") or ANY, _inputs(run, record, _names(call), call)
-    )
+    return parameter_object(run, call, _name(call), _inputs(run, record, _name(call), call))
 
 
 def _get_parameters(run: Run, record: NodeRecord, call: Call) -> Value:
@@ -483,9 +485,7 @@ def _get_parameters(run: Run, record: NodeRecord, call: Call) -> Value:
     if names is None:
         return ANY
     found = (
-        parameter_object(
-            run, call, each, _inputs(run, record, constant_strings(each), call), f"parameter {index}"
-        )
+        parameter_object(run, call, each, _inputs(run, record, each, call), f"parameter {index}")
         for index, each in enumerate(names)
     )
     return run.sequence(call.node, "list", Items(tuple(found)))
@@ -502,18 +502,17 @@ def _get_parameters_by_prefix(run: Run, record: NodeRecord, call: Call) -> Value
     start = f"{prefix}." if prefix else ""
     for name in dict.fromkeys((*record.parameters, *launched.parameters)):
         if name.startswith(start):
-            held = parameter_object(run, call, (name,), _inputs(run, record, [name], call), name)
+            held = parameter_object(run, call, (name,), _inputs(run, record, (name,), call), name)
             run.state.store(found, Key(name.removeprefix(start)), held)
     return (found,)
 
 
 def _get_parameter_or(run: Run, record: NodeRecord, call: Call) -> Value:
-    names = _names(call)
     others = (a for a in call.args.at(1, "alternative_value") or BOTTOM if isinstance(a, Instance))
     default = join_all(present(other.cells.get("value", BOTTOM)) for other in others)
-    for name in names:
+    for name in constant_strings(_name(call)):
         record.declare(name, _default_value(default or None))
-    return parameter_object(run, call, call.args.at(0, "name") or ANY, _inputs(run, record, names, call))
+    return parameter_object(run, call, _name(call), _inputs(run, record, _name(call), call))
 
 
 def _set_parameters(run: Run, record: NodeRecord, call: Call) -> Value:
@@ -527,7 +526,11 @@ def assign_parameters(run: Run, record: NodeRecord, listed: Value, call: Call) -
     for entry in _entries(run, lists, call) if lists else ():
         for atom in entry:
             if isinstance(atom, Instance):
-                for name in constant_strings(atom.cells.get("name", BOTTOM)):
+                names = atom.cells.get("name", ANY)
+                known = constant_strings(names)
+                if len(known) < len(names):
+                    run.findings.gap(call.source, "which parameter is set in code is not known")
+                for name in known:
                     value = present(atom.cells.get("value", ANY))
                     record.assigned[name] = join(record.assigned.get(name, BOTTOM), value)
                     run.state.write(record.cells, name, value)

@@ -380,8 +380,10 @@ Method = Callable[[Run, Instance, Call], Value]
 
 def _environment(run: Run, call: Call) -> Value:
     default = call.args.at(1, "default") or BOTTOM
-    result: Value = BOTTOM
-    for name in constant_strings(call.args.at(0) or ANY):
+    names = call.args.at(0) or ANY
+    known = constant_strings(names)
+    result: Value = unknown("an environment variable") if len(known) < len(names) else BOTTOM
+    for name in known:
         held = run.environment.get(name, ABSENT)
         result = join(result, present(held))
         if ABSENT[0] not in held:
@@ -392,12 +394,15 @@ def _environment(run: Run, call: Call) -> Value:
             result = join(result, default if settled is None else (settled,))
             continue
         result = join(result, run.of_launch(Input("$" + name, run.options)))
-    return result or unknown("an environment variable")
+    return result
 
 
 def _set_default_environment(run: Run, call: Call) -> Value:
     found = _environment(run, call)
-    for name in constant_strings(call.args.at(0) or ANY):
+    names = call.args.at(0) or ANY
+    if len(constant_strings(names)) < len(names):
+        return _change_environment(run, call)
+    for name in constant_strings(names):
         run.state.write(run.environment, name, found)
     return found
 

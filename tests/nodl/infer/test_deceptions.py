@@ -179,6 +179,7 @@ def test_the_way_that_a_launch_takes_says_the_same(title: str, tmp_path: Path) -
         "data_model: a class may have an attribute of its own; else its base has it",
         "data_model: a field may not be set, so that __getattr__ gives it",
         "data_model: object.__setattr__ sets what a frozen dataclass keeps",
+        "in_place: an element is taken off a list that is known in full",
         "language: a list is edited after it was added",
         "language: lists added",
         "waiting: a thread sets what no other code does",
