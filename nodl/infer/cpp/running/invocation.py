@@ -205,7 +205,7 @@ MAX_OVERLOADS = 3
 
 
 def _one_of_many(run: Machine, functions: Sequence[Function], node: Node, frame: Frame) -> Value:
-    """Return an unknown for one of many overloads; a gap if they change what matters."""
+    """Return an unknown for one of many overloads; a gap if they change what matters, or may make interfaces."""
     run.handle(node, frame)
     run.called.update(functions)
     name, given = functions[0].name, given_to(node, frame)
@@ -215,8 +215,10 @@ def _one_of_many(run: Machine, functions: Sequence[Function], node: Node, frame:
         changed |= (written.assigned | written.changed | written.seen) - {p.name for p in each.parameters}
         back = (at for at, p in zip(given, each.parameters, strict=False) if p.written_back)
         changed.update(*map(words_in, back))
-    if not changed.isdisjoint(looked_at(run)) or not all(
-        effects_of(run, each).only_variables for each in functions
+    if (
+        not changed.isdisjoint(looked_at(run))
+        or not all(effects_of(run, each).only_variables for each in functions)
+        or any(map(run.makes_interfaces, functions))
     ):
         which = "specialisation of" if any(each.specialises for each in functions) else "function"
         run.gap(node, frame, f"which {which} {name} is called is not known")
@@ -307,7 +309,8 @@ def call_methods(
     if not fitting:
         name = "::".join(filter(None, (methods[0].owner, methods[0].name)))
         return unknown_call(run, name, values, node, [], frame)
-    if len(fitting) > MAX_OVERLOADS and not any(map(run.makes_interfaces, fitting)):
+    is_among = not set(run.active).isdisjoint(fitting)  # each of them runs all others, which run all others
+    if len(fitting) > MAX_OVERLOADS and (is_among or not any(map(run.makes_interfaces, fitting))):
         return _one_of_many(run, fitting, node, frame)
     left_out = fitting[0].parameters[len(values) :] if fitting[0].virtual and not exactly else ()
     if left_out:  # those of the class that the object is seen as ([dcl.fct.default]/10)

@@ -178,3 +178,17 @@ def test_a_specialisation_changes_what_it_is_given_and_nothing_else(
     use = f'std::string t = "a"; {use} create_publisher<std_msgs::msg::String>(t, 1);'
     system = infer(tmp_path, in_class(use, before=before))
     assert (names(system), gaps(system)) == (made, [])
+
+
+def test_overloads_that_all_call_each_other_are_told_where_one_runs_already(tmp_path: Path) -> None:
+    """Each would run all others, which run all others: 7! of them."""
+    body = "void convert(const other::K{} & k) {{ convert(k.a); convert(k.b); ++count; }}"
+    member = "int count = 0; " + " ".join(map(body.format, range(7)))
+    assert gaps(infer(tmp_path / "counts", in_class("convert(other::get());", member))) == []
+    makes = member.replace("++count", f'create_publisher<{S}>("a", 1)', 1)
+    system = infer(tmp_path / "makes", in_class("convert(other::get());", makes))
+    assert names(system) == ["a"]
+    assert set(gaps(system)) == {
+        "which function convert is called is not known",
+        "which of 7 functions convert() is called is not known",
+    }
