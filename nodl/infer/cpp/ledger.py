@@ -455,11 +455,11 @@ def leads_to_interfaces(run: Machine, words: frozenset[str]) -> bool:
     return without_interfaces(run, words) is None
 
 
-def without_interfaces(run: Machine, words: frozenset[str]) -> set[Function] | None:
+def without_interfaces(run: Machine, words: frozenset[str]) -> Reach | None:
     """Return what a function with these words may call, if neither it nor any of that makes an interface or a node."""
     reach = Reach(run)
     makes = makes_by_words(words) or any(makes_by_words(each.words) for each in reach.from_words(words))
-    return None if makes else reach.reached
+    return None if makes else reach
 
 
 @lru_cache(maxsize=50_000)

@@ -50,9 +50,9 @@ class CallEffects:
         self._of = of
         # The variable that mattered and was known the last time; whether it is assigned, and changed.
         self.kept_by: tuple[Cell, bool, bool] | None = None
-        self.functions = frozenset(
-            Reach(run, operators=True).from_code(of if isinstance(of, Function) else of.node)
-        )
+        reach = Reach(run, operators=True)
+        self.functions = frozenset(reach.from_code(of if isinstance(of, Function) else of.node))
+        self.idle = frozenset(reach.idle)  # once one of these classes is used, it may do more
 
     @property
     def may_hide_writes(self) -> bool:
@@ -156,14 +156,33 @@ class CallEffects:
     @cached_property
     def _parts(self) -> list[tuple[Function | None, VariableWrites]]:
         """Return what each function does to variables, with what it passes to the program's own."""
-        own: list[tuple[Function | None, VariableWrites]] = [
-            (each, written_in(each)) for each in self.functions
+        found: list[tuple[Function | None, VariableWrites]] = [
+            (each, _with_all_passed(self._run, each)) for each in self.functions
         ]
         if isinstance(self._of, Lambda):
             written = written_by(self._of.node)
             others = frozenset((name, "", frozenset[str]()) for name, *_ in written.of_others)
-            own.append((self._of.frame.function, written._replace(of_others=others)))
-        return [(function, _with_passed(self._run, part)) for function, part in own]
+            own = _with_passed(self._run, written._replace(of_others=others))
+            found.append((self._of.frame.function, own))
+        return found
+
+    @cached_property
+    def touched(self) -> frozenset[str]:
+        """Return the names that it writes, or passes on to anything but what makes an interface."""
+        return frozenset[str]().union(*map(_touched, self.functions))
+
+
+@lru_cache(maxsize=50_000)
+def _touched(function: Function) -> frozenset[str]:
+    written = written_in(function)
+    given = (words for callee, *_, words in written.passed if not CREATES.fullmatch(callee))
+    return (written.assigned | written.changed).union(*given)
+
+
+def _with_all_passed(run: Machine, function: Function) -> VariableWrites:
+    if function not in run.passed:
+        run.passed[function] = _with_passed(run, written_in(function))
+    return run.passed[function]
 
 
 def _with_passed(run: Machine, part: VariableWrites) -> VariableWrites:
@@ -197,8 +216,8 @@ def may_mean(run: Machine, owners: Owners, cell: Cell) -> bool:
 def effects_of(run: Machine, of: Function | Lambda | Bound) -> CallEffects:
     """Return what ``of`` may do with the classes that are used so far."""
     of = of.function if isinstance(of, Bound) else of
-    key = (of if isinstance(of, Function) else of.node.id, len(run.used_classes()))
-    if key not in run.effects:
+    key, used = of if isinstance(of, Function) else of.node.id, run.used_classes()
+    if key not in run.effects or not run.effects[key].idle.isdisjoint(used):
         run.effects[key] = CallEffects(run, of)
     return run.effects[key]
 

@@ -17,6 +17,7 @@ from nodl.infer.cpp.ledger import CREATES, without_interfaces
 from nodl.infer.cpp.reading.declarations import Class, FileIndex, Function, Scope
 from nodl.infer.cpp.reading.names import Names
 from nodl.infer.cpp.reading.type_names import Type
+from nodl.infer.cpp.reading.writes import VariableWrites
 from nodl.infer.cpp.running.memory import AbstractStore, Cell, Changes, Memory
 from nodl.infer.cpp.running.values import (
     BOTTOM,
@@ -141,11 +142,14 @@ class Machine:
         self.unset: dict[tuple[str, int], tuple[SourceRef, str, str]] = {}  # calls on pointers to nothing
         self._used: set[str] = set()
         self._known: set[Class] = set()
-        self.effects: dict[tuple[object, int], CallEffects] = {}  # by how many classes were used
+        self.effects: dict[object, CallEffects] = {}
+        self.passed: dict[Function, VariableWrites] = {}  # what functions write, with what they pass on
         self.leaving: dict[Function, Leaving] = {}
         self.taken: dict[tuple[str, int, int], int] = {}
         self.looked_at: dict[int, Owners] = {}
-        self._leading: dict[tuple[object, int], bool] = {}
+        self._leading: set[tuple[object, int]] = set()  # by how many classes were used
+        # What makes no interface as long as none of these classes is used.
+        self._harmless: dict[object, frozenset[str]] = {}
 
     # --- running ------------------------------------------------------------------------------------------
 
@@ -405,12 +409,19 @@ class Machine:
         return self._leads(node.id, words_in(node))
 
     def _leads(self, key: object, words: frozenset[str]) -> bool:
-        count = len(self.used_classes())
-        if (key, count) not in self._leading:
-            reached = without_interfaces(self, words)
-            self._leading[key, count] = reached is None
-            self._leading.update(((each, count), False) for each in reached or ())  # nor does what it calls
-        return self._leading[key, count]
+        used = self.used_classes()
+        if key in self._harmless and self._harmless[key].isdisjoint(used):
+            return False
+        if (key, len(used)) in self._leading:
+            return True
+        reach = without_interfaces(self, words)
+        if reach is None:
+            self._leading.add((key, len(used)))
+            return True
+        self._harmless.update(
+            dict.fromkeys((key, *reach.reached), frozenset(reach.idle))
+        )  # nor does what it calls
+        return False
 
 
 _CALLS_ALL = frozenset({"fold_expression", "co_await_expression", "generic_expression"})

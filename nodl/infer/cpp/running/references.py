@@ -10,9 +10,8 @@ import re
 from collections.abc import Iterator
 from functools import partial
 
-from nodl.infer.cpp.ledger import CREATES
 from nodl.infer.cpp.reading.declarations import Class
-from nodl.infer.cpp.running.effects import effects_of, referred_to, written_in
+from nodl.infer.cpp.running.effects import effects_of, referred_to
 from nodl.infer.cpp.running.machine import Frame, Machine
 from nodl.infer.cpp.running.memory import Cell
 from nodl.infer.cpp.running.static_types import current_object, is_address
@@ -93,12 +92,7 @@ def _changes_behind(run: Machine, initial: Node | None, frame: Frame) -> bool:
     behind = words_in(field_of(callee, "argument") or initial)
     named = run.names.functions_by_name.get(last_name(callee), ()) if callee is not None else ()
     behind = behind.union(*map(referred_to, named))
-    for each in effects_of(run, frame.function).functions:
-        written = written_in(each)
-        given = (words for callee, *_, words in written.passed if not CREATES.fullmatch(callee))
-        if not behind.isdisjoint((written.assigned | written.changed).union(*given)):
-            return True
-    return False
+    return not behind.isdisjoint(effects_of(run, frame.function).touched)
 
 
 def forget(
