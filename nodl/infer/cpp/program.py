@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import re
 from codecs import BOM_UTF8
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -214,6 +214,10 @@ def run_program(sources: Sources, entry: Entry, start: Start | None) -> ProgramF
     missing = [name for name in _possible_plugins(sources, files) if name not in {i.file for i in files}]
     if missing:
         files = sources.closure([*entry.files, *missing], entry.definitions)
+    ros_1 = _header_of_ros_1(files)
+    if ros_1 is not None:
+        gap = (ros_1, "this is a program of ROS 1, which is not analysed")
+        return ProgramFindings([], (gap,), [], set(), tuple(index.file for index in files), False, ())
     names = Names(files)
     names.plugins = {key: found[0][0].type for key, found in sources.workspace.plugin_classes.items()}
     names.depends = frozenset().union(
@@ -228,6 +232,14 @@ def run_program(sources: Sources, entry: Entry, start: Start | None) -> ProgramF
     except Exception as error:
         run.gap_at(_place(entry), failure("the analysis of this program", error))
     return _findings(run, sources)
+
+
+def _header_of_ros_1(files: Sequence[FileIndex]) -> SourceRef | None:
+    """Return where a program that has no header of rclcpp includes that of roscpp."""
+    if any(name.startswith("rcl") for index in files for name in index.source.foreign):
+        return None
+    lines = ((index.file, index.source.foreign.get("ros/ros.h")) for index in files)
+    return next((SourceRef(file, line) for file, line in lines if line is not None), None)
 
 
 def _place(entry: Entry) -> SourceRef:

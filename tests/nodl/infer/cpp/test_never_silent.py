@@ -462,3 +462,16 @@ def test_the_size_of_a_map_is_not_known(tmp_path: Path) -> None:
     use = f"{{}} create_publisher<{S}>(std::to_string(m.size()), 1);"
     member = 'std::map<std::string, int> m{{"a", 1}};'
     assert names(infer(tmp_path / "asked", in_class(use.format("m[get()];"), member))) == ["?"]
+
+
+def test_a_program_of_ros_1_is_one_gap_and_one_that_also_has_rclcpp_is_analysed(tmp_path: Path) -> None:
+    source = """#include <ros/ros.h>
+int main(int argc, char ** argv) {
+  ros::init(argc, argv, "n"); ros::NodeHandle nh; ros::Timer timer;
+  auto pub = nh.advertise<std_msgs::String>("a", 1); auto sub = nh.subscribe("b", 1, called);
+}
+"""
+    system = infer(tmp_path, source)
+    assert (names(system), gaps(system)) == ([], ["this is a program of ROS 1, which is not analysed"])
+    both = in_class(f'create_publisher<{S}>("a", 1);', before="#include <ros/ros.h>\n")
+    assert names(infer(tmp_path / "both", both)) == ["a"]
