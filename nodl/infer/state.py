@@ -26,6 +26,7 @@ from nodl.infer.values import (
     ContentCells,
     Dictionary,
     FieldCells,
+    FixedCells,
     HeapObject,
     Items,
     Key,
@@ -67,7 +68,8 @@ class ProgramState:
 
     def write(self, cells: Cells, key: object, value: Value, local: bool = False) -> None:
         """Update strongly. ``local``: only the running function can see the cell (no new stamp)."""
-        if key in self.changed_meanwhile and (type(cells) is not LocalCells or cells.shared):
+        own = type(cells) is FixedCells or (type(cells) is LocalCells and not cells.shared)
+        if key in self.changed_meanwhile and not own:
             value = unsettled(value)
         old = cells.get(key)
         if old is value or (old is not None and _same(old, value)):

@@ -78,6 +78,10 @@ class ContentCells(FieldCells):
     """The cells of a dictionary, or of something of a library: the program's text does not name their keys."""
 
 
+class FixedCells(ContentCells):
+    """The cells of an object of a library whose attributes no program sets: nothing changes them later."""
+
+
 class External:
     """Something of a library that is not analysed, by its dotted path: ``rclpy.node.Node``."""
 

@@ -84,7 +84,7 @@ def _element(run: Run, atom: object, key: Value, node: ast.Subscript, frame: Fra
     if isinstance(atom, ClassValue):
         return member_with_name(run, atom, key) if is_enumeration(atom) else (atom,)  # Generic[T]
     if isinstance(atom, External) and atom.path == "os.environ":
-        return run.call(external("os.environ.get"), Arguments([key]), node, frame)
+        return run.call(external("os.environ.__getitem__"), Arguments([key]), node, frame)
     if sole(key) == _BEHIND_PROGRAM and (atom,) == unknown(COMMAND_LINE):
         return unknown(WITHOUT_PROGRAM)
     if sole(key) == _BEHIND_PROGRAM and (atom,) == result_of("rclpy"):  # what remove_ros_args() leaves

@@ -30,6 +30,7 @@ from nodl.infer.values import (
     ContentCells,
     Dictionary,
     External,
+    FixedCells,
     ForeignMethod,
     Frame,
     FunctionEntry,
@@ -287,6 +288,16 @@ class Run(Allocations):
         """Return the object of the library class ``path`` that ``call`` makes; ``kind`` as in ``allocate``."""
         return self.allocate(call.node, kind or path, lambda: Instance(External(path)))
 
+    def fixed_object(self, call: Call, path: str, kind: str) -> Instance:
+        """Return such an object whose attributes no program sets."""
+
+        def make() -> Instance:
+            made = Instance(External(path))
+            made.cells = FixedCells()
+            return made
+
+        return self.allocate(call.node, kind, make)
+
     def attribute(self, owner: Value, name: str, node: ast.AST, frame: Frame) -> Value:
         readers = self.tables.attributes
         if len(owner) == 1:
@@ -332,6 +343,8 @@ class Run(Allocations):
         A variable that never holds anything else is known, unless ``certainly``: other code will change it.
         """
         for cells, key, held in seen.values():
+            if type(cells) is FixedCells:
+                continue
             if certainly or isinstance(held[0], Items) or sum(type(atom) is not Absent for atom in held) > 1:
                 variable = isinstance(key, str) and key not in (ITEMS, OTHER, OTHER_KEYS)
                 self.meanwhile |= {str(key)} if variable else self.made_at(cells)

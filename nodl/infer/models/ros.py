@@ -156,7 +156,7 @@ ENDPOINT_NAMES = frozenset({"topic", "srv_name"})  # the name as the program gav
 def endpoint_object(run: Run, kind: EndpointKind, record: NodeRecord, names: Value, call: Call) -> Value:
     """Return the object of a publisher, subscription, service or client that ``record`` made."""
     path = _CLASS_OF[kind]
-    made = run.library_object(call, path, f"{path} {id(record)}")
+    made = run.fixed_object(call, path, f"{path} {id(record)}")
     run.state.store(made, "name", names)
     return (made,)
 
@@ -371,7 +371,7 @@ def parameter_object(
     run: Run, call: Call, name: Value, value: Value, key: str = "parameter"
 ) -> tuple[Instance]:
     """Return an rclpy ``Parameter`` that holds ``value``; ``key`` tells those made by one call apart."""
-    instance = run.library_object(call, PARAMETER_CLASS, key)
+    instance = run.fixed_object(call, PARAMETER_CLASS, key)
     run.state.store(instance, "name", name)
     run.state.store(instance, "value", value)
     return (instance,)

@@ -378,8 +378,8 @@ Method = Callable[[Run, Instance, Call], Value]
 # --- environment, paths ---------------------------------------------------------------------------------------
 
 
-def _environment(run: Run, call: Call) -> Value:
-    default = call.args.at(1, "default") or BOTTOM
+def _environment(run: Run, call: Call, otherwise: Value = NONE) -> Value:
+    default = call.args.at(1, "default") or otherwise
     names = call.args.at(0) or ANY
     known = constant_strings(names)
     result: Value = unknown("an environment variable") if len(known) < len(names) else BOTTOM
@@ -493,6 +493,7 @@ FUNCTIONS: dict[str, Model] = {
     "argparse.ArgumentParser": options.made_parser,
     "os.getenv": _environment,
     "os.environ.get": _environment,
+    "os.environ.__getitem__": partial(_environment, otherwise=BOTTOM),
     "os.environ.setdefault": _set_default_environment,
     **dict.fromkeys(("os.environ.update", "os.environ.pop", "os.putenv"), _change_environment),
     "os.path.join": _path_join,

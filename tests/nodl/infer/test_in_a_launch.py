@@ -602,6 +602,8 @@ if given.fps > 20:
 make(f"camera{given.device}", twice=True)
 if int(os.environ.get("ARMS", "1")) > 1:
     make("second_arm")
+if os.environ.get("DEBUG"):
+    make("debug")
 names = node.declare_parameter("names", ["one"]).value
 if len(names) > 1:
     make("several")
@@ -618,6 +620,11 @@ rclpy.spin(node)
             "--fps 20.5",
             '<env name="ARMS" value="2"/>',
             {"/fast", "/camera0/left", "/camera0/right", "/second_arm"},
+        ),
+        (
+            "--fps 20.5",
+            '<env name="DEBUG" value="0"/>',
+            {"/fast", "/camera0/left", "/camera0/right", "/debug"},
         ),
         ("--fps 1", '<param name="names" value="[a, b]"/>', {"/camera0/left", "/camera0/right", "/several"}),
     ],
