@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import re
 
 from nodl.infer.interpreter import imports
 from nodl.infer.interpreter.define import enumeration_member, is_enumeration, linearized, program_classes
@@ -127,11 +128,14 @@ def _bound_class_method(method: ClassMethod, cls: object) -> Value:
 
 def _of_class(run: Run, cls: ClassValue, name: str, node: ast.AST, frame: Frame) -> Value:
     if name in ("__name__", "__qualname__"):
-        return (cls.name,) if name == "__name__" or "." not in cls.name else ANY
+        return (cls.name,) if name == "__name__" and name not in cls.cells else ANY
     if name == "__dict__":
         return run.variables_of(node, frame)
     if name == "__module__":
         return cls.module.cells.get("__name__", ANY)
+    if name in ("__subclasses__", "__bases__", "__base__", "__mro__", "mro"):
+        run.gap(node, frame, f"classes are found through {name}, which is not followed")
+        return unknown(f"{name} of class {cls.name}")
     result: Value = BOTTOM
     for base in linearized(cls):
         if isinstance(base, ClassValue):
@@ -151,11 +155,7 @@ def _of_class(run: Run, cls: ClassValue, name: str, node: ast.AST, frame: Frame)
                 return result or ANY
         if isinstance(base, External) and base.path not in ("builtins.object", "abc.ABC", "typing.Generic"):
             return join(result, external(f"{base.path}.{name}"))
-    if result:
-        return result
-    if name in ("__subclasses__", "__bases__", "__base__", "__mro__", "mro"):
-        run.gap(node, frame, f"classes are found through {name}, which is not followed")
-    return unknown(f"attribute {name} of class {cls.name}")
+    return result or unknown(f"attribute {name} of class {cls.name}")
 
 
 def _of_module(run: Run, module: ModuleValue, name: str, node: ast.AST, frame: Frame) -> Value:
@@ -166,7 +166,9 @@ def _of_module(run: Run, module: ModuleValue, name: str, node: ast.AST, frame: F
 
 def _of_external(run: Run, atom: External, name: str, node: ast.AST, frame: Frame) -> Value:
     if name == "__name__":
-        return (atom.path.rpartition(".")[2],)
+        # ``numpy.float_`` is called float64; interface types are called what they are imported as
+        of_type = re.fullmatch(r"\w+\.(?:msg|srv|action)\.(\w+)", atom.path)
+        return (of_type[1],) if of_type else unknown(f"the name of {atom.path}")
     if name == "__dict__" and foreign.is_node_class(atom.path):
         return run.variables_of(node, frame)
     if atom.path.endswith(RESULT) and not foreign.is_asked_of(name):
@@ -214,8 +216,8 @@ def _of_native(run: Run, atom: object, name: str, node: ast.AST, frame: Frame) -
 
 
 def _of_function(run: Run, atom: FunctionValue, name: str, node: ast.AST, frame: Frame) -> Value:
-    if name in ("__name__", "__qualname__"):
-        return (atom.name,) if atom.name else unknown("the name of a wrapped function")
+    if name == "__name__":
+        return (atom.name,) if atom.name else unknown("the name of a function that is wrapped or renamed")
     run.escape_value((atom,))  # ``__call__``, ``__get__`` and their like lead to it
     return unknown(f"attribute {name} of a function")
 

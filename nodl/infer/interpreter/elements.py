@@ -35,6 +35,7 @@ from nodl.infer.values import (
     Dictionary,
     External,
     Frame,
+    FunctionValue,
     Instance,
     Items,
     Key,
@@ -258,6 +259,8 @@ def store_attribute(run: Run, owners: Value, name: str, value: Value, node: ast.
             run.state.store(owner, name, join(kept, value))
         else:
             run.escape_value(value)  # whoever holds it may call it
+            if isinstance(owner, FunctionValue) and name == "__name__":
+                owner.name = ""
             if owner is MODULES[0]:
                 run.gap(node, frame, "a variable of a module out of sys.modules is set")
             if isinstance(owner, External):
