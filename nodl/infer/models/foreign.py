@@ -10,6 +10,7 @@ import builtins
 import functools
 import sys
 
+from nodl.infer.findings import NodeRecord
 from nodl.infer.interpreter.run import Call, Run
 from nodl.infer.models import (
     native,
@@ -23,6 +24,7 @@ from nodl.infer.models.signatures import (
     library_node,
     may_make_nodes,
 )
+from nodl.infer.text import Input, Text
 from nodl.infer.values import (
     ANY,
     RESULT,
@@ -30,6 +32,7 @@ from nodl.infer.values import (
     ForeignMethod,
     Instance,
     NativeMethod,
+    Sequence,
     Unknown,
     Value,
     external,
@@ -306,16 +309,39 @@ def call_native(run: Run, method: NativeMethod, call: Call) -> Value:
 
 # --- attributes ---------------------------------------------------------------------------------------------
 
-_PARAMETER_VALUES = frozenset({
-    "value", "string_value", "bool_value", "integer_value", "double_value", "string_array_value",
-    "integer_array_value", "double_array_value", "bool_array_value", "byte_array_value",
-})  # fmt: skip
+# Fields of a parameter's value, by the type that they hold or whose lists they hold.
+_PARAMETER_VALUES = {
+    "value": None, "byte_array_value": None,
+    **{f"{name}{array}_value": kind for array in ("", "_array")
+       for name, kind in (("string", str), ("bool", bool), ("integer", int), ("double", float))},
+}  # fmt: skip
+
+
+def _of_type(value: Value, kind: type | None) -> Value:
+    """Return ``value``, unknown where it is of another type: then the field holds its zero."""
+    if kind is None or all(_is_of(atom, kind) for atom in value):
+        return value
+    return unknown("a field for another type than the parameter has")
+
+
+def _is_of(atom: object, kind: type) -> bool:
+    if isinstance(atom, Sequence):
+        return all(_is_of(each, kind) for each in atom.items.any_element())
+    if isinstance(atom, Text):
+        inputs = ((piece.owner, piece.name) for piece in atom.pieces if isinstance(piece, Input))
+        return all(
+            _is_of(each, kind)
+            for node, name in inputs
+            if isinstance(node, NodeRecord)
+            for each in node.default(name)
+        )
+    return isinstance(atom, Unknown) or type(atom) is kind
 
 
 def instance_attribute(run: Run, obj: Instance, path: str, name: str) -> Value:
     """Return an attribute of an object whose class is foreign."""
     if path == ros.PARAMETER_CLASS and name in _PARAMETER_VALUES:
-        return obj.cells.get("value", ANY)
+        return _of_type(obj.cells.get("value", ANY), _PARAMETER_VALUES[name])
     if path in ros.ENDPOINT_CLASSES and name in ros.ENDPOINT_NAMES:
         return obj.cells.get("name", ANY)
     if path in stdlib.OPEN_ATTRIBUTES:

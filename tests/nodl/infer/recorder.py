@@ -109,11 +109,12 @@ class Parameter:
         self.name, self.value = name, value
 
     def get_parameter_value(self) -> Any:
+        zeros = {"string": "", "integer": 0, "double": 0.0, "bool": False, "string_array": []}
         return types.SimpleNamespace(
-            string_value=self.value,
-            string_array_value=self.value,
-            integer_value=self.value,
-            bool_value=self.value,
+            **{
+                f"{kind}_value": self.value if type(self.value) is type(zero) else zero
+                for kind, zero in zeros.items()
+            }
         )
 
 
