@@ -18,6 +18,7 @@ from nodl.infer.models.signatures import (
     HELPERS,
     NODE_CALLBACKS,
     NODE_ENDPOINTS,
+    NODE_HOOKS,
     SUBSCRIPTION,
     Argument,
     CallbackArgument,
@@ -45,6 +46,7 @@ from nodl.infer.values import (
     RESULT,
     Dictionary,
     External,
+    ForeignMethod,
     Instance,
     Items,
     Key,
@@ -94,12 +96,23 @@ def initialise_node(run: Run, instance: Instance, path: str, call: Call) -> None
     if record.lifecycle:
         enabled = call.args.at(-1, "enable_communication_interface")
         record.communication_interface = enabled is None or truth(enabled) is not False
+    for name in sorted(NODE_HOOKS):
+        own = _expect_own(run, instance, name, call)
+        if own and name == "get_name":
+            run.findings.gap(call.source, "rclpy names parameter services by the get_name() of the program")
     overrides = call.args.at(-1, "parameter_overrides")
     if overrides:
         assign_parameters(run, record, overrides, call)
     if truth(call.args.at(-1, "enable_logger_service") or (False,)) is not False:
         for service, service_type in LOGGER_SERVICES.items():
             add_endpoint(run, record, EndpointKind.SERVICE_SERVER, f"~/{service}", service_type, call)
+
+
+def _expect_own(run: Run, node: Instance, name: str, call: Call) -> bool:
+    """Expect that libraries call this method of the node if it is the program's own; return whether it is."""
+    own = run.attribute((node,), name, call.node, call.frame)
+    run.register_callback(own, None, run.state.mark())
+    return not all(isinstance(atom, ForeignMethod) for atom in own)
 
 
 def strings_in(run: Run, value: Value, call: Call) -> Value:
@@ -135,6 +148,8 @@ def records_of(run: Run, value: Value | None, call: Call) -> list[NodeRecord]:
     records: list[NodeRecord] = []
     for atom in value or ANY:
         if isinstance(atom, Instance):
+            for name in ("create_publisher", "create_service", "create_subscription"):
+                _expect_own(run, atom, name, call)
             records.append(record_of_instance(run, atom, call))
         elif isinstance(atom, (Unknown, External)):
             why = atom.why if isinstance(atom, Unknown) else f"a result of {atom.path.removesuffix(RESULT)}"

@@ -158,6 +158,18 @@ LIFECYCLE_HOOKS = frozenset(
 )
 
 
+# What rclpy itself calls and reads of every node (node.py, time_source.py but for ``/clock``, executors.py,
+# parameter_service.py, logging_service.py, type_description_service.py, qos_overriding_options.py, action).
+NODE_HOOKS = frozenset({
+    "create_publisher", "create_service", "create_timer", "add_waitable",
+    "add_on_set_parameters_callback", "declare_parameter", "declare_parameters", "has_parameter", "list_parameters",
+    "get_parameter", "get_parameters", "get_parameter_or", "get_parameter_type", "get_parameter_types",
+    "describe_parameter", "describe_parameters", "set_parameters_atomically", "get_name", "get_namespace", "get_clock",
+    "get_logger", "context", "executor", "handle", "default_callback_group",
+    "clients", "guards", "services", "subscriptions", "timers", "waitables",
+})  # fmt: skip
+
+
 class LibraryNode(NamedTuple):
     """A node class of a library. ``name``: what the node is called unless its user says otherwise."""
 

@@ -144,6 +144,9 @@ def _node_class(recorder: Recorder) -> type:
                 for name, value in self._overrides.items():
                     self._parameters[name] = Parameter(name, None, value)
             recorder.facts.add(("node", self.get_fully_qualified_name()))
+            own = getattr(self.create_publisher, "__func__", None)
+            if own is not Node.create_publisher:  # else it is left out: every node has it
+                self.create_publisher(Anything, "/parameter_events", 10)
             if enable_logger_service:
                 for service in _STATE_SERVICES:
                     recorder.facts.add(("service_server", f"{self.get_fully_qualified_name()}/{service}"))
