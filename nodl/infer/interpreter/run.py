@@ -123,6 +123,14 @@ MAX_DEPTH = 120  # analysed calls inside calls
 
 # Others can do nothing with these.
 _INERT = frozenset({str, int, float, bool, bytes, type(None), Text, Unknown})
+
+
+def _has_call(atom: object) -> bool:
+    """Return True for an object of a class of the program that has ``__call__``."""
+    classes = (isinstance(atom, Instance) and isinstance(atom.cls, ClassValue) and atom.cls.linear) or ()
+    return any(isinstance(base, ClassValue) and "__call__" in base.cells for base in classes)
+
+
 _FUNCTIONS = frozenset({FunctionValue, BoundMethod, Partial})
 
 
@@ -329,7 +337,7 @@ class Run(Allocations):
         """
         self.asks_launch = self.asks_launch or bool(self.guards)  # which its interfaces do not have
         for atom in value:
-            if isinstance(atom, (FunctionValue, BoundMethod, Partial, ClassMethod)):
+            if isinstance(atom, (FunctionValue, BoundMethod, Partial, ClassMethod)) or _has_call(atom):
                 if since is not None:
                     self.at_any_time.setdefault(atom, since)
                 if atom not in self.callbacks:
@@ -372,6 +380,8 @@ class Run(Allocations):
             elif isinstance(atom, (ClassValue, Instance)):
                 if objects:
                     self.escape_object(atom, trusted=not opened)
+                elif _has_call(atom):
+                    self.register_callback((atom,), None, self.state.mark())
             elif kind is ForeignMethod or kind is External:
                 if self.tables.creates(atom):
                     self.callbacks.setdefault(atom, None)
