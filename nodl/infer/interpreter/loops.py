@@ -43,11 +43,12 @@ def _looped(run: Run, node: Loop, frame: Frame, turns: Callable[[], bool]) -> bo
     frame.unsettled = ""
     frame.loop_forks = run.state.forks
     passes = turns()
+    left = frame.jump == "break"
     frame.unsettled, frame.loop_forks = before, loop_forks
     frame.jump = ""
     if passes and node.orelse and not _breaks(node):
         return run.execute(node.orelse, frame)
-    if passes and node.orelse:
+    if passes and node.orelse and not left:
         run.state.maybe(lambda: run.execute(node.orelse, frame))
     return passes
 
@@ -79,7 +80,7 @@ def _for(run: Run, node: For, iterated: Value, frame: Frame) -> bool:
 
 
 def _unrolled(run: Run, node: For, exact: tuple[Value, ...], frame: Frame) -> bool:
-    """Run one turn after the other. Return False if control cannot pass."""
+    """Run one turn after the other. Return False if control cannot pass; ``break`` is the jump if it certainly ran."""
     start, guards = run.state.mark(), run.guards
     broken, passes = False, True
     run.state.depth += 1
@@ -94,6 +95,7 @@ def _unrolled(run: Run, node: For, exact: tuple[Value, ...], frame: Frame) -> bo
         run.state.join_seen(start, mixed=True)
     if left:
         run.guards = guards
+    frame.jump = "break" if left and not broken else ""
     return passes or left
 
 
@@ -155,6 +157,7 @@ def fixpoint(run: Run, frame: Frame, turn: Callable[[], bool]) -> None:
     run.state.depth -= 1
     run.state.forks -= 1
     run.repeated -= 1
+    frame.jump = ""
     if jumped:
         run.state.join_seen(start, mixed=True)
 

@@ -95,7 +95,7 @@ CASES: dict[str, tuple[str, list[str]]] = {
         ["?", "c"],
     ),
     "the else of a loop that a break leaves": (
-        "x = 'a'\nfor i in range(3):\n    if i == 2: break\nelse:\n    x = 'c'\nself.P(x)", ["a", "c"]
+        "x = 'a'\nfor i in range(3):\n    if i == 2: break\nelse:\n    x = 'c'\nself.P(x)", ["a"]
     ),
     "early return": ("def f():\n    if sys.argv[1]: return 'a'\n    return 'b'\nself.P(f())", ["a", "b"]),
     "closure": ("x = 'a'\ndef f():\n    return x + '/b'\nself.P(f())", ["a/b"]),
