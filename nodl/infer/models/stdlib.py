@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import ast
 import functools
+import itertools
 import os.path
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Any
 
 from nodl.infer.interpreter.conditions import is_instance, is_of_launch, truth
 from nodl.infer.interpreter.define import expect_methods, new_instance, program_classes
-from nodl.infer.interpreter.elements import copy_dictionary, elements, store_attribute
+from nodl.infer.interpreter.elements import copy_dictionary, elements, store_attribute, store_item
 from nodl.infer.interpreter.formatting import as_texts, text_value
 from nodl.infer.interpreter.imports import import_module
 from nodl.infer.interpreter.run import Arguments, Call, Model, Run
@@ -53,6 +54,7 @@ from nodl.infer.values import (
 )
 
 MAX_RANGE = 64
+MAX_ROWS = 4096
 
 
 # --- texts and numbers --------------------------------------------------------------------------------------
@@ -150,13 +152,15 @@ def _enumerate(run: Run, call: Call) -> Value:
     return run.sequence(call.node, LAZY, Items(None, pair))
 
 
-def _zip(run: Run, call: Call) -> Value:
+def _rows(run: Run, call: Call, combine: Callable[..., Iterable[tuple[Value, ...]]]) -> Value:
     """Return the rows of lists that are all known; unknown otherwise, since nobody knows what goes with what."""
     columns = [elements(run, value, call.node, call.frame) for value in call.args.positional]
     known = [column.exact for column in columns if column.exact is not None]
-    if call.args.more or len(known) < len(columns):
+    if call.args.more or call.args.keywords.keys() - {"strict"} or len(known) < len(columns):
         return ANY
-    rows = tuple(run.tuple_of(row) for row in zip(*known, strict=False))
+    rows = tuple(run.tuple_of(row) for row in itertools.islice(combine(*known), MAX_ROWS + 1))
+    if len(rows) > MAX_ROWS:
+        return ANY
     return run.sequence(call.node, LAZY, Items(rows))
 
 
@@ -191,12 +195,26 @@ def _dict(run: Run, call: Call) -> Value:
 
 def fill(run: Run, obj: Dictionary, call: Call) -> None:
     """Add what ``dict`` and ``dict.update`` are given to ``obj``."""
-    for atom in call.args.at(0) or BOTTOM:
+    given = call.args.at(0) or BOTTOM
+    pairs = _pairs(run, given, call)
+    for key, value in pairs or ():
+        store_item(run, obj, key, value)
+    for atom in given if pairs is None else BOTTOM:
         copy_dictionary(run, obj, (atom,))
     for name, value in call.args.keywords.items():
         run.state.store(obj, Key(name), value)
     if call.args.more_keywords:
         run.state.store(obj, OTHER, join(obj.cells.get(OTHER, BOTTOM), call.args.more_keywords))
+
+
+def _pairs(run: Run, given: Value, call: Call) -> list[tuple[Value, Value]] | None:
+    """Return the pairs of a list that is known in full, ``None`` if it is none."""
+    if not isinstance(sole(given), Sequence):
+        return None
+    rows = elements(run, given, call.node, call.frame).exact
+    known = [elements(run, row, call.node, call.frame).exact for row in rows or ()]
+    pairs = [(row[0], row[1]) for row in known if row is not None and len(row) == 2]
+    return pairs if rows is not None and len(pairs) == len(known) else None
 
 
 def chosen(run: Run, call: Call) -> Value:
@@ -351,7 +369,7 @@ _BUILT_IN: dict[str, Callable[[Run, Call], Value]] = {
         ),
         "sorted": _sorted,
         "enumerate": _enumerate,
-        "zip": _zip,
+        "zip": lambda run, call: _rows(run, call, zip),
         "map": _map,
         "dict": _dict,
         "next": lambda run, call: mixed_with_unknown(chosen(run, call)),
@@ -499,6 +517,7 @@ FUNCTIONS: dict[str, Model] = {
     "os.path.join": _path_join,
     "os.path.basename": _base_name,
     "functools.partial": _partial,
+    "itertools.product": lambda run, call: _rows(run, call, itertools.product),
     **{f"threading.{name}": _lock for name in ("Lock", "RLock", "Condition", "Semaphore", "Event")},
     "threading.Thread": _thread,
     "multiprocessing.Process": _thread,

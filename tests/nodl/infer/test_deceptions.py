@@ -183,6 +183,7 @@ def test_the_way_that_a_launch_takes_says_the_same(title: str, tmp_path: Path) -
         "data_model: a field may not be set, so that __getattr__ gives it",
         "data_model: object.__setattr__ sets what a frozen dataclass keeps",
         "in_place: an element is taken off a list that is known in full",
+        "in_place: pairs that are edited after a dictionary was made of them",
         "language: a list is edited after it was added",
         "language: lists added",
         "options: the field of the type that the parameter has",

@@ -40,6 +40,14 @@ CASES: dict[str, tuple[str, list[str]]] = {
     "range": ("for i in range(3):\n    self.P('r%d' % i)", ["r0", "r1", "r2"]),
     "enumerate": ("for i, x in enumerate(['a', 'b']):\n    self.P(f'{i}{x}')", ["0a", "1b"]),
     "zip": ("for x, y in zip(['a', 'b'], ['c', 'd', 'e']):\n    self.P(f'{x}{y}')", ["ac", "bd"]),
+    "a dictionary of pairs": ("for x, y in dict([('a', 'b'), ('c', 'd')]).items():\n    self.P(x + y)", ["ab", "cd"]),
+    "a dictionary of what may be pairs": ("self.P(dict(sys.argv[1])['a'])", ["?"]),
+    "product": (
+        "import itertools\nfor x, y in itertools.product('ab', 'c'):\n    self.P(x + y)", ["ac", "bc"]
+    ),
+    "product with itself": (
+        "import itertools\nfor x, y in itertools.product('ab', repeat=2):\n    self.P(x + y)", ["?"]
+    ),
     "zip of parameters": (
         "L = [self.declare_parameter(n, ['a', 'b']).value for n in 'xy']\n"
         "for x, y in zip(L[0], L[1]):\n    self.P(f'{x}{y}')",
