@@ -105,7 +105,7 @@ EXPRESSIONS = {
         |          | label_of($b)                                  || | | label_of($n)
         | texts    | ($v.empty() ? std::string($w) : $v[0])        || | texts | ($v.size() > 1 ? $v.at(1) : $o)
         | texts    | ($v.empty() ? std::string($w) : $v.back())    || | array | $v[$n % 2]
-        | array    | std::get<1>($v)                               || | table | ($v.count($w) ? $v.at("odom") : $o)
+        | array    | std::get<1>($v)                               || | table | ($v.count("odom") ? $v.at("odom") : $o)
         | table    | ($v.empty() ? $o : $v.begin()->second)        || | maybe | $v.value_or($w)
         | maybe    | ($v ? *$v : $o)                               || | pair | $v.first
         | pair     | ($v.first + std::to_string($v.second))        || | item | $v.name

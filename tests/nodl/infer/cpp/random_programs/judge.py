@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 import re
 import subprocess
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,22 +17,43 @@ from tests.nodl.infer.cpp.random_programs.generator import HEAD, TYPES, Program
 from tests.nodl.infer.cpp.workspace import gaps, package
 
 STAND_IN = Path(__file__).with_name("rclcpp_stand_in.hpp")
-COMPILER = ["g++", "-std=c++17", "-O0", "-w", "-D_GLIBCXX_ASSERTIONS", "-Werror=return-type"]
+COMPILER = [
+    "g++",
+    "-std=c++17",
+    "-O0",
+    "-g1",
+    "-no-pie",
+    "-w",
+    "-D_GLIBCXX_ASSERTIONS",
+    "-Werror=return-type",
+]
 Interface = tuple[str, str]  # kind and final name; of a node its kind is "node"
 Scenario = Mapping[str, str]  # parameters
+
+
+class Made(NamedTuple):
+    """``lines``: those of the program that led here: of the call that makes it, of each call around, and of those that
+    registered the callback in which it stands."""
+
+    interface: Interface
+    lines: frozenset[int]
 
 
 class Run(NamedTuple):
     """``status``: 0, 1 after an exception that nobody caught, 2 if it crashed or did not end."""
 
     scenario: Scenario
-    made: frozenset[Interface]
+    made: frozenset[Made]
     status: int
+
+    @property
+    def interfaces(self) -> set[Interface]:
+        return {each.interface for each in self.made}
 
 
 class Verdict(NamedTuple):
-    """``silent``: made and not covered; ``false``: certain, without a note of a condition, and made by no run.
-    ``whole``: without gaps and open names.
+    """``silent``: made and not covered, nor is a gap said of a line that led to it; ``false``: certain, without a note
+    of a condition, and made by no run. ``whole``: without gaps and open names.
     """
 
     silent: frozenset[Interface]
@@ -57,91 +78,130 @@ def compiled(programs: Sequence[Program], folder: Path, seeds: Iterable[int]) ->
         subprocess.run([*COMPILER, "-x", "c++-header", header, "-o", f"{header}.gch"], check=True)
     text, calls = [], []
     for number, program in enumerate(programs):
-        body = re.sub(
-            r"^#include.*\n",
-            "",
-            program.files["src/main.cpp"].removeprefix(HEAD).removeprefix(TYPES),
-            flags=re.M,
-        )
-        text.append(f'#line 1 "program {number}"\nnamespace p{number} {{\n{body}\n}}')
+        source = program.files["src/main.cpp"]
+        body = source.removeprefix(HEAD).removeprefix(TYPES)
+        first = source.count("\n") - body.count("\n") + 1
+        body = re.sub(r"^#include.*", "", body, flags=re.M)
+        text.append(f'namespace p{number} {{\n#line {first} "program {number}"\n{body}\n}}')
         for at, scenario in enumerate(scenarios(program, number)):
             words = " ".join(f"{name}={value}" for name, value in scenario.items())
             calls += [f'in_a_process("{number} {at}", p{number}::main, {seed}, "{words}");' for seed in seeds]
-    source = folder / "programs.cpp"
-    source.write_text("\n".join([*text, "int main() {", *calls, "}"]))
-    command: list[str | Path] = [*COMPILER, "-include", header, source, "-o", folder / "programs"]
+    main = folder / "programs.cpp"
+    main.write_text("\n".join([*text, '#line 1 "main"', "int main() {", *calls, "}"]))
+    command: list[str | Path] = [*COMPILER, "-include", header, main, "-o", folder / "programs"]
     subprocess.run(command, check=True, capture_output=True, text=True)
     return folder / "programs"
 
 
 def runs(programs: Sequence[Program], folder: Path, seeds: Iterable[int]) -> list[list[Run]]:
     """What each program made, run by run."""
-    output = subprocess.run(
-        [compiled(programs, folder, seeds)], check=True, capture_output=True, text=True
-    ).stdout
+    executable = compiled(programs, folder, seeds)
+    output = subprocess.run([executable], check=True, capture_output=True, text=True).stdout
+    lines_at = _lines(executable, set(re.findall(r"\b0x[0-9a-f]+", output)))
     found: list[list[Run]] = [[] for _ in programs]
     for one in output.split("RUN ")[1:]:
-        head, *lines = one.splitlines()
+        head, *rows = one.splitlines()
         number, at, _ = map(int, head.split())
-        pairs = [line.split(" ", 1) for line in lines if line]
-        ended = [pair[1] for pair in pairs if pair[0] == "END"]
-        made = frozenset((kind, name) for kind, name in pairs if kind != "END")
-        found[number].append(
-            Run(scenarios(programs[number], number)[at], made, int(ended[0]) if ended else 2)
-        )
+        ended, made = 2, set()
+        for kind, name, *addresses in (row.split(" ") for row in rows if row):
+            if kind == "END":
+                ended = int(name)
+            else:
+                lines = {lines_at[address] for address in addresses if address in lines_at}
+                made.add(Made((kind, name), frozenset(lines)))
+        found[number].append(Run(scenarios(programs[number], number)[at], frozenset(made), ended))
     return found
+
+
+def _lines(executable: Path, addresses: Collection[str]) -> dict[str, int]:
+    """The line of a program behind each return address, where there is one."""
+    called_at = "\n".join(hex(int(address, 16) - 1) for address in addresses)
+    command: list[str | Path] = ["addr2line", "-e", executable]
+    places = subprocess.run(command, input=called_at, check=True, capture_output=True, text=True).stdout
+    found = (re.search(r"program \d+:(\d+)", place) for place in places.splitlines())
+    return {address: int(place[1]) for address, place in zip(addresses, found, strict=True) if place}
 
 
 def judged(program: Program, made: Sequence[Run], folder: Path) -> Verdict:
     """Compare the runs with what inference says under their parameters."""
     system = infer_paths([package(folder / "demo", program.files)])
-    has_gaps = bool(gaps(system))
     silent: set[Interface] = set()
     certain: set[Interface] = set()
     is_open = False
     for scenario in {tuple(run.scenario.items()) for run in made}:
-        claim = _claim(system, dict(scenario))
+        claim = _claim(system, program.files["src/main.cpp"], dict(scenario))
         certain |= claim.certain
         is_open = is_open or bool(claim.patterns)
         of_these = [run for run in made if tuple(run.scenario.items()) == scenario and run.status != 2]
         silent |= {
-            each for run in of_these for each in run.made if not claim.covers(each) and _valid(each[1])
+            each.interface
+            for run in of_these
+            for each in run.made
+            if not claim.covers(each) and _valid(each.interface[1])
         }
     # What an exception that nobody catches leaves out has no note.
     ended = not any(run.status for run in made)
-    false = certain - {each for run in made for each in run.made} if ended else set()
-    return Verdict(frozenset(() if has_gaps else silent), frozenset(false), not has_gaps and not is_open)
+    false = certain - {each for run in made for each in run.interfaces} if ended else set()
+    return Verdict(frozenset(silent), frozenset(false), not gaps(system) and not is_open)
+
+
+class _Pattern(NamedTuple):
+    kind: str
+    name: re.Pattern[str]
+    line: int
+
+    def fits(self, made: Made) -> bool:
+        kind, name = made.interface
+        return kind == self.kind and self.line in made.lines and self.name.fullmatch(name) is not None
 
 
 class _Claim(NamedTuple):
-    """``certain``: without a note; ``noted``: under a condition."""
+    """``certain``: without a note; ``noted``: under a condition; ``gaps``: the lines that they are said of."""
 
     certain: set[Interface]
     noted: set[Interface]
-    patterns: list[tuple[str, re.Pattern[str]]]
+    patterns: list[_Pattern]
+    gaps: set[int]
 
-    def covers(self, made: Interface) -> bool:
-        known = any(kind == made[0] and pattern.fullmatch(made[1]) for kind, pattern in self.patterns)
-        return known or made in self.certain or made in self.noted
+    def covers(self, made: Made) -> bool:
+        if not self.gaps.isdisjoint(made.lines):
+            return True
+        if made.interface in self.certain or made.interface in self.noted:
+            return True
+        return any(pattern.fits(made) for pattern in self.patterns)
 
 
-def _claim(system: InferredSystem, parameters: Mapping[str, object]) -> _Claim:
-    claim = _Claim(set(), set(), [])
+def _covered(text: str, line: int) -> range:
+    """Return what a gap at a line is said of: the line with the block that it begins, everything without a line."""
+    rows = text.splitlines()
+    depth = 0
+    for last, row in enumerate(rows[line - 1 :], line) if line else ():
+        depth += row.count("{") - row.count("}")
+        if depth <= 0:
+            return range(line, last + 1)
+    return range(len(rows) + 1)
+
+
+def _claim(system: InferredSystem, text: str, parameters: Mapping[str, object]) -> _Claim:
+    claim = _Claim(set(), set(), [], set())
+    for gap in (*system.gaps, *(gap for node in system.nodes for gap in node.gaps)):
+        claim.gaps.update(_covered(text, gap.source.line))
     for node in system.nodes:
         if node.name is None or node.namespace is None:
-            claim.patterns.append(("node", re.compile(".*")))
+            claim.patterns.append(_Pattern("node", re.compile(".*"), node.source.line))
         else:
             claim.noted.add(("node", expand_name(node.name, namespace=node.namespace, node="x")))
         for endpoint in node.endpoints:
             kind = endpoint.kind.value
-            for text in {filled.text for filled in endpoint.name.fill_each(parameters)}:
-                if endpoint.certainty in (Certainty.EXACT, Certainty.FROM_DEFAULT) and "*" not in text:
+            for written in {filled.text for filled in endpoint.name.fill_each(parameters)}:
+                if endpoint.certainty in (Certainty.EXACT, Certainty.FROM_DEFAULT) and "*" not in written:
                     conditional = endpoint.note == UNDECIDED or endpoint.name != endpoint.name.unconditional
-                    final = _final(text, node.name, node.namespace)
+                    final = _final(written, node.name, node.namespace)
                     (claim.noted if conditional or not final else claim.certain).add((kind, final))
                 else:
-                    start = "" if text.startswith(("/", "*")) else ".*/"
-                    claim.patterns.append((kind, re.compile(start + re.escape(text).replace(r"\*", ".*"))))
+                    start = "" if written.startswith(("/", "*")) else ".*/"
+                    name = re.compile(start + re.escape(written).replace(r"\*", ".*"))
+                    claim.patterns.append(_Pattern(kind, name, endpoint.source.line))
     return claim
 
 

@@ -1,6 +1,7 @@
-// What of rclcpp the random programs use. It writes each node and interface to standard output under its final name,
-// takes parameters from the scenario, and calls callbacks in an order that the seed decides.
+// What of rclcpp the random programs use. It writes each node and interface to standard output under its final name with
+// the calls that led to it, takes parameters from the scenario, and calls callbacks in an order that the seed decides.
 #pragma once
+#include <execinfo.h>
 #include <sys/wait.h>
 #include <unistd.h>
 #include <array>
@@ -54,6 +55,19 @@ private:
   std::string name_;
   Value value_;
 };
+using Calls = std::vector<void *>;  // return addresses
+inline Calls & registered() { static Calls calls; return calls; }  // those that led to the callback that runs
+inline Calls calls_until_here() {
+  Calls calls(100);
+  calls.resize(backtrace(calls.data(), calls.size()));
+  calls.insert(calls.end(), registered().begin(), registered().end());
+  return calls;
+}
+inline void write(const std::string & kind, const std::string & name) {
+  std::cout << kind << " " << name;
+  for (void * address : calls_until_here()) std::cout << " " << address;
+  std::cout << "\n";
+}
 template <typename T> struct Made { using SharedPtr = std::shared_ptr<Made>; void publish(const T &) {} };
 template <typename T> using Publisher = Made<T>;
 template <typename T> using Subscription = Made<T>;
@@ -65,7 +79,7 @@ class Node : public std::enable_shared_from_this<Node> {
 public:
   using SharedPtr = std::shared_ptr<Node>;
   explicit Node(const std::string & name, const std::string & space = "") : name_(name), space_(space) {
-    std::cout << "node " << space_ << "/" << name_ << "\n";
+    write("node", space_ + "/" + name_);
   }
   Node(const Node &) = delete;
   virtual ~Node() = default;
@@ -121,10 +135,16 @@ public:
   std::string get_name() const { return name_; }
   std::vector<Callback> callbacks;
 private:
-  template <typename F> void call_later(F call) { callbacks.push_back(std::make_shared<std::function<void()>>(call)); }
+  template <typename F> void call_later(F call) {
+    callbacks.push_back(std::make_shared<std::function<void()>>([call, led = calls_until_here()]() mutable {
+      registered() = led;
+      call();
+      registered().clear();
+    }));
+  }
   template <typename T> std::shared_ptr<Made<T>> made(const char * kind, const std::string & name) {
     const std::string full = name[0] == '/' ? name : name[0] == '~' ? space_ + "/" + name_ + name.substr(1) : space_ + "/" + name;
-    std::cout << kind << " " << full << "\n";
+    write(kind, full);
     return std::make_shared<Made<T>>();
   }
   std::string name_, space_;
