@@ -32,7 +32,7 @@ from nodl.infer.cpp.running.constructors import construct
 from nodl.infer.cpp.running.invocation import invoke
 from nodl.infer.cpp.running.machine import Frame, Machine, StepLimitExceeded
 from nodl.infer.cpp.running.values import Seq, Value, unknown
-from nodl.infer.cpp.running.variables import constant
+from nodl.infer.cpp.running.variables import constant, static_member
 from nodl.infer.cpp.syntax import line_of
 from nodl.infer.start import Start
 from nodl.source_ref import SourceRef
@@ -271,9 +271,13 @@ def _start(run: Machine, entry: Entry) -> None:
 
 def _globals(run: Machine, entry: Entry) -> None:
     """Make variables outside of functions, as happens before main."""
-    for file in entry.files:
-        index = run.names.files.get(file)
-        listed = (each for found in index.globals.values() for each in found) if index is not None else ()
+    seen = (name for file in entry.files for name in (*sorted(run.names.visible(file) - {file}), file))
+    for index in (run.names.files[name] for name in dict.fromkeys(seen) if name in run.names.files):
+        for cls in (each for found in index.classes.values() for each in found):
+            for name, member in cls.fields.items():
+                if member.static and member.default is not None and not cls.templates and not cls.specialises:
+                    static_member(run, cls, name)
+        listed = (each for found in index.globals.values() for each in found)
         for each in sorted(listed, key=lambda found: found.node.start_byte):
             mark = run.store.mark()
             kind = run.names.resolve(each.type, each.scope, each.file)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from nodl.infer.cpp.reading.declarations import (
+    BIT_FIELD,
     Class,
     Field,
     FileIndex,
@@ -345,7 +346,8 @@ def declared_names(node: Node) -> list[DeclaredVariable]:
         if inner is not None:
             end = declarators[index + 1].start_byte if index + 1 < len(declarators) else node.end_byte
             later = [v for v in values if declarator.end_byte <= v.start_byte < end]
-            written = type_text(node)
+            is_bit_field = any(each.type == "bitfield_clause" for each in node.named_children)
+            written = BIT_FIELD if is_bit_field else type_text(node)
             if array and (pointer or written not in ("char", "unsigned char")):
                 counted = f", {size}" if size.isdigit() else ""
                 written, pointer = f"std::array<{written}{' *' if pointer else ''}{counted}>", False

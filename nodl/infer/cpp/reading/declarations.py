@@ -206,6 +206,10 @@ BODIES = ("class_specifier", "struct_specifier", "union_specifier", "enum_specif
 """What declares a type where it is used."""
 
 
+BIT_FIELD = "bit_field"
+"""Stands for the type of a member that keeps some bits of a number only."""
+
+
 def unnamed(node: Node) -> str:
     """Make a name for a structure without one."""
     return f"unnamed_{line_of(node)}_{node.start_point[1]}"
@@ -236,9 +240,11 @@ def parameters_of(declarator: Node, function: Function | None = None) -> list[Fu
 
 
 def _marks(declarator: Node | None) -> str:
-    """Return ``&`` or ``*`` of a declarator."""
+    """Return ``&`` or ``*`` of a declarator; an array as a parameter is a pointer ([dcl.fct]/5)."""
     if declarator is None:
         return ""
+    if declarator.type == "array_declarator":
+        return "*"
     written = text(declarator)
     return "".join(c for c in written[: max(1, len(written) - len(written.lstrip("&* ")))] if c in "&*")
 

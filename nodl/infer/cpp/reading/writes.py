@@ -54,9 +54,10 @@ _REPLACES = frozenset({"reset", "swap", "emplace", "assign", "store", "exchange"
 FILLS = frozenset({
     "push_back", "emplace_back", "push_front", "emplace_front", "insert", "insert_or_assign", "emplace", "try_emplace",
     "erase", "clear", "resize", "append", "pop_back", "pop_front", "pop", "push", "assign", "fill", "sort", "merge",
-    "splice", "remove", "remove_if", "unique", "reverse", "replace", "swap", "reset",
+    "splice", "remove", "remove_if", "unique", "reverse", "replace", "swap", "reset", "store", "exchange", "fetch_add",
+    "fetch_sub", "fetch_and", "fetch_or", "fetch_xor", "compare_exchange_strong", "compare_exchange_weak",
 })  # fmt: skip
-"""Methods that change what their text or container holds."""
+"""Methods that change what their text, container or ``std::atomic`` holds."""
 _READS_ARGUMENTS = re.compile(r"RCLCPP_\w+|lookupTransform|canTransform|publish|get_logger")
 
 

@@ -7,6 +7,7 @@ import re
 from collections.abc import Callable
 from typing import Any
 
+from nodl.infer.cpp.reading.declarations import BIT_FIELD
 from nodl.infer.cpp.running.values import (
     END,
     Const,
@@ -99,8 +100,8 @@ _INTEGER = re.compile(
 
 def as_type(name: str, value: Value) -> Value:
     """Return ``value`` as a variable of this fundamental type holds it; of other types as it was."""
-    if name in ("double", "float") and any(isinstance(atom, int | Text | Unknown) for atom in value):
-        return unknown("a fraction")
+    if name in ("double", "float", BIT_FIELD) and any(isinstance(a, int | Text | Unknown) for a in value):
+        return unknown("a part of a number")
     if name == "bool":
         return join(*((_as_bool(atom),) for atom in value))
     match = _INTEGER.fullmatch(name)

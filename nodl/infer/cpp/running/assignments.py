@@ -149,8 +149,8 @@ def as_declared(run: Machine, left: Node, value: Value, frame: Frame) -> Value:
     """Return a number as the type of the variable holds it."""
     if not any(isinstance(atom, int | Text | Unknown) for atom in value):
         return value
-    kind, pointer = declared_type(run, left, frame)
-    return value if pointer else as_type(kind.name, value)
+    kind = seen_type(run, left, frame)
+    return value if kind.pointer or is_pointer(run, left, frame) else as_type(kind.name, value)
 
 
 def assign(run: Machine, target: Node, value: Value, frame: Frame) -> None:

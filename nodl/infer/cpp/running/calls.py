@@ -43,16 +43,23 @@ from nodl.infer.cpp.running.static_types import (
     TEXTS,
     class_around,
     class_of_member,
+    classes_around,
     current_object,
     declared_type,
     methods_meant,
     points_to_plain,
 )
-from nodl.infer.cpp.running.unknown_calls import changed_by_standard, unknown_call, without_source
+from nodl.infer.cpp.running.unknown_calls import (
+    changed_by_standard,
+    may_be_written,
+    unknown_call,
+    without_source,
+)
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     Atom,
     Bound,
+    Const,
     Lambda,
     Obj,
     Seq,
@@ -147,7 +154,17 @@ def _named_call(run: Machine, name: str, site: CallSite) -> Value:
         values = site.values
         return call_values(run, run.store.get((owner, name)) or BOTTOM, values, site.node, site.frame)
     found = _own_method(run, name, site)
+    found = _method_around(run, name, site) if found is None else found
     return _free_call(run, name, site, site.frame.scope) if found is None else found
+
+
+def _method_around(run: Machine, name: str, site: CallSite) -> Value | None:
+    """Call a static method of a class around by its name alone; ``None`` if none has it."""
+    for cls in classes_around(run, site.frame):
+        methods = run.names.find_methods(cls, name) if name != cls.name else []
+        if methods:
+            return site.call_methods(methods, None, exactly=True)
+    return None
 
 
 def _is_global(site: CallSite) -> bool:
@@ -358,7 +375,7 @@ def method_call(run: Machine, site: CallSite) -> Value:
         return BOTTOM
     if name in FILLS and (REFERRED_TO in receiver or points_to_plain(run, subject, frame, TEXTS)):
         through(run, subject, frame)
-    elif name in FILLS and any(isinstance(atom, Unknown) for atom in receiver):
+    elif name in FILLS and any(isinstance(atom, Unknown | int | Const) for atom in receiver):
         forget(run, subject, frame, told=False)
     found: list[Value] = []
     before = run.store.mark()
@@ -512,4 +529,5 @@ def _on_unknown(run: Machine, atom: Unknown, name: str, site: CallSite) -> Value
             which = f"which {name}() is called here is not known ({atom.why})"
             run.gap(node, frame, f"{which}; {makes} makes interfaces")
     handed_over(run, f"{text(subject)[:40]}->{name}()", values, node, frame)
+    may_be_written(run, name, [], site.given, frame)
     return unknown(f"the result of {name}()")

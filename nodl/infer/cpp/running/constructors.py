@@ -12,6 +12,7 @@ from functools import partial
 
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES, Call, is_harmless_class
 from nodl.infer.cpp.reading.declarations import (
+    BIT_FIELD,
     Class,
     Field,
     Function,
@@ -57,7 +58,7 @@ _TEXTS = frozenset({
 _SCALARS = frozenset({
     "bool", "int", "float", "double", "char", "size_t", "std::size_t", "unsigned", "long", "short", "auto",
     "uint8_t", "uint16_t", "uint32_t", "uint64_t", "int8_t", "int16_t", "int32_t", "int64_t", "unsigned int",
-    "std::atomic_bool", "std::chrono::milliseconds", "std::chrono::seconds",
+    "std::atomic_bool", "std::chrono::milliseconds", "std::chrono::seconds", BIT_FIELD,
 })  # fmt: skip
 
 
@@ -176,7 +177,7 @@ def _sequence(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame
         if inner.pointer and (inner.name == "char" or each.type.endswith("literal"))
         else _pointed_to(run, each, frame)
         if inner.pointer
-        else copied(run, run.evaluate(each, frame), each, frame, cls)
+        else as_type(inner.name, copied(run, run.evaluate(each, frame), each, frame, cls))
         for each in given
     ]
     if len(given) == 1 and given[0].type != "initializer_list" and any(isinstance(a, Seq) for a in items[0]):
@@ -640,6 +641,8 @@ def _members(run: Machine, this: Obj, cls: Class, given: dict[str, Node], inner:
             )
         if member.pointer and "char" not in member.type:
             found = as_referred_to(found)
+        elif any(isinstance(atom, int) for atom in found):
+            found = as_type(kind.name, found)
         before = run.store.get((this, name)) or BOTTOM  # of a member that this one hides
         run.store.set((this, name), join(before, found))
 
@@ -679,7 +682,11 @@ def bind_parameters(run: Machine, function: Function, arguments: Sequence[Value]
 
 
 def as_parameter(run: Machine, parameter: FunctionParameter, value: Value, node: Node, inner: Frame) -> Value:
-    """Return an argument as its parameter has it: an object of its class unless it is a reference or pointer."""
+    """Return an argument as its parameter has it: a number of its type, an object of its class unless it is a reference
+    or pointer.
+    """
+    if "*" not in parameter.type and any(isinstance(atom, int) for atom in value):
+        value = as_type(run.type_of(parameter.type, inner).name, value)
     if parameter.type.rstrip().endswith(("&", "*")) or _is_pointer_in(node, parameter.name):
         return value
     return copied(run, value, node, inner, _class_of_parameter(run, parameter, value, inner))

@@ -8,7 +8,7 @@ from itertools import chain
 
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES
 from nodl.infer.cpp.reading.type_names import Type
-from nodl.infer.cpp.running.arithmetic import added
+from nodl.infer.cpp.running.arithmetic import added, as_type
 from nodl.infer.cpp.running.assignments import assign, with_entry
 from nodl.infer.cpp.running.constructors import (
     ORDERED,
@@ -26,6 +26,7 @@ from nodl.infer.cpp.running.machine import Machine
 from nodl.infer.cpp.running.references import forget
 from nodl.infer.cpp.running.standard import called_now
 from nodl.infer.cpp.running.static_types import declared_type, seen_type
+from nodl.infer.cpp.running.unknown_calls import may_be_written
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     END,
@@ -93,6 +94,7 @@ def container_call(run: Machine, atom: object, name: str, site: CallSite) -> Val
     if isinstance(atom, Seq | Group):
         return _sequence_call(run, atom, name, site)
     run.later(values, site.frame)
+    may_be_written(run, name, [], site.given, site.frame)
     return unknown(f"the result of {name}()")
 
 
@@ -125,7 +127,10 @@ def _added(run: Machine, atom: object, name: str, site: CallSite) -> Value:
     else:
         listed = [run.evaluate(each, frame) for each in given]
         if inner is None or not inner.pointer:
-            listed = [copied(run, v, each, frame, cls) for v, each in zip(listed, given, strict=True)]
+            listed = [
+                as_type(inner.name if inner else "", copied(run, value, each, frame, cls))
+                for value, each in zip(listed, given, strict=True)
+            ]
         if name == "insert" and len(listed) == 3:
             return _inserted(run, atom, listed[1], site)
         value = listed[-1] if listed else BOTTOM

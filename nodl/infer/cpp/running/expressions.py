@@ -15,7 +15,12 @@ from nodl.infer.cpp.running.contents import copied, elements_copied, items_of
 from nodl.infer.cpp.running.invocation import by_operator, pointed_to
 from nodl.infer.cpp.running.launch_values import decided, in_doubt, settled
 from nodl.infer.cpp.running.machine import NEXT, Frame, Machine, expression
-from nodl.infer.cpp.running.references import as_referred_to, is_plain, keep_reference
+from nodl.infer.cpp.running.references import (
+    as_referred_to,
+    forget_everything,
+    is_plain,
+    keep_reference,
+)
 from nodl.infer.cpp.running.static_types import (
     class_of_member,
     current_object,
@@ -130,6 +135,20 @@ def this(run: Machine, node: Node, frame: Frame) -> Value:
 def inside(run: Machine, node: Node, frame: Frame) -> Value:
     """Evaluate parentheses, a condition: the value of the expression in them."""
     return run.evaluate(unwrapped(node), frame)
+
+
+@expression("fold_expression", "co_await_expression", "generic_expression")
+def not_followed(run: Machine, node: Node, frame: Frame) -> Value:
+    """Add a gap where what is not followed may make interfaces; what it may write is not known afterwards."""
+    what = f"the C++ {node.type.replace('_', ' ')}"
+    if run.subtree_matters(node) or b"=" in (node.text or b""):
+        run.gap(node, frame, f"{what} is not followed; it may make interfaces, or write to their names")
+    if any(each.type in _WRITES for each in walk(node)):
+        forget_everything(run, f"what {what} may have written")
+    return unknown(what)
+
+
+_WRITES = frozenset({"call_expression", "assignment_expression", "update_expression", "ERROR"})
 
 
 @expression("parameter_pack_expansion")

@@ -13,6 +13,7 @@ from nodl.infer.cpp.libraries import IN_PLACE_OF_SOURCE, Call
 from nodl.infer.cpp.reading.declarations import Function, FunctionParameter, parameters_of, type_text
 from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.reading.writes import writes_of
+from nodl.infer.cpp.running.arithmetic import as_type
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.constructors import as_parameter, bind_parameters
 from nodl.infer.cpp.running.contents import copied, handed_over
@@ -461,6 +462,8 @@ def _as_returned(run: Machine, function: Function, inner: Frame) -> Value:
     declarator = field_of(function.node, "declarator")
     if declarator is None or declarator.type != "function_declarator":
         return inner.returned  # a reference or pointer
+    if any(isinstance(atom, int) for atom in inner.returned):
+        return as_type(run.type_of(type_text(function.node), inner).name, inner.returned)
     if not any(isinstance(atom, Obj) and atom.cls is not None and atom.cls.bases for atom in inner.returned):
         return inner.returned
     kind = run.type_of(type_text(function.node), inner)

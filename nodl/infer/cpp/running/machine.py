@@ -163,12 +163,7 @@ class Machine:
             return self._misread(node, frame)
         handler = EXPRESSIONS.get(node.type)
         if handler is None:
-            what = f"the C++ {node.type.replace('_', ' ')}"
-            if node.type in _CALLS_ALL and (self.subtree_matters(node) or b"=" in (node.text or b"")):
-                self.gap(
-                    node, frame, f"{what} is not followed; it may make interfaces, or write to their names"
-                )
-            return unknown(what)
+            return unknown(f"the C++ {node.type.replace('_', ' ')}")
         return handler(self, node, frame)
 
     def _misread(self, node: Node, frame: Frame) -> Value:
@@ -422,9 +417,6 @@ class Machine:
             dict.fromkeys((key, *reach.reached), frozenset(reach.idle))
         )  # nor does what it calls
         return False
-
-
-_CALLS_ALL = frozenset({"fold_expression", "co_await_expression", "generic_expression"})
 
 
 @dataclass(eq=False)

@@ -51,7 +51,7 @@ _READS = re.compile(
     r"function|optional|shared_ptr|unique_ptr|weak_ptr|thread|jthread|async|call_once|for_each|this_thread\w*|cout|cerr|quoted|"
     r"tolower|toupper|isspace|isdigit|isalpha|isalnum|strlen|strcmp|printf|puts|getenv|sqrt|pow|floor|ceil|round|lround|fmod|sin|"
     r"cos|tan|a?tan2?|asin|acos|hypot|exp|log\w*|hash|mutex|lock_guard|unique_lock|scoped_lock|chrono|any|any_cast|variant|move|"
-    r"forward|as_const|addressof|declval|less|greater|plus|minus|cmp_\w+|initializer_list|atomic\w*|runtime_error|\w+_error|"
+    r"forward|as_const|addressof|declval|less|greater|plus|minus|cmp_\w+|initializer_list|atomic(?:_load)?|runtime_error|\w+_error|"
     r"exception|out_of_range|invalid_argument|signal|system|exit|abort|terminate|filesystem)\b.*"
 )
 """Functions of the standard library that leave the texts and containers alone that they get."""

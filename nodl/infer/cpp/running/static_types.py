@@ -6,6 +6,7 @@ A member that a derived class hides shares its cell with the hidden one; where a
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable, Iterator
 from functools import partial
 
 from nodl.infer.cpp.reading.declarations import Class, Function, type_text
@@ -77,6 +78,14 @@ def class_around(run: Machine, frame: Frame) -> Class | None:
     return run.names.find_class(owner, frame.scope, frame.file) if owner else None
 
 
+def classes_around(run: Machine, frame: Frame) -> Iterator[Class]:
+    """Yield the classes in whose scope the code is, the innermost first."""
+    for depth in range(len(frame.scope), 0, -1):
+        cls = run.names.find_class("::".join(frame.scope[:depth]), (), frame.file)
+        if cls is not None:
+            yield cls
+
+
 def class_of_member(run: Machine, atom: Obj, access: Node, frame: Frame) -> Class | None:
     """Return the class in which ``x.name``, ``x->name`` or ``x.Base::name`` is looked up where ``x`` is ``atom``."""
     head = text(field_of(access, "field")).rpartition("::")[0]
@@ -102,10 +111,10 @@ def static_by_name(run: Machine, name: str, frame: Frame) -> tuple[Class, str] |
     """
     head, separator, last = name.rpartition("::")
     if separator:
-        cls = run.class_of(run.type_of(head, frame), frame)
+        around: Iterable[Class | None] = [run.class_of(run.type_of(head, frame), frame)]
     else:
-        cls = run.names.find_class("::".join(frame.scope), (), frame.file) if frame.scope else None
-    for each in run.names.ancestry(cls):
+        around = classes_around(run, frame)
+    for each in (base for cls in around for base in run.names.ancestry(cls)):
         if last in each.fields and each.fields[last].static:
             return each, last
     return None

@@ -86,8 +86,7 @@ def unknown_call(
         run.later(values, frame)
         return unknown(f"the result of {name}()")
     handed_over(run, f"{name}()", values, node, frame)
-    if receiver is None or receiver.cls is not None:
-        may_be_written(run, name, values, given, frame)
+    may_be_written(run, name, values, given, frame)
     return unknown(f"the result of {name}()")
 
 

@@ -57,7 +57,8 @@ def static_member(run: Machine, cls: object, name: str) -> Value:
     if known is not None:
         return known
     declared = cls.fields[name]
-    frame = Frame(cls.file, cls.scope)
+    scope = (*cls.scope, cls.name)
+    frame = Frame(cls.file, scope)
     defined = [g for g in run.names.globals.get(name, ()) if g.scope == cls.scope and g.value is not None]
     outside = defined[0] if defined else None
     if any(each.specialises for each in defined) or cls.qualified in run.names.doubts:
@@ -65,7 +66,7 @@ def static_member(run: Machine, cls: object, name: str) -> Value:
     else:
         value = declared.default
         if value is None and outside is not None:
-            value, frame = outside.value, Frame(outside.file, cls.scope)
+            value, frame = outside.value, Frame(outside.file, scope)
         found = _before_main(
             run,
             cell,

@@ -148,6 +148,58 @@ PROGRAMS: dict[str, tuple[str, str, str, set[str], set[str]]] = {
         "struct S { static B held; }; B S::held = D(); static B made = D();\n",
         {"base", "base_c", "derived_r"}, {"derived", "derived_c"},
     ),
+    "what a global or static member is made with may change another one": (
+        'pub("n" + std::to_string(count)); pub(who); pub(level);', "",
+        "int count = 0; static int last = count++; static int twice = ++count;\n"
+        'std::string who = "nobody"; struct Y { static bool set() { who = "y"; return true; }\n'
+        "inline static bool r = set(); };\n"
+        'std::string level = "info"; struct Z { static bool set() { level = "debug"; return true; } static bool r; };\n'
+        "bool Z::r = set();\n",
+        {"n2", "y", "debug"}, {"n0", "nobody", "info"},
+    ),
+    "a static method calls another one of its class, of a base or of a class around by its name alone": (
+        "Y::set(); Y::In().more(); pub(who + Y::get());", "",
+        'std::string who = "nobody"; struct X { static std::string end() { return "/end"; } };\n'
+        'struct Y : X { static void set() { to("y"); } static void to(std::string t) { who = t; }\n'
+        "static std::string get() { return end(); } struct In { void more() { to(who + who); } }; };\n",
+        {"yy/end"}, {"nobody/end", "y/end"},
+    ),
+    "a constant of the class around is nearer than a global": (
+        "pub(H::In::get()); pub(kT);", "",
+        'const char * const kT = "outer";\n'
+        'struct H { static constexpr const char * kT = "member";\n'
+        "struct In { static std::string get() { return kT; } }; };\n",
+        {"member", "outer"}, set(),
+    ),
+    "an array as a parameter is a pointer": (
+        'std::string a[2] = {"a", "b"}; rename(a); pub(a[0]);', "",
+        'void rename(std::string names[]) { names[0] = "renamed"; }\n', {"renamed"}, {"a"},
+    ),
+    "a number is held as its type has it": (
+        'P p{300}; pub("a" + std::to_string(p.a)); p.a = 257; pub("b" + std::to_string(p.a)); H h(5);'
+        'pub("h" + std::to_string(h.truth)); pub("s" + std::to_string(small(260))); show(7);'
+        'std::vector<uint8_t> v; v.push_back(280); pub("v" + std::to_string(v[0])); p.bits = 9;'
+        'pub("f" + std::to_string(p.bits)); p.wide = 12; pub("w" + std::to_string(p.wide));',
+        'void show(double x) { pub("d" + std::to_string(x)); }',
+        "struct P { uint8_t a = 0; unsigned bits : 2; int wide = 0; };\n"
+        "struct H { explicit H(int x) : truth(x) {} bool truth; }; uint8_t small(int x) { return x; }\n",
+        {"h1", "w12"}, {"a300", "b257", "h5", "s260", "v280", "d7", "f9"},
+    ),
+    "a std::atomic is written by its methods": (
+        'int e = 1; k_.store(2); pub("a" + std::to_string(k_)); n_.fetch_add(2); pub("n" + std::to_string(n_));'
+        'm_.compare_exchange_strong(e, 9); pub("m" + std::to_string(m_)); pub("e" + std::to_string(e));'
+        'pub("l" + std::to_string(l_.load()) + std::to_string(l_));',
+        "std::atomic<int> k_{0}, n_{0}, m_{0}, l_{3};", "", set(), {"a0", "n0", "m0", "e1"},
+    ),
+    "a fold writes what nobody knows": (
+        'std::string s = "s"; add(s, "x", "y"); pub(s);', "",
+        "template <typename... T> void add(std::string & s, const T &... p) { (s.append(p), ...); }\n", set(), {"s"},
+    ),
+    "a method of a library may write to the variable that it gets": (
+        'acme::Reader r; std::string a = "a"; r.read(a); pub(a); auto q = acme::make(); std::string b = "b";'
+        'q->fill(b); pub(b); const std::string c = "c"; q->fill(c); pub(c);',
+        "", "", {"c"}, {"a", "b"},
+    ),
     "a global is made before main of what others held then": (
         'first = "later"; pub(second); pub(S::held); pub(S::own); pub(kept); pub(same_);', 'std::string same_ = first;',
         'std::string first = "first", second = first, other = "other", kept = other + "_k";\n'
