@@ -529,5 +529,6 @@ def _on_unknown(run: Machine, atom: Unknown, name: str, site: CallSite) -> Value
             which = f"which {name}() is called here is not known ({atom.why})"
             run.gap(node, frame, f"{which}; {makes} makes interfaces")
     handed_over(run, f"{text(subject)[:40]}->{name}()", values, node, frame)
-    may_be_written(run, name, [], site.given, frame)
+    # The methods of nodes only read their first argument, a name.
+    may_be_written(run, name, [], site.given[name in NODE_METHODS :], frame)
     return unknown(f"the result of {name}()")

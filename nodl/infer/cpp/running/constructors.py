@@ -17,14 +17,17 @@ from nodl.infer.cpp.reading.declarations import (
     Field,
     Function,
     FunctionParameter,
+    Global,
     function_declarator,
 )
 from nodl.infer.cpp.reading.type_names import NO_TYPE, Type
 from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.arithmetic import as_type
 from nodl.infer.cpp.running.contents import copied, elements_copied, handed_over, items_of, takes_another
+from nodl.infer.cpp.running.effects import effects_of
 from nodl.infer.cpp.running.foreign import unmodelled
 from nodl.infer.cpp.running.machine import MAX_DEPTH, NEXT, Frame, Machine
+from nodl.infer.cpp.running.memory import Cell
 from nodl.infer.cpp.running.overloads import candidates
 from nodl.infer.cpp.running.references import as_referred_to, forget, is_plain, keep_reference, leads_into
 from nodl.infer.cpp.running.static_types import check_hidden, given_to, seen_class, seen_type
@@ -418,10 +421,26 @@ def _check_operators(run: Machine, cls: Class, node: Node, frame: Frame) -> None
     for name, method in listed:
         if name.startswith("~") and _writes_elsewhere(ancestry, method):
             run.gap(node, frame, f"{name} changes what others have: when it runs is not followed")
+        if name.startswith("~"):
+            _written_when_destroyed(run, method)
         kept = (behind_const if _only_reads(method) else fields.keys()) | run.names.globals.keys()
         if _NOT_FOLLOWED.fullmatch(name) and (run.makes_interfaces(method) or writes_of(method.node) & kept):
             why = f"{name} of {cls.name} changes something: where it runs is not followed"
             run.gap(node, frame, why)
+
+
+def _written_when_destroyed(run: Machine, destructor: Function) -> None:
+    """Know nothing of a plain global or static member that a destructor writes to: when it runs is not followed."""
+    written = effects_of(run, destructor).written
+    for name in sorted(written.assigned | written.changed):
+        cells: list[tuple[Cell, Global | Field, Global | Class]] = [
+            ((each, ""), each, each) for each in run.names.globals.get(name, ())
+        ]
+        cells += [((cls, name), cls.fields[name], cls) for cls in run.names.static_members.get(name, ())]
+        for cell, declared, where in cells:
+            kind = run.names.resolve(declared.type, where.scope, where.file)
+            if is_plain_type(kind.name) and not declared.pointer:
+                run.store.share_cell(cell, lambda _: unknown("what a destructor may have written"))
 
 
 _WRITES = {"assignment_expression": "left", "update_expression": "argument"}

@@ -94,7 +94,8 @@ def container_call(run: Machine, atom: object, name: str, site: CallSite) -> Val
     if isinstance(atom, Seq | Group):
         return _sequence_call(run, atom, name, site)
     run.later(values, site.frame)
-    may_be_written(run, name, [], site.given, site.frame)
+    if isinstance(atom, int):  # a std::atomic, compare_exchange_strong() writes back
+        may_be_written(run, name, [], site.given, site.frame)
     return unknown(f"the result of {name}()")
 
 

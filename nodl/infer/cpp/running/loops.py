@@ -20,6 +20,7 @@ from nodl.infer.cpp.running.values import (
     BOTTOM,
     Group,
     Map,
+    Obj,
     Seq,
     Text,
     Unknown,
@@ -69,7 +70,12 @@ def for_range_loop(run: Machine, node: Node, frame: Frame) -> int:
     held: Changes | None = {} if may_write else None
     outcome = _over(run, body, [partial(bind, item) for item in items], exact, frame, held)
     left = join(*(held.get((frame, name)) or BOTTOM for name in names)) if held else BOTTOM
-    is_plain_one = is_plain(left) or (left != BOTTOM and has_text(subject))  # a letter is not known
+    is_own = any(
+        isinstance(atom, Obj) and atom.cls is not None for atom in subject
+    )  # with a begin() of its own
+    is_plain_one = is_plain(left) or (
+        left != BOTTOM and (is_own or has_text(subject))
+    )  # a letter is not known
     if right is not None and is_plain_one:
         forget(run, right, frame, "what a loop writes to the elements")
     return outcome

@@ -197,8 +197,20 @@ PROGRAMS: dict[str, tuple[str, str, str, set[str], set[str]]] = {
     ),
     "a method of a library may write to the variable that it gets": (
         'acme::Reader r; std::string a = "a"; r.read(a); pub(a); auto q = acme::make(); std::string b = "b";'
-        'q->fill(b); pub(b); const std::string c = "c"; q->fill(c); pub(c);',
+        'q->take(b); pub(b); const std::string c = "c"; q->take(c); pub(c);',
         "", "", {"c"}, {"a", "b"},
+    ),
+    "a destructor may have written to a global": (
+        '{ auto p = std::make_unique<D>(); } pub("l" + text); pub("o" + other);', "",
+        'std::string text; std::string other = "x"; struct B { ~B() { text += "B"; } };\n'
+        "struct C : B {}; struct D { C c; };\n",
+        {"ox"}, {"l"},
+    ),
+    "a loop by reference over an object with iterators of its own writes to what it holds": (
+        'R r, q; for (auto & s : r) { s += "_r"; } pub(r.v[0]); for (const auto & s : q) { (void)s; } pub(q.v[1]);', "",
+        'struct R { std::vector<std::string> v{"x", "y"};\n'
+        "auto begin() { return v.begin(); } auto end() { return v.end(); } };\n",
+        {"y"}, {"x"},
     ),
     "a global is made before main of what others held then": (
         'first = "later"; pub(second); pub(S::held); pub(S::own); pub(kept); pub(same_);', 'std::string same_ = first;',
