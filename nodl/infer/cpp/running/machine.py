@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 NEXT, RETURN, BREAK, CONTINUE = 1, 2, 4, 8
 
 MAX_DEPTH = 60
-MAX_STEPS = 800_000
+MAX_STEPS = 400_000
 
 Key = TypeVar("Key")
 Handler = TypeVar("Handler")
