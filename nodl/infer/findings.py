@@ -36,7 +36,6 @@ class NodeRecord:
         self.communication_interface = True
         self.endpoints: dict[FoundEndpoint, None] = {}
         self.parameters: dict[str, Value] = {}
-        self.loose: set[str] = set()  # parameters whose type launch may change
         self.assigned: dict[str, Value] = {}  # set by the program itself
         self.arguments: Value = BOTTOM  # cli_args of the node
         self.use_global_arguments: Value = (True,)

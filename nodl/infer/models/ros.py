@@ -401,8 +401,6 @@ def _declare_parameter(run: Run, record: NodeRecord, call: Call) -> Value:
     ignored = truth(call.args.at(3, "ignore_override") or (False,))
     for name in constant_strings(_name(call)):
         record.declare(name, default)
-        if call.args.at(2, "descriptor"):  # it may ask for dynamic typing
-            record.loose.add(name)
         if ignored is not False:  # what launch says does not count, or perhaps not
             record.assigned[name] = default
             run.state.write(record.cells, name, join(default or NONE, BOTTOM if ignored else ABSENT))
