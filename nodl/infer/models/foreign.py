@@ -39,6 +39,7 @@ from nodl.infer.values import (
     result_of,
     unknown,
 )
+from nodl.source_ref import SourceRef
 
 NODE_METHODS = frozenset(NODE_ENDPOINTS) | frozenset(COMMON_CALLBACKS)
 
@@ -199,7 +200,10 @@ def _unbound_method(run: Run, path: str, name: str, call: Call) -> Value:
 
 def _note_unknown_package(run: Run, path: str, call: Call) -> None:
     """Add a gap for a class or function of a ROS package that cannot be read: it may make a node of its own."""
-    if may_make_nodes(path, run.dependencies):
+    if path.startswith("rospy."):
+        why = "this program calls rospy of ROS 1, which is not analysed"
+        run.findings.gap(SourceRef(run.main.path), why)
+    elif may_make_nodes(path, run.dependencies):
         why = f"{path}() is of a ROS package that is not analysed, and may make a node or interfaces"
         run.gap(call.node, call.frame, why)
 

@@ -41,6 +41,11 @@ def test_what_a_ros_package_makes_that_cannot_be_read_is_a_gap(imports: str, bod
     assert "is of a ROS package that is not analysed" in gap.why
 
 
+def test_all_calls_of_ros_1_are_one_gap(infer: Infer) -> None:
+    (gap,) = infer(_OWN_NODE.format(imports="import rospy", body="rospy.init_node('m'); rospy.Rate(1)")).gaps
+    assert gap.why == "this program calls rospy of ROS 1, which is not analysed"
+
+
 @pytest.mark.parametrize(
     ("imports", "body"),
     [
