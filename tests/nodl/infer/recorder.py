@@ -7,6 +7,7 @@ spins. ``choose`` of the module ``tosses`` is a coin; each seed is another run.
 
 from __future__ import annotations
 
+import os
 import random
 import sys
 import types
@@ -297,7 +298,7 @@ def stand_in(recorder: Recorder) -> dict[str, types.ModuleType]:
 
 @contextmanager
 def _installed(modules: dict[str, types.ModuleType], folder: Path) -> Iterator[None]:
-    before, path, argv = dict(sys.modules), list(sys.path), list(sys.argv)
+    before, path, argv, environment = dict(sys.modules), list(sys.path), list(sys.argv), dict(os.environ)
     sys.modules.update(modules)
     sys.path.insert(0, str(folder))
     sys.argv = ["program"]
@@ -309,6 +310,8 @@ def _installed(modules: dict[str, types.ModuleType], folder: Path) -> Iterator[N
                 del sys.modules[name]
         sys.modules.update({name: module for name, module in before.items() if name in modules})
         sys.path[:], sys.argv = path, argv
+        os.environ.clear()
+        os.environ.update(environment)
 
 
 def record(program: Path, parameters: dict[str, object], seed: int = 0) -> set[Fact]:
