@@ -27,19 +27,21 @@ def directory(root: Path, enclave: str) -> Path:
 def heard(dds: Probe, domain: int, talking: Path, listening: Path, hope: bool = True) -> bool:
     """Whether a listener of the keystore ``listening`` hears a talker of ``talking``.
 
-    A second talker, of ``listening``, must be heard. Without ``hope`` the first is only given some seconds more.
+    Where it ought not to (``hope``), a second talker, of ``listening``, must be heard: then silence means something.
+    Only there, since of three that meet at once Fast DDS 2.9 sometimes authenticates one after half a minute.
     """
-    answers, _ = dds.talk(
+    talkers = [Participant("talker", directory(talking, TALKER), publish=("rt/chatter",))]
+    if not hope:
+        talkers.append(Participant("control", directory(listening, TALKER), publish=("rt/chatter",)))
+    expected = talkers[-1].label
+    answers, said = dds.talk(
         domain,
         Participant("listener", directory(listening, LISTENER), subscribe=("rt/chatter",)),
-        [
-            Participant("control", directory(listening, TALKER), publish=("rt/chatter",)),
-            Participant("talker", directory(talking, TALKER), publish=("rt/chatter",)),
-        ],
-        expected={"control", "talker"} if hope else {"control"},
+        talkers,
+        expected={expected},
         settle=0.0 if hope else 3.0,
     )
-    assert "control" in answers.voices, answers.log
+    assert expected in answers.voices, (answers, answers.log, said, said.log)
     return "talker" in answers.voices
 
 
