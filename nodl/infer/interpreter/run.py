@@ -123,15 +123,13 @@ MAX_DEPTH = 120  # analysed calls inside calls
 
 # Others can do nothing with these.
 _INERT = frozenset({str, int, float, bool, bytes, type(None), Text, Unknown})
+_FUNCTIONS = frozenset({FunctionValue, BoundMethod, Partial})
 
 
 def _has_call(atom: object) -> bool:
     """Return True for an object of a class of the program that has ``__call__``."""
     classes = (isinstance(atom, Instance) and isinstance(atom.cls, ClassValue) and atom.cls.linear) or ()
     return any(isinstance(base, ClassValue) and "__call__" in base.cells for base in classes)
-
-
-_FUNCTIONS = frozenset({FunctionValue, BoundMethod, Partial})
 
 
 class BudgetExceeded(Exception):

@@ -23,12 +23,13 @@ from nodl.infer.cpp.reading.type_names import NO_TYPE, Type
 from nodl.infer.cpp.reading.writes import FILLS
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.callbacks import run_meanwhile
-from nodl.infer.cpp.running.constructors import cast, construct, is_plain_type, made
+from nodl.infer.cpp.running.constructors import cast, construct, made
 from nodl.infer.cpp.running.containers import CONTAINER_METHODS, container_call, is_standard
 from nodl.infer.cpp.running.contents import copied, handed_over
 from nodl.infer.cpp.running.invocation import CallSite, call_functions, call_values, pointed_to
 from nodl.infer.cpp.running.left_out import forget_writes
 from nodl.infer.cpp.running.machine import Frame, Machine, expression
+from nodl.infer.cpp.running.plain_types import is_plain_type
 from nodl.infer.cpp.running.references import (
     REFERRED_TO,
     forget,

@@ -12,23 +12,19 @@ from functools import partial
 
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES, Call, is_harmless_class
 from nodl.infer.cpp.reading.declarations import (
-    BIT_FIELD,
     Class,
     Field,
     Function,
     FunctionParameter,
-    Global,
-    function_declarator,
 )
 from nodl.infer.cpp.reading.type_names import NO_TYPE, Type
-from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.arithmetic import as_type
 from nodl.infer.cpp.running.contents import copied, elements_copied, handed_over, items_of, takes_another
-from nodl.infer.cpp.running.effects import effects_of
 from nodl.infer.cpp.running.foreign import unmodelled
+from nodl.infer.cpp.running.implicit_calls import check_implicit_calls
 from nodl.infer.cpp.running.machine import MAX_DEPTH, NEXT, Frame, Machine
-from nodl.infer.cpp.running.memory import Cell
 from nodl.infer.cpp.running.overloads import candidates
+from nodl.infer.cpp.running.plain_types import MAPS, NUMBERS, ORDERED, SEQUENCES, TEXT_CLASSES
 from nodl.infer.cpp.running.references import as_referred_to, forget, is_plain, keep_reference, leads_into
 from nodl.infer.cpp.running.static_types import check_hidden, given_to, seen_class, seen_type
 from nodl.infer.cpp.running.values import (
@@ -47,27 +43,7 @@ from nodl.infer.cpp.running.values import (
     open_sequence,
     unknown,
 )
-from nodl.infer.cpp.syntax import Node, children, field_of, last_name, text, walk, words_in
-
-SEQUENCES = frozenset({
-    "std::vector", "std::array", "std::list", "std::deque", "std::set", "std::unordered_set", "std::initializer_list",
-    "vector", "std::multiset", "std::queue", "std::stack",
-})  # fmt: skip
-ORDERED = frozenset({"std::set", "std::unordered_set", "set", "std::multiset", "std::priority_queue"})
-MAPS = frozenset({"std::map", "std::unordered_map", "map"})
-_TEXTS = frozenset({
-    "std::string", "string", "std::string_view", "std::stringstream", "std::ostringstream", "std::filesystem::path",
-})  # fmt: skip
-_SCALARS = frozenset({
-    "bool", "int", "float", "double", "char", "size_t", "std::size_t", "unsigned", "long", "short", "auto",
-    "uint8_t", "uint16_t", "uint32_t", "uint64_t", "int8_t", "int16_t", "int32_t", "int64_t", "unsigned int",
-    "std::atomic_bool", "std::chrono::milliseconds", "std::chrono::seconds", BIT_FIELD,
-})  # fmt: skip
-
-
-def is_plain_type(name: str) -> bool:
-    """Return whether it is a text, number or container."""
-    return name in SEQUENCES or name in MAPS or name in _TEXTS or name in _SCALARS
+from nodl.infer.cpp.syntax import Node, children, field_of, last_name, text
 
 
 def declared_value(
@@ -77,7 +53,7 @@ def declared_value(
     kind = run.type_of(written, frame)
     if value is None:
         return BOTTOM if pointer or kind.pointer else default_value(run, node, kind, frame)
-    if pointer or kind.pointer or _is_auto(written) or kind.name in _SCALARS:
+    if pointer or kind.pointer or _is_auto(written) or kind.name in NUMBERS:
         by_reference = pointer or (kind.pointer and "optional" not in written)
         found = initial_value(run, value, frame, by_reference or (_is_auto(written) and "&" in written))
         if "optional" in written and not pointer:
@@ -139,10 +115,10 @@ def made(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame: Fra
         return _sequence(run, node, kind, given, frame)
     if cls is None and kind.name in MAPS:
         return as_map([run.evaluate(each, frame) for each in given])
-    if cls is None and (kind.name in _TEXTS or kind.name in _SCALARS or kind.last in run.names.enums):
+    if cls is None and (kind.name in TEXT_CLASSES or kind.name in NUMBERS or kind.last in run.names.enums):
         if not given:
             return default_value(run, node, kind, frame)
-        if kind.name in _TEXTS:
+        if kind.name in TEXT_CLASSES:
             return text_of(run, [run.evaluate(each, frame) for each in given])
         return as_type(kind.name, run.evaluate(given[0], frame))
     values: list[Value] | None = None
@@ -312,7 +288,7 @@ def _aggregate(
 
 def default_value(run: Machine, node: Node, kind: Type, frame: Frame) -> Value:
     """Return what a declaration without initial value holds."""
-    if kind.name in _TEXTS:
+    if kind.name in TEXT_CLASSES:
         return literal("")
     if kind.name == "std::array" and kind.arguments and not kind.arguments[0].pointer:
         return _repeated(run, node, kind.arguments[0], frame)
@@ -320,7 +296,7 @@ def default_value(run: Machine, node: Node, kind: Type, frame: Frame) -> Value:
         return (Seq(()),)
     if kind.name in MAPS:
         return (Map(()),)
-    if kind.name in _SCALARS or not kind.name or kind.last in run.names.enums:
+    if kind.name in NUMBERS or not kind.name or kind.last in run.names.enums:
         return unknown("a value that is not set")
     if kind.name in ("std::function", "std::pair", "std::tuple", "std::mutex"):
         return BOTTOM
@@ -358,7 +334,7 @@ def construct(
         made_object.data["members"] = members or {}
         _start_fields(run, made_object, cls)
         check_hidden(run, made_object, cls, node, frame)
-        _check_operators(run, cls, node, frame)
+        check_implicit_calls(run, cls, node, frame)
         if any(cls.name in run.names.pointers_to_plain.get(field, ()) for field in cls.fields):
             for each, value in zip(given_to(node, frame), arguments, strict=False):
                 if is_plain(value):
@@ -404,74 +380,6 @@ def _unmodelled(run: Machine, kind: Type, node: Node, frame: Frame, deliberate: 
     why = unmodelled(run.names, kind.name, frame.scope, frame.file, deliberate)
     if why and all(why != said for _, said in run.gaps):  # one place says it of a class
         run.gap(node, frame, why)
-
-
-def _check_operators(run: Machine, cls: Class, node: Node, frame: Frame) -> None:
-    """Add a gap for functions that change something and that are called implicitly.
-
-    Conversions, ``,``, comparisons, from which C++20 derives others, and destructors that write to what a member
-    refers or points to.
-    """
-    ancestry = run.names.ancestry(cls)
-    fields = {name: member for each in ancestry for name, member in each.fields.items()}
-    behind_const = {name for name, each in fields.items() if each.pointer or "mutable" in text(each.node)}
-    listed = [
-        (name, f) for each in ancestry for name, found in run.names.methods[each].items() for f in found
-    ]
-    for name, method in listed:
-        if name.startswith("~") and _writes_elsewhere(ancestry, method):
-            run.gap(node, frame, f"{name} changes what others have: when it runs is not followed")
-        if name.startswith("~"):
-            _written_when_destroyed(run, method)
-        kept = (behind_const if _only_reads(method) else fields.keys()) | run.names.globals.keys()
-        if _NOT_FOLLOWED.fullmatch(name) and (run.makes_interfaces(method) or writes_of(method.node) & kept):
-            why = f"{name} of {cls.name} changes something: where it runs is not followed"
-            run.gap(node, frame, why)
-
-
-def _written_when_destroyed(run: Machine, destructor: Function) -> None:
-    """Know nothing of a plain global or static member that a destructor writes to: when it runs is not followed."""
-    written = effects_of(run, destructor).written
-    for name in sorted(written.assigned | written.changed):
-        cells: list[tuple[Cell, Global | Field, Global | Class]] = [
-            ((each, ""), each, each) for each in run.names.globals.get(name, ())
-        ]
-        cells += [((cls, name), cls.fields[name], cls) for cls in run.names.static_members.get(name, ())]
-        for cell, declared, where in cells:
-            kind = run.names.resolve(declared.type, where.scope, where.file)
-            if is_plain_type(kind.name) and not declared.pointer:
-                run.store.share_cell(cell, lambda _: unknown("what a destructor may have written"))
-
-
-_WRITES = {"assignment_expression": "left", "update_expression": "argument"}
-
-
-def _writes_elsewhere(ancestry: Sequence[Class], method: Function) -> bool:
-    """Return whether a method writes to what a member of its object refers or points to."""
-    fields = [field for each in ancestry for field in each.fields.values() if field.pointer]
-    references = {each.name for each in fields if "&" in text(each.node)}
-    pointers = {each.name for each in fields} - references
-    for each in walk(method.node):
-        target = field_of(each, _WRITES[each.type]) if each.type in _WRITES else None
-        words = words_in(target) if target is not None else frozenset()
-        behind = words & pointers and text(target).removeprefix("this->") not in pointers
-        if words & references or behind:
-            return True
-    return False
-
-
-def _only_reads(method: Function) -> bool:
-    """Return whether a method is ``const``, and what it takes, too: it hands its members on to be read."""
-    declarator = function_declarator(method.node)
-    qualifiers = declarator.named_children if declarator is not None else []
-    return (
-        any(each.type == "type_qualifier" and text(each) == "const" for each in qualifiers)
-        and "const_cast" not in method.words
-        and not any(each.written_back for each in method.parameters)
-    )
-
-
-_NOT_FOLLOWED = re.compile(r"operator (?!new|delete)\w.*|operator(?:,|&&|\|\||==|<=>)")
 
 
 def _never_known(run: Machine, this: Obj, cls: Class, why: str) -> None:

@@ -11,11 +11,9 @@ from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.arithmetic import added, as_type
 from nodl.infer.cpp.running.assignments import assign, with_entry
 from nodl.infer.cpp.running.constructors import (
-    ORDERED,
     construct,
     copies,
     default_value,
-    is_plain_type,
     made,
 )
 from nodl.infer.cpp.running.contents import copied, elements_copied, handed_over, items_of
@@ -23,6 +21,7 @@ from nodl.infer.cpp.running.expressions import element
 from nodl.infer.cpp.running.invocation import CallSite
 from nodl.infer.cpp.running.launch_values import settled_text
 from nodl.infer.cpp.running.machine import Machine
+from nodl.infer.cpp.running.plain_types import ORDERED, is_plain_type
 from nodl.infer.cpp.running.references import forget
 from nodl.infer.cpp.running.standard import called_now
 from nodl.infer.cpp.running.static_types import declared_type, seen_type

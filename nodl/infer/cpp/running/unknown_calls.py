@@ -9,9 +9,9 @@ from functools import partial
 from nodl.infer.cpp.ledger import CREATES
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES, is_harmless_class, is_harmless_function
 from nodl.infer.cpp.running.assignments import assign
-from nodl.infer.cpp.running.constructors import is_plain_type
 from nodl.infer.cpp.running.contents import handed_over, nodes_in
 from nodl.infer.cpp.running.machine import Frame, Machine
+from nodl.infer.cpp.running.plain_types import is_plain_type
 from nodl.infer.cpp.running.references import forget, is_plain, leads_into
 from nodl.infer.cpp.running.standard import INTO_FIRST, called_now
 from nodl.infer.cpp.running.static_types import declared_type, given_to

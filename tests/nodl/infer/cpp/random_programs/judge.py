@@ -32,15 +32,18 @@ Scenario = Mapping[str, str]  # parameters
 
 
 class Made(NamedTuple):
-    """``lines``: those of the program that led here: of the call that makes it, of each call around, and of those that
-    registered the callback in which it stands."""
+    """An interface that a run made.
+
+    ``lines``: those of the program that led to it: of the call that makes it, of each call around that one, and of
+    the calls that registered the callback in which it stands.
+    """
 
     interface: Interface
     lines: frozenset[int]
 
 
 class Run(NamedTuple):
-    """``status``: 0, 1 after an exception that nobody caught, 2 if it crashed or did not end."""
+    """``status``: 0, 1 after an exception that was not caught, 2 if it crashed or did not end."""
 
     scenario: Scenario
     made: frozenset[Made]
@@ -52,8 +55,11 @@ class Run(NamedTuple):
 
 
 class Verdict(NamedTuple):
-    """``silent``: made and not covered, nor is a gap said of a line that led to it; ``false``: certain, without a note
-    of a condition, and made by no run. ``whole``: without gaps and open names.
+    """What inference says beside what the runs made.
+
+    ``silent``: made by a run, not listed, and no gap is at a line that led to it.
+    ``false``: listed without a condition, and made by no run.
+    ``whole``: without gaps and open names.
     """
 
     silent: frozenset[Interface]
@@ -139,7 +145,7 @@ def judged(program: Program, made: Sequence[Run], folder: Path) -> Verdict:
             for each in run.made
             if not claim.covers(each) and _valid(each.interface[1])
         }
-    # What an exception that nobody catches leaves out has no note.
+    # What an exception leaves out has no note if it is not caught.
     ended = not any(run.status for run in made)
     false = certain - {each for run in made for each in run.interfaces} if ended else set()
     return Verdict(frozenset(silent), frozenset(false), not gaps(system) and not is_open)
@@ -156,7 +162,7 @@ class _Pattern(NamedTuple):
 
 
 class _Claim(NamedTuple):
-    """``certain``: without a note; ``noted``: under a condition; ``gaps``: the lines that they are said of."""
+    """``certain``: listed without a condition; ``noted``: with one; ``gaps``: the lines that gaps cover."""
 
     certain: set[Interface]
     noted: set[Interface]
@@ -172,7 +178,7 @@ class _Claim(NamedTuple):
 
 
 def _covered(text: str, line: int) -> range:
-    """Return what a gap at a line is said of: the line with the block that it begins, everything without a line."""
+    """Return the lines that a gap covers: its own with the block that begins there, all if it has none."""
     rows = text.splitlines()
     depth = 0
     for last, row in enumerate(rows[line - 1 :], line) if line else ():
