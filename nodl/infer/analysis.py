@@ -35,6 +35,7 @@ from nodl.infer.start import NO_LAUNCH, InferredProgram, LaunchKey, ProgramLaunc
 from nodl.infer.values import (
     ANY,
     COMMAND_LINE,
+    EVERY_FIELD,
     OF_A_NODE,
     TOO_MANY,
     BoundMethod,
@@ -164,6 +165,8 @@ def _may_find_more(run: Run, callback: object, arity: int | None) -> bool:
     if previous is None:
         return True
     changed = run.state.changes(previous.stamp)
+    if changed and EVERY_FIELD in previous.containers:
+        return True
     if not changed.isdisjoint(previous.containers) or not changed.isdisjoint(_unnamed_cells(run)):
         return True
     words = (words_read(each.module.source)[each.node] for each in previous.functions)
@@ -234,7 +237,7 @@ def _called_from_outside(run: Run, callback: object, arity: int | None) -> Calla
 def call_from_outside(run: Run, module: ModuleValue, atom: object, args: Arguments) -> tuple[object, ...]:
     """Call ``atom`` as nobody in the program does; returns what it gives."""
     frame = Frame(module, {}, None, run.state.depth)
-    return run.call_atom(atom, Call(args, module.source.tree, frame))
+    return run.swallowed(lambda: run.call_atom(atom, Call(args, module.source.tree, frame)))
 
 
 _ANALYSES_A_COLLECTION = 100

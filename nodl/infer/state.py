@@ -87,6 +87,10 @@ class ProgramState:
             value = join(obj.cells.get(key, BOTTOM), value)
         self.write(obj.cells, key, value)
 
+    def touch(self, obj: HeapObject, key: object) -> None:
+        """Note a write to an object that may leave what is known of the cell as it is."""
+        self._trail.append((obj.cells, key, obj.cells[key]))
+
     def open(self, obj: HeapObject) -> None:
         """Note that code which is not analysed got a container; no branch takes that back."""
         obj.escaped = True

@@ -132,12 +132,16 @@ class LocalCells(dict[object, Value]):
         self.shared = False
 
 
+EVERY_FIELD = -1
+
+
 class HeapObject:
     """An object with mutable contents. A ``summary`` stands for several concrete ones (weak updates)."""
 
     __slots__ = ("cells", "escaped", "summary")
 
-    looked_into: ClassVar[set[int]] = set()  # cells of containers and functions that were read, by ``id``
+    # Cells of containers and functions that were read, by ``id``; ``EVERY_FIELD`` where all of an object were.
+    looked_into: ClassVar[set[int]] = set()
 
     def __init__(self) -> None:
         self.cells: Cells = {}

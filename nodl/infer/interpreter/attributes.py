@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import re
+from functools import partial
 
 from nodl.infer.interpreter import imports
 from nodl.infer.interpreter.define import enumeration_member, is_enumeration, linearized, program_classes
@@ -56,16 +57,22 @@ def _of_instance(run: Run, obj: Instance, name: str, node: ast.AST, frame: Frame
     held = present(held)
     if name == "__class__":
         return held or (obj.cls,)
-    in_class = _class_attribute(run, obj, linearized(obj.cls), name, node, frame)
+    order = linearized(obj.cls)
+    hook = next(
+        (c.cells["__getattr__"] for c in program_classes(obj.cls) if "__getattr__" in c.cells), BOTTOM
+    )
+    ask = partial(run.call, hook, Arguments([(obj,), (name,)]), node, frame)
+    if hook:  # asked after a property that raises
+        look = partial(_class_attribute, run, obj, order, name, node, frame)
+        in_class = run.swallowed(lambda: look() or BOTTOM, ask) or None
+    else:
+        in_class = _class_attribute(run, obj, order, name, node, frame)
     if in_class is not None:
         if held and any(map(_is_of_a_node, in_class)) and name not in foreign.NODE_METHODS:
             return held  # rclpy's node has no attribute of this name: read too early, it is an error
         return join(held, in_class)
-    getter = next(
-        (c.cells["__getattr__"] for c in program_classes(obj.cls) if "__getattr__" in c.cells), BOTTOM
-    )
-    if getter:
-        return join(held, run.call(getter, Arguments([(obj,), (name,)]), node, frame))
+    if hook:
+        return join(held, ask())
     return held or unknown(f"attribute {name}, which nothing analysed sets")
 
 

@@ -7,6 +7,7 @@ import functools
 
 from nodl.infer.interpreter.conditions import is_of_launch, under
 from nodl.infer.interpreter.define import (
+    expect_operators,
     foreign_bases,
     functions_of,
     is_enumeration,
@@ -237,7 +238,7 @@ def _made_by_new(run: Run, cls: ClassValue, call: Call) -> Value | None:
 def initialise(run: Run, cls: ClassValue, instance: Instance, call: Call) -> None:
     """Call the constructor: the first one in the method resolution order."""
     _expect_callbacks(run, cls, instance)
-    _expect_operators(run, cls, instance)
+    expect_operators(run, cls, instance)
     for base in linearized(cls):
         if isinstance(base, ClassValue):
             if base.fields is not None and "__init__" not in base.cells:
@@ -264,25 +265,6 @@ def _fill_fields(run: Run, cls: ClassValue, instance: Instance, call: Call) -> N
     after = run.attribute((instance,), "__post_init__", call.node, call.frame)
     if isinstance(after[0], BoundMethod):
         run.call(after, Arguments(), call.node, call.frame)
-
-
-SPECIAL_FOLLOWED = frozenset({  # special methods that run where the program says so
-    "__init__", "__new__", "__call__", "__enter__", "__exit__", "__getattr__", "__post_init__", "__init_subclass__",
-    "__name__", "__module__", "__doc__", "__slots__", "__class_getitem__", "__set_name__",
-})  # fmt: skip
-
-
-def _expect_operators(run: Run, cls: ClassValue, instance: Instance) -> None:
-    """Expect calls of special methods at any time, by operators, iteration, tests and texts; where is not followed."""
-    for base in program_classes(cls):
-        for name, value in list(base.cells.items()):
-            if (
-                isinstance(name, str)
-                and name.startswith("__")
-                and name.endswith("__")
-                and name not in SPECIAL_FOLLOWED
-            ):
-                run.register_callback(methods_in(value, instance, cls), None, run.state.mark())
 
 
 def _expect_callbacks(run: Run, cls: ClassValue, instance: Instance) -> None:

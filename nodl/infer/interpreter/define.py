@@ -343,6 +343,25 @@ def expect_methods(run: Run, value: Value, since: int | None = None) -> None:
 _NOT_CALLED = frozenset({"__init__", "__new__", "__init_subclass__", "__class_getitem__", "__set_name__"})
 
 
+_FOLLOWED = frozenset({  # special methods that run where the program says so
+    "__init__", "__new__", "__call__", "__enter__", "__exit__", "__getattr__", "__post_init__", "__init_subclass__",
+    "__name__", "__module__", "__doc__", "__slots__", "__class_getitem__", "__set_name__",
+})  # fmt: skip
+
+
+def expect_operators(run: Run, cls: ClassValue, instance: Instance) -> None:
+    """Expect calls of special methods at any time, by operators, iteration, tests and texts; where is not followed."""
+    for base in program_classes(cls):
+        for name, value in list(base.cells.items()):
+            if (
+                isinstance(name, str)
+                and name.startswith("__")
+                and name.endswith("__")
+                and name not in _FOLLOWED
+            ):
+                run.register_callback(methods_in(value, instance, cls), None, run.state.mark())
+
+
 def setter_of(owner: Instance, name: str) -> Value:
     """Return what sets the attribute, if it is a property with a setter."""
     classes = program_classes(owner.cls) if isinstance(owner.cls, ClassValue) else []

@@ -436,6 +436,7 @@ def change(run: Run, owner: Sequence, added: Value, taken: bool = True) -> None:
         others = join(others, unknown(TOO_MANY))
     if taken and any(isinstance(atom, (str, Text)) for atom in others):
         others = join(tuple(atom for atom in others if not isinstance(atom, (str, Text))), EDITED)
+    run.state.touch(owner, ITEMS)
     run.state.store(owner, ITEMS, (Items(None, others),))
 
 

@@ -193,6 +193,7 @@ class Run(Allocations):
         self.classes: dict[ast.AST, ClassValue] = {}
         self.functions: dict[tuple[object, ...], FunctionValue] = {}
         self.members: dict[tuple[ClassValue, str], Instance] = {}  # of enumerations
+        self.copied_from: dict[HeapObject, HeapObject] = {}  # copies, with what was copied first
         self.recursive: set[ast.AST] = set()  # functions that called themselves in the running call
         self.options = OptionDefaults()
         self.launch = NO_LAUNCH  # with its values inputs do not stay open
@@ -209,6 +210,7 @@ class Run(Allocations):
         self.steps = 0
         self.limit = min(MAX_STEPS, MAX_STEPS_IN_VAIN)
         self.gave_up = False
+        self.raised = False  # a ``raise`` ran, see ``swallowed``
         self.called_back: dict[tuple[object, int | None], Called] = {}
         self.running: set[FunctionValue] = set()  # functions that ran since the latest callback began
 
@@ -219,6 +221,21 @@ class Run(Allocations):
             self.program.ask("file", str(manifest))
         package = find_package(self.main.path)
         return package.dependencies if package else frozenset()
+
+    def swallowed(self, action: Callable[[], Value], otherwise: Callable[[], Value] | None = None) -> Value:
+        """Return what ``action`` gives, for a caller that goes on after an exception: state may be as it was then.
+
+        ``otherwise``: what the caller then does. ``try`` and ``with`` look at this by themselves; everywhere else an
+        exception ends the program.
+        """
+        mark, outside = self.state.mark(), self.raised
+        self.raised = False
+        given = action()
+        if self.raised:
+            self.state.join_seen(mark, mixed=True)
+            given = join(given, self.state.perhaps(otherwise)) if otherwise is not None else given
+        self.raised = outside
+        return given
 
     # --- syntax -----------------------------------------------------------------------------------------
 

@@ -132,7 +132,8 @@ def _raise(run: Run, node: ast.Raise, frame: Frame) -> bool:
         run.evaluate(node.cause, frame)
     if len(value) == 1 and isinstance(value[0], ClassValue):
         run.call(value, Arguments(), node, frame)
-    _leave(run, frame)
+    frame.jump = ""
+    run.raised = True
     return False
 
 

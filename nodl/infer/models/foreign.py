@@ -50,7 +50,7 @@ _KEEPS_OFF = frozenset({
     "tf2_py", "message_filters", "transforms3d", "scipy", "yaml", "ament_index_python", "rosidl_runtime_py",
     "rcl_interfaces", "rosidl_parser", "launch", "launch_ros", "std_msgs", "PIL", "torch", "matplotlib",
     "pandas", "serial", "requests", "setuptools", "pytest", "tqdm", "sensor_msgs_py", "psutil", "colorama",
-    "ament_copyright", "ament_flake8", "ament_pep257",
+    "ament_copyright", "ament_flake8", "ament_pep257", "generate_parameter_library_py",
     # of Python's own library
     "unittest",
     "builtins", "logging", "time", "math", "cmath", "random", "datetime", "typing", "abc", "json", "warnings",

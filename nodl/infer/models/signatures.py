@@ -237,6 +237,7 @@ _MAKES_NOTHING = frozenset({
     "ament_index_python", "ament_copyright", "ament_flake8", "ament_pep257", "rosidl_runtime_py", "rosidl_parser",
     "tf2_geometry_msgs", "tf2_sensor_msgs", "tf2_py", "launch", "launch_ros", "rclpy", "rospkg", "ros2cli", "rosbags",
     "diagnostic_updater", "message_filters", "interactive_markers", "tf2_kdl", "PyKDL",
+    "generate_parameter_library_py", "python_qt_binding",
 })  # fmt: skip
 # Libraries that know nothing of ROS, under names that package.xml lists too.
 _NOT_OF_ROS = frozenset({

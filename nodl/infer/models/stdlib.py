@@ -17,6 +17,7 @@ from nodl.infer.interpreter.formatting import as_texts, text_value
 from nodl.infer.interpreter.imports import import_module
 from nodl.infer.interpreter.run import Arguments, Call, Model, Run
 from nodl.infer.models import options
+from nodl.infer.models.copies import copied
 from nodl.infer.start import NO_LAUNCH
 from nodl.infer.text import Input, concatenations, constant_text
 from nodl.infer.values import (
@@ -231,7 +232,8 @@ def _getattr(run: Run, call: Call) -> Value:
     """Return the attribute, the default or either."""
     owner, names = call.args.at(0) or ANY, call.args.at(1) or ANY
     known = constant_strings(names)
-    found = join_all(run.attribute(owner, name, call.node, call.frame) for name in known)
+    looks = (partial(run.attribute, owner, name, call.node, call.frame) for name in known)
+    found = join_all(map(run.swallowed, looks))
     if len(known) < len(names):
         expect_methods(run, owner)
         for atom in owner:
@@ -266,7 +268,8 @@ def _has_attribute(atom: object, name: object) -> bool:
 def _hasattr(run: Run, call: Call) -> Value:
     """Look the attribute up, which may run a property; whether there is one stays open."""
     for name in constant_strings(call.args.at(1) or ANY):
-        run.state.perhaps(partial(run.attribute, call.args.at(0) or ANY, name, call.node, call.frame))
+        look = partial(run.attribute, call.args.at(0) or ANY, name, call.node, call.frame)
+        run.state.perhaps(partial(run.swallowed, look))
     return BOOLEAN
 
 
@@ -491,15 +494,6 @@ def _thread_init(run: Run, thread: Instance, call: Call) -> Value:
 # --- containers ---------------------------------------------------------------------------------------------
 
 
-def _copy(run: Run, call: Call) -> Value:
-    """Model ``copy`` and ``deepcopy``: something unknown; a copy of an object of the program is a gap."""
-    given = call.args.at(0) or ANY
-    run.escape_value(given, opened=False, objects=False)
-    if any(isinstance(atom, Instance) and isinstance(atom.cls, ClassValue) for atom in given):
-        run.gap(call.node, call.frame, "an object of the program is copied, which is not followed")
-    return unknown("a copy")
-
-
 def _patched(run: Run, call: Call) -> Value:
     run.gap(call.node, call.frame, "unittest.mock replaces something while the program runs")
     return ANY
@@ -523,7 +517,8 @@ FUNCTIONS: dict[str, Model] = {
     "multiprocessing.Process": _thread,
     "collections.OrderedDict": _BUILT_IN["builtins.dict"],
     "collections.deque": _BUILT_IN["builtins.list"],
-    **dict.fromkeys(("copy.copy", "copy.deepcopy"), _copy),
+    "copy.copy": partial(copied, deep=False),
+    "copy.deepcopy": partial(copied, deep=True),
     "random.choice": _BUILT_IN["builtins.next"],
     **dict.fromkeys(("importlib.import_module", "importlib.reload"), import_dynamic),
 }

@@ -52,6 +52,13 @@ PLACES = (
     Place("items.append({})", "items[-1]"),
     Place("table['key'] = {}", "table['key']"),
     Place("table.update(key={})", "table['key']"),
+    Place("kept.topic = {}", "copy.deepcopy(kept).topic"),
+    Place("kept.names = [{}]", "copy.copy(kept).names[0]"),
+    Place("copy.copy(kept).names[0] = {}", "kept.names[0]"),
+    Place("copy.deepcopy(kept).names[0] = {}", "kept.names[0]"),
+    Place("kept.inner = copy.deepcopy(Kept({}))", "kept.inner.topic"),
+    Place("items[0] = {}", "copy.deepcopy([items])[0][0]"),
+    Place("table['key'] = {}", "copy.copy(table)['key']"),
 )
 WAYS = (
     "{}",
@@ -103,6 +110,7 @@ def random_program(seed: int) -> str:
         call = f"part{number}()"
         body = chance.choice(MECHANISMS).replace("AGAIN", again.write.format(f"'c{number}'"))
         change = _function("change()", place.write.format(f"'z{number}'"), place)
+        change += _function("again()", again.write.format(f"'d{number}'"), again)
         part = _function(call, change + body, again)
         interface = chance.choice(INTERFACES).format(chance.choice((place, place, again)).read)
         lines += [part, chance.choice(WAYS).format(call), interface]

@@ -26,6 +26,7 @@ from tests.nodl.infer.recorder import Fact, record
 FOLDER = Path(__file__).parent / "deceptions"
 SEEDS = range(6)
 _PRELUDE = """\
+import copy
 import rclpy
 from rclpy.node import Node
 from std_msgs.msg import String

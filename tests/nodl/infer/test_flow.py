@@ -32,6 +32,16 @@ CASES: dict[str, tuple[str, list[str]]] = {
     "branches join": ("x = 'a' if sys.argv[1:] else 'b'\nself.P(x + '/c')", ["a/c", "b/c"]),
     "if": ("x = 'a'\nif sys.argv[1] == 'x':\n    x = 'b'\nself.P(x)", ["a", "b"]),
     "a certain condition": ("D = False\nif D:\n    self.P('a')\nelse:\n    self.P('b')", ["b"]),
+    "what an exception ends is not followed": (
+        "x = 'a'\ndef f():\n    nonlocal x\n    x = 'b'\n    if sys.argv[1:]:\n        raise ValueError\n    x = 'c'\n"
+        "f()\nself.P(x)",
+        ["c"],
+    ),
+    "what is caught may have stopped anywhere": (
+        "x = 'a'\ndef f():\n    nonlocal x\n    x = 'b'\n    if sys.argv[1:]:\n        raise ValueError\n    x = 'c'\n"
+        "try:\n    f()\nexcept ValueError:\n    pass\nself.P(x)",
+        ["?", "c"],
+    ),
     "None is filled in": ("x = None\nif x is None:\n    x = 'a'\nself.P(x)", ["a"]),
     "list": ("for x in ['a', 'b']:\n    self.P(x)", ["a", "b"]),
     "pairs": ("for x, y in [('a', 1), ('b', 2)]:\n    self.P(f'{x}{y}')", ["a1", "b2"]),
