@@ -52,9 +52,10 @@ class FleetReport(NamedTuple):
 
 
 class Reference(NamedTuple):
-    """What the CA's own keystore knows."""
+    """What the CA's own keystore knows. ``trusted``: the CAs of its trust files; ``in_use``: those that sign."""
 
-    authorities: frozenset[str]
+    in_use: frozenset[str]
+    trusted: frozenset[str]
     revoked: frozenset[int]
     crl_number: int
     signers: tuple[CertificateFacts, ...]
@@ -95,10 +96,12 @@ def fleet_status(
 def _reference(root: Path) -> Reference:
     view = keystore_at(root)
     register = read_register(root) or Register()
+    in_use = frozenset(fingerprint(view.ca(role).der) for role in Role)
     return Reference(
-        frozenset(fingerprint(view.ca(role).der) for role in Role),
+        in_use,
+        in_use | {fingerprint(ca) for role, ca in register.authorities if register.trusts_authority(role, ca)},
         frozenset(one.serial for one in register.certificates.values() if one.revoked is not None),
-        register.crl_number,
+        register.crl_number if register.crl_published else 0,
         tuple(own_permissions_cas(view)),
         view,
     )
@@ -164,9 +167,9 @@ def _changed(place: Path, manifest: Manifest) -> Iterator[str]:
 
 def _against(manifest: Manifest, reference: Reference) -> Iterator[str]:
     trusted = {one for role in Role for one in manifest.authorities[role]}
-    if old := sorted(trusted - reference.authorities):
+    if old := sorted(trusted - reference.trusted):
         yield f"still trusts an old CA: {', '.join(one[:16] for one in old)}"
-    if reference.authorities - trusted:
+    if reference.in_use - trusted:
         yield "does not trust the CA in use"
     for one in manifest.enclaves:
         if one.serial in reference.revoked:
