@@ -122,7 +122,7 @@ def _run_python_launch_file(python_launch_file_path: str) -> LaunchDescription:
                 "'generate_launch_description()'"
             )
         description: LaunchDescription = module.generate_launch_description()
-    except Exception as error:  # foreign code may raise anything; it goes on, with its place noted
+    except error_location.RAISED_BY_USER_CODE as error:  # it goes on, with its place noted
         error_location.mark_at(error, python_file.user_frame(error, python_launch_file_path))
         raise
     return description

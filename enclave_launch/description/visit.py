@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from enclave_launch.description.actions.includes import IncludeLaunchDescription, opened
 from enclave_launch.description.entity import LaunchDescriptionEntity
 from enclave_launch.description.location import annotate, includes_below
+from enclave_launch.frontend import error_location
 
 if TYPE_CHECKING:
     from enclave_launch.description.events.event import Event
@@ -44,7 +45,7 @@ def visit_all(entity: LaunchDescriptionEntity, context: LaunchContext) -> list[A
                 futures.append((current, future))
             if sub_entities is not None:
                 stack.append((iter(sub_entities), _surroundings_below(current, context)))
-    except Exception as error:  # noted where it happened, and raised again
+    except error_location.RAISED_BY_USER_CODE as error:  # noted where it happened, and raised again
         annotate(error, current, context)
         raise
     finally:

@@ -53,6 +53,9 @@ def _text(error: BaseException) -> str:
         return f"{error.strerror}: '{os.fsdecode(error.filename)}'"
     if isinstance(error, SyntaxError):
         return _syntax(error)
+    if isinstance(error, SystemExit):
+        code = "" if error.code is None else repr(error.code)
+        return f"this calls sys.exit({code}); to refuse to launch, raise an error that says why"
     if hasattr(error, "problem_mark"):  # yaml.MarkedYAMLError, without loading PyYAML for the question
         parts = (getattr(error, "context", None), getattr(error, "problem", None))
         return "malformed YAML: " + ", ".join(part for part in parts if part)

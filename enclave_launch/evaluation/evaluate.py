@@ -75,7 +75,7 @@ def evaluate(
             host.warnings.extend(_unknown_arguments(arguments, context.configurations_read))
         except EnclaveLaunchError:
             raise
-        except Exception as error:  # launch files run code of their own: any exception is theirs
+        except error_location.RAISED_BY_USER_CODE as error:
             raise _evaluation_error(error, path, host) from error
         finally:
             if host.user_code_results is not None:
@@ -101,7 +101,7 @@ def read_description(launch_file: str | os.PathLike[str], host: PlanHost) -> Ite
             yield description
         except EnclaveLaunchError:
             raise
-        except Exception as error:  # Python launch files run code of their own: any exception is theirs
+        except error_location.RAISED_BY_USER_CODE as error:
             raise _evaluation_error(error, path, host) from error
 
 
@@ -152,20 +152,20 @@ def _evaluation(host: PlanHost) -> Evaluation:
     )
 
 
-def _evaluation_error(error: Exception, path: str, host: PlanHost) -> EvaluationError:
+def _evaluation_error(error: BaseException, path: str, host: PlanHost) -> EvaluationError:
     wrapped = launch_file_error(error, path)
     wrapped.partial = _evaluation(host)
     return wrapped
 
 
-def launch_file_error(error: Exception, path: str) -> EvaluationError:
+def launch_file_error(error: BaseException, path: str) -> EvaluationError:
     """Convert an exception of visiting ``path`` to an error with its place, include chain and remedy."""
     location, helper = _location(error, path)
     where = f" (in {helper.file}:{helper.line})" if helper else ""
     return EvaluationError(error_text(error_location.likeliest(error)) + where, location, error)
 
 
-def _location(error: Exception, path: str) -> tuple[SourceLocation, SourceLocation | None]:
+def _location(error: BaseException, path: str) -> tuple[SourceLocation, SourceLocation | None]:
     """Return the innermost known place, with the include chain of the visited entity, and the place in a helper
     module if the entity comes from one."""
     visited = place_of(error)

@@ -24,6 +24,7 @@ from enclave_launch.description.events.queue import Handler
 from enclave_launch.description.location import location_of, place_of
 from enclave_launch.description.visit import AND_THEN, chain, run_handler
 from enclave_launch.evaluation.error_text import error_text
+from enclave_launch.frontend import error_location
 from enclave_launch.host.user_code import only_acts
 from enclave_launch.process import Reaction, Unforeseeable
 from nodl.ament_index import ExecutableNotInstalledError, PackageNotFoundError
@@ -174,7 +175,7 @@ class Explorer:
             self._settle()
             self._context._set_is_shutdown(False)
             self._suppose(known, new_from)
-        except Exception as error:
+        except error_location.RAISED_BY_USER_CODE as error:
             if isinstance(_root(error), (PackageNotFoundError, ExecutableNotInstalledError)):
                 raise
             self._note_failure(event, error)
@@ -183,7 +184,7 @@ class Explorer:
             self._context.restore(saved)
             self._host.loop.restore(clock)
 
-    def _note_failure(self, event: Event, error: Exception) -> None:
+    def _note_failure(self, event: Event, error: BaseException) -> None:
         place = place_of(error) or location_of(event, self._context)
         what = f"what {event.name.rpartition('.')[2]} {event.subject()}".rstrip()
         self._host.unforeseeable(Unforeseeable(f"{what} would lead to: {error_text(error)}", place))

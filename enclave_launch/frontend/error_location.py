@@ -9,6 +9,9 @@ from enclave_launch.source_location import SourceLocation
 
 _ATTRIBUTE = "enclave_launch_location"
 
+RAISED_BY_USER_CODE = (Exception, SystemExit)
+"""Launch files call ``sys.exit``, and are refused with the place where they do."""
+
 
 def mark(error: BaseException, entity: object) -> None:
     """Record that ``error`` came from ``entity``; the first, innermost record stays.

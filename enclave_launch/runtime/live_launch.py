@@ -35,6 +35,7 @@ from enclave_launch.evaluation.evaluate import (
     launch_file_error,
     top_description,
 )
+from enclave_launch.frontend import error_location
 from enclave_launch.host.current import active_host
 from enclave_launch.options import RunSettings
 from enclave_launch.plan import LaunchSource
@@ -207,7 +208,7 @@ class LiveLaunch:
             except asyncio.CancelledError as error:
                 cancelled = error
                 self.shut_down("cancelled")
-            except Exception as error:  # launch files run code of their own: any error ends the launch
+            except error_location.RAISED_BY_USER_CODE as error:  # it ends the launch
                 self._on_error(error)
         if cancelled is not None:
             raise cancelled
@@ -299,7 +300,7 @@ class LiveLaunch:
         if self._services is not None:
             self._services.abandon()
 
-    def _on_error(self, error: Exception) -> None:
+    def _on_error(self, error: BaseException) -> None:
         self._failed = True
         file = self._source.launch_file
         reported = error if isinstance(error, EnclaveLaunchError) else launch_file_error(error, file)

@@ -99,7 +99,8 @@ def _reference(root: Path) -> Reference:
     in_use = frozenset(fingerprint(view.ca(role).der) for role in Role)
     return Reference(
         in_use,
-        in_use | {fingerprint(ca) for role, ca in register.authorities if register.trusts_authority(role, ca)},
+        in_use
+        | {fingerprint(ca) for role, ca in register.authorities if register.trusts_authority(role, ca)},
         frozenset(one.serial for one in register.certificates.values() if one.revoked is not None),
         register.crl_number if register.crl_published else 0,
         tuple(own_permissions_cas(view)),

@@ -105,6 +105,21 @@ def test_an_error_in_an_argument_of_an_include_stands_at_the_include(tmp_path: P
     assert text == "a.launch.xml:2: <include> launch configuration 'unset' does not exist"
 
 
+def test_a_launch_file_that_ends_python_is_refused_where_it_does(tmp_path: Path) -> None:
+    code = "import sys\ndef generate_launch_description():\n    sys.exit({})\n"
+    told = "; to refuse to launch, raise an error that says why"
+    assert (
+        message(tmp_path, "a.launch.py", code.format("0")) == f"a.launch.py:3: this calls sys.exit(0){told}"
+    )
+    assert message(tmp_path, "a.launch.py", code.format("")) == f"a.launch.py:3: this calls sys.exit(){told}"
+    inside = (
+        "from launch import LaunchDescription\nfrom launch.actions import OpaqueFunction\n"
+        "def act(context):\n    raise SystemExit('no')\n"
+        "def generate_launch_description():\n    return LaunchDescription([OpaqueFunction(function=act)])\n"
+    )
+    assert message(tmp_path, "a.launch.py", inside).startswith("a.launch.py:4: this calls sys.exit('no'); ")
+
+
 @pytest.mark.parametrize("name", ["b.launch.xml", "b.launch.py"])
 def test_a_pipe_is_no_launch_file(tmp_path: Path, name: str) -> None:
     """Nobody may ever write to it."""

@@ -92,7 +92,9 @@ def test_who_still_trusts_the_old_ca(ca: Path, tmp_path: Path) -> None:
     assert found(ca, tmp_path / "finished") == {f"robot{number}": () for number in range(3)}
 
 
-def test_what_was_exported_at_a_step_of_a_roll_over_is_in_order_until_the_next(ca: Path, tmp_path: Path) -> None:
+def test_what_was_exported_at_a_step_of_a_roll_over_is_in_order_until_the_next(
+    ca: Path, tmp_path: Path
+) -> None:
     remove(ca, ["/robot1/arm"], options=RemoveOptions(durable=False))  # a CRL, which ends with its CA
     for step in Step:
         roll_over(ca, step, tuple(Role), options=options())
