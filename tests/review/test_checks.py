@@ -215,13 +215,37 @@ def test_a_forbidden_flow_is_an_error_that_shows_the_way(target: str) -> None:
     )
 
 
+def test_what_may_be_sent_on_a_forbidden_name_is_an_error_though_nobody_here_receives_it() -> None:
+    """The receiver may be in another launch."""
+    planner = {"subscribe": ["/image"], "publish": ["/joints", "/speed"]}
+    enclaves = {
+        "/camera": {"/camera": {"publish": ["/image"]}},
+        "/planner": {"/planner": planner},
+        "/base": {"/base": {"subscribe": ["/speed"]}},
+    }
+
+    def told(**entry: str) -> list[str]:
+        return [each.text for each in rule_findings(DryRun(**document(enclaves)), rules(**entry))]
+
+    assert told(from_="/camera", to="/joints") == [
+        "/camera must never reach /joints: /camera -> /planner by topic /image; "
+        "/planner may send on topic /joints, whoever receives it"
+    ]
+    assert told(from_="/planner", to="/join*") == [
+        "/planner must never reach /join*: /planner may send on topic /joints, whoever receives it"
+    ]
+    assert told(from_="/base", to="/joints") == []
+    assert told(from_="/base", to="/*joints") == []
+
+
 def test_a_flow_that_does_not_exist_is_not_told() -> None:
     assert rule_findings(DryRun(**document(ROBOT)), rules(from_="/logger", to="/base")) == []
 
 
 def test_a_rule_that_names_nothing_is_told_since_it_protects_nothing() -> None:
-    (told,) = rule_findings(DryRun(**document(ROBOT)), rules(from_="/camra", to="/base"))
-    assert (told.severity, told.code) == ("warning", "rule-idle")
+    for entry in ({"from_": "/camra", "to": "/base"}, {"from_": "/camera", "to": "/bas"}):
+        (told,) = rule_findings(DryRun(**document(ROBOT)), rules(**entry))
+        assert (told.severity, told.code) == ("warning", "rule-idle")
 
 
 def test_an_accepted_finding_is_the_one_that_was_named() -> None:

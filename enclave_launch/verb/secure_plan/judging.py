@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from datetime import datetime
 from fnmatch import fnmatchcase
 from pathlib import Path
@@ -20,7 +20,7 @@ from enclave_launch.review.checks import check_plan
 from enclave_launch.review.checks.keystore import against_keystore, against_router
 from enclave_launch.review.checks.rules import finding
 from enclave_launch.review.document import PlanDocument, plan_from_document
-from enclave_launch.review.information_flow import FlowStep, flow_graph, shortest_paths
+from enclave_launch.review.information_flow import FlowGraph, FlowStep, Hop, flow_graph, shortest_paths
 from enclave_launch.verb.secure_plan.keystores import (
     DEFAULT_MARGIN,
     endings,
@@ -28,6 +28,7 @@ from enclave_launch.verb.secure_plan.keystores import (
     signed_grants,
     zenoh_findings,
 )
+from keystore.formats.permissions_patterns import can_meet
 
 EXPECTATIONS = "enclaves.review.yaml"
 EXPECT: Option = ("--expect FILE", PATH, f"default: {EXPECTATIONS}, if it exists")
@@ -73,6 +74,7 @@ def expectations(file: Path | None) -> Expectations:
 
 
 _TAKES = ("subscribe", "serve_services", "serve_actions")
+_SENDS = ("publish", "call_services", "call_actions")
 
 
 class Never(NamedTuple):
@@ -129,31 +131,40 @@ def rule_findings(document: DryRun, rules: Iterable[Never]) -> list[Diagnostic]:
     graph = flow_graph(plan)
     broken, idle = [], []
     for rule in rules:
-        sources, targets = _enclaves_named(plan, rule.source), _enclaves_receiving(plan, rule.target)
-        if not sources or not targets:
+        sources = _enclaves_named(plan, rule.source)
+        named = _enclaves_named(plan, rule.target)
+        targets = named or list(_with_grant(plan, _TAKES, rule.target))
+        senders = (
+            {} if named else _with_grant(plan, _SENDS, rule.target)
+        )  # who receives may be in another launch
+        if not sources or not (targets or senders):
             idle.append(
                 finding("rule-idle", rule.source, f"no {rule.source} or no {rule.target} in this plan")
             )
             continue
-        ways = [_way(graph, source, target) for source in sources for target in targets]
-        possible = [way for way in ways if way is not None]
-        if possible:
-            source, _, steps = min(possible, key=lambda way: (len(way[2]), way))
-            broken.append(finding("flow-forbidden", source, _broken_text(rule, source, steps), fails=True))
+        received, sent = _ways(graph, sources, targets), _ways(graph, sources, senders)
+        if possible := received or sent:
+            source, target, steps = min(possible, key=lambda way: (len(way[2]), way))
+            text = _broken_text(rule, source, steps, None if received else senders[target])
+            broken.append(finding("flow-forbidden", source, text, fails=True))
     return [*broken, *idle]
 
 
-def _broken_text(rule: Never, source: str, steps: Iterable[FlowStep]) -> str:
-    ways = "; ".join(f"{step.source} -> {step.target} by {step.hops[0]}" for step in steps)
-    how = ways or f"both are in enclave {source}"
+def _broken_text(rule: Never, source: str, steps: Sequence[FlowStep], sent: Hop | None) -> str:
+    ways = [f"{step.source} -> {step.target} by {step.hops[0]}" for step in steps]
+    if sent is not None:
+        ways.append(f"{steps[-1].target if steps else source} may send on {sent}, whoever receives it")
+    how = "; ".join(ways) or f"both are in enclave {source}"
     return f"{rule.source} must never reach {rule.target}{f' ({rule.why})' if rule.why else ''}: {how}"
 
 
-def _way(graph: Any, source: str, target: str) -> tuple[str, str, tuple[FlowStep, ...]] | None:
-    if source == target:
-        return source, target, ()
-    paths = shortest_paths(graph, source, target)
-    return (source, target, paths[0]) if paths else None
+def _ways(
+    graph: FlowGraph, sources: Iterable[str], targets: Collection[str]
+) -> list[tuple[str, str, tuple[FlowStep, ...]]]:
+    """Return a shortest way from each source to each target that it reaches; without steps to itself."""
+    pairs = [(source, target) for source in sources for target in targets]
+    paths = [(pair, [()] if pair[0] == pair[1] else shortest_paths(graph, *pair)) for pair in pairs]
+    return [(*pair, found[0]) for pair, found in paths if found]
 
 
 def _enclaves_named(plan: PlanDocument, pattern: str) -> list[str]:
@@ -161,13 +172,20 @@ def _enclaves_named(plan: PlanDocument, pattern: str) -> list[str]:
     return sorted(of_nodes | {path for path in plan.enclaves if fnmatchcase(path, pattern)})
 
 
-def _enclaves_receiving(plan: PlanDocument, pattern: str) -> list[str]:
-    named = _enclaves_named(plan, pattern)
-    return named or sorted(
-        path
-        for path, grants in plan.enclaves.items()
-        if any(each.operation in _TAKES and fnmatchcase(each.name, pattern) for each in grants)
-    )
+def _with_grant(plan: PlanDocument, operations: Collection[str], pattern: str) -> dict[str, Hop]:
+    """Return the enclaves that have one of these operations on a matching name, each with the first such grant.
+
+    What every node has does not count.
+    """
+    granted = {
+        path: sorted(
+            each
+            for each in grants - plan.built_in(path)
+            if each.operation in operations and can_meet(each.name, pattern)
+        )
+        for path, grants in sorted(plan.enclaves.items())
+    }
+    return {path: Hop(*each[0]) for path, each in granted.items() if each}
 
 
 def _items(content: Mapping[str, Any], key: str, place: str) -> list[Any]:
