@@ -62,6 +62,29 @@ def load_yaml_with_lines(text: str, limit: int = MAX_CHARACTERS) -> YamlDocument
     return _read(text, limit, document)
 
 
+def load_strict_yaml(text: str) -> YamlDocument:
+    """Load a document that a person wrote for us, without aliases, and with no key twice: only one would count.
+
+    Raises:
+        YAMLError: as ``load_yaml``, and ``MarkedYAMLError`` with the place of an alias or of a key that came before.
+        ValueError, OverflowError: as ``load_yaml``.
+    """
+
+    def document(node: yaml.Node | None) -> YamlDocument:
+        _refuse_aliases_and_repeated_keys(node)
+        constructor = _Constructor()
+        root = None if node is None else constructor.construct_document(node)
+        return YamlDocument(root, constructor.lines)
+
+    return _read(text, MAX_CHARACTERS, document)
+
+
+def problem_of(error: yaml.YAMLError, file: str) -> str:
+    """Return ``file:line: what is wrong``, on one line."""
+    mark, problem = getattr(error, "problem_mark", None), getattr(error, "problem", None)
+    return f"{file}{f':{mark.line + 1}' if mark else ''}: {problem or str(error) or 'not YAML'}"
+
+
 def compose_yaml(text: str) -> yaml.Node | None:
     """Return the root node of the one document in ``text``, None without one; raises YAMLError and ``RefusedYaml``."""
     return _read(text, MAX_CHARACTERS, lambda node: node)
@@ -194,3 +217,32 @@ def _parts(node: yaml.Node) -> Iterator[yaml.Node] | list[yaml.Node]:
     if isinstance(node, yaml.MappingNode):
         return [part for pair in node.value for part in pair]
     return node.value if isinstance(node, yaml.SequenceNode) else []
+
+
+def _refuse_aliases_and_repeated_keys(root: yaml.Node | None) -> None:
+    """Raise ``yaml.MarkedYAMLError``: nothing here needs aliases; of two values under one key only one would count."""
+    seen: set[int] = set()
+    pending = [] if root is None else [root]
+    for node in pending:
+        if id(node) in seen:
+            raise _refused(node, "aliases are not allowed here")
+        seen.add(id(node))
+        if isinstance(node, yaml.SequenceNode):
+            pending += node.value
+        elif isinstance(node, yaml.MappingNode):
+            _refuse_repeated_keys(node)
+            pending += [value for _, value in node.value]
+
+
+def _refuse_repeated_keys(node: yaml.MappingNode) -> None:
+    seen: set[str] = set()
+    for key, _ in node.value:
+        if not isinstance(key, yaml.ScalarNode):
+            raise _refused(key, "a key must be a plain word")
+        if key.value in seen:
+            raise _refused(key, f"{key.value!r} is written twice")
+        seen.add(key.value)
+
+
+def _refused(node: yaml.Node, problem: str) -> yaml.MarkedYAMLError:
+    return yaml.MarkedYAMLError(problem=problem, problem_mark=node.start_mark)

@@ -13,10 +13,18 @@ SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"
 
 
 def sarif_document(
-    findings: Iterable[tuple[Diagnostic, str | None]], rules: Mapping[str, str], version: str, root: str
+    findings: Iterable[tuple[Diagnostic, str | None]],
+    rules: Mapping[str, str],
+    version: str,
+    root: str,
+    planned: str,
 ) -> dict[str, object]:
-    """Return findings, each with the reason why it was accepted, as a SARIF log; paths below ``root`` are relative."""
-    results = [_result(diagnostic, accepted, root) for diagnostic, accepted in findings]
+    """Return findings, each with the reason why it was accepted, as a SARIF log.
+
+    Paths below ``root`` are relative. A finding without a file points to ``planned``, the file that was checked: code
+    hosts refuse a log in which one result has no place.
+    """
+    results = [_result(diagnostic, accepted, root, planned) for diagnostic, accepted in findings]
     used = sorted({str(result["ruleId"]) for result in results})
     driver = {
         "name": "secure-plan",
@@ -28,16 +36,15 @@ def sarif_document(
     return {"$schema": SCHEMA, "version": "2.1.0", "runs": [run]}
 
 
-def _result(diagnostic: Diagnostic, accepted: str | None, root: str) -> dict[str, object]:
+def _result(diagnostic: Diagnostic, accepted: str | None, root: str, planned: str) -> dict[str, object]:
     text = f"{diagnostic.text}: {diagnostic.remedy}" if diagnostic.remedy else diagnostic.text
     result: dict[str, object] = {
         "ruleId": diagnostic.code,
         "level": diagnostic.severity,
         "message": {"text": text},
         "partialFingerprints": {"codeSubjectAndFile/v1": _fingerprint(diagnostic, root)},
+        "locations": [_location(diagnostic.file or planned, diagnostic.line if diagnostic.file else 0, root)],
     }
-    if diagnostic.file:
-        result["locations"] = [_location(diagnostic.file, diagnostic.line, root)]
     if accepted is not None:
         result["suppressions"] = [{"kind": "external", "justification": accepted}]
     return result
@@ -59,7 +66,4 @@ def _location(file: str, line: int, root: str) -> dict[str, object]:
         if inside
         else {"uri": f"file://{quote(os.fsencode(path))}"}
     )
-    physical: dict[str, object] = {"artifactLocation": place}
-    if line > 0:
-        physical["region"] = {"startLine": line}
-    return {"physicalLocation": physical}
+    return {"physicalLocation": {"artifactLocation": place, "region": {"startLine": max(line, 1)}}}

@@ -27,10 +27,13 @@ class LaunchTarget(NamedTuple):
 def find_target(words: Sequence[str], prefixes: Sequence[str]) -> LaunchTarget:
     """Find the launch file and its arguments.
 
-    Raises ``UsageError``: nothing given, no such file or package, several files of that name, bad argument.
+    Raises ``UsageError``: nothing given, no such file or package, several files of that name, bad argument, a working
+    directory that was removed.
     """
     if not words:
         raise UsageError("give PACKAGE LAUNCH_FILE or the PATH of a launch file (see secure-launch --help)")
+    with translated(OSError, UsageError, "the working directory: "):
+        os.getcwd()
     first, *rest = words
     if os.path.isfile(first):
         return LaunchTarget(first, parse_arguments(rest))
@@ -43,7 +46,10 @@ def find_target(words: Sequence[str], prefixes: Sequence[str]) -> LaunchTarget:
 def _beside(path: str) -> str:
     """Return a suggestion: the file in the same folder that was probably meant."""
     folder, name = os.path.split(path)
-    beside = os.listdir(folder or ".") if os.path.isdir(folder or ".") else []
+    try:
+        beside = os.listdir(folder or ".")
+    except OSError:  # there is no such folder, or it may not be looked into
+        return ""
     return did_you_mean(name, [each for each in beside if each.endswith((".py", ".xml", ".yaml", ".yml"))])
 
 

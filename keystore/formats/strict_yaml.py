@@ -7,7 +7,7 @@ from typing import TypeVar
 import yaml
 from pydantic import BaseModel, StrictInt, ValidationError
 
-from enclave_common.yaml_reader import compose_yaml, construct
+from enclave_common.yaml_reader import load_strict_yaml, problem_of
 from keystore.errors import InvalidInputError
 from keystore.formats.given_file import MAX_BYTES
 
@@ -31,12 +31,9 @@ def parse_strict(model: type[_Document], text: bytes, where: str) -> _Document:
     if len(text) > MAX_BYTES:
         raise InvalidInputError(f"{where}: larger than {MAX_BYTES} bytes")
     try:
-        root = compose_yaml(text.decode("utf-8"))
-        _refuse_aliases_and_repeated_keys(root)
-        content = None if root is None else construct(root)
+        content = load_strict_yaml(text.decode("utf-8")).root
     except yaml.MarkedYAMLError as error:
-        line = f":{error.problem_mark.line + 1}" if error.problem_mark else ""
-        raise InvalidInputError(f"{where}{line}: {error.problem or 'not YAML'}") from None
+        raise InvalidInputError(problem_of(error, where)) from None
     except (yaml.YAMLError, ValueError, RecursionError):  # numbers, dates, nesting that Python refuses
         raise InvalidInputError(f"{where}: not YAML text") from None
     if not isinstance(content, dict) or not all(isinstance(key, str) for key in content):
@@ -51,32 +48,3 @@ def parse_strict(model: type[_Document], text: bytes, where: str) -> _Document:
     if document.version != 1:
         raise InvalidInputError(f"{where}: version: {document.version} is not known, only 1 is")
     return document
-
-
-def _refuse_aliases_and_repeated_keys(root: yaml.Node | None) -> None:
-    """Raise ``yaml.MarkedYAMLError``: nothing here needs aliases; of two values under one key only one would count."""
-    seen: set[int] = set()
-    pending = [] if root is None else [root]
-    for node in pending:
-        if id(node) in seen:
-            raise _refused(node, "aliases are not allowed here")
-        seen.add(id(node))
-        if isinstance(node, yaml.SequenceNode):
-            pending += node.value
-        elif isinstance(node, yaml.MappingNode):
-            _refuse_repeated_keys(node)
-            pending += [value for _, value in node.value]
-
-
-def _refuse_repeated_keys(node: yaml.MappingNode) -> None:
-    seen: set[str] = set()
-    for key, _ in node.value:
-        if not isinstance(key, yaml.ScalarNode):
-            raise _refused(key, "a key must be a plain word")
-        if key.value in seen:
-            raise _refused(key, f"{key.value!r} is written twice")
-        seen.add(key.value)
-
-
-def _refused(node: yaml.Node, problem: str) -> yaml.MarkedYAMLError:
-    return yaml.MarkedYAMLError(problem=problem, problem_mark=node.start_mark)

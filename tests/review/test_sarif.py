@@ -25,8 +25,14 @@ VALIDATOR = Draft4Validator(json.loads(SCHEMA.read_text(encoding="utf-8")))
 ROOT = "/work/my robot"
 
 
+def results(findings: list[tuple[Diagnostic, str | None]]) -> list[dict[str, Any]]:
+    log: dict[str, Any] = sarif_document(findings, RULES, "0.1.0", ROOT, f"{ROOT}/a.launch.xml")
+    found: list[dict[str, Any]] = log["runs"][0]["results"]
+    return found
+
+
 def errors(findings: list[tuple[Diagnostic, str | None]]) -> list[str]:
-    document = json.loads(json_text(sarif_document(findings, RULES, "0.1.0", ROOT)))
+    document = json.loads(json_text(sarif_document(findings, RULES, "0.1.0", ROOT, f"{ROOT}/a.launch.xml")))
     return [f"{list(error.absolute_path)}: {error.message}" for error in VALIDATOR.iter_errors(document)]
 
 
@@ -59,7 +65,7 @@ def test_any_finding_is_valid(findings: list[tuple[Diagnostic, str | None]]) -> 
 
 
 def test_the_schema_refuses_what_is_not_sarif() -> None:
-    document: dict[str, Any] = sarif_document([], RULES, "0.1.0", ROOT)
+    document: dict[str, Any] = sarif_document([], RULES, "0.1.0", ROOT, f"{ROOT}/a.launch.xml")
     assert not list(VALIDATOR.iter_errors(document))
     assert list(VALIDATOR.iter_errors({**document, "version": "2.0.0"}))
     assert list(VALIDATOR.iter_errors({**document, "runs": [{"results": []}]}))
@@ -69,8 +75,17 @@ def test_a_finding_keeps_its_fingerprint_when_its_line_moves() -> None:
     def at(line: int, subject: str = "/x") -> Diagnostic:
         return finding("no-publisher", subject, "text", (f"{ROOT}/a.xml", line))
 
-    prints = [
-        sarif_document([(each, None)], RULES, "0.1.0", ROOT)["runs"][0]["results"][0]["partialFingerprints"]  # type: ignore[index]
-        for each in (at(3), at(9), at(3, "/y"))
-    ]
+    prints = [results([(each, None)])[0]["partialFingerprints"] for each in (at(3), at(9), at(3, "/y"))]
     assert prints[0] == prints[1] != prints[2]
+
+
+def test_each_result_has_a_place_without_which_code_hosts_refuse_the_whole_log() -> None:
+    found = results([
+        (finding("node-name-twice", "/x", "text"), None),
+        (finding("no-publisher", "/x", "text", (f"{ROOT}/b.launch.xml", 7)), None),
+    ])  # fmt: skip
+    places = [result["locations"][0]["physicalLocation"] for result in found]
+    assert [(place["artifactLocation"]["uri"], place["region"]["startLine"]) for place in places] == [
+        ("a.launch.xml", 1),
+        ("b.launch.xml", 7),
+    ]

@@ -92,7 +92,7 @@ def test_check_in_a_repository_with_rules(
     status, text, _ = run("check", saved)
     assert status == 1
     assert text.startswith(
-        "error: /speaker must never reach /ear (a test): /speaker -> /ear by topic /conversation"
+        "error: enclaves.review.yaml:2: /speaker must never reach /ear (a test): /speaker -> /ear by topic /conversation"
     )
     (tmp_path / "accepts.yaml").write_text(
         "never:\n- {from: /speaker, to: /ear}\naccept:\n- {code: flow-forbidden, why: they must talk}\n"
@@ -144,6 +144,48 @@ def test_what_is_not_a_plan_is_wrong_usage(run: Run, tmp_path: Path, content: st
     status, _, told = run("show", tmp_path / "x.json")
     assert status == 2 and why in told
     assert run("show", tmp_path / "absent.json")[0] == 2
+
+
+def test_a_key_that_stands_twice_in_the_rules_is_wrong_usage_since_only_one_would_count(
+    run: Run, tmp_path: Path
+) -> None:
+    rules = tmp_path / "rules.yaml"
+    rules.write_text("never: [{from: /a, to: /b}]\naccept: []\nnever: []\n")
+    status, _, told = run("check", *PLAIN, "--expect", rules)
+    assert (status, told) == (2, f"secure-plan: error: {rules}:3: 'never' is written twice\n")
+    rules.write_text("never: [\n")
+    assert run("check", *PLAIN, "--expect", rules)[2].startswith(f"secure-plan: error: {rules}:2: ")
+    rules.write_text("never: [{from: /a, to: /b}]\naccept: []\n")
+    assert run("check", *PLAIN, "--expect", rules)[0] == 0
+
+
+def test_a_launch_file_that_changes_the_working_directory_does_not_move_what_is_written(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "a.launch.py").write_text(
+        "import os\nfrom launch import LaunchDescription\n"
+        f"os.chdir({str(tmp_path / 'elsewhere')!r})\n"
+        "def generate_launch_description():\n    return LaunchDescription([])\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    assert run("report", "-o", "report.html", "a.launch.py")[0] == 0
+    assert (tmp_path / "report.html").is_file() and not [*(tmp_path / "elsewhere").iterdir()]
+
+
+def test_a_working_directory_that_was_removed_is_wrong_usage(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "a.launch.xml").write_text("<launch/>")
+    (tmp_path / "gone").mkdir()
+    monkeypatch.chdir(tmp_path / "gone")
+    assert run("check", tmp_path / "a.launch.xml")[0] == 0
+    (tmp_path / "gone").rmdir()
+    status, _, told = run("check", tmp_path / "a.launch.xml")
+    assert (status, told) == (
+        2,
+        "secure-plan: error: the working directory: No such file or directory\n",
+    )
 
 
 def test_suggest_on_a_shared_enclave(run: Run) -> None:

@@ -40,7 +40,8 @@ PREDICATE = "https://in-toto.io/attestation/test-result/v0.1"
 
 class Examined(NamedTuple):
     """The subject of the evidence. ``keys``, ``defaults`` and ``components`` are ``None`` where nothing was given to
-    examine; ``document``: the dry run's JSON; ``rules``: every code that the checks can give, with its meaning."""
+    examine; ``document``: the dry run's JSON; ``file``: what was planned or where that was saved; ``rules``: every code
+    that the checks can give, with its meaning."""
 
     document: Mapping[str, Any]
     plan: DryRun
@@ -48,6 +49,7 @@ class Examined(NamedTuple):
     rules: Mapping[str, str]
     at: str
     root: str
+    file: str
     keys: list[dict[str, Any]] | None = None
     defaults: dict[str, Any] | None = None
     components: dict[str, Any] | None = None
@@ -69,7 +71,9 @@ def evidence_files(examined: Examined) -> dict[str, bytes]:
             examined.components, "bill_of_materials", "no CycloneDX document was given (--sbom)"
         ),
         "findings.json": findings_document(contents.judged),
-        "findings.sarif": sarif_document(contents.judged, examined.rules, __version__, examined.root),
+        "findings.sarif": sarif_document(
+            contents.judged, examined.rules, __version__, examined.root, examined.file
+        ),
         "accepted.json": _accepted(contents),
         "scope.json": _scope(examined),
         "requirements.json": {"version": 1, "claim": DISCLAIMER, "parts": [part._asdict() for part in PARTS]},

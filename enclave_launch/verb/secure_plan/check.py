@@ -20,7 +20,7 @@ from enclave_launch.report.review_text import findings_document, findings_text
 from enclave_launch.report.sarif import sarif_document
 from enclave_launch.review.checks import MEANINGS
 from enclave_launch.verb.secure_plan.judging import EXPECT, WITHIN, judged
-from enclave_launch.verb.secure_plan.plans import read_plan
+from enclave_launch.verb.secure_plan.plans import planned_file, read_plan
 
 OPTIONS = {
     "": (
@@ -36,14 +36,15 @@ OPTIONS = {
 def run(options: argparse.Namespace) -> int:
     """Print the findings. Returns 1 for an error that nobody accepted (``--strict``: for any finding)."""
     found = judged(read_plan(options.words, options), options.expect, options.keystore, options.within)
-    sys.stdout.write(_text(found, options.format, options.verbose))
+    sys.stdout.write(_text(found, options))
     open_ones = [finding for finding, accepted in found if accepted is None]
     return 1 if any(options.strict or finding.severity == "error" for finding in open_ones) else 0
 
 
-def _text(found: list[tuple[Diagnostic, str | None]], form: str, verbose: bool) -> str:
-    if form == "sarif":
-        return json_text(sarif_document(found, MEANINGS, __version__, os.getcwd()), indent=2) + "\n"
-    if form == "json":
+def _text(found: list[tuple[Diagnostic, str | None]], options: argparse.Namespace) -> str:
+    if options.format == "sarif":
+        log = sarif_document(found, MEANINGS, __version__, os.getcwd(), planned_file(options.words, options))
+        return json_text(log, indent=2) + "\n"
+    if options.format == "json":
         return json_text(findings_document(found), indent=2) + "\n"
-    return findings_text(found, verbose=verbose)
+    return findings_text(found, verbose=options.verbose)

@@ -28,7 +28,7 @@ from enclave_launch.report.evidence.documents import PAYLOAD_TYPE, Examined, evi
 from enclave_launch.review.checks import MEANINGS
 from enclave_launch.verb.secure_plan.judging import EXPECT, WITHIN, judged
 from enclave_launch.verb.secure_plan.keystores import endings
-from enclave_launch.verb.secure_plan.plans import is_saved_plan, read_document
+from enclave_launch.verb.secure_plan.plans import is_saved_plan, planned_file, read_document
 from keystore.errors import InvalidInputError
 from keystore.formats.validity import iso, parse_time, utc_now
 from keystore.signing.ca_access import CaAccess, Secret
@@ -93,7 +93,8 @@ def _examine(options: argparse.Namespace) -> Examined:
     ends = endings(keystore, now=now) if keystore is not None else None
     root = os.getcwd()
     contents = report_contents(plan, found, title=" ".join(options.words), root=root, endings=ends)
-    examined = Examined(document, plan, contents, MEANINGS, iso(now), root, components=components)
+    file = planned_file(options.words, options)
+    examined = Examined(document, plan, contents, MEANINGS, iso(now), root, file, components=components)
     if keystore is None:
         return examined
     return examined._replace(keys=_keys(keystore), defaults=_defaults(keystore, now))

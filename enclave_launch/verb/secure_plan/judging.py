@@ -7,13 +7,14 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from datetime import datetime
 from fnmatch import fnmatchcase
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import yaml
 
 from enclave_common.command_line import PATH, Option
 from enclave_common.files import read_text
-from enclave_common.yaml_reader import load_yaml
+from enclave_common.yaml_reader import load_strict_yaml, problem_of
 from enclave_launch.dry_run import Diagnostic, DryRun
 from enclave_launch.errors import UsageError, translated
 from enclave_launch.review.checks import check_plan
@@ -69,8 +70,13 @@ def expectations(file: Path | None) -> Expectations:
         if not os.path.exists(EXPECTATIONS):
             return Expectations()
         file = Path(EXPECTATIONS)
-    with translated(OSError, UsageError, f"{file}: "), translated(yaml.YAMLError, UsageError, f"{file}: "):
-        return read_expectations(load_yaml(read_text(file)) or {}, str(file))
+    with translated(OSError, UsageError, f"{file}: "), translated(ValueError, UsageError, f"{file}: "):
+        text = read_text(file)
+        try:
+            content, lines = load_strict_yaml(text)
+        except yaml.YAMLError as error:
+            raise UsageError(problem_of(error, str(file))) from None
+    return read_expectations(content or {}, str(file), lines)
 
 
 _TAKES = ("subscribe", "serve_services", "serve_actions")
@@ -78,11 +84,12 @@ _SENDS = ("publish", "call_services", "call_actions")
 
 
 class Never(NamedTuple):
-    """No influence from ``source`` to ``target``, over any number of enclaves."""
+    """No influence from ``source`` to ``target``, over any number of enclaves; ``place``: file and line of the rule."""
 
     source: str
     target: str
     why: str
+    place: tuple[str, int]
 
 
 class Accepted(NamedTuple):
@@ -107,14 +114,20 @@ class Expectations(NamedTuple):
         return next((accepted.why for accepted in self.accept if accepted.covers(diagnostic)), None)
 
 
-def read_expectations(content: Any, place: str) -> Expectations:
-    """Read a parsed YAML document (docs/secure-plan.md); raises ``UsageError`` if it is not such a file."""
+def read_expectations(
+    content: Any, place: str, lines: Mapping[int, int] = MappingProxyType({})
+) -> Expectations:
+    """Read a parsed YAML document (docs/secure-plan.md); raises ``UsageError`` if it is not such a file.
+
+    ``lines``: of its entries, by ``id``.
+    """
     if not isinstance(content, Mapping) or content.keys() - {"never", "accept"}:
         raise UsageError(f"{place}: expected a mapping with 'never' and 'accept'")
     return Expectations(
         tuple(
-            Never(*_texts(item, ("from", "to"), ("why",), f"{place}: never"))
+            Never(source, target, why, (place, lines.get(id(item), 0)))
             for item in _items(content, "never", place)
+            for source, target, why in [_texts(item, ("from", "to"), ("why",), f"{place}: never")]
         ),
         tuple(
             Accepted(code, subject or "*", why)
@@ -138,15 +151,14 @@ def rule_findings(document: DryRun, rules: Iterable[Never]) -> list[Diagnostic]:
             {} if named else _with_grant(plan, _SENDS, rule.target)
         )  # who receives may be in another launch
         if not sources or not (targets or senders):
-            idle.append(
-                finding("rule-idle", rule.source, f"no {rule.source} or no {rule.target} in this plan")
-            )
+            text = f"no {rule.source} or no {rule.target} in this plan"
+            idle.append(finding("rule-idle", rule.source, text, rule.place))
             continue
         received, sent = _ways(graph, sources, targets), _ways(graph, sources, senders)
         if possible := received or sent:
             source, target, steps = min(possible, key=lambda way: (len(way[2]), way))
             text = _broken_text(rule, source, steps, None if received else senders[target])
-            broken.append(finding("flow-forbidden", source, text, fails=True))
+            broken.append(finding("flow-forbidden", source, text, rule.place, fails=True))
     return [*broken, *idle]
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -56,16 +57,29 @@ def read_saved(file: Path) -> DryRun:
     return _saved(file)[1]
 
 
+def planned_file(words: Sequence[str], options: argparse.Namespace) -> str:
+    """Return the saved plan or launch file that ``words`` name; raises UsageError."""
+    return (
+        words[0] if is_saved_plan(words) else find_target(words, search_prefixes(options.prefix)).launch_file
+    )
+
+
 def _planned(words: Sequence[str], options: argparse.Namespace) -> Mapping[str, Any]:
     target = find_target(words, search_prefixes(options.prefix))
-    with stdout_is_for_the_plan():
-        plan = resolve(target.launch_file, target.arguments, options=resolve_options(options))
+    here = os.getcwd()
+    try:
+        with stdout_is_for_the_plan():
+            plan = resolve(target.launch_file, target.arguments, options=resolve_options(options))
+    finally:
+        os.chdir(here)  # code of the launch file may have changed it, and our options are relative to it
     return plan_document(plan)
 
 
 def _saved(file: Path) -> tuple[Mapping[str, Any], DryRun]:
     try:
         document: Mapping[str, Any] = json.loads(read_text(file, limit=LARGEST_PLAN))
+        if not isinstance(document, dict):
+            raise ValueError("not an object")
         plan = DryRun(**document)
     except OSError as error:
         raise UsageError(f"{file}: {error.strerror}") from error
