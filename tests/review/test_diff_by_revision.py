@@ -53,6 +53,21 @@ def test_what_a_commit_added(repository: Path, capsys: pytest.CaptureFixture[str
     assert (status, text.splitlines()) == (0, ["no enclave, node, permission or flow differs", NOT_COMPARED])
 
 
+def test_arguments_are_for_both_launch_files(repository: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = repository / "launch" / "named.launch.xml"
+    file.write_text(
+        '<launch><arg name="ns"/><node pkg="demo_nodes" exec="talker" namespace="$(var ns)"/></launch>'
+    )
+    git(repository, "add", "-A")
+    git(repository, "commit", "-q", "-m", "named")
+    for before in ("HEAD:", "HEAD:launch/named.launch.xml", str(file)):
+        assert diff(capsys, before, str(file), "ns:=robot1")[:2] == (
+            0,
+            "no enclave, node, permission or flow differs\n"
+            + f"{NOT_COMPARED}\n" * before.startswith("HEAD"),
+        )
+
+
 def test_what_is_not_committed_yet_counts_to_the_work_tree(
     repository: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -9,7 +9,7 @@
 
 With a revision, the packages of the repository are planned from their sources, in the revision and in the work tree;
 with --build COMMAND the revision is built instead, and compared with what is installed. Other packages are taken as
-they are installed now; the answer names them.
+they are installed now; the answer names them. name:=value is for both launch files.
 
 exit status: 0 no enclave may do more than before, 1 rights grew, 2 wrong usage
 """
@@ -29,7 +29,7 @@ from enclave_launch.review.document import PlanDocument, plan_from_document
 from enclave_launch.review.signed import keystore_as_plan, plan_as_signed
 from enclave_launch.verb.secure_plan import plans, revisions
 from enclave_launch.verb.secure_plan.keystores import on_zenoh, refuse_edited_files, signed_grants
-from enclave_launch.verb.secure_plan.plans import read_plan
+from enclave_launch.verb.secure_plan.plans import is_saved_plan, read_plan
 
 WORDS: tuple[Option, ...] = (
     ("before BEFORE", TEXT, "PLAN.json | PATH | REVISION: | REVISION:PATH | KEYSTORE"),
@@ -68,7 +68,8 @@ def _both(options: argparse.Namespace) -> tuple[PlanDocument, PlanDocument, tupl
     after = plan_from_document(read_plan(options.words, options))
     if os.path.isdir(options.before):
         return (*_keystore_and(after, options.before), ())
-    return plan_from_document(read_plan([options.before], options)), after, ()
+    arguments = [] if is_saved_plan([options.before]) else [word for word in options.words if ":=" in word]
+    return plan_from_document(read_plan([options.before, *arguments], options)), after, ()
 
 
 def _keystore_and(plan: PlanDocument, keystore: str) -> tuple[PlanDocument, PlanDocument]:

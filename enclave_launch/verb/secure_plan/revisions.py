@@ -82,7 +82,8 @@ def plans_of(word: str, words: Sequence[str], options: argparse.Namespace) -> Re
     now = None if is_saved_plan(words) else _located(words, options)
     inside = Path.cwd() if path or now is None else now.inside
     with checkout(revision, inside) as old, tempfile.TemporaryDirectory(prefix="secure-plan-") as scratch:
-        then = _Launch(inside, _named(path, old), (), ()) if path or now is None else now
+        arguments = now.arguments if now is not None else ()
+        then = _Launch(inside, _named(path, old), (), arguments) if path or now is None else now
         if then.file is not None:
             _in(old, then.file, revision)
         prefixes = _then_prefixes(old, Path(scratch, "before"), options)
