@@ -38,7 +38,7 @@ def provisioned(launch: Path, keystore: Path) -> Path:
 
 
 def secure_plan(verb: str, launch: Path, *words: str) -> int:
-    resolving = ("--prefix", str(DEMO_WS), "--enclave-scope", "node")
+    resolving = () if launch.suffix == ".json" else ("--prefix", str(DEMO_WS), "--enclave-scope", "node")
     return main([verb, *words, *resolving, str(launch)])
 
 

@@ -92,7 +92,8 @@ def test_check_in_a_repository_with_rules(
     status, text, _ = run("check", saved)
     assert status == 1
     assert text.startswith(
-        "error: enclaves.review.yaml:2: /speaker must never reach /ear (a test): /speaker -> /ear by topic /conversation"
+        "error: enclaves.review.yaml:2: /speaker must never reach /ear (a test): "
+        "/speaker -> /ear by topic /conversation"
     )
     (tmp_path / "accepts.yaml").write_text(
         "never:\n- {from: /speaker, to: /ear}\naccept:\n- {code: flow-forbidden, why: they must talk}\n"
@@ -186,6 +187,22 @@ def test_a_working_directory_that_was_removed_is_wrong_usage(
         2,
         "secure-plan: error: the working directory: No such file or directory\n",
     )
+
+
+def test_what_has_no_effect_on_a_saved_plan_is_wrong_usage(run: Run, saved: Path) -> None:
+    for words in (
+        ("--enclave-scope", "node"),
+        ("--policy", "absent.xml"),
+        ("count:=3",),
+        ("--accept-patterns",),
+    ):
+        status, _, told = run("check", saved, *words)
+        assert (status, told) == (
+            2,
+            f"secure-plan: error: {words[0]} has no effect: {saved} is a saved plan; "
+            "plan the launch file again with it\n",
+        )
+    assert run("diff", saved, *PLAIN, "--enclave-scope", "node")[0] in (0, 1)
 
 
 def test_suggest_on_a_shared_enclave(run: Run) -> None:

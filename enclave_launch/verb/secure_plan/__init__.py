@@ -19,7 +19,7 @@ from enclave_launch.verb.secure_plan.plans import WORDS
 
 PLAN: tuple[Option, ...] = (("words", WORDS, "a plan or what to plan"),)
 RESOLVING = (*POLICY, *EVALUATION)
-"""As of ``secure-launch``; without effect on a saved plan."""
+"""As of ``secure-launch``; a saved plan takes none."""
 VERBS = ("show", "check", "diff", "drift", "flow", "hosts", "export", "suggest", "report", "evidence")
 DESCRIPTION = """\
 Look at what a launch file would start and allow, without starting anything: show it, check it, compare two

@@ -15,7 +15,7 @@ import sys
 from enclave_common.command_line import FLAG, PATH, one_of
 from enclave_common.terminal import json_text
 from enclave_launch import __version__
-from enclave_launch.dry_run import Diagnostic
+from enclave_launch.dry_run import Diagnostic, DryRun
 from enclave_launch.report.review_text import findings_document, findings_text
 from enclave_launch.report.sarif import sarif_document
 from enclave_launch.review.checks import MEANINGS
@@ -35,15 +35,17 @@ OPTIONS = {
 
 def run(options: argparse.Namespace) -> int:
     """Print the findings. Returns 1 for an error that nobody accepted (``--strict``: for any finding)."""
-    found = judged(read_plan(options.words, options), options.expect, options.keystore, options.within)
-    sys.stdout.write(_text(found, options))
+    plan = read_plan(options.words, options)
+    found = judged(plan, options.expect, options.keystore, options.within)
+    sys.stdout.write(_text(plan, found, options))
     open_ones = [finding for finding, accepted in found if accepted is None]
     return 1 if any(options.strict or finding.severity == "error" for finding in open_ones) else 0
 
 
-def _text(found: list[tuple[Diagnostic, str | None]], options: argparse.Namespace) -> str:
+def _text(plan: DryRun, found: list[tuple[Diagnostic, str | None]], options: argparse.Namespace) -> str:
     if options.format == "sarif":
-        log = sarif_document(found, MEANINGS, __version__, os.getcwd(), planned_file(options.words, options))
+        file = planned_file(options.words, options, plan)
+        log = sarif_document(found, MEANINGS, __version__, os.getcwd(), file)
         return json_text(log, indent=2) + "\n"
     if options.format == "json":
         return json_text(findings_document(found), indent=2) + "\n"

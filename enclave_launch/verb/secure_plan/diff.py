@@ -20,6 +20,7 @@ import argparse
 import os
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 
 from enclave_common.command_line import TEXT, Option, one_of
 from enclave_common.terminal import json_text, warn
@@ -29,7 +30,7 @@ from enclave_launch.review.document import PlanDocument, plan_from_document
 from enclave_launch.review.signed import keystore_as_plan, plan_as_signed
 from enclave_launch.verb.secure_plan import plans, revisions
 from enclave_launch.verb.secure_plan.keystores import on_zenoh, refuse_edited_files, signed_grants
-from enclave_launch.verb.secure_plan.plans import is_saved_plan, read_plan
+from enclave_launch.verb.secure_plan.plans import is_saved_plan, read_plan, read_saved
 
 WORDS: tuple[Option, ...] = (
     ("before BEFORE", TEXT, "PLAN.json | PATH | REVISION: | REVISION:PATH | KEYSTORE"),
@@ -68,7 +69,9 @@ def _both(options: argparse.Namespace) -> tuple[PlanDocument, PlanDocument, tupl
     after = plan_from_document(read_plan(options.words, options))
     if os.path.isdir(options.before):
         return (*_keystore_and(after, options.before), ())
-    arguments = [] if is_saved_plan([options.before]) else [word for word in options.words if ":=" in word]
+    if is_saved_plan([options.before]):
+        return plan_from_document(read_saved(Path(options.before))), after, ()
+    arguments = [word for word in options.words if ":=" in word]
     return plan_from_document(read_plan([options.before, *arguments], options)), after, ()
 
 

@@ -93,7 +93,7 @@ def _examine(options: argparse.Namespace) -> Examined:
     ends = endings(keystore, now=now) if keystore is not None else None
     root = os.getcwd()
     contents = report_contents(plan, found, title=" ".join(options.words), root=root, endings=ends)
-    file = planned_file(options.words, options)
+    file = planned_file(options.words, options, plan)
     examined = Examined(document, plan, contents, MEANINGS, iso(now), root, file, components=components)
     if keystore is None:
         return examined

@@ -19,7 +19,7 @@ from enclave_launch.errors import UsageError
 from enclave_launch.flow import resolve
 from enclave_launch.report.plan_json import plan_document
 from enclave_launch.verb.completion import launch_words
-from enclave_launch.verb.options import resolve_options
+from enclave_launch.verb.options import EVALUATION, POLICY, resolve_options
 from enclave_launch.verb.target import find_target
 from nodl.ament_index import search_prefixes
 
@@ -33,18 +33,35 @@ FORM: Option = ("--format", one_of("text", "json"), "how to print (text)")
 
 
 def read_plan(words: Sequence[str], options: argparse.Namespace) -> DryRun:
-    """Return the plan that ``words`` name; raises UsageError."""
-    return read_saved(Path(words[0])) if is_saved_plan(words) else plan_of(words, options)
+    """Return the plan that ``words`` name; raises UsageError, also for options that a saved plan does not take."""
+    if not is_saved_plan(words):
+        return plan_of(words, options)
+    _refuse_idle_options(words, options)
+    return read_saved(Path(words[0]))
 
 
 def read_document(words: Sequence[str], options: argparse.Namespace) -> Mapping[str, Any]:
-    """Return the dry run's JSON of the plan that ``words`` name, as it was saved or would be; raises UsageError."""
-    return _saved(Path(words[0]))[0] if is_saved_plan(words) else _planned(words, options)
+    """Return the JSON of the plan that ``words`` name, as it was saved or would be; raises as ``read_plan``."""
+    if not is_saved_plan(words):
+        return _planned(words, options)
+    _refuse_idle_options(words, options)
+    return _saved(Path(words[0]))[0]
 
 
 def is_saved_plan(words: Sequence[str]) -> bool:
     """Return True if ``words`` name the JSON of a dry run and no launch file."""
-    return len(words) == 1 and words[0].endswith(".json")
+    return words[0].endswith(".json")
+
+
+def _refuse_idle_options(words: Sequence[str], options: argparse.Namespace) -> None:
+    """Raise ``UsageError`` for arguments and options of planning: who gives them believes that they count."""
+    defaults = {written.split()[0]: kind.get("default") for written, kind, _ in (*POLICY, *EVALUATION)}
+    values = {flag: getattr(options, flag[2:].replace("-", "_"), None) for flag in defaults}
+    idle = [*words[1:], *(flag for flag, value in values.items() if value and value != defaults[flag])]
+    if idle:
+        raise UsageError(
+            f"{idle[0]} has no effect: {words[0]} is a saved plan; plan the launch file again with it"
+        )
 
 
 def plan_of(words: Sequence[str], options: argparse.Namespace) -> DryRun:
@@ -57,11 +74,11 @@ def read_saved(file: Path) -> DryRun:
     return _saved(file)[1]
 
 
-def planned_file(words: Sequence[str], options: argparse.Namespace) -> str:
-    """Return the saved plan or launch file that ``words`` name; raises UsageError."""
-    return (
-        words[0] if is_saved_plan(words) else find_target(words, search_prefixes(options.prefix)).launch_file
-    )
+def planned_file(words: Sequence[str], options: argparse.Namespace, plan: DryRun) -> str:
+    """Return the launch file that ``words`` name; of a saved plan, the file of what it starts first, else itself."""
+    if is_saved_plan(words):
+        return next((each.launch_file for each in plan.launched), words[0])
+    return find_target(words, search_prefixes(options.prefix)).launch_file
 
 
 def _planned(words: Sequence[str], options: argparse.Namespace) -> Mapping[str, Any]:
