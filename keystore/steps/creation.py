@@ -56,7 +56,7 @@ class CreateOptions(ChangeOptions):
     names: Mapping[Role, str] = field(default_factory=dict)
     imported: Mapping[Role, ImportedCa] = field(default_factory=dict)
     encrypt_ca_keys: bool = False
-    """Encrypt new CA keys with ``access.passphrase``."""
+    """Make no CA key without ``access.passphrase``, which encrypts new ones whenever it is given."""
 
     @property
     def settings(self) -> KeystoreSettings:
@@ -95,8 +95,7 @@ def refuse_unusable(options: CreateOptions) -> None:
         Validity.starting(now, lifetime)
     for name in options.names.values():
         authority.refuse_ca_name(name)
-    if (passphrase := _passphrase(options)) is not None:
-        passphrase.value()
+    _passphrase(options)
     for role, given in options.imported.items():
         if given.key is None:
             _external_ca(role, options)
@@ -112,6 +111,7 @@ def complete(opened: Store, options: CreateOptions) -> CreateReport:
     warnings: list[str] = []
     install_incoming(opened)
     if not view.is_complete:
+        _passphrase(options)
         if _write_settings(opened, options):
             actions.append("settings written")
             if any((folder / ".git").exists() for folder in opened.root.absolute().parents):
@@ -216,7 +216,9 @@ def _self_signed(role: Role, options: CreateOptions, key: PrivateKey) -> Authori
 def _passphrase(options: CreateOptions) -> Secret | None:
     if options.encrypt_ca_keys and options.access.passphrase is None:
         raise InvalidInputError("encrypting CA keys needs a passphrase: --passphrase-file, -fd or -env")
-    return options.access.passphrase if options.encrypt_ca_keys else None
+    if options.access.passphrase is not None:
+        options.access.passphrase.value()  # reports what is wrong with it
+    return options.access.passphrase
 
 
 def _import_ca(role: Role, options: CreateOptions, file: Path) -> tuple[Authority, bytes]:

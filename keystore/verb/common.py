@@ -58,7 +58,7 @@ WITHIN: Option = ("--within TIME", {"default": "30d"}, "what counts as soon (30d
 DOMAINS: Option = ("--domain-id IDS", TEXT, "domains of the permissions (default: the governance's)")
 """Read by ``domains``."""
 REVOKE_OLD: Option = ("--revoke-old", FLAG, "also revoke the certificates these enclaves had before")
-ENCRYPTION: Option = ("--encrypt-ca-keys", FLAG, "encrypt new CA keys with the passphrase")
+ENCRYPTION: Option = ("--encrypt-ca-keys", FLAG, "make no CA key without a passphrase, which encrypts it")
 VALIDITY: Option = (
     "--valid-for TIME", TEXT, "90d, 12h, 10y from now, or until an ISO date (default: the keystore's)"
 )  # fmt: skip

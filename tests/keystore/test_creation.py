@@ -153,6 +153,27 @@ def test_encrypted_ca_keys(tmp_path: Path) -> None:
     assert not (root / "enclaves/b").exists()
 
 
+def test_a_passphrase_encrypts_new_ca_keys_whoever_makes_them(tmp_path: Path) -> None:
+    (tmp_path / "sentence").write_bytes(SENTENCE)
+    access = CaAccess(passphrase=Secret(file=tmp_path / "sentence"))
+    created(tmp_path / "ks", access=access)
+    provision(tmp_path / "launched", [policy("/a")], options=options(access=access))
+    created(tmp_path / "plain")
+    for name, kind in (("ks", b"ENCRYPTED "), ("launched", b"ENCRYPTED "), ("plain", b"")):
+        for role in Role:
+            pem = (tmp_path / name / f"private/{role.value}.key.pem").read_bytes()
+            assert pem.startswith(b"-----BEGIN " + kind + b"PRIVATE KEY-----")
+
+
+def test_an_unreadable_passphrase_makes_no_keystore(tmp_path: Path) -> None:
+    access = CaAccess(passphrase=Secret(file=tmp_path / "absent"))
+    with pytest.raises(InvalidInputError, match="cannot read the passphrase"):
+        created(tmp_path / "ks", access=access)
+    with pytest.raises(InvalidInputError, match="cannot read the passphrase"):
+        provision(tmp_path / "launched", [policy("/a")], options=options(access=access))
+    assert not (tmp_path / "ks").exists() and not (tmp_path / "launched/public").exists()
+
+
 def test_an_unchanged_launch_needs_no_passphrase(tmp_path: Path) -> None:
     (tmp_path / "sentence").write_bytes(SENTENCE)
     access = CaAccess(passphrase=Secret(file=tmp_path / "sentence"))
