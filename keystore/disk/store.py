@@ -69,6 +69,7 @@ class Store:
         """False on a host that issues nothing, and before the first thing is issued."""
         self.register = present or Register()
         """What was issued so far; each ``Batch.record`` replaces it."""
+        self._adopted = False
         self.clock: datetime | None = None
         """What the machine's clock said when this was opened; None where the caller gave the time."""
         self.notes: list[str] = []
@@ -80,13 +81,25 @@ class Store:
         batch = Batch(self)
         try:
             yield batch
+            if self._adopted and batch.recorded is None:
+                batch.record(self.register)
             batch.commit()
             if batch.recorded is not None:
-                self.register, self.has_register = batch.recorded, True
+                self.register, self.has_register, self._adopted = batch.recorded, True, False
         except OSError as error:
             raise StorageError.of(error, "writing the keystore") from None
         finally:
             batch.discard()
+
+    def adopt(self, register: Register) -> None:
+        """Go on with a register made of the keystore's files; it is written with the first change."""
+        self.register, self.has_register, self._adopted = register, True, True
+
+    def keep_adopted(self) -> None:
+        """Write what was adopted if nothing changed since."""
+        if self._adopted:
+            with self.batch():
+                pass
 
     def ensure_directory(self, relative: str) -> None:
         """Create the directory and those above it if missing; refuse links and foreign directories."""

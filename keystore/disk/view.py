@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import os
 import shlex
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from keystore.disk import layout, safe_files
@@ -48,10 +49,14 @@ def keystore_at(keystore: Path | str) -> KeystoreView:
 
 
 class KeystoreView:
-    """Reads a keystore. ``root`` should be resolved by the caller: links above the keystore are the user's business."""
+    """Reads a keystore. ``root`` should be resolved by the caller: links above the keystore are the user's business.
 
-    def __init__(self, root: Path):
+    ``successors``: CAs that are about to follow those on disk; it is seen as if they had.
+    """
+
+    def __init__(self, root: Path, successors: Mapping[Role, Authority] = MappingProxyType({})):
         self.root = root
+        self._successors = successors
 
     @property
     def is_complete(self) -> bool:
@@ -107,7 +112,9 @@ class KeystoreView:
         bundles = {}
         for role in Role:
             name = layout.ca_cert(role)
-            bundles[role] = read_certificates(safe_files.read(self.root, name), printable(self.root / name))
+            present = read_certificates(safe_files.read(self.root, name), printable(self.root / name))
+            coming = [self._successors[role].facts] if role in self._successors else []
+            bundles[role] = [*coming, *present]
         return bundles
 
     def refuse_ended(self, now: datetime, *roles: Role) -> None:
@@ -129,11 +136,13 @@ class KeystoreView:
 
     def authority(self, role: Role, access: CaAccess) -> Authority:
         """Return the CA ready to sign; raises SigningUnavailableError if its key is not here, or does not open."""
+        if role in self._successors:
+            return self._successors[role]
         name = self.key_file(role)
         if name is None:
             raise SigningUnavailableError(
                 f"{printable(self.root / layout.ca_key(role))} is not here, so nothing can be signed; "
-                "run this where the CA key is"
+                "run this where the CA keys are, then deploy"
             )
         reference = safe_files.read_private(self.root, name)
         key = open_key(reference, printable(self.root / name), access)

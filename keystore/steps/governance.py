@@ -13,6 +13,7 @@ from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import DamagedKeystoreError, printable
 from keystore.formats.domains import Domains
 from keystore.formats.governance import Governance, governance_document, parse_governance
+from keystore.formats.register import Register
 from keystore.formats.role import Role
 from keystore.formats.validity import utc_now
 from keystore.signing.authority import Authority
@@ -46,12 +47,19 @@ def renew_governance(opened: Store, domains: Domains, access: CaAccess, now: dat
     view = KeystoreView(opened.root)
     if governance_stands(view, domains, opened.register):
         return False
-    document = opened.register.governance or trusted_document(view, layout.GOVERNANCE)
+    document = governance_for(view, opened.register, domains)
+    write_governance(opened, document, view.authority(Role.PERMISSIONS, access), now)
+    return True
+
+
+def governance_for(view: KeystoreView, register: Register, domains: Domains) -> bytes:
+    """Return the governance signed last, extended to ``domains``. Raises DamagedKeystoreError for one of nobody we
+    know, InvalidInputError without a rule."""
+    document = register.governance or trusted_document(view, layout.GOVERNANCE)
     governance = parse_governance(document, printable(view.root / layout.GOVERNANCE))
     if not governance.domains().covers(domains):
         document = governance_document(governance.extended_to(domains))
-    write_governance(opened, document, view.authority(Role.PERMISSIONS, access), now)
-    return True
+    return document
 
 
 def set_governance(

@@ -46,6 +46,7 @@ def opened_for_change(
 ) -> Iterator[Store]:
     """Open as ``store.opened``; a complete keystore without a register gets one made from its contents.
 
+    It is written with the first change, so that a change which is refused leaves the keystore as it was.
     Raises DamagedKeystoreError if the clock cannot be right, unless that is accepted or the caller gave the time.
     """
     with store.opened(root, timeout=options.lock_timeout, durable=options.durable) as opened:
@@ -57,6 +58,7 @@ def opened_for_change(
         elif opened.has_register:
             _adopt_newer_crl(opened)
         yield opened
+        opened.keep_adopted()
 
 
 _BACK, _AHEAD = timedelta(days=1), timedelta(days=366)
@@ -103,12 +105,9 @@ def take_over(opened: Store) -> None:
         register = replace(register, governance=trusted_document(view, layout.GOVERNANCE))
     register = register.with_certificates(_issued(view))
     register = register.with_documents(_documents(view, register))
-    register = _with_crl(view, register)
-    opened.ensure_directory(layout.PRIVATE)
-    with opened.batch() as batch:
-        batch.record(register)
+    opened.adopt(_with_crl(view, register))
     opened.notes.append(
-        f"register made from the files in this keystore: {counted(len(register.certificates), 'certificate')}"
+        f"register made from the files in this keystore: {counted(len(opened.register.certificates), 'certificate')}"
     )
 
 

@@ -21,15 +21,16 @@ from keystore.disk.register_file import refuse_foreign_authorities
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.share_files import read_shares
 from keystore.disk.signed_documents import governance_domains, signed_governance
-from keystore.disk.store import Store
+from keystore.disk.store import Batch, Store
 from keystore.disk.view import KeystoreView, keystore_at
-from keystore.errors import InvalidInputError, KeystoreError, printable
+from keystore.errors import InvalidInputError, KeystoreError, StorageError, printable
 from keystore.formats.enclave_name import check_distinct, validate_enclave_name
 from keystore.formats.governance import Governance, governance_document, parse_governance
 from keystore.formats.policy import EnclavePolicy, Operation, Policy, Profile, Qualifier, Rule
 from keystore.formats.role import Role
 from keystore.formats.subject import SubjectScheme
 from keystore.formats.validity import DEFAULT_LIFETIME, Validity, utc_now
+from keystore.signing.authority import Authority
 from keystore.steps.comparison import (
     WantedEnclave,
     as_found,
@@ -44,7 +45,7 @@ from keystore.steps.creation import CreateOptions, complete
 from keystore.steps.crl import publish_crl, restore_crl
 from keystore.steps.enclave_state import EnclaveState, PermissionsSource
 from keystore.steps.enclave_writing import EnclaveWriter
-from keystore.steps.governance import renew_governance
+from keystore.steps.governance import governance_for, renew_governance
 from keystore.steps.opening import opened_for_change
 from keystore.steps.options import EnclaveReport, Progress, ProvisionOptions, ProvisionReport
 from keystore.steps.sharing import given_up, left_over, refuse_running, shares_in_use
@@ -212,14 +213,11 @@ def reconcile(
         done, warnings = _complete_keystore(opened, options, now)
         done = [*opened.notes, *done]
         view = KeystoreView(root)
-        register = opened.register if opened.has_register else None
-        refuse_foreign_authorities(view, register)
-        check_distinct(dict.fromkeys((*view.enclaves(), *wanted)))
+        refuse_foreign_authorities(view, opened.register if opened.has_register else None)
         writer = EnclaveWriter(opened, view, options, now)
         wanted = {name: _as_it_is_now(one) for name, one in wanted.items()}
-        states = [inspect_wanted(view, register, name, one, options, now) for name, one in wanted.items()]
+        states = _states(opened, view, writer, wanted, options, now)
         refuse_without_keys(view, states, {name: one.permissions for name, one in wanted.items()})
-        writer.check_subjects(states)
         _record_shares(opened, wanted)
         reports = _write_all(opened, writer, states, wanted, options.progress)
         if writer.has_revoked:
@@ -230,6 +228,48 @@ def reconcile(
             )
     warnings += shares_in_use(one.share for one in wanted.values() if one.share is not None)
     return ProvisionReport(root, tuple(done), reports, (*warnings, *writer.warnings))
+
+
+def rehearse(
+    opened: Store,
+    wanted: Mapping[str, WantedEnclave],
+    options: ProvisionOptions,
+    now: datetime,
+    successors: Mapping[Role, Authority],
+) -> None:
+    """Sign everything as these CAs would, and throw it away.
+
+    What would stop ``reconcile`` raises here, before the CAs are replaced and the other enclaves depend on its success.
+    """
+    view = KeystoreView(opened.root, successors)
+    writer = EnclaveWriter(opened, view, options, now)
+    governance_for(view, opened.register, options.domains or governance_domains(view))
+    states = _states(opened, view, writer, wanted, options, now)
+    batch = Batch(opened)
+    try:
+        for state in states:
+            if not state.is_good:
+                writer.write(batch, state, wanted[state.enclave].permissions)
+    except OSError as error:
+        raise StorageError.of(error, "writing the keystore") from None
+    finally:
+        batch.discard()
+
+
+def _states(
+    opened: Store,
+    view: KeystoreView,
+    writer: EnclaveWriter,
+    wanted: Mapping[str, WantedEnclave],
+    options: ProvisionOptions,
+    now: datetime,
+) -> list[EnclaveState]:
+    """Inspect the enclaves; raises InvalidInputError for names or subjects that would be confused."""
+    register = opened.register if opened.has_register else None
+    check_distinct(dict.fromkeys((*view.enclaves(), *wanted)))
+    states = [inspect_wanted(view, register, name, one, options, now) for name, one in wanted.items()]
+    writer.check_subjects(states)
+    return states
 
 
 def _as_it_is_now(one: WantedEnclave) -> WantedEnclave:

@@ -74,20 +74,25 @@ def renew(
     now = provisioning.now or utc_now()
     named = None if enclaves is None else sorted({validate_enclave_name(name) for name in enclaves})
     view.require_enclaves(named or ())
+    due = provisioning if named is not None else provisioning._replace(renew_within=chosen.within)
     with opened_for_change(root, now, provisioning) as opened:
         install_incoming(opened)
-        repaired = [*opened.notes, *_repair_keystore(opened, chosen, now)]
+        repaired = [*opened.notes, *_restore_trust_files(opened)]
+        view = KeystoreView(root)
+        wanted = {
+            name: _wanted(view, name, named, chosen)
+            for name in view.enclaves()
+            if name in (named or ()) or not is_tool_enclave(name)
+        }
+        due = with_domains(root, due)
+        if view.shares_one_ca:
+            rollover.separate_permissions_ca(opened, wanted, due, now, encrypt=chosen.encrypt_ca_keys)
+            repaired.append("permissions CA separated from the identity CA; deploy all enclaves together")
+        repaired += [f"made {name} private" for name in _close_modes(opened)]
         repaired += restore_crl(opened, provisioning.access, now, chosen.within)
         if mirror_governance(opened):
             repaired.append("governance.xml made equal to the signed governance.p7s")
-    view = KeystoreView(root)
-    wanted = {
-        name: _wanted(view, name, named, chosen)
-        for name in view.enclaves()
-        if name in (named or ()) or not is_tool_enclave(name)
-    }
-    due = provisioning if named is not None else provisioning._replace(renew_within=chosen.within)
-    report = bring_about(root, wanted, with_domains(root, due))
+    report = bring_about(root, wanted, due)
     if chosen.revoke_old:
         with opened_for_change(root, now, provisioning) as opened:
             changed = named if named is not None else [one.enclave for one in report.enclaves if one.actions]
@@ -159,15 +164,6 @@ def _is_exposed(view: KeystoreView, name: str, options: RenewOptions) -> bool:
         scheme is SubjectScheme.EXACT and scheme_of(facts.common_name or "/") is SubjectScheme.COMPATIBLE
     )
     return facts.can_sign_mail or borrows
-
-
-def _repair_keystore(opened: Store, options: RenewOptions, now: datetime) -> list[str]:
-    done = [f"made {name} private" for name in _close_modes(opened)]
-    done += _restore_trust_files(opened)
-    if KeystoreView(opened.root).shares_one_ca:
-        rollover.separate_permissions_ca(opened, options.provisioning, now, encrypt=options.encrypt_ca_keys)
-        done.append("permissions CA separated from the identity CA; deploy all enclaves together")
-    return done
 
 
 def _restore_trust_files(opened: Store) -> list[str]:

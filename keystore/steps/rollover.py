@@ -13,7 +13,7 @@ one, so a keystore with revocations skips the overlap: the CRL goes with the old
 from __future__ import annotations
 
 import os
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from contextlib import suppress
 from datetime import datetime
 from enum import Enum
@@ -24,7 +24,7 @@ from keystore.disk import layout, safe_files, store
 from keystore.disk.signed_documents import governance_stands
 from keystore.disk.store import Content, Store, refresh_copies
 from keystore.disk.view import KeystoreView, keystore_at
-from keystore.errors import DamagedKeystoreError, InvalidInputError
+from keystore.errors import DamagedKeystoreError, InvalidInputError, printable
 from keystore.formats.bundle import handover_json
 from keystore.formats.certificate import read_certificate
 from keystore.formats.register import AuthorityState
@@ -32,16 +32,18 @@ from keystore.formats.role import Role
 from keystore.formats.tool_needs import is_tool_enclave
 from keystore.formats.validity import utc_now
 from keystore.signing import smime
+from keystore.signing.authority import Authority, authority_of
 from keystore.signing.ca_access import CaAccess
 from keystore.signing.public_key import fingerprint, issued_by
 from keystore.signing.smime import sign_document
+from keystore.signing.token_key import open_key
 from keystore.steps.comparison import WantedEnclave, with_domains
 from keystore.steps.creation import CreateOptions, new_ca
 from keystore.steps.crl import drop_crl
 from keystore.steps.incoming_ca import install_incoming, put_incoming
 from keystore.steps.opening import opened_for_change
 from keystore.steps.options import ProvisionOptions, ProvisionReport
-from keystore.steps.provisioning import bring_about, keep
+from keystore.steps.provisioning import bring_about, keep, rehearse
 
 
 class Step(str, Enum):
@@ -69,10 +71,17 @@ def roll_over(
     root = keystore_at(keystore).root
     now = chosen.now or utc_now()
     creation = _creation(chosen, now, encrypt)
+    wanted = {
+        name: WantedEnclave(keep) for name in KeystoreView(root).enclaves() if not is_tool_enclave(name)
+    }
     with opened_for_change(root, now, chosen) as opened:
         install_incoming(opened)
+        if step is Step.START:
+            _refuse_without_keys(opened, roles, chosen.access)
         for role in roles:
             _forget_installed(opened, role)
+        if step is Step.SWITCH and (successors := _successors(opened, roles, chosen.access)):
+            rehearse(opened, wanted, with_domains(root, chosen), now, successors)
         if step is Step.FINISH:
             _refuse_to_strand(opened, roles)
             _refuse_without_start(opened, roles)
@@ -83,9 +92,6 @@ def roll_over(
     if step is not Step.SWITCH:
         warnings = tuple(follow(root, chosen))
         return ProvisionReport(root, tuple(text for text in done if text), (), warnings)
-    wanted = {
-        name: WantedEnclave(keep) for name in KeystoreView(root).enclaves() if not is_tool_enclave(name)
-    }
     report = bring_about(root, wanted, with_domains(root, chosen))
     return report._replace(created=(*(text for text in done if text), *report.created))
 
@@ -97,6 +103,36 @@ def _creation(options: ProvisionOptions, now: datetime, encrypt: bool) -> Create
         encrypt_ca_keys=encrypt,
         now=now,
     )
+
+
+def _refuse_without_keys(opened: Store, roles: Collection[Role], access: CaAccess) -> None:
+    """Open the keys before anything is written. The permissions CA signs who follows; an identity CA may be elsewhere.
+
+    What opens the present keys encrypts the new ones, too.
+    """
+    view = KeystoreView(opened.root)
+    for role in Role:
+        if role is Role.PERMISSIONS or (role in roles and view.key_file(role) is not None):
+            view.authority(role, access)
+
+
+def _successors(opened: Store, roles: Collection[Role], access: CaAccess) -> dict[Role, Authority]:
+    """Return the new CAs ready to sign; none of a role that is switched already."""
+    found = {}
+    for role in roles:
+        if opened.is_directory(_waiting(role)):
+            place = printable(opened.root / _waiting(role))
+            cert = safe_files.read(opened.root, f"{_waiting(role)}/{layout.CERT}")
+            key = safe_files.read_private(opened.root, f"{_waiting(role)}/{layout.KEY}")
+            found[role] = authority_of(read_certificate(cert, place), open_key(key, place, access), place)
+        elif not _is_switched(opened, role):
+            raise InvalidInputError(f"there is no new {role.label} yet: first --ca start, and deploy")
+    return found
+
+
+def _is_switched(opened: Store, role: Role) -> bool:
+    retired = any((opened.root / layout.RETIRED).glob(f"{role.value}-*.cert.pem"))
+    return retired or len(KeystoreView(opened.root).ca_bundle(role)) > 1
 
 
 def _start(opened: Store, role: Role, creation: CreateOptions) -> str:
@@ -141,10 +177,7 @@ def _trust(opened: Store, role: Role, bundle: bytes) -> str:
 
 def _switch(opened: Store, role: Role, creation: CreateOptions) -> str:
     if not opened.is_directory(_waiting(role)):
-        retired = any((opened.root / layout.RETIRED).glob(f"{role.value}-*.cert.pem"))
-        if len(KeystoreView(opened.root).ca_bundle(role)) > 1 or retired:
-            return ""  # switched already
-        raise InvalidInputError(f"there is no new {role.label} yet: first --ca start, and deploy")
+        return ""  # switched already
     view = KeystoreView(opened.root)
     new = safe_files.read(opened.root, f"{_waiting(role)}/{layout.CERT}")
     key = safe_files.read_private(opened.root, f"{_waiting(role)}/{layout.KEY}")
@@ -247,11 +280,21 @@ def _hangs_on_old_ca(view: KeystoreView, enclave: str, roles: Collection[Role]) 
 
 
 def separate_permissions_ca(
-    opened: Store, options: ProvisionOptions, now: datetime, *, encrypt: bool
+    opened: Store,
+    wanted: Mapping[str, WantedEnclave],
+    options: ProvisionOptions,
+    now: datetime,
+    *,
+    encrypt: bool,
 ) -> None:
-    """Give a keystore with a single CA its own permissions CA; ``bring_about`` signs all again."""
-    retire(opened, Role.PERMISSIONS)
+    """Give a keystore with a single CA its own permissions CA; ``bring_about`` signs all again.
+
+    Raises before anything is written if that would not succeed.
+    """
+    KeystoreView(opened.root).authority(Role.IDENTITY, options.access)
     made, key = new_ca(Role.PERMISSIONS, _creation(options, now, encrypt))
+    rehearse(opened, wanted, options, now, {Role.PERMISSIONS: made})
+    retire(opened, Role.PERMISSIONS)
     put_incoming(opened, Role.PERMISSIONS, made.facts.pem, key)
     install_incoming(opened)
     _retire_for_good(opened, Role.PERMISSIONS)

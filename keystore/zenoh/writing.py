@@ -80,6 +80,7 @@ def write_zenoh(
     if not found.sessions and not found.is_router_stale:
         return ZenohReport(view.root, address, (), found.router.served, found.router.gaps, restart=False)
     with opened_for_change(view.root, now, chosen) as opened:
+        opened.keep_adopted()  # the router's file follows from the register
         found = _pending(KeystoreView(opened.root), names, address, due)
         return _write(opened, found, address, chosen.access, now)
 
