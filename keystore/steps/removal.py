@@ -15,10 +15,12 @@ from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
+from enclave_common.words import some_of
 from keystore.add_ons import follow
 from keystore.disk import layout
 from keystore.disk.store import Store
 from keystore.disk.view import KeystoreView, keystore_at
+from keystore.errors import SigningUnavailableError, printable
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.role import Role
 from keystore.formats.validity import utc_now
@@ -61,13 +63,19 @@ def remove(
     Repeating completes an interrupted run.
 
     Enclaves below a removed one stay. One whose files are lost is revoked as the register knows it.
-    Raises InvalidInputError for an enclave that was never there.
+    Raises InvalidInputError for an enclave that was never there, SigningUnavailableError on a host: it revokes nothing,
+    and the next import brings back what is only deleted.
     """
     chosen = options or RemoveOptions()
     now = chosen.now or utc_now()
     wanted = sorted({validate_enclave_name(name) for name in names})
     root = keystore_at(keystore).root
     with opened_for_change(root, now, chosen) as opened:
+        if not opened.has_register:
+            raise SigningUnavailableError(
+                f"{printable(root)} is a deployed copy without CA keys: {some_of(wanted, 3)} cannot be removed "
+                "here; remove it where the CA keys are, then deploy"
+            )
         view = KeystoreView(root)
         lost = {one.enclave for one in revocable(view, opened.register, wanted)}
         view.require_enclaves(set(wanted) - lost)

@@ -1,7 +1,7 @@
 """Revoke enclaves and delete them; all remaining enclaves get the CRL.
 
 Cyclone DDS and Fast DDS refuse revoked peers when they start with the new crl.pem, so deploy afterwards;
-RTI Connext is not given a CRL by its rmw.
+RTI Connext is not given a CRL by its rmw. Run it where the CA keys are: a deployed copy refuses it.
 """
 
 from __future__ import annotations

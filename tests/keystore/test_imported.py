@@ -42,7 +42,7 @@ from keystore.formats.bundle import pin
 from keystore.steps.comparison import differences
 from keystore.steps.importing import Restart
 from keystore.verb import main
-from tests.keystore.kit import filled, options, policy
+from tests.keystore.kit import contents, filled, options, policy
 
 
 def exported(ca: Path, output: Path, host: str = "arm", *names: str, accept: bool = False) -> HostBundle:
@@ -98,6 +98,24 @@ CHANGES: dict[str, tuple[Callable[[Path, bytes], None], Restart]] = {
     "CRL deleted": (delete_crl, Restart.ALL),
     "another's permissions": (swap_permissions, Restart.CHANGED),
 }
+
+
+@pytest.mark.parametrize("more", [(), ("--no-revoke",)])
+def test_an_enclave_is_removed_where_the_ca_keys_are(
+    ca: Path, host: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], more: tuple[str, ...]
+) -> None:
+    assert main(["export", str(ca), "-o", str(tmp_path / "copy"), "--enclave", "*"]) == 0
+    for deployed in (host, tmp_path / "copy"):
+        before = contents(deployed)
+        capsys.readouterr()
+        assert main(["remove", str(deployed), "/a", *more]) == 1
+        told = capsys.readouterr()
+        assert "remove it where the CA keys are, then deploy" in told.err
+        assert told.out == "" and told.err.count("\n") == 1
+        assert contents(deployed) == before and verify(deployed).is_good
+    assert main(["remove", str(ca), "/a", *more]) == 0
+    import_bundle(host, exported(ca, tmp_path / "next", "arm", "/b").path, options=ImportOptions("arm"))
+    assert not (host / "enclaves/a").exists() and verify(host).is_good
 
 
 def test_what_was_imported_is_good_and_the_same_bundle_changes_nothing(
