@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from keystore.disk import layout, safe_files
-from keystore.errors import UnsafeKeystoreError, printable
+from keystore.errors import StorageError, UnsafeKeystoreError, printable
 from keystore.formats.enclave_name import from_flat_name
 from keystore.formats.shares import Share, parse_shares
 
@@ -28,11 +28,14 @@ def read_shares(root: Path, enclave: str) -> tuple[Share, ...]:
 
 
 def enclaves_with_shares(root: Path) -> Iterator[str]:
-    """Return the sorted names of the enclaves that launches have shares of."""
+    """Return the sorted names of the enclaves that launches have shares of; raises StorageError if that is not to be
+    seen."""
     try:
         names = os.listdir(root / layout.SHARES)
-    except (FileNotFoundError, NotADirectoryError, PermissionError):
+    except (FileNotFoundError, NotADirectoryError):
         return
+    except OSError as error:
+        raise StorageError.of(error, "reading the shares in") from None
     for name in sorted(names):
         enclave = from_flat_name(name.removesuffix(".json"))
         if name.endswith(".json") and enclave is not None:

@@ -15,7 +15,7 @@ from keystore.disk.register_file import needs_register, read_register, refuse_fo
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.signed_documents import governance_domains, governance_stands
 from keystore.disk.view import KeystoreView
-from keystore.errors import NotAKeystoreError, SigningUnavailableError, printable
+from keystore.errors import SigningUnavailableError, printable
 from keystore.formats.domains import Domains
 from keystore.formats.permissions import permissions_document
 from keystore.formats.policy import EnclavePolicy
@@ -78,10 +78,7 @@ def compare(
     view = KeystoreView(root)
     if not view.is_complete:
         if not options.create:
-            raise NotAKeystoreError(
-                f"{printable(view.root)} is not a complete keystore; "
-                "make one with secure-keystore create, or leave out --no-create-keystore"
-            )
+            view.require_complete()
         view.refuse_foreign()
         return None
     if any(os.path.lexists(f"{root}/{name}") for name in (layout.INCOMING, layout.CRL_UNLINKED)):

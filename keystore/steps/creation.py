@@ -96,6 +96,10 @@ def refuse_unusable(options: CreateOptions) -> None:
     for name in options.names.values():
         authority.refuse_ca_name(name)
     _passphrase(options)
+    for role in options.names.keys() & options.imported.keys():
+        raise InvalidInputError(
+            f"the {role.label} has the name in its certificate; leave out --{role.value.replace('_', '-')}-name"
+        )
     for role, given in options.imported.items():
         if given.key is None:
             _external_ca(role, options)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 
 from enclave_common.command_line import PATH, TEXT
+from keystore.errors import InvalidInputError
 from keystore.formats.domains import Domains
 from keystore.formats.governance_yaml import load_governance_yaml
 from keystore.formats.role import Role
@@ -48,6 +49,11 @@ def run(arguments: argparse.Namespace) -> int:
     given = vars(arguments)
     imported = {role: ImportedCa(*given[role.value]) for role in Role if given[role.value]}
     if arguments.external_identity_ca:
+        if Role.IDENTITY in imported:
+            raise InvalidInputError(
+                "--identity-ca and --external-identity-ca name two identity CAs; leave out one: external is a CA whose "
+                "key is elsewhere"
+            )
         imported[Role.IDENTITY] = ImportedCa(arguments.external_identity_ca)
     options = CreateOptions(
         domains=Domains.parse(arguments.domain_id),

@@ -11,6 +11,7 @@ from keystore import (
     BundleOptions,
     ImportOptions,
     InvalidInputError,
+    Role,
     Severity,
     SigningUnavailableError,
     accept_certificates,
@@ -21,6 +22,7 @@ from keystore import (
     request,
     verify,
 )
+from keystore.disk.view import KeystoreView
 from keystore.steps.host_keys import Request, parse_requests, requests_text
 from keystore.verb import main
 from tests.keystore.kit import actions, openssl, options, policy
@@ -147,3 +149,21 @@ def test_the_commands(
     assert "/arm: certificate taken, key SHA-256 " in capsys.readouterr().out
     assert main(["create-enclave", str(ks), "/arm"]) == 0, "it exists"
     assert requests_text(parse_requests(file.read_bytes(), "requests")) == file.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("more", "told"),
+    [
+        (["--identity-ca", "CERT", "KEY"], "leave out one"),
+        (["--identity-ca-name", "Foo"], "leave out --identity-ca-name"),
+    ],
+)
+def test_no_option_of_an_external_ca_is_dropped(
+    external: ExternalCa, tmp_path: Path, capsys: pytest.CaptureFixture[str], more: list[str], told: str
+) -> None:
+    root, files = tmp_path / "new", {"CERT": str(external.cert), "KEY": str(external.key)}
+    create = ["create", str(root), "--external-identity-ca", str(external.cert)]
+    assert main([*create, *(files.get(word, word) for word in more)]) == 2
+    assert told in capsys.readouterr().err and not root.exists()
+    assert main([*create, "--permissions-ca-name", "Foo"]) == 0, "that one is made here"
+    assert KeystoreView(root).ca(Role.PERMISSIONS).common_name == "Foo"

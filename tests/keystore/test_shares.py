@@ -213,6 +213,17 @@ class TestDropping:
         assert "/own: certificate, permissions, old certificate revoked" in capsys.readouterr().out
         assert granted(root) == {"rt/plan"}
 
+    @pytest.mark.skipif(os.geteuid() == 0, reason="root may read anywhere")
+    def test_not_for_who_cannot_see_them(self, root: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        start(root, BRINGUP, policy("/"))
+        (root / layout.PRIVATE).chmod(0)
+        assert main(["shares", str(root)]) == 1
+        told = capsys.readouterr()
+        assert told.out == "" and "private/shares" in told.err and "Permission denied" in told.err
+        (root / layout.PRIVATE).chmod(0o700)
+        assert main(["shares", str(root)]) == 0
+        assert capsys.readouterr().out == f"'{BRINGUP}': /\n"
+
     def test_with_the_enclave(self, root: Path) -> None:
         start(root, BRINGUP, policy("/a"), policy("/b"))
         remove(root, ["/a"], options=RemoveOptions(durable=False))

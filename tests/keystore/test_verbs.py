@@ -104,6 +104,7 @@ BAD_USAGE = {
     ("create", "KS", "--domain-id", "231"): ("0..230", 2),
     ("create", "NEW", "--encrypt-ca-keys"): ("needs a passphrase", 2),
     ("create", "NEW", "--identity-ca-name", "a/b"): ("1 to 64 bytes", 2),
+    ("create-enclave", "NEW", "/a"): ("; to make one: secure-keystore create ", 1),
 }
 
 
