@@ -107,6 +107,13 @@ class CertificateFacts:
         return usage is None or usage.digital_signature or usage.content_commitment
 
     @property
+    def can_certify(self) -> bool:
+        """Return True for a CA, and for a certificate whose key may sign certificates or CRLs."""
+        constraints, usage = self.extension(x509.BasicConstraints), self.extension(x509.KeyUsage)
+        signs = usage is not None and (usage.key_cert_sign or usage.crl_sign)
+        return signs or (constraints is not None and constraints.ca)
+
+    @property
     def names_hosts(self) -> bool:
         """Return True if it has alternative names: a TLS client accepts its holder as a server of these hosts."""
         return self.extension(x509.SubjectAlternativeName) is not None

@@ -21,11 +21,12 @@ from keystore.formats.given_file import read_given
 from keystore.formats.governance import Governance, governance_document, parse_governance
 from keystore.formats.register import AuthorityState
 from keystore.formats.role import Role
-from keystore.formats.subject import SubjectScheme
+from keystore.formats.subject import SubjectScheme, common_name
 from keystore.formats.validity import DEFAULT_LIFETIME, Validity, utc_now
 from keystore.signing import authority
 from keystore.signing.authority import Authority, check_can_serve
 from keystore.signing.ca_access import Secret
+from keystore.signing.openssl import refuse_unfit_ca
 from keystore.signing.private_key import PrivateKey, key_pem, new_key
 from keystore.signing.public_key import CYCLONE_KINDS, key_kind
 from keystore.signing.token_key import open_key
@@ -229,7 +230,13 @@ def _import_ca(role: Role, options: CreateOptions, file: Path) -> tuple[Authorit
     place, reference = options.imported[role].certificate, read_given(file)
     key = open_key(reference, printable(file), options.access)
     bound = authority.authority_of(_given(place), key, printable(place))
-    check_can_serve(bound.facts, role, options.now or utc_now(), printable(place))
+    now = options.now or utc_now()
+    check_can_serve(bound.facts, role, now, printable(place))
+    probe = None
+    if role is Role.IDENTITY:  # its constraints on names show only below it
+        name = common_name("/probe")
+        probe = bound.issue(name, new_key().public_key(), Validity.starting(now, options.lifetime))
+    refuse_unfit_ca(bound.facts, role, printable(place), probe)
     return bound, reference
 
 
@@ -253,6 +260,7 @@ def _external_ca(role: Role, options: CreateOptions) -> CertificateFacts:
         raise InvalidInputError("only the identity CA can be external: permissions are signed here")
     facts = _given(place)
     check_can_serve(facts, role, options.now or utc_now(), printable(place))
+    refuse_unfit_ca(facts, role, printable(place))
     return facts
 
 

@@ -17,6 +17,7 @@ from keystore.formats.subject import common_name, names_enclave, subject_name
 from keystore.formats.validity import utc_now
 from keystore.signing.authority import Authority
 from keystore.signing.certificate_request import request_key
+from keystore.signing.openssl import refusals
 from keystore.signing.public_key import fingerprint, issued_by
 from keystore.signing.records import certificate_record, permissions_record
 from keystore.signing.smime import sign_document
@@ -78,6 +79,7 @@ def accept_certificates(
             fingerprint(one.public_key): one for one in given_certificates(issued, "the issued certificates")
         }
         found = [(one, _fitting(view, opened.register, one, by_key.get(one.key), now)) for one in requests]
+        _refuse_by_openssl(view, found)
         signer = view.authority(Role.PERMISSIONS, chosen.access)
         register = opened.register
         with opened.batch() as batch:
@@ -105,10 +107,26 @@ def _fitting(
         raise InvalidInputError(f"{what} is not signed by the identity CA of this keystore itself")
     if not facts.validity.covers(now):
         raise InvalidInputError(f"{what} is not valid now")
+    if facts.can_certify:
+        raise InvalidInputError(
+            f"{what} may certify enclaves of its own (CA:TRUE, or key usage keyCertSign or cRLSign); have the CA issue "
+            "one of an end entity"
+        )
     known = register.certificates.get(facts.serial)
     if known is not None and (known.enclave != one.enclave or known.revoked is not None):
         raise InvalidInputError(f"{what} has the serial number of another enclave's, or of a revoked one")
     return facts
+
+
+def _refuse_by_openssl(view: KeystoreView, found: list[tuple[Request, CertificateFacts]]) -> None:
+    judged = refusals(view.ca(Role.IDENTITY), [facts for _, facts in found], Role.IDENTITY)
+    for (one, _), why in zip(found, judged, strict=True):
+        if why:
+            raise InvalidInputError(
+                f"the certificate for {one.enclave}: OpenSSL, by which DDS implementations check, refuses it: {why}; "
+                "have the CA issue one with its own authorityKeyIdentifier or none, and no critical extensions but "
+                "basicConstraints and key usage"
+            )
 
 
 def _accept(

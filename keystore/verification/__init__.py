@@ -24,6 +24,7 @@ from keystore.verification.files import check_files, check_parents
 from keystore.verification.finding import Finding as Finding
 from keystore.verification.finding import Severity as Severity
 from keystore.verification.issued import check_anchors, check_published, load_register
+from keystore.verification.openssl import check_by_openssl
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +85,7 @@ def _findings(
     except KeystoreError:
         revoked = frozenset()  # the CRL itself was reported above
     yield from check_enclaves(view, register, revoked, now)
+    yield from check_by_openssl(view)
     if view.has_zenoh_router:
         yield from _check_zenoh(view, now)
 
