@@ -116,6 +116,12 @@ class Register:
         """Return whether the CA with this certificate may stand in the trust file: known, and not retired."""
         return self.authorities.get((role, ca), AuthorityState.RETIRED) is not AuthorityState.RETIRED
 
+    def trusted_authorities(self, role: Role) -> list[bytes]:
+        """Return the certificates of a trust file, the one in use first."""
+        known = {ca: state for (its, ca), state in self.authorities.items() if its is role}
+        in_use = [ca for ca, state in known.items() if state is AuthorityState.IN_USE]
+        return in_use + [ca for ca in known if self.trusts_authority(role, ca) and ca not in in_use]
+
     def revoked(self, issuer: str) -> dict[int, datetime]:
         """Map serial to date of revocation, of the certificates that this CA issued."""
         return {

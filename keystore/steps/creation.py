@@ -15,7 +15,7 @@ from keystore.disk.safe_files import resolve_root
 from keystore.disk.store import Store
 from keystore.disk.view import KeystoreSettings, KeystoreView
 from keystore.errors import DamagedKeystoreError, InvalidInputError, printable
-from keystore.formats.certificate import CertificateFacts, given_certificates
+from keystore.formats.certificate import CertificateFacts, given_certificates, read_der
 from keystore.formats.domains import Domains
 from keystore.formats.given_file import read_given
 from keystore.formats.governance import Governance, governance_document, parse_governance
@@ -126,6 +126,8 @@ def complete(opened: Store, options: CreateOptions) -> CreateReport:
         for directory in (layout.PUBLIC, layout.PRIVATE, layout.ENCLAVES):
             opened.ensure_directory(directory)
     for role in Role:
+        if _restore_ca(opened, role):
+            actions.append(f"{role.label} restored from the register")
         if os.path.exists(opened.root / layout.ca_cert(role)):
             _record_present_ca(opened, role, options)  # its key may be missing: the CA may be kept elsewhere
             continue
@@ -143,6 +145,16 @@ def _write_settings(opened: Store, options: CreateOptions) -> bool:
         return False
     with opened.batch() as batch:
         batch.file(layout.SETTINGS, options.settings.to_json())
+    return True
+
+
+def _restore_ca(opened: Store, role: Role) -> bool:
+    """Write a lost trust file again as the register knows it: another CA over the same key would issue for nobody."""
+    trusted = opened.register.trusted_authorities(role)
+    if not trusted or os.path.lexists(opened.root / layout.ca_cert(role)):
+        return False
+    with opened.batch() as batch:
+        batch.file(layout.ca_cert(role), b"".join(read_der(ca).pem for ca in trusted))
     return True
 
 

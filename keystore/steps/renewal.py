@@ -22,7 +22,6 @@ from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import DamagedKeystoreError, InvalidInputError, printable
 from keystore.formats.certificate import read_der
 from keystore.formats.enclave_name import validate_enclave_name
-from keystore.formats.register import AuthorityState
 from keystore.formats.role import Role
 from keystore.formats.subject import SubjectScheme, scheme_of
 from keystore.formats.tool_needs import is_tool_enclave
@@ -171,7 +170,7 @@ def _restore_trust_files(opened: Store) -> list[str]:
         return []
     done: list[str] = []
     for role in Role:
-        trusted = _trusted(opened, role)
+        trusted = opened.register.trusted_authorities(role)
         try:
             found = KeystoreView(opened.root).ca_bundle(role)
         except DamagedKeystoreError:
@@ -194,12 +193,6 @@ def _restore_trust_files(opened: Store) -> list[str]:
     if done:
         refresh_copies(opened)
     return done
-
-
-def _trusted(opened: Store, role: Role) -> list[bytes]:
-    known = {ca: state for (its, ca), state in opened.register.authorities.items() if its is role}
-    in_use = [ca for ca, state in known.items() if state is AuthorityState.IN_USE]
-    return in_use + [ca for ca in known if opened.register.trusts_authority(role, ca) and ca not in in_use]
 
 
 def _close_modes(opened: Store) -> list[str]:

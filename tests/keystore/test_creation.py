@@ -54,6 +54,18 @@ def test_creating_again_changes_nothing(tmp_path: Path) -> None:
     assert snapshot(root) == before
 
 
+@pytest.mark.parametrize("role", Role)
+def test_a_lost_ca_certificate_is_restored_and_no_other_ca_made(tmp_path: Path, role: Role) -> None:
+    root = created(tmp_path / "ks")
+    provision(root, [policy("/a")], options=options())
+    lost = root / "public" / f"{role.value}.cert.pem"
+    before = lost.read_bytes()
+    lost.unlink()
+    assert create_keystore(root).actions == (f"{role.label} restored from the register",)
+    assert lost.read_bytes() == before
+    assert findings(root) == set()
+
+
 def test_an_empty_directory_is_used(tmp_path: Path) -> None:
     assert findings(created(tmp_path)) == set()
 
