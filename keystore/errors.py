@@ -62,6 +62,10 @@ class DamagedKeystoreError(KeystoreError):
     """A file of the keystore is missing, unreadable or not what it should be."""
 
 
+class OtherFormError(DamagedKeystoreError):
+    """A signed document is not in the form that is written here, so DDS implementations may read something else."""
+
+
 class NotInstalledError(KeystoreError):
     """An add-on that the keystore needs is not part of this installation."""
 

@@ -23,7 +23,7 @@ from asn1crypto import cms
 from cryptography.hazmat.primitives import hashes
 from cryptography.hazmat.primitives.serialization import Encoding, pkcs7
 
-from keystore.errors import DamagedKeystoreError, InvalidInputError
+from keystore.errors import DamagedKeystoreError, InvalidInputError, OtherFormError
 from keystore.formats.certificate import NOT_OUR_FORM, CertificateFacts
 from keystore.signing.authority import Authority
 from keystore.signing.public_key import signature_is_valid
@@ -98,10 +98,10 @@ class SignedDocument(NamedTuple):
 
 
 def read(p7s: bytes, place: str) -> SignedDocument:
-    """Takes a file apart that is in the form ``sign_document`` writes; raises DamagedKeystoreError for any other."""
+    """Takes a file apart that is in the form ``sign_document`` writes; raises OtherFormError for any other."""
     found = _read(p7s)
     if found is None:
-        raise DamagedKeystoreError(f"{place} is not a signed document as it should be: {NOT_OUR_FORM}")
+        raise OtherFormError(f"{place} is not a signed document as it should be: {NOT_OUR_FORM}")
     return found
 
 

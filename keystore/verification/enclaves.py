@@ -18,6 +18,7 @@ from keystore.errors import (
     DamagedKeystoreError,
     InvalidInputError,
     KeystoreError,
+    OtherFormError,
     UnsafeKeystoreError,
     printable,
 )
@@ -256,6 +257,8 @@ class _EnclaveCheck:
             signed = smime.read(p7s, place)
             smime.check(signed, self._view.ca_bundle(Role.PERMISSIONS), place)
             grants = parse_permissions(signed.document, place)
+        except OtherFormError:
+            return  # the check of all files reports it, and that renew writes it again
         except KeystoreError as error:
             yield self._distrusted("permissions", str(error))
             return
