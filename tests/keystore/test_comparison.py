@@ -190,7 +190,7 @@ class TestWhatAStartFinds:
         assert not again(root).changed
 
     def test_a_keystore_is_made_only_where_that_was_allowed(self, tmp_path: Path) -> None:
-        with pytest.raises(NotAKeystoreError, match="is not a complete keystore"):
+        with pytest.raises(NotAKeystoreError, match="there is no keystore at"):
             again(tmp_path / "ks", create=False)
         assert not (tmp_path / "ks").exists()
         assert again(tmp_path / "ks").changed
