@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
@@ -53,9 +54,16 @@ def renew_governance(opened: Store, domains: Domains, access: CaAccess, now: dat
 
 
 def governance_for(view: KeystoreView, register: Register, domains: Domains) -> bytes:
-    """Return the governance signed last, extended to ``domains``. Raises DamagedKeystoreError for one of nobody we
-    know, InvalidInputError without a rule."""
-    document = register.governance or trusted_document(view, layout.GOVERNANCE)
+    """Return the governance signed last, extended to ``domains``.
+
+    Raises DamagedKeystoreError if no CA of this keystore signed it, InvalidInputError without a rule.
+    """
+    try:
+        document = register.governance or trusted_document(view, layout.GOVERNANCE)
+    except DamagedKeystoreError as error:
+        raise DamagedKeystoreError(
+            f"{error}; put yours in force: secure-keystore governance {shlex.quote(str(view.root))} FILE.yaml"
+        ) from None
     governance = parse_governance(document, printable(view.root / layout.GOVERNANCE))
     if not governance.domains().covers(domains):
         document = governance_document(governance.extended_to(domains))

@@ -65,17 +65,18 @@ def roll_over(
 ) -> ProvisionReport:
     """Do one step of replacing CAs; repeating an interrupted step completes it.
 
-    Raises InvalidInputError for a step out of order.
+    Raises InvalidInputError for a step out of order. What would stop ``start`` or ``switch`` half-way raises before
+    anything is written: SigningUnavailableError for a key that does not open, DamagedKeystoreError for a document.
     """
     chosen = (options or ProvisionOptions())._replace(create=False)
     root = keystore_at(keystore).root
     now = chosen.now or utc_now()
     creation = _creation(chosen, now, encrypt)
-    wanted = {
-        name: WantedEnclave(keep) for name in KeystoreView(root).enclaves() if not is_tool_enclave(name)
-    }
     with opened_for_change(root, now, chosen) as opened:
         install_incoming(opened)
+        wanted = {
+            name: WantedEnclave(keep) for name in KeystoreView(root).enclaves() if not is_tool_enclave(name)
+        }
         if step is Step.START:
             _refuse_without_keys(opened, roles, chosen.access)
         for role in roles:

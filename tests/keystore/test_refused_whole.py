@@ -145,6 +145,7 @@ def test_a_document_of_a_stranger_costs_nobody_the_keystore(
     by_a_stranger(sros2, name, sros2_style.issue("stranger", is_ca=True))
     told = refused(sros2, capsys, "renew")
     assert name in told and "not the permissions CA" in told
+    assert f"secure-keystore {'governance' if 'governance' in name else 'apply-policy'}" in told
     by_a_stranger(sros2, name, sros2_style.Credential.of_ca(sros2))
     renew(sros2)
     assert codes(sros2) == set()
