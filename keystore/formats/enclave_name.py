@@ -35,6 +35,14 @@ def validate_enclave_name(name: str) -> str:
     return name
 
 
+def is_enclave_name(name: str) -> bool:
+    """Return whether it is an enclave name."""
+    try:
+        return validate_enclave_name(name) == name
+    except InvalidEnclaveNameError:
+        return False
+
+
 def _differences(name: str) -> str:
     if not name:
         return "it is empty"

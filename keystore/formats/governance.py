@@ -59,8 +59,8 @@ class TopicRule:
 
 @dataclass(frozen=True, slots=True)
 class DomainRule:
-    """Rules for a set of domains. The last topic rule always matches every topic: what no rule matches is
-    refused by both implementations."""
+    """Rules for a set of domains. The last topic rule matches every topic, unless it was read from a document without
+    such a rule: what no rule matches is refused by both implementations."""
 
     domains: Domains = field(default_factory=lambda: Domains.single(0))
     allow_unauthenticated_participants: bool = False
@@ -164,18 +164,21 @@ TOPIC_SETTINGS = tuple(each.name for each in fields(TopicRule) if each.name != "
 
 
 def parse_governance(document: bytes, where: str) -> Governance:
-    """Parse a governance document, ours or SROS2's; raises InvalidInputError with file:line."""
+    """Parse a governance document, ours or SROS2's, with no other rules than it has; raises InvalidInputError with
+    file:line."""
     root = parse_xml(document, where)
     check_schema(root, "governance.xsd", where, "DDS governance document")
     return Governance(tuple(_read_rule(element) for element in root.iter("domain_rule")))
 
 
 def _read_rule(element: etree._Element) -> DomainRule:
-    return DomainRule(
+    rule = DomainRule(
         domains=Domains(tuple(_range(part) for part in element[0])),
-        topic_rules=tuple(_read_topic_rule(rule) for rule in element.iter("topic_rule")),
         **{name: _setting(element, name) for name in DOMAIN_SETTINGS},
     )
+    # Behind its back: a rule for every topic that the document lacks is not in force.
+    object.__setattr__(rule, "topic_rules", tuple(map(_read_topic_rule, element.iter("topic_rule"))))
+    return rule
 
 
 def _read_topic_rule(element: etree._Element) -> TopicRule:

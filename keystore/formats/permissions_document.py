@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from keystore.errors import DamagedKeystoreError
 from keystore.formats.permissions_names import ros_rules
-from keystore.formats.permissions_patterns import can_meet, covers
+from keystore.formats.permissions_patterns import can_meet, covers, matches
 from keystore.formats.policy import Qualifier, Rule
 from keystore.formats.safe_xml import check_schema, parse_xml
 from keystore.formats.validity import Validity
@@ -25,12 +25,15 @@ _DECLARATION = '<?xml version="1.0" encoding="UTF-8"?>\n'
 
 @dataclass(frozen=True, slots=True)
 class DdsRule:
-    """One ``allow_rule`` or ``deny_rule``; ``domains`` are pairs (first, last), last ``None`` when open."""
+    """One ``allow_rule`` or ``deny_rule``; ``domains`` are pairs (first, last), last ``None`` when open.
+
+    ``partitions``: of those parts that are not for the default partition, the one of ROS."""
 
     qualifier: Qualifier
     domains: DomainRanges
     publish: tuple[str, ...]
     subscribe: tuple[str, ...]
+    partitions: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,7 +93,13 @@ def _rule(element: etree._Element) -> DdsRule:
         domains=tuple(_domain(child) for child in element[0]),
         publish=_topics(element, "publish"),
         subscribe=_topics(element, "subscribe"),
+        partitions=tuple(name for part in element.iter("partitions") for name in _foreign_partitions(part)),
     )
+
+
+def _foreign_partitions(element: etree._Element) -> list[str]:
+    names = [partition.text or "" for partition in element]
+    return [] if any(matches(name, "") for name in names) else names
 
 
 def _domain(element: etree._Element) -> tuple[int, int | None]:

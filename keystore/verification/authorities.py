@@ -22,7 +22,7 @@ from keystore.signing.ca_access import CaAccess
 from keystore.signing.public_key import CYCLONE_KINDS, issued_by, key_kind
 from keystore.verification import repair
 from keystore.verification.finding import Finding, Severity
-from keystore.verification.governance import check_strength
+from keystore.verification.governance import check_strength, check_topics
 
 
 def check_authorities(
@@ -116,6 +116,7 @@ def _check_governance(
             Severity.ERROR, "embedded-differs", place,
             "carries another certificate than that of the permissions CA: older DDS versions refuse it", again,
         )  # fmt: skip
+    yield from check_topics(view.root, governance)
     yield from check_strength(view.root, governance, required)
     if register is not None and register.governance and signed.document != register.governance:
         yield Finding(

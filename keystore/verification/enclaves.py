@@ -26,6 +26,7 @@ from keystore.formats.certificate import NOT_OUR_FORM, CertificateFacts, read_ce
 from keystore.formats.domains import Domains
 from keystore.formats.governance import parse_governance
 from keystore.formats.permissions_document import Grant, parse_permissions
+from keystore.formats.permissions_patterns import matches_everything
 from keystore.formats.permissions_size import FAST_DDS_LIMIT_BYTES, WARN_BYTES
 from keystore.formats.policy import Qualifier
 from keystore.formats.register import Register
@@ -308,9 +309,17 @@ class _EnclaveCheck:
                 f"also grants to {', '.join(map(printable, others[:4]))}, so to any participant of that name",
                 self._renew(),
             )  # fmt: skip
-        if any("*" in (*rule.publish, *rule.subscribe) for rule in mine.rules):
-            yield self._finding(
-                Severity.EXPOSURE, "everything", layout.PERMISSIONS, "grants every topic (*)", self._renew()
+        allowed = [rule for rule in mine.rules if rule.qualifier is Qualifier.ALLOW]
+        topics = {topic for rule in allowed for topic in (*rule.publish, *rule.subscribe)}
+        if wide := sorted(filter(matches_everything, topics)):
+            text = f"grants every topic, or nearly ({', '.join(map(printable, wide[:4]))})"
+            fix = repair.run(self._view.root, "apply-policy", "POLICY.xml", note="that names what it needs")
+            yield self._finding(Severity.EXPOSURE, "everything", layout.PERMISSIONS, text, fix)
+        if partitions := sorted({name for rule in mine.rules for name in rule.partitions}):
+            yield self._distrusted(
+                "partitions",
+                f"a rule is for partitions {', '.join(map(printable, partitions[:4]))} only: ROS uses none, so "
+                "Cyclone DDS and Fast DDS refuse its endpoints",
             )
         ranges = [(low, low if high is None else high) for rule in mine.rules for low, high in rule.domains]
         with contextlib.suppress(InvalidInputError):
@@ -322,9 +331,12 @@ class _EnclaveCheck:
         except InvalidInputError as error:
             yield self.error("permissions-dates", layout.PERMISSIONS, str(error))
             return
-        if not validity.covers(self._now):
+        if parse_time(grant.not_after) > LATEST:
+            text = f"valid until {grant.not_after}: Cyclone DDS refuses what ends after {iso(LATEST)}"
+            yield self.error("permissions-dates", layout.PERMISSIONS, text)
+        elif not validity.covers(self._now):
             dates = f"valid from {grant.not_before} to {grant.not_after}"
             yield self.error("permissions-expired", layout.PERMISSIONS, dates)
-        elif validity.not_after != facts.validity.not_after or parse_time(grant.not_after) > LATEST:
+        elif validity.not_after != facts.validity.not_after:
             text = "not valid as long as the certificate"
             yield self._finding(Severity.WARNING, "validity-differs", layout.PERMISSIONS, text, self._renew())

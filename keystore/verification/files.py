@@ -20,7 +20,7 @@ from keystore.disk.container_copies import differing_copies
 from keystore.disk.crl_file import is_crl
 from keystore.errors import DamagedKeystoreError, InvalidEnclaveNameError, printable
 from keystore.formats.certificate import read_certificate, read_certificates
-from keystore.formats.enclave_name import check_distinct, validate_enclave_name
+from keystore.formats.enclave_name import check_distinct, is_enclave_name, validate_enclave_name
 from keystore.formats.role import Role
 from keystore.signing import smime
 from keystore.signing.public_key import is_our_form
@@ -170,7 +170,8 @@ def _belongs(root: Path, directory: str, name: str) -> bool:
     if relative in _KNOWN or relative in _NEXT_CAS or name.endswith(_PRIVATE_FOLDERS.get(directory, ())):
         return True
     if directory.split("/")[0] == layout.ENCLAVES and name in {*layout.ENCLAVE_FILES, layout.ENCLAVE_ZENOH}:
-        return True
+        # Of the copy of an enclave that no process can use, the key is a second one.
+        return name != layout.KEY or is_enclave_name(directory.removeprefix(layout.ENCLAVES) or "/")
     # Alone, the URI is that of the enclave's key in a token.
     return name == layout.KEY_URI and not os.path.lexists(root / directory / layout.KEY)
 

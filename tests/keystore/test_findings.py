@@ -244,6 +244,90 @@ def test_signed_permissions_with_more_in_them_than_belongs_there(
     assert of_enclave(root, code) is severity
 
 
+def permits(root: Path, old: str, new: str) -> set[str]:
+    """The codes that are found in the permissions of /a, signed with this change."""
+    twin = root / "enclaves/a/permissions.xml"
+    assert old in twin.read_text()
+    twin.write_text(twin.read_text().replace(old, new))
+    signed = sign_document(twin.read_bytes(), authority(root, Role.PERMISSIONS))
+    (root / "enclaves/a/permissions.p7s").write_bytes(signed)
+    return {one.code for one in verify(root).findings} - {"permissions-not-last", "wildcard"}
+
+
+@pytest.mark.parametrize(
+    "topic", ["*", "**", " * ", "?*", "[!x]*", "[^x]*", "[[:alpha:]]*", "r*", "*/*", "[ -~]*"]
+)
+def test_a_grant_of_everything_in_any_spelling(root: Path, topic: str) -> None:
+    assert permits(root, "<topic>rt/chatter<", f"<topic>{topic}<") == {"everything"}
+    assert of_enclave(root, "everything") is Severity.EXPOSURE
+
+
+@pytest.mark.parametrize("topic", ["rt/*", "rq/*Request", "rt/camera/*", "[!r]*", "*/image", "r", "?"])
+def test_a_grant_of_a_kind_of_topics_is_not_one_of_everything(root: Path, topic: str) -> None:
+    assert permits(root, "<topic>rt/chatter<", f"<topic>{topic}<") == set()
+
+
+def test_who_is_denied_everything_is_not_granted_it(root: Path) -> None:
+    provision(root, [kit.policy("/a")], options=kit.options())
+    text = (root / "enclaves/a/permissions.xml").read_text()
+    rule = text[text.index("<allow_rule>") : text.index("</allow_rule>")]
+    denied = rule.replace("allow", "deny").replace("rt/chatter", "*") + "</deny_rule>"
+    assert permits(root, "<default>", f"{denied}<default>") == set()
+
+
+@pytest.mark.parametrize(("year", "codes"), [("2261", set()), ("2300", {"permissions-dates"})])
+def test_permissions_that_end_too_late_for_cyclone_dds(root: Path, year: str, codes: set[str]) -> None:
+    end = (root / "enclaves/a/permissions.xml").read_text().partition("<not_after>")[2][:4]
+    assert permits(root, f"<not_after>{end}", f"<not_after>{year}") - {"validity-differs"} == codes
+
+
+@pytest.mark.parametrize(
+    ("partitions", "codes"),
+    [
+        (("left",), {"partitions"}),
+        (("left", "right"), {"partitions"}),
+        (("*",), set()),
+        (("left", "*"), set()),
+    ],
+)
+def test_permissions_for_partitions_of_dds(root: Path, partitions: tuple[str, ...], codes: set[str]) -> None:
+    listed = "".join(f"<partition>{name}</partition>" for name in partitions)
+    assert permits(root, "</topics>", f"</topics><partitions>{listed}</partitions>") == codes
+
+
+@pytest.mark.parametrize(
+    ("expressions", "codes"),
+    [
+        (("rt/x",), {"topics-not-governed"}),
+        (("rt/*", "rq/*", "rr/*"), {"topics-not-governed"}),
+        (("rt/x", "*"), set()),
+        (("rt/x", "**"), set()),
+    ],
+)
+def test_a_governance_without_a_rule_for_every_topic(
+    root: Path, expressions: tuple[str, ...], codes: set[str]
+) -> None:
+    text = (root / layout.GOVERNANCE_XML).read_text()
+    head, _, rest = text.partition("<topic_rule>")
+    rule, _, tail = rest.partition("</topic_rule>")
+    rules = "".join(f"<topic_rule>{rule.replace('>*<', f'>{one}<')}</topic_rule>" for one in expressions)
+    document = f"{head}{rules}{tail}".encode()
+    (root / layout.GOVERNANCE_XML).write_bytes(document)
+    (root / layout.GOVERNANCE).write_bytes(sign_document(document, authority(root, Role.PERMISSIONS)))
+    assert {one.code for one in verify(root).findings} - {"governance-not-last"} == codes
+    for one in found(root, "topics-not-governed"):
+        assert one.severity is Severity.ERROR and "secure-keystore governance" in one.repair
+
+
+def test_a_copy_of_an_enclave_holds_a_second_key(root: Path) -> None:
+    copy = root / "enclaves/a.bak"
+    shutil.copytree(root / "enclaves/a", copy, symlinks=True)
+    (one,) = found(root, "stray-key")
+    assert one.severity is Severity.ERROR and one.place == "enclaves/a.bak/key.pem"
+    (copy / "key.pem").unlink()
+    assert found(root, "stray-key") == [] and verify(root).is_good, "what is left is a stray"
+
+
 def test_a_governance_with_another_certificate_in_it(root: Path) -> None:
     document = (root / layout.GOVERNANCE_XML).read_bytes()
     (root / layout.GOVERNANCE).write_bytes(with_another_certificate(document, root))
