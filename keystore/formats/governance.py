@@ -176,7 +176,7 @@ def _read_rule(element: etree._Element) -> DomainRule:
         domains=Domains(tuple(_range(part) for part in element[0])),
         **{name: _setting(element, name) for name in DOMAIN_SETTINGS},
     )
-    # Behind its back: a rule for every topic that the document lacks is not in force.
+    # As read: the rule for every topic that a new DomainRule gets is not in force if the document lacks it.
     object.__setattr__(rule, "topic_rules", tuple(map(_read_topic_rule, element.iter("topic_rule"))))
     return rule
 

@@ -5,6 +5,7 @@
 from __future__ import annotations
 
 import ctypes
+import sys
 from functools import lru_cache
 
 _ALPHABET = frozenset("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_/")
@@ -19,7 +20,7 @@ UNRELATED_NAMES = (
 )  # fmt: skip
 """DDS topics that have nothing in common, to try out what an expression matches."""
 _LIBC = ctypes.CDLL(None)
-_FNM_NOESCAPE = 2  # of Linux; so Fast DDS calls it
+_FNM_NOESCAPE = 2 if sys.platform == "linux" else 1  # as Fast DDS calls it; BSD and macOS number it otherwise
 
 
 def matches(expression: str, name: str) -> bool:

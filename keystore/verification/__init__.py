@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from keystore.add_ons import zenoh_files
-from keystore.disk import layout
+from keystore.disk import layout, safe_files
 from keystore.disk.crl_file import revoked_serials
 from keystore.disk.deployed import find_differences
 from keystore.disk.view import KeystoreView, keystore_at
@@ -56,12 +56,26 @@ def verify(
     required: Requirements | None = None,
 ) -> VerifyReport:
     """Check everything; raises NotAKeystoreError only when there is nothing to check."""
-    view = keystore_at(keystore)
     order = list(Severity)
     with storage_errors("checking the keystore"):
-        found = list(_findings(view, access or CaAccess(), now or utc_now(), required or Requirements()))
+        for _ in range(_ATTEMPTS):
+            view = keystore_at(keystore)
+            before = _register_file(view)
+            found = list(_findings(view, access or CaAccess(), now or utc_now(), required or Requirements()))
+            if not found or _register_file(view) == before:
+                break  # else a command wrote meanwhile, and files of before and after were compared
     found.sort(key=lambda finding: (order.index(finding.severity), finding.place, finding.code))
     return VerifyReport(view.root, len(view.enclaves()), tuple(found))
+
+
+_ATTEMPTS = 5
+
+
+def _register_file(view: KeystoreView) -> bytes | None:
+    try:
+        return safe_files.read_if_there(view.root, layout.REGISTER)
+    except KeystoreError:
+        return None  # the check itself reports it
 
 
 def _findings(

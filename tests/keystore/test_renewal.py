@@ -69,7 +69,9 @@ def test_an_sros2_keystore_is_reported_as_exposed(sros2: Path) -> None:
     exposed = {finding.code for finding in found if finding.severity is Severity.EXPOSURE}
     assert exposed == {"shared-ca", "leaf-can-sign", "borrowed-permissions", "no-register"}
     assert all(finding.repair for finding in found if finding.severity.fails)
-    assert not any(finding.repair.startswith("rm ") for finding in found)  # renew keeps what its documents grant
+    assert not any(
+        finding.repair.startswith("rm ") for finding in found
+    )  # renew keeps what its documents grant
 
 
 def test_an_sros2_keystore_is_extended_in_place(sros2: Path) -> None:

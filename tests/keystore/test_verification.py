@@ -4,15 +4,30 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from keystore import CaAccess, Domains, NotAKeystoreError, Role, Severity, Validity, provision, verify
+from keystore import (
+    CaAccess,
+    Domains,
+    Finding,
+    NotAKeystoreError,
+    RenewOptions,
+    Role,
+    Severity,
+    Validity,
+    provision,
+    renew,
+    verification,
+    verify,
+)
 from keystore.disk.view import KeystoreView
 from keystore.formats.permissions import permissions_document
 from keystore.signing import smime
+from keystore.verification import enclaves
 from tests.dds import sros2_style
 from tests.keystore.kit import DAY, NOW, filled, options, policy
 
@@ -150,3 +165,18 @@ def test_nothing_to_check(tmp_path: Path) -> None:
     for path in (tmp_path, tmp_path / "nowhere"):
         with pytest.raises(NotAKeystoreError):
             verify(path)
+
+
+def test_what_a_command_writes_meanwhile_is_no_finding(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    root = filled(tmp_path / "ks", ["/a"])
+    written: list[object] = []
+
+    def while_another_command_writes(*arguments: Any) -> Iterator[Finding]:
+        if not written:
+            written.append(renew(root, ["/a"], options=RenewOptions(new_keys=True, provisioning=options())))
+        return enclaves.check_enclaves(*arguments)
+
+    monkeypatch.setattr(verification, "check_enclaves", while_another_command_writes)
+    assert verify(root).findings == () and written
