@@ -21,7 +21,8 @@ def public_half(pem: bytes, place: str) -> PublicKey:
     return load_private_key(pem, None, place).public_key()
 
 
-USABLE_KINDS = frozenset({"P-256", "P-384", "RSA-2048"})
+USABLE_KINDS = ("P-256", "RSA-2048")
+"""What DDS-Security 1.1 has (section 9.3.2.1), and what Cyclone DDS takes besides other curves of 256 bits."""
 
 
 class RequestedKey(NamedTuple):

@@ -16,8 +16,7 @@ from keystore.errors import SigningUnavailableError
 from keystore.formats.certificate import CertificateFacts
 from keystore.signing.private_key import key_pem, load_private_key, spki
 
-CYCLONE_KINDS = ("P-256", "RSA-2048")
-"""The keys that Cyclone DDS takes; Fast DDS takes any."""
+_CURVES = {"secp224r1": "P-224", "secp256r1": "P-256", "secp384r1": "P-384", "secp521r1": "P-521"}
 
 
 def fingerprints(named: Iterable[str]) -> frozenset[str]:
@@ -41,13 +40,36 @@ def signature_is_valid(key: Any, signature: bytes, data: bytes, digest: hashes.H
 
 def key_kind(public_key: bytes) -> str:
     """Returns ``P-256``, ``P-384``, ``RSA-2048`` and so on, of a SubjectPublicKeyInfo in DER."""
-    try:
-        key = load_der_public_key(public_key)
-    except (ValueError, UnsupportedAlgorithm):
-        return "damaged"
+    key = _loaded(public_key)
     if isinstance(key, ec.EllipticCurvePublicKey):
-        return {"secp256r1": "P-256", "secp384r1": "P-384"}.get(key.curve.name, key.curve.name)
+        return _CURVES.get(key.curve.name, key.curve.name)
+    if key is None:
+        return "damaged"
     return f"RSA-{key.key_size}" if isinstance(key, rsa.RSAPublicKey) else type(key).__name__
+
+
+def cyclone_takes(public_key: bytes) -> bool:
+    """Returns whether Cyclone DDS takes the key for an identity or its CA: it goes by the size. Fast DDS takes any,
+    and for a permissions CA both do."""
+    key = _loaded(public_key)
+    if isinstance(key, rsa.RSAPublicKey):
+        return key.key_size == 2048
+    return isinstance(key, ec.EllipticCurvePublicKey) and key.key_size == 256
+
+
+def is_weak(public_key: bytes) -> bool:
+    """Returns whether the key has less than the 112 bits of security of NIST SP 800-57, or a curve below P-256."""
+    key = _loaded(public_key)
+    if isinstance(key, rsa.RSAPublicKey):
+        return key.key_size < 2048
+    return isinstance(key, ec.EllipticCurvePublicKey) and key.key_size < 256
+
+
+def _loaded(public_key: bytes) -> Any:
+    try:
+        return load_der_public_key(public_key)
+    except (ValueError, UnsupportedAlgorithm):
+        return None
 
 
 @lru_cache(maxsize=2048)  # a launch asks of the same certificates before each of its processes

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import shlex
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from datetime import timedelta
 from pathlib import Path
@@ -28,7 +28,7 @@ from keystore.signing.authority import Authority, check_can_serve
 from keystore.signing.ca_access import Secret
 from keystore.signing.openssl import refuse_unfit_ca
 from keystore.signing.private_key import PrivateKey, key_pem, new_key
-from keystore.signing.public_key import CYCLONE_KINDS, key_kind
+from keystore.signing.public_key import cyclone_takes, is_weak, key_kind
 from keystore.signing.token_key import open_key
 from keystore.steps.governance import write_governance
 from keystore.steps.incoming_ca import install_incoming, put_incoming
@@ -167,7 +167,7 @@ def _add_ca(opened: Store, role: Role, options: CreateOptions) -> tuple[str, lis
         with opened.batch() as batch:
             batch.record(opened.register.with_authority(role, facts.der, AuthorityState.IN_USE))
             batch.file(layout.ca_cert(role), facts.pem)
-        return "of somebody else imported; it signs what hosts request", []
+        return "of somebody else imported; it signs what hosts request", [*_key_warnings(role, facts)]
     if given is not None and given.key is not None:
         made, key = _import_ca(role, options, given.key)
         verb, warnings = "imported", _shared_ca_warnings(role, options)
@@ -176,11 +176,15 @@ def _add_ca(opened: Store, role: Role, options: CreateOptions) -> tuple[str, lis
         verb, warnings = "created", []
     put_incoming(opened, role, made.facts.pem, key)
     install_incoming(opened)
-    if (kind := key_kind(made.facts.public_key)) not in CYCLONE_KINDS:
-        warnings.append(
-            f"the {role.label} key is {kind}: Cyclone DDS accepts only P-256 and RSA-2048, Fast DDS any"
-        )
-    return verb, warnings
+    return verb, [*warnings, *_key_warnings(role, made.facts)]
+
+
+def _key_warnings(role: Role, facts: CertificateFacts) -> Iterator[str]:
+    kind = key_kind(facts.public_key)
+    if role is Role.IDENTITY and not cyclone_takes(facts.public_key):
+        yield f"the {role.label} key is {kind}: Cyclone DDS refuses it, Fast DDS accepts it; P-256 suits both"
+    if is_weak(facts.public_key):
+        yield f"the {role.label} key is {kind}, which is weak: who breaks it can sign as this CA; take P-256"
 
 
 def _record_present_ca(opened: Store, role: Role, options: CreateOptions) -> None:

@@ -98,6 +98,9 @@ def _request(pending: Path, enclave: str, options: RequestOptions) -> Request:
     if not place.is_dir():
         file, key = _new_key(options)
         pem = new_request(common_name(enclave), key)
+        request_key(
+            pem, f"the request of {enclave}"
+        )  # before it is kept: one that no CA takes would wait for ever
         aside = pending / f".{place.name}"
         shutil.rmtree(aside, ignore_errors=True)
         with storage_errors("writing the request"):

@@ -19,7 +19,7 @@ from keystore.formats.validity import iso
 from keystore.signing import smime
 from keystore.signing.authority import check_can_serve
 from keystore.signing.ca_access import CaAccess
-from keystore.signing.public_key import CYCLONE_KINDS, issued_by, key_kind
+from keystore.signing.public_key import cyclone_takes, is_weak, issued_by, key_kind
 from keystore.verification import repair
 from keystore.verification.finding import Finding, Severity
 from keystore.verification.governance import check_strength, check_topics
@@ -68,11 +68,14 @@ def _check_certificate(
         yield Finding(Severity.ERROR, "ca-unfit", place, str(error), fix)
     if facts.issuer == facts.subject and not issued_by(facts, facts):
         yield Finding(Severity.ERROR, "ca-signature", place, "its self-signature is wrong", repair.BACKUP)
-    if key_kind(facts.public_key) not in CYCLONE_KINDS:
-        yield Finding(
-            Severity.WARNING, "ca-key-kind", place,
-            f"a {key_kind(facts.public_key)} key: Cyclone DDS refuses it, Fast DDS accepts it",
-        )  # fmt: skip
+    kind = key_kind(facts.public_key)
+    if role is Role.IDENTITY and not cyclone_takes(facts.public_key):
+        text = f"a {kind} key: Cyclone DDS refuses it, Fast DDS accepts it"
+        yield Finding(Severity.WARNING, "ca-key-kind", place, text)
+    if is_weak(facts.public_key):
+        text = f"a {kind} key, which is weak: who breaks it can sign what this CA signs"
+        fix = repair.run(view.root, "renew", "--ca", "start", note="deploy; then --ca switch and --ca finish")
+        yield Finding(Severity.EXPOSURE, "weak-key", place, text, fix)
 
 
 def _check_key(view: KeystoreView, role: Role, access: CaAccess) -> Iterator[Finding]:

@@ -41,7 +41,7 @@ from keystore.formats.subject import (
 )
 from keystore.formats.validity import LATEST, Validity, iso, parse_time
 from keystore.signing import smime
-from keystore.signing.public_key import CYCLONE_KINDS, is_our_form, issued_by, key_kind, key_matches
+from keystore.signing.public_key import cyclone_takes, is_our_form, is_weak, issued_by, key_kind, key_matches
 from keystore.verification import repair
 from keystore.verification.finding import Finding, Severity
 from keystore.verification.governance import check_domains
@@ -175,9 +175,13 @@ class _EnclaveCheck:
         elif key is not None and not key_matches(key, self.facts):
             text = "does not belong to cert.pem; Cyclone DDS starts but never talks"
             yield self.error("key-mismatch", layout.KEY, text)
-        if (kind := key_kind(self.facts.public_key)) not in CYCLONE_KINDS:
-            text = f"a {kind} key: Cyclone DDS refuses it"
+        kind = key_kind(self.facts.public_key)
+        if not cyclone_takes(self.facts.public_key):
+            text = f"a {kind} key: Cyclone DDS refuses it, Fast DDS accepts it"
             yield self._finding(Severity.WARNING, "key-kind", layout.CERT, text)
+        if is_weak(self.facts.public_key):
+            text = f"a {kind} key, which is weak: who breaks it is this enclave"
+            yield self.leaf(Severity.EXPOSURE, "weak-key", text)
 
     def _chain(self, facts: CertificateFacts) -> Iterator[Finding]:
         bundle = self._view.ca_bundle(Role.IDENTITY)

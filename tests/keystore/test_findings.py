@@ -17,10 +17,12 @@ from cryptography.hazmat.primitives.asymmetric import ec
 
 from keystore import (
     CaAccess,
+    CreateOptions,
     DomainRule,
     Domains,
     Finding,
     Governance,
+    ImportedCa,
     Protection,
     RemoveOptions,
     RenewOptions,
@@ -29,6 +31,7 @@ from keystore import (
     Severity,
     SubjectScheme,
     Validity,
+    create_keystore,
     provision,
     remove,
     renew,
@@ -125,10 +128,49 @@ def test_keys_that_cyclone_dds_refuses(root: Path, tmp_path: Path, monkeypatch: 
         patch.setattr(ec, "SECP256R1", ec.SECP384R1)
         other = kit.filled(tmp_path / "other", ["/a"])
     assert of_enclave_without_repair(other, "key-kind") is Severity.WARNING
-    kinds = found(other, "ca-key-kind")
-    assert [one.place for one in kinds] == sorted(layout.ca_cert(role) for role in Role)
-    assert all(one.severity is Severity.WARNING and "P-384" in one.message for one in kinds)
+    (kind,) = found(other, "ca-key-kind")
+    assert kind.place == layout.ca_cert(Role.IDENTITY), "as permissions CA it takes any"
+    assert kind.severity is Severity.WARNING and "P-384" in kind.message and verify(other).is_good
     assert found(root, "key-kind") == found(root, "ca-key-kind") == []
+
+
+@pytest.mark.parametrize("role", Role)
+@pytest.mark.parametrize(
+    ("kind", "is_weak", "cyclone_takes"),
+    [
+        ("RSA-1024", True, False),
+        ("RSA-2048", False, True),
+        ("RSA-3072", False, False),
+        ("P-224", True, False),
+        ("P-256", False, True),
+    ],
+)
+def test_a_ca_with_a_weak_key(
+    tmp_path: Path, role: Role, kind: str, is_weak: bool, cyclone_takes: bool
+) -> None:
+    family, _, size = kind.partition("-")
+    key = ("rsa:" + size,) if family == "RSA" else ("ec", "-pkeyopt", f"ec_paramgen_curve:{kind}")
+    given = ImportedCa(tmp_path / "ca.pem", tmp_path / "ca.key")
+    usage = ("-addext", "keyUsage=critical,keyCertSign,cRLSign,digitalSignature", "-subj", "/CN=ca")
+    kit.openssl(
+        "req", "-x509", "-newkey", *key, "-nodes", *usage, "-days", "9", "-keyout", tmp_path / "ca.key",
+        "-out", given.certificate,
+    )  # fmt: skip
+    made = create_keystore(tmp_path / "ks", CreateOptions(durable=False, imported={role: given}))
+    expected = {"weak-key": Severity.EXPOSURE} if is_weak else {}
+    if role is Role.IDENTITY and not cyclone_takes:
+        expected["ca-key-kind"] = Severity.WARNING
+    assert {one.code: one.severity for one in verify(tmp_path / "ks").findings} == expected
+    assert len(made.warnings) == len(expected) and all(kind in one for one in made.warnings)
+
+
+def test_enclaves_with_weak_keys(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr(ec, "SECP256R1", ec.SECP224R1)
+        other = kit.filled(tmp_path / "other", ["/a"])
+    weak = {one.place: one.severity for one in found(other, "weak-key")}
+    places = ("enclaves/a/cert.pem", *(layout.ca_cert(role) for role in Role))
+    assert weak == dict.fromkeys(places, Severity.EXPOSURE) and found(root, "weak-key") == []
 
 
 def of_enclave_without_repair(root: Path, code: str) -> Severity:

@@ -188,7 +188,7 @@ def test_a_request_for_what_does_not_exist_or_is_anothers_is_refused(ca: Path, t
     assert private_keys(ca).keys() == {"enclaves/base/key.pem"}
 
 
-@pytest.mark.parametrize("kind", ["ed25519", "ec:secp256k1"])
+@pytest.mark.parametrize("kind", ["ed25519", "ec:secp256k1", "ec:P-384", "ec:P-224"])
 def test_a_key_that_dds_cannot_use_is_refused(tmp_path: Path, kind: str) -> None:
     name, _, curve = kind.partition(":")
     more = ["-pkeyopt", f"ec_paramgen_curve:{curve}"] if curve else []
