@@ -24,7 +24,7 @@ from nodl.infer.cpp.running.foreign import unmodelled
 from nodl.infer.cpp.running.implicit_calls import check_implicit_calls
 from nodl.infer.cpp.running.machine import MAX_DEPTH, NEXT, Frame, Machine
 from nodl.infer.cpp.running.overloads import candidates
-from nodl.infer.cpp.running.plain_types import MAPS, NUMBERS, ORDERED, SEQUENCES, TEXT_CLASSES
+from nodl.infer.cpp.running.plain_types import MAPS, NUMBERS, ORDERED, SEQUENCES, STREAMS, TEXT_CLASSES
 from nodl.infer.cpp.running.references import as_referred_to, forget, is_plain, keep_reference, leads_into
 from nodl.infer.cpp.running.static_types import check_hidden, given_to, seen_class, seen_type
 from nodl.infer.cpp.running.values import (
@@ -41,9 +41,12 @@ from nodl.infer.cpp.running.values import (
     literal,
     lost,
     open_sequence,
+    plain,
     unknown,
 )
 from nodl.infer.cpp.syntax import Node, children, field_of, last_name, text
+
+_MOST_ELEMENTS = 1024
 
 
 def declared_value(
@@ -119,7 +122,8 @@ def made(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame: Fra
         if not given:
             return default_value(run, node, kind, frame)
         if kind.name in TEXT_CLASSES:
-            return text_of(run, [run.evaluate(each, frame) for each in given])
+            parts = [run.evaluate(each, frame) for each in given]
+            return begun_stream(parts[0]) if kind.name in STREAMS else text_of(run, parts)
         return as_type(kind.name, run.evaluate(given[0], frame))
     values: list[Value] | None = None
     if cls is not None and len(given) == 1 and not given[0].type.startswith("initializer_"):
@@ -162,6 +166,8 @@ def _sequence(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame
     if len(given) == 1 and given[0].type != "initializer_list" and any(isinstance(a, Seq) for a in items[0]):
         return elements_copied(run, kind, items[0], node, frame)
     parent = given[0].parent if given else None
+    if kind.name == "std::array":
+        items += _not_given(run, node, kind, len(items), frame)
     if parent is None or parent.type != "argument_list":
         return (open_sequence(items) if kind.name in ORDERED else Seq(tuple(items)),)
     if len(items) > 1 and END in items[1]:
@@ -170,6 +176,21 @@ def _sequence(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame
         found = Seq(tuple(listed)) if len(parts) == 1 and parts[0][1] else open_sequence(listed)
         return elements_copied(run, kind, (found,), node, frame)
     return _repeated(run, node, inner, frame, items[1] if len(items) > 1 else None)
+
+
+def _not_given(run: Machine, node: Node, kind: Type, count: int, frame: Frame) -> list[Value]:
+    """Return the elements of an array behind the ``count`` that its braces give: zero, or as made by default."""
+    size = kind.arguments[1].name if count and len(kind.arguments) > 1 else ""
+    left = int(size) - count if size.isdigit() else 0
+    if left <= 0:
+        return []
+    inner = kind.arguments[0]
+    if inner.pointer:
+        value = BOTTOM
+    else:
+        is_number = inner.name in NUMBERS
+        value = as_type(inner.name, (0,)) if is_number else default_value(run, node, inner, frame)
+    return [value] * min(left, _MOST_ELEMENTS)
 
 
 def _pointed_to(run: Machine, given: Node, frame: Frame) -> Value:
@@ -214,6 +235,11 @@ def cast(run: Machine, kind: Type, value: Value) -> Value:
     return unknown("an enumerator") if kind.last in run.names.enums else as_type(kind.name, value)
 
 
+def begun_stream(value: Value) -> Value:
+    """Return what a stream holds that is given a text: what is written to it replaces the text from its start."""
+    return value if all(plain(atom) == "" for atom in value) else unknown("a stream that begins with a text")
+
+
 def text_of(run: Machine, values: Sequence[Value]) -> Value:
     """Make ``std::string(...)`` of a text, of so many letters, of a part of a text.
 
@@ -236,12 +262,13 @@ def _all_of(kind: Type, value: Value) -> bool:
 
 
 def as_map(items: Sequence[Value]) -> Value:
-    """Return a map with these pairs as entries; a map among them comes back as it is, all else gives an unknown."""
-    entries = []
+    """Return a map of these pairs, the first of each key; a map among them comes back, all else gives an unknown."""
+    entries: list[tuple[Value, Value]] = []
     for value in items:
         for atom in value:
             if isinstance(atom, Group | Seq) and len(atom.items) == 2:
-                entries.append((atom.items[0], atom.items[1]))
+                if all(key != atom.items[0] for key, _ in entries):
+                    entries.append((atom.items[0], atom.items[1]))
             elif isinstance(atom, Map):
                 return value
             else:

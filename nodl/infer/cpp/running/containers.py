@@ -11,6 +11,7 @@ from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.arithmetic import added, as_type
 from nodl.infer.cpp.running.assignments import assign, with_entry
 from nodl.infer.cpp.running.constructors import (
+    begun_stream,
     construct,
     copies,
     default_value,
@@ -314,7 +315,7 @@ def _text_call(run: Machine, atom: Text | Param, name: str, site: CallSite) -> V
     values = site.values
     if name in _SAME_TEXT:
         if name == "str" and values:
-            assign(run, site.receiver, values[0], site.frame)
+            assign(run, site.receiver, begun_stream(values[0]), site.frame)
         return (atom,)
     if name == "clear" and "stream" in declared_type(run, site.receiver, site.frame)[0].name:
         return BOTTOM  # of its flags

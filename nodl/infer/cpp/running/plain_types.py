@@ -10,6 +10,7 @@ SEQUENCES = frozenset({
 })  # fmt: skip
 ORDERED = frozenset({"std::set", "std::unordered_set", "set", "std::multiset", "std::priority_queue"})
 MAPS = frozenset({"std::map", "std::unordered_map", "map"})
+STREAMS = frozenset({"std::stringstream", "std::ostringstream"})
 TEXT_CLASSES = frozenset({
     "std::string", "string", "std::string_view", "std::stringstream", "std::ostringstream", "std::filesystem::path",
 })  # fmt: skip

@@ -294,6 +294,11 @@ def try_statement(run: Machine, node: Node, frame: Frame) -> int:
 
 def _caught(run: Machine, clause: Node, held: Changes, doubt: str, frame: Frame) -> int:
     run.store.merge([{}, held], doubt)
+    return _catch_clause(run, clause, frame)
+
+
+@in_a_block
+def _catch_clause(run: Machine, clause: Node, frame: Frame) -> int:
     for each in (n for n in walk(clause) if n.type == "parameter_declaration"):
         declared = field_of(each, "declarator")
         if declared is not None:
