@@ -13,7 +13,7 @@ from collections.abc import Iterator
 
 from keystore.disk import layout, safe_files
 from keystore.disk.view import KeystoreView
-from keystore.errors import DamagedKeystoreError, printable
+from keystore.errors import DamagedKeystoreError, KeystoreError, OtherFormError, printable
 from keystore.formats.certificate import CertificateFacts, read_certificates
 from keystore.formats.domains import Domains
 from keystore.formats.register import Register
@@ -65,6 +65,17 @@ def trusted_document(view: KeystoreView, relative: str) -> bytes:
     signed = smime.read_any(safe_files.read(view.root, relative), place)
     smime.check(signed, list(own_permissions_cas(view)), place)
     return signed.document
+
+
+def is_to_be_written_again(view: KeystoreView, relative: str, error: KeystoreError) -> bool:
+    """Return whether only the form of a document is wrong: one of our CAs signed it, so a renewal writes it again."""
+    if not isinstance(error, OtherFormError):
+        return False
+    try:
+        trusted_document(view, relative)
+    except KeystoreError:
+        return False
+    return True
 
 
 def own_permissions_cas(view: KeystoreView) -> Iterator[CertificateFacts]:

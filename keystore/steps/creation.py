@@ -151,7 +151,8 @@ def _write_settings(opened: Store, options: CreateOptions) -> bool:
 def _restore_ca(opened: Store, role: Role) -> bool:
     """Write a lost trust file again as the register knows it: another CA over the same key would issue for nobody."""
     trusted = opened.register.trusted_authorities(role)
-    if not trusted or os.path.lexists(opened.root / layout.ca_cert(role)):
+    is_lost = not os.path.lexists(opened.root / layout.ca_cert(role))
+    if not (trusted and is_lost and KeystoreView(opened.root).key_file(role)):
         return False
     with opened.batch() as batch:
         batch.file(layout.ca_cert(role), b"".join(read_der(ca).pem for ca in trusted))

@@ -9,8 +9,9 @@ from datetime import datetime
 from keystore.disk import layout, safe_files
 from keystore.disk.crl_file import crl_validity, load_crl
 from keystore.disk.register_file import describe
+from keystore.disk.signed_documents import is_to_be_written_again
 from keystore.disk.view import KeystoreView
-from keystore.errors import KeystoreError, OtherFormError, SigningUnavailableError, UnsafeKeystoreError
+from keystore.errors import KeystoreError, SigningUnavailableError, UnsafeKeystoreError
 from keystore.formats.certificate import CertificateFacts
 from keystore.formats.governance import Governance, parse_governance
 from keystore.formats.register import Register
@@ -109,10 +110,9 @@ def _check_governance(
         signed = smime.read(p7s, place)
         smime.check(signed, view.ca_bundle(Role.PERMISSIONS), place)
         governance = parse_governance(signed.document, place)
-    except OtherFormError:
-        return  # the check of all files reports it, and that renew writes it again
     except KeystoreError as error:
-        yield Finding(Severity.ERROR, "governance", place, str(error), again)
+        if not is_to_be_written_again(view, place, error):
+            yield Finding(Severity.ERROR, "governance", place, str(error), again)
         return
     if not signed.embeds(view.ca(Role.PERMISSIONS).der):
         yield Finding(

@@ -12,13 +12,12 @@ from cryptography import x509
 
 from enclave_common.words import counted
 from keystore.disk import layout, safe_files
-from keystore.disk.signed_documents import signed_governance
+from keystore.disk.signed_documents import is_to_be_written_again, signed_governance
 from keystore.disk.view import KeystoreView
 from keystore.errors import (
     DamagedKeystoreError,
     InvalidInputError,
     KeystoreError,
-    OtherFormError,
     UnsafeKeystoreError,
     printable,
 )
@@ -262,10 +261,9 @@ class _EnclaveCheck:
             signed = smime.read(p7s, place)
             smime.check(signed, self._view.ca_bundle(Role.PERMISSIONS), place)
             grants = parse_permissions(signed.document, place)
-        except OtherFormError:
-            return  # the check of all files reports it, and that renew writes it again
         except KeystoreError as error:
-            yield self._distrusted("permissions", str(error))
+            if not is_to_be_written_again(self._view, place, error):
+                yield self._distrusted("permissions", str(error))
             return
         if not signed.embeds(self._view.ca(Role.PERMISSIONS).der):
             yield self.error(

@@ -338,7 +338,7 @@ HOSTILE: dict[str, tuple[str, Change]] = {
     "a character of what is signed": ("permissions", changed_at("enclaves/a/permissions.p7s", b"<topic>rt/")),
     "a character of the signature": ("permissions", swapped_before("enclaves/a/permissions.p7s", b"\r\n\r\n------")),
     "a character of the type": ("permissions", changed_at("enclaves/a/permissions.p7s", b"multipart/sig")),
-    "a character of the second type": ("permissions", changed_at("enclaves/a/permissions.p7s", b"Type: application/x")),
+    "a character of the second type": ("other-form", changed_at("enclaves/a/permissions.p7s", b"Type: application/x")),
     "a character of the governance": ("governance", changed_at("enclaves/governance.p7s", b"<id>")),
     "CRL deleted everywhere": ("crl-not-last", without_crl),
 }  # fmt: skip
