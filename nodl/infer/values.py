@@ -261,6 +261,17 @@ class FunctionValue:
         self.cached = False  # by functools.cache
 
 
+class DataField(NamedTuple):
+    """A field of a dataclass or named tuple, by what its constructor does with it."""
+
+    default: Value | None = None
+    factory: tuple[Value, ast.expr, Frame] | None = (
+        None  # makes the default of each object; where it is written
+    )
+    by_position: bool = True
+    by_keyword: bool = True
+
+
 class ClassValue(HeapObject):
     """An analysed class, whose cells hold what its body and later assignments set."""
 
@@ -274,7 +285,7 @@ class ClassValue(HeapObject):
         self.module = module
         self.bases = bases
         self.linear: tuple[object, ...] | None = None  # method resolution order, made on first use
-        self.fields: list[tuple[str, Value | None]] | None = None  # of a dataclass
+        self.fields: dict[str, DataField] | None = None  # of a dataclass
 
 
 class Instance(HeapObject):

@@ -27,6 +27,7 @@ from nodl.infer.values import (
     OTHER,
     BoundMethod,
     ClassValue,
+    DataField,
     Dictionary,
     External,
     ForeignMethod,
@@ -259,12 +260,25 @@ def initialise(run: Run, cls: ClassValue, instance: Instance, call: Call) -> Non
 
 
 def _fill_fields(run: Run, cls: ClassValue, instance: Instance, call: Call) -> None:
-    for index, (name, default) in enumerate(cls.fields or ()):
-        value = call.args.at(index, name)
-        run.state.store(instance, name, value if value is not None else default or MISSING)
+    index = 0
+    for name, field in (cls.fields or {}).items():
+        place = index if field.by_position else -1
+        value = call.args.at(place, name) if field.by_keyword else None
+        index += field.by_position
+        run.state.store(instance, name, value if value is not None else _default(run, field, call))
     after = run.attribute((instance,), "__post_init__", call.node, call.frame)
     if isinstance(after[0], BoundMethod):
         run.call(after, Arguments(), call.node, call.frame)
+
+
+def _default(run: Run, field: DataField, call: Call) -> Value:
+    if field.factory is None:
+        return field.default or MISSING
+    factory, node, frame = field.factory
+    previous = run.enter(id(call.node))  # what the factory makes is of this object
+    made = run.call(factory, Arguments(), node, frame)
+    run.context = previous
+    return made
 
 
 def _expect_callbacks(run: Run, cls: ClassValue, instance: Instance) -> None:

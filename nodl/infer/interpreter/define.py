@@ -11,6 +11,7 @@ from nodl.infer.values import (
     BoundMethod,
     ClassMethod,
     ClassValue,
+    DataField,
     External,
     Frame,
     FunctionValue,
@@ -44,6 +45,7 @@ _PLAIN_DECORATORS = frozenset(
 _DATACLASSES = frozenset(
     {"dataclasses.dataclass", "attr.s", "attrs.define", "attr.dataclass", "attrs.frozen"}
 )
+_FIELDS = frozenset({"dataclasses.field", "attr.ib", "attrs.field"})
 
 
 def make_function(run: Run, node: FunctionNode, name: str, frame: Frame) -> FunctionValue:
@@ -191,7 +193,7 @@ def _decorated_class(run: Run, value: Value, cls: ClassValue, decorator: ast.exp
     callee = run.evaluate(decorator.func if isinstance(decorator, ast.Call) else decorator, frame)
     atom = sole(callee)
     if isinstance(atom, External) and atom.path in _DATACLASSES:
-        cls.fields = _fields(run, cls, frame)
+        cls.fields = _fields(run, cls, frame, decorator)
         return value
     if isinstance(atom, External) and atom.path in _PLAIN_DECORATORS:
         return value
@@ -206,34 +208,52 @@ def _decorated_class(run: Run, value: Value, cls: ClassValue, decorator: ast.exp
     return made or value
 
 
-def _fields(run: Run, cls: ClassValue, frame: Frame) -> list[tuple[str, Value | None]]:
-    """Return the fields of a dataclass in the order of its constructor, with their defaults."""
-    fields: dict[str, Value | None] = {}
+def _fields(
+    run: Run, cls: ClassValue, frame: Frame, settings: ast.expr | None = None
+) -> dict[str, DataField]:
+    """Return the fields of a dataclass, in the order of its constructor but for those that are keywords only.
+
+    ``settings``: its decorator.
+    """
+    fields: dict[str, DataField] = {}
     for base in reversed(program_classes(cls)[1:]):
-        fields.update(base.fields or ())
+        fields.update(base.fields or {})
+    by_position = not _says(run, settings, "kw_only", frame)
     for statement in cls.node.body:
         if isinstance(statement, ast.AnnAssign) and isinstance(statement.target, ast.Name):
-            annotation = ast.dump(statement.annotation) if statement.annotation else ""
-            if "ClassVar" in annotation:
-                continue
-            fields[statement.target.id] = _field_default(run, statement.value, frame, cls)
-    return list(fields.items())
+            annotation = ast.dump(statement.annotation)
+            if "KW_ONLY" in annotation:
+                by_position = False
+            elif "ClassVar" not in annotation:
+                fields[statement.target.id] = _field(run, statement.value, frame, by_position)
+    return fields
 
 
-def _field_default(run: Run, default: ast.expr | None, frame: Frame, cls: ClassValue) -> Value | None:
+def _says(run: Run, call: ast.expr | None, name: str, frame: Frame, otherwise: bool = False) -> bool:
+    """Return what a call says to a keyword that is true or false."""
+    keywords = call.keywords if isinstance(call, ast.Call) else ()
+    given = next((each.value for each in keywords if each.arg == name), None)
+    return otherwise if given is None else bool(sole(run.evaluate(given, frame)))
+
+
+def _field(run: Run, default: ast.expr | None, frame: Frame, by_position: bool) -> DataField:
     if default is None:
-        return None
-    if isinstance(default, ast.Call):
-        atom = sole(run.evaluate(default.func, frame))
-        if isinstance(atom, External) and atom.path in ("dataclasses.field", "attr.ib", "attrs.field"):
-            for keyword in default.keywords:
-                if keyword.arg == "default":
-                    return run.evaluate(keyword.value, frame)
-                if keyword.arg in ("default_factory", "factory"):
-                    factory = run.evaluate(keyword.value, frame)
-                    return run.call(factory, Arguments(), default, frame)
-            return None
-    return run.evaluate(default, frame)
+        return DataField(by_position=by_position)
+    field = sole(run.evaluate(default.func, frame)) if isinstance(default, ast.Call) else None
+    if not isinstance(default, ast.Call) or not isinstance(field, External) or field.path not in _FIELDS:
+        return DataField(run.evaluate(default, frame), by_position=by_position)
+    in_constructor = _says(run, default, "init", frame, True)
+    found = DataField(
+        by_position=in_constructor and not _says(run, default, "kw_only", frame, not by_position),
+        by_keyword=in_constructor,
+    )
+    for keyword in default.keywords:
+        value = run.evaluate(keyword.value, frame)
+        if keyword.arg == "default":
+            return found._replace(default=value)
+        if keyword.arg in ("default_factory", "factory"):
+            return found._replace(factory=(value, default, frame))
+    return found
 
 
 def linearized(cls: ClassValue) -> tuple[object, ...]:
