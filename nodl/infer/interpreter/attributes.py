@@ -29,6 +29,7 @@ from nodl.infer.values import (
     Instance,
     ModuleValue,
     NativeMethod,
+    Partial,
     PropertyValue,
     Sequence,
     SuperProxy,
@@ -233,7 +234,21 @@ def _of_unknown(run: Run, atom: Unknown, name: str, node: ast.AST, frame: Frame)
     return (NativeMethod(atom, name),) if name in foreign.NODE_METHODS else (atom,)
 
 
+def _of_partial(run: Run, atom: Partial, name: str, node: ast.AST, frame: Frame) -> Value:
+    if name == "func":
+        return atom.function
+    if name == "args":
+        return run.tuple_of(atom.positional)
+    run.escape_value((atom,))
+    if name == "keywords":
+        run.gap(
+            node, frame, "keywords of a functools.partial are read, perhaps changed, which is not followed"
+        )
+    return unknown(f"attribute {name} of a functools.partial")
+
+
 ATTRIBUTES: dict[type, AttributeReader] = {
+    Partial: _of_partial,
     Instance: _of_instance,
     ClassValue: _of_class,
     ModuleValue: _of_module,

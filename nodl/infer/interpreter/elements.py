@@ -11,6 +11,7 @@ from nodl.infer.interpreter.define import (
     enumeration_members,
     is_constant,
     is_enumeration,
+    linearized,
     member_with_name,
     setter_of,
 )
@@ -255,6 +256,8 @@ def store_attribute(run: Run, owners: Value, name: str, value: Value, node: ast.
             call = partial(run.call, setter, Arguments([(owner,), value]), node, frame)
             call() if certain else run.state.perhaps(call)
         elif isinstance(owner, (Instance, ClassValue, ModuleValue)):
+            if isinstance(owner, Instance) and _is_of_one_thread(owner):
+                value = join(value, unknown("an attribute that each thread has for itself"))
             kept = BOTTOM if certain else owner.cells.get(name, BOTTOM)
             run.state.store(owner, name, join(kept, value))
         else:
@@ -265,6 +268,11 @@ def store_attribute(run: Run, owners: Value, name: str, value: Value, node: ast.
                 run.gap(node, frame, "a variable of a module out of sys.modules is set")
             if isinstance(owner, External):
                 _patched(run, owner, name, value, node, frame)
+
+
+def _is_of_one_thread(owner: Instance) -> bool:
+    order = linearized(owner.cls) if isinstance(owner.cls, ClassValue) else ()
+    return any(isinstance(base, External) and base.path == "threading.local" for base in order)
 
 
 _DESCRIBING = frozenset({"__name__", "__qualname__", "__doc__", "__module__", "__version__", "__wrapped__"})

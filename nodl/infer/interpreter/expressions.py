@@ -28,7 +28,6 @@ from nodl.infer.interpreter.formatting import as_texts, f_string, percent
 from nodl.infer.interpreter.loops import comprehension, dict_comprehension
 from nodl.infer.interpreter.run import Arguments, Evaluator, Run
 from nodl.infer.text import (
-    Hole,
     Text,
     TextAtom,
     concatenate,
@@ -43,6 +42,7 @@ from nodl.infer.values import (
     OTHER,
     ClassValue,
     Dictionary,
+    External,
     Frame,
     Instance,
     Items,
@@ -144,8 +144,8 @@ def _text_side(value: Value) -> list[TextAtom]:
     for atom in value:
         if isinstance(atom, (str, Text)):
             found.append(atom)
-        elif isinstance(atom, Unknown):
-            found.append(Text((Hole(atom.why),)))
+        elif isinstance(atom, (Unknown, External)):
+            found += as_texts((atom,))
     return found or as_texts(value)
 
 

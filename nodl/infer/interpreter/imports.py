@@ -5,9 +5,10 @@ from __future__ import annotations
 import ast
 import os
 
+from nodl.infer.interpreter.elements import elements
 from nodl.infer.interpreter.run import Run
 from nodl.infer.program import SourceModule
-from nodl.infer.values import Frame, ModuleValue, Value, external
+from nodl.infer.values import Frame, ModuleValue, Value, external, sole
 from nodl.source_ref import SourceRef
 
 
@@ -29,7 +30,7 @@ def run_import_from(run: Run, node: ast.ImportFrom, frame: Frame) -> bool:
     module = import_module(run, base, frame) if base else external("")
     for alias in node.names:
         if alias.name == "*":
-            _import_star(run, module, base, frame)
+            _import_star(run, module, base, node, frame)
             continue
         value = member(run, module, base, alias.name, frame)
         run.assign_name(alias.asname or alias.name, value, frame)
@@ -64,18 +65,27 @@ def member(run: Run, module: Value, base: str, name: str, frame: Frame) -> Value
     return external(f"{atom.source.name}.{name}")
 
 
-def _import_star(run: Run, module: Value, base: str, frame: Frame) -> None:
+def _import_star(run: Run, module: Value, base: str, node: ast.ImportFrom, frame: Frame) -> None:
     atom = module[0]
     if not isinstance(atom, ModuleValue):
         if base not in frame.module.stars:
             frame.module.stars.append(base)
         return
+    listed = atom.cells.get("__all__")
+    if listed is not None:
+        items = elements(run, listed, node, frame).exact
+        names = [name for name in map(sole, items or ()) if isinstance(name, str)]
+        for name in names:
+            run.assign_name(name, member(run, module, base, name, frame), frame)
+        if items is not None and len(names) == len(items):
+            return
+        run.gap(node, frame, f"which names {base} gives is not known: its __all__ is made at run time")
     for star in atom.stars:
         if star not in frame.module.stars:
             frame.module.stars.append(star)
-    for name, value in list(atom.cells.items()):
-        if isinstance(name, str) and not name.startswith(("_", "[")):
-            run.assign_name(name, value, frame)
+    for key, value in list(atom.cells.items()):
+        if isinstance(key, str) and not key.startswith(("_", "[")):
+            run.assign_name(key, value, frame)
 
 
 def import_module(run: Run, name: str, frame: Frame) -> Value:
@@ -94,8 +104,8 @@ def _load(run: Run, name: str, frame: Frame) -> ModuleValue | None:
         folder = os.path.dirname(frame.module.source.path)
         if package and frame.module.source.package() == package and not frame.module.source.is_package:
             path = run.program.find(last, folder)  # a relative import in a folder without __init__.py
-    if path is None or path == run.main.path:
-        return run.modules.get("__main__") if path else None
+    if path is None:
+        return None
     parent = _load(run, package, frame) if package else None
     source = run.program.load(path, name)
     module = execute_module(run, source, name)

@@ -102,6 +102,7 @@ def _parsed(run: Run, name: str, call: Call) -> Value:
         return run.of_launch(flag) if isinstance(default, bool) else BOOLEAN
     kept = all(isinstance(atom, External) and atom.path in _KEEP_TEXT for atom in given.get("type", BOTTOM))
     if action == "store" and nargs in (None, "?") and kept and name.startswith("-"):
+        run.asks_launch = run.asks_launch or nargs == "?"  # without a word it is ``const``
         return run.of_launch(Input(name, run.options))
     run.asks_launch = True
     return unknown(f"what is made of the command line option {name}")

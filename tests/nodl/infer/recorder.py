@@ -279,6 +279,7 @@ def stand_in(recorder: Recorder) -> dict[str, types.ModuleType]:
         "rclpy.node": {"Node": node_class},
         "rclpy.action": {"ActionServer": action("action_server"), "ActionClient": action("action_client")},
         "rclpy.parameter": {"Parameter": Parameter},
+        "rclpy.utilities": {"remove_ros_args": lambda args=None: list(sys.argv if args is None else args)},
         "rclpy.executors": {"SingleThreadedExecutor": Executor, "MultiThreadedExecutor": Executor},
         "rclpy.qos": {"QoSProfile": Anything, "qos_profile_sensor_data": None},
         "rclpy.service_introspection": {"ServiceIntrospectionState": Anything()},

@@ -692,22 +692,32 @@ def test_lists_of_words_of_the_command_line_are_names(
     assert own - {"/rosout", "/parameter_events"} == published
 
 
-@pytest.mark.parametrize(("words", "published"), [("", "/chatter"), ('args="speech"', "/speech")])
-def test_a_word_that_may_be_left_out_has_its_default(
-    words: str, published: str, launch: Launch, prefix: Path
+@pytest.mark.parametrize(
+    ("argument", "words", "published"),
+    [
+        ("'topic'", "", "/chatter"),
+        ("'topic'", "speech", "/speech"),
+        ("'--topic'", "", "/chatter"),
+        ("'--topic'", "--topic speech", "/speech"),
+        ("'--topic'", "--topic", "/constant"),
+    ],
+)
+def test_a_word_that_may_be_left_out_has_its_default_or_constant(
+    argument: str, words: str, published: str, launch: Launch, prefix: Path
 ) -> None:
-    program = """
+    program = f"""
 import argparse
 import rclpy
 from std_msgs.msg import String
 parser = argparse.ArgumentParser()
-parser.add_argument("topic", nargs="?", default="chatter")
+parser.add_argument({argument}, nargs="?", const="constant", default="chatter")
 given, _ = parser.parse_known_args()
 rclpy.init()
 rclpy.create_node("one").create_publisher(String, given.topic, 10)
 """
     install_program(prefix, PYTHON + program, "one")
-    plan = launch(f'<launch><node pkg="demo" exec="one" {words}/></launch>')
+    given = f'args="{words}"' if words else ""
+    plan = launch(f'<launch><node pkg="demo" exec="one" {given}/></launch>')
     assert [str(problem) for problem in plan.problems] == []
     own = {name for operation, name in permissions(plan) if operation == "publish"}
     assert own - {"/rosout", "/parameter_events"} == {published}
