@@ -379,7 +379,7 @@ class Reach:
                 self._use(word)
 
 
-_POINTER = re.compile(r"_ptr\b|Ptr\b|\*|&|\bweak_|optional")
+_POINTER = re.compile(r"_ptr\b|Ptr\b|\*|&|\bweak_")
 _WORD = re.compile(r"[A-Za-z_]\w*")
 
 
@@ -401,6 +401,8 @@ def open_words(
         how = _mentioned_how(found, handled)
         if how == "type":
             types.add(word)
+            if _is_object(found) and not _is_dead(run, function.file.file, offset):
+                calls.add(word)  # a value that stands for an object runs a constructor
         elif how == "open" and not _is_dead(run, function.file.file, offset):
             calls.add(word)
     return calls, types
@@ -422,6 +424,8 @@ def _mentioned_how(node: Node | None, handled: set[int]) -> str:
         if parent.type in ("new_expression", "compound_literal_expression"):
             is_made = field_of(parent, "type") == node
             return "followed" if is_made and parent.start_byte in handled else "open"
+        if inside_type and parent.type == "declaration":
+            return "type"  # of an element, whatever became of the list
         if parent.type in ("declaration", "field_initializer"):
             arguments = parent.named_children[-1].start_byte if parent.named_children else 0
             if parent.start_byte in handled or arguments in handled:
@@ -444,6 +448,37 @@ def _mentioned_how(node: Node | None, handled: set[int]) -> str:
             return "type" if inside_type else "open"
         node = parent
     return "open"
+
+
+def _is_object(name: Node | None) -> bool:
+    """Return whether a type is that of an object, also in a container, or a reference to one made for it."""
+    written = name
+    while (
+        written is not None
+        and written.parent is not None
+        and written.type != "trailing_return_type"
+        and (written.parent.type in _PARTS_OF_TYPES or written.parent.type in _TYPES)
+    ):
+        written = written.parent
+    parent = written.parent if written is not None else None
+    if written is None or parent is None:
+        return False
+    if written.type not in _TYPES and field_of(parent, "type") != written:
+        return False
+    whole = text(parent if parent.type == "declaration" else written).partition("=")[0]
+    declarator = field_of(parent, "declarator")
+    if (
+        parent.type == "function_definition"
+        and declarator is not None
+        and declarator.type != "function_declarator"
+    ):
+        return False
+    return not _POINTS.search(whole) and ("&" not in whole or "const" in whole or "&&" in whole)
+
+
+_POINTS = re.compile(r"_ptr\b|Ptr\b|\*|\bweak_")
+_PARTS_OF_TYPES = ("qualified_identifier", "template_type", "template_argument_list", "abstract_function_declarator",
+                   "parameter_list")  # fmt: skip
 
 
 def _is_dead(run: Machine, file: str, offset: int) -> bool:

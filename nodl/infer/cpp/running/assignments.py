@@ -7,8 +7,9 @@ from collections.abc import Sequence
 
 from nodl.infer.cpp.libraries import LIBRARY_METHODS, Call
 from nodl.infer.cpp.reading.declarations import Class, Field
+from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.running.arithmetic import added, as_type, computed
-from nodl.infer.cpp.running.constructors import gives_pointer, in_braces
+from nodl.infer.cpp.running.constructors import gives_pointer, in_braces, made_of
 from nodl.infer.cpp.running.contents import copied, elements_copied, overwrite
 from nodl.infer.cpp.running.effects import referred_to
 from nodl.infer.cpp.running.machine import Frame, Machine, expression
@@ -72,6 +73,9 @@ def assignment(run: Machine, node: Node, frame: Frame) -> Value:
         is_shown = is_address(run, left, frame) or gives_pointer(run, right or left)
         cls = object_class(run, left, frame) if not is_shown else None
         before = run.evaluate(left, frame) if cls is not None else BOTTOM
+        if cls is not None and not run.names.find_methods(cls, "operator="):
+            of_other = made_of(run, Type(cls.qualified), value, node, frame)
+            value = value if of_other is None else of_other
         objects = bool(before) and all(isinstance(atom, Obj) and atom.cls is not None for atom in before)
         if objects and _assigned(run, before, value, node, frame):
             return before

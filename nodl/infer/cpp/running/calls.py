@@ -23,7 +23,7 @@ from nodl.infer.cpp.reading.type_names import NO_TYPE, Type
 from nodl.infer.cpp.reading.writes import FILLS
 from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.callbacks import run_meanwhile
-from nodl.infer.cpp.running.constructors import cast, construct, made
+from nodl.infer.cpp.running.constructors import cast, construct, made, made_of
 from nodl.infer.cpp.running.containers import CONTAINER_METHODS, container_call, is_standard
 from nodl.infer.cpp.running.contents import copied, handed_over
 from nodl.infer.cpp.running.invocation import CallSite, call_functions, call_values, pointed_to
@@ -187,7 +187,8 @@ def _cast(run: Machine, name: str, site: CallSite) -> Value:
         return value
     cls = run.class_of(site.types[0], site.frame)
     if cls is not None and not text(template_arguments(site.callee)[0]).endswith(("&", "*")):
-        value = copied(run, value, site.node, site.frame, cls)
+        made = made_of(run, site.types[0], value, site.node, site.frame, True)
+        return copied(run, value, site.node, site.frame, cls) if made is None else made
     return cast(run, site.types[0], value)
 
 
@@ -432,6 +433,8 @@ def _on_atom(run: Machine, atom: object, name: str, site: CallSite) -> Value:
     if isinstance(atom, Lambda | Bound):
         values = site.values
         return call_values(run, (atom,), values, site.node, site.frame) if name == "operator()" else BOTTOM
+    if CREATES.fullmatch(name) and not isinstance(atom, Unknown):
+        atom = Unknown("what is no node")
     if not isinstance(atom, Unknown) or name in CONTAINER_METHODS:
         return container_call(run, atom, name, site)
     return _on_unknown(run, atom, name, site)

@@ -16,6 +16,7 @@ from nodl.infer.cpp.reading.declarations import (
     Field,
     Function,
     FunctionParameter,
+    type_text,
 )
 from nodl.infer.cpp.reading.type_names import NO_TYPE, Type
 from nodl.infer.cpp.running.arithmetic import as_type
@@ -23,10 +24,10 @@ from nodl.infer.cpp.running.contents import copied, elements_copied, handed_over
 from nodl.infer.cpp.running.foreign import unmodelled
 from nodl.infer.cpp.running.implicit_calls import check_implicit_calls
 from nodl.infer.cpp.running.machine import MAX_DEPTH, NEXT, Frame, Machine
-from nodl.infer.cpp.running.overloads import candidates
+from nodl.infer.cpp.running.overloads import candidates, fits
 from nodl.infer.cpp.running.plain_types import MAPS, NUMBERS, ORDERED, SEQUENCES, STREAMS, TEXT_CLASSES
 from nodl.infer.cpp.running.references import as_referred_to, forget, is_plain, keep_reference, leads_into
-from nodl.infer.cpp.running.static_types import check_hidden, given_to, seen_class, seen_type
+from nodl.infer.cpp.running.static_types import check_hidden, given_in_braces, given_to, seen_class, seen_type
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     END,
@@ -56,6 +57,10 @@ def declared_value(
     kind = run.type_of(written, frame)
     if value is None:
         return BOTTOM if pointer or kind.pointer else default_value(run, node, kind, frame)
+    if pointer and value.type not in ("argument_list", "initializer_list") and _BINDS_A_NEW.search(written):
+        of_other = made_of(run, kind, run.evaluate(value, frame), node, frame)
+        if of_other is not None:
+            return of_other
     if pointer or kind.pointer or _is_auto(written) or kind.name in NUMBERS:
         by_reference = pointer or (kind.pointer and "optional" not in written)
         found = initial_value(run, value, frame, by_reference or (_is_auto(written) and "&" in written))
@@ -65,6 +70,10 @@ def declared_value(
     if value.type not in ("argument_list", "initializer_list"):
         return converted(run, kind, run.evaluate(value, frame), node, frame)
     return made(run, node, kind, children(value), frame)
+
+
+_BINDS_A_NEW = re.compile(r"\bconst\b.*&$|&&$")
+"""A reference that an object may be made for."""
 
 
 def _is_auto(written: str) -> bool:
@@ -102,6 +111,9 @@ def gives_pointer(run: Machine, value: Node) -> bool:
 def converted(run: Machine, kind: Type, value: Value, node: Node, frame: Frame) -> Value:
     """Convert ``Foo x = y``: a copy of an object, as a Foo, or a Foo made of y."""
     cls = run.class_of(kind, frame)
+    found = made_of(run, kind, value, node, frame)
+    if found is not None:
+        return found
     if any(isinstance(atom, Seq | Map) for atom in value) and cls is None:
         return elements_copied(run, kind, value, node, frame)
     if cls is None or any(isinstance(atom, Obj) for atom in value):
@@ -111,13 +123,57 @@ def converted(run: Machine, kind: Type, value: Value, node: Node, frame: Frame) 
     return construct(run, kind, [value], node, frame)
 
 
+def made_of(
+    run: Machine, kind: Type, value: Value, node: Node, frame: Frame, explicit: bool = False
+) -> Value | None:
+    """Return the object that a constructor makes where a value, or one in braces, stands for one ([class.conv.ctor]).
+
+    ``None`` if it is such an object already, or no constructor takes it; ``explicit``: a cast asks for it.
+    """
+    cls = run.held_class(kind, frame)
+    if cls is None or len(value) != 1 or isinstance(value[0], Unknown | Group):
+        return None
+    atom = value[0]
+    if isinstance(atom, Obj) and cls in run.names.ancestry(atom.cls):
+        return None
+    fitting = [
+        each
+        for each in run.names.methods[cls].get(cls.name, ())
+        if not takes_another(each) and (explicit or not _is_explicit(cls, each))
+    ]
+    in_braces = list(atom.items) if isinstance(atom, Seq) and not atom.open and not atom.place else []
+    for given in (in_braces, [value]):
+        if given and any(fits(each, given) for each in fitting):
+            return construct(run, kind, given, node, frame)
+    return None
+
+
+def as_result(run: Machine, value: Value, node: Node, frame: Frame) -> Value:
+    """Return what ``return value`` makes of the type that the function says it gives; a closure's is not read."""
+    declarator = (
+        field_of(frame.function.node, "declarator") if frame.function and frame.outer is None else None
+    )
+    if frame.function is None or declarator is None or declarator.type != "function_declarator":
+        return value
+    found = made_of(run, run.type_of(type_text(frame.function.node), frame), value, node, frame)
+    return value if found is None else found
+
+
+def _is_explicit(cls: Class, constructor: Function) -> bool:
+    """Return whether a constructor may be declared ``explicit``: that may stand where it has no body."""
+    declared = [
+        each for each in cls.declared.get(cls.name, ()) if len(each.parameters) == len(constructor.parameters)
+    ]
+    return any("explicit" in text(each.node).partition("(")[0] for each in (constructor, *declared))
+
+
 def made(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame: Frame) -> Value:
     """Make an object of ``kind`` from arguments in parentheses or braces."""
     cls = run.class_of(kind, frame)
     if cls is None and kind.name in SEQUENCES:
         return _sequence(run, node, kind, given, frame)
     if cls is None and kind.name in MAPS:
-        return as_map([run.evaluate(each, frame) for each in given])
+        return as_map([_entry(run, kind, each, frame) for each in given])
     if cls is None and (kind.name in TEXT_CLASSES or kind.name in NUMBERS or kind.last in run.names.enums):
         if not given:
             return default_value(run, node, kind, frame)
@@ -160,7 +216,7 @@ def _sequence(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame
         if inner.pointer and (inner.name == "char" or each.type.endswith("literal"))
         else _pointed_to(run, each, frame)
         if inner.pointer
-        else as_type(inner.name, copied(run, run.evaluate(each, frame), each, frame, cls))
+        else as_element(run, inner, run.evaluate(each, frame), each, frame)
         for each in given
     ]
     if len(given) == 1 and given[0].type != "initializer_list" and any(isinstance(a, Seq) for a in items[0]):
@@ -191,6 +247,16 @@ def _not_given(run: Machine, node: Node, kind: Type, count: int, frame: Frame) -
         is_number = inner.name in NUMBERS
         value = as_type(inner.name, (0,)) if is_number else default_value(run, node, inner, frame)
     return [value] * min(left, _MOST_ELEMENTS)
+
+
+def as_element(run: Machine, kind: Type, value: Value, node: Node, frame: Frame) -> Value:
+    """Return what an element of type ``kind`` holds: a copy, or an object made of the value."""
+    found = made_of(run, kind, value, node, frame)
+    return (
+        as_type(kind.name, copied(run, value, node, frame, run.held_class(kind, frame)))
+        if found is None
+        else found
+    )
 
 
 def _pointed_to(run: Machine, given: Node, frame: Frame) -> Value:
@@ -274,6 +340,17 @@ def as_map(items: Sequence[Value]) -> Value:
             else:
                 return unknown("entries of a map")
     return (Map(tuple(entries)),)
+
+
+def _entry(run: Machine, kind: Type, given: Node, frame: Frame) -> Value:
+    """Return what is given to a map: of ``{key, value}`` with an object of a class in reach both."""
+    inner = kind.arguments[1] if len(kind.arguments) > 1 else NO_TYPE
+    pair = children(given) if given.type == "initializer_list" else []
+    if len(pair) != 2 or run.held_class(inner, frame) is None:
+        return run.evaluate(given, frame)
+    key = run.evaluate(pair[0], frame)
+    held = in_braces(run, pair[1], inner, frame)
+    return (Group((key, as_element(run, inner, held, pair[1], frame))),)
 
 
 def is_aggregate(run: Machine, cls: Class) -> bool:
@@ -437,6 +514,8 @@ def construct_class(
     is_of_text = any(isinstance(atom, Text) for value in arguments for atom in value)
     if len(fitting) > 1 and (is_of_text or any(run.makes_interfaces(f) or _holds_text(f) for f in fitting)):
         run.gap(node, frame, f"which constructor of {cls.name} is meant here is not known")
+    if arguments and given_in_braces(node, frame) and any(_takes_list(f) and f not in fitting for f in own):
+        run.gap(node, frame, f"which constructor of {cls.name} is meant here is not known: one takes a list")
     constructor = next(iter(fitting), None)
     path = (*frame.path[-24:], (frame.file.file, node.start_byte))
     inner = run.frame(
@@ -478,6 +557,10 @@ def construct_class(
     elif arguments and not this.data["members"] and not cls.inherits_constructors:
         this.data["arguments"] = list(arguments)  # closures among them may be called with it
         _made_unseen(run, this, cls, arguments, node, frame)
+
+
+def _takes_list(constructor: Function) -> bool:
+    return any("initializer_list" in each.type for each in constructor.parameters[:1])
 
 
 def _holds_text(constructor: Function) -> bool:
@@ -641,6 +724,14 @@ def as_parameter(run: Machine, parameter: FunctionParameter, value: Value, node:
     """
     if "*" not in parameter.type and any(isinstance(atom, int) for atom in value):
         value = as_type(run.type_of(parameter.type, inner).name, value)
+    if parameter.type.endswith("*") and len(value) == 1 and isinstance(value[0], Seq):
+        items = value[0].items  # ``f({this})``
+        return items[0] if len(items) == 1 and all(isinstance(atom, Obj) for atom in items[0]) else value
+    if not parameter.type.endswith(("&", "*")) or _BINDS_A_NEW.search(parameter.type):
+        place = replace(inner, path=(*inner.path, parameter.name))
+        found = made_of(run, run.type_of(parameter.type, inner), value, node, place)
+        if found is not None:
+            return found
     if parameter.type.rstrip().endswith(("&", "*")) or _is_pointer_in(node, parameter.name):
         return value
     return copied(run, value, node, inner, _class_of_parameter(run, parameter, value, inner))

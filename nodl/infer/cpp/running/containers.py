@@ -7,11 +7,12 @@ from collections.abc import Sequence
 from itertools import chain
 
 from nodl.infer.cpp.libraries import LIBRARY_CLASSES
-from nodl.infer.cpp.reading.type_names import Type
-from nodl.infer.cpp.running.arithmetic import added, as_type
+from nodl.infer.cpp.reading.type_names import NO_TYPE, Type
+from nodl.infer.cpp.running.arithmetic import added
 from nodl.infer.cpp.running.assignments import assign, with_entry
 from nodl.infer.cpp.running.constructors import (
     begun_stream,
+    as_element,
     construct,
     copies,
     default_value,
@@ -107,6 +108,10 @@ _PARAMETER_VIEWS = frozenset({
 })  # fmt: skip
 
 
+_AT_A_PLACE = ("std::vector", "std::list", "std::deque")
+"""Whose ``emplace`` first gets where."""
+
+
 def _added(run: Machine, atom: object, name: str, site: CallSite) -> Value:
     given, frame, receiver = site.given, site.frame, site.receiver
     kind, _ = declared_type(run, receiver, frame)
@@ -117,11 +122,12 @@ def _added(run: Machine, atom: object, name: str, site: CallSite) -> Value:
         and inner is not None
         and (cls is not None or inner.name in LIBRARY_CLASSES)
     ):
-        is_copy = len(site.values) == 1 and cls is not None and copies(run, cls, site.values[0])
+        values = site.values[name == "emplace" and kind.name in _AT_A_PLACE :]
+        is_copy = len(values) == 1 and cls is not None and copies(run, cls, values[0])
         value = (
-            copied(run, site.values[0], site.node, frame, cls)
+            copied(run, values[0], site.node, frame, cls)
             if is_copy
-            else construct(run, inner, site.values, site.node, frame)
+            else construct(run, inner, values, site.node, frame)
         )
     elif given and given[-1].type == "initializer_list" and inner is not None and inner.name:
         value = made(run, given[-1], inner, children(given[-1]), frame)
@@ -129,7 +135,7 @@ def _added(run: Machine, atom: object, name: str, site: CallSite) -> Value:
         listed = [run.evaluate(each, frame) for each in given]
         if inner is None or not inner.pointer:
             listed = [
-                as_type(inner.name if inner else "", copied(run, value, each, frame, cls))
+                as_element(run, inner or NO_TYPE, value, each, frame)
                 for value, each in zip(listed, given, strict=True)
             ]
         if name == "insert" and len(listed) == 3:

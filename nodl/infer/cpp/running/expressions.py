@@ -10,7 +10,7 @@ from nodl.infer.cpp.reading.type_names import Type
 from nodl.infer.cpp.reading.writes import FILLS
 from nodl.infer.cpp.running.arithmetic import added, computed
 from nodl.infer.cpp.running.assignments import as_declared, assign
-from nodl.infer.cpp.running.constructors import cast, construct, initial_value, made
+from nodl.infer.cpp.running.constructors import cast, construct, initial_value, made, made_of
 from nodl.infer.cpp.running.contents import copied, elements_copied, items_of
 from nodl.infer.cpp.running.invocation import by_operator, pointed_to
 from nodl.infer.cpp.running.launch_values import decided, in_doubt, settled
@@ -241,7 +241,13 @@ def nothing_known(run: Machine, node: Node, frame: Frame) -> Value:
 def c_cast(run: Machine, node: Node, frame: Frame) -> Value:
     """Convert ``(T) x`` like ``static_cast<T>(x)``."""
     kind = run.type_of(text(field_of(node, "type")), frame)
-    return cast(run, kind, run.evaluate(field_of(node, "value"), frame))
+    value = run.evaluate(field_of(node, "value"), frame)
+    made = (
+        None
+        if text(field_of(node, "type")).endswith(("*", "&"))
+        else made_of(run, kind, value, node, frame, True)
+    )
+    return cast(run, kind, value) if made is None else made
 
 
 @expression("lambda_expression")

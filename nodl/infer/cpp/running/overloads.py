@@ -29,6 +29,16 @@ def candidates(functions: Sequence[Function], arguments: Sequence[Value]) -> Seq
     return [each for each, score in rated if score == best or (unsure and each.variadic)]
 
 
+def fits(function: Function, arguments: Sequence[Value]) -> bool:
+    """Return whether a function takes so many arguments, none of which looks as if it were of another type."""
+    if not _takes(function, len(arguments)):
+        return False
+    return all(
+        _likeness(*each, function.templates) >= 0
+        for each in zip(function.parameters, arguments, strict=False)
+    )
+
+
 _EXACT = 3
 """What ``_likeness`` gives an argument that needs no conversion."""
 

@@ -10,7 +10,7 @@ from nodl.infer.cpp.libraries import is_harmless_class
 from nodl.infer.cpp.reading.collect import declared_names
 from nodl.infer.cpp.reading.declarations import type_text
 from nodl.infer.cpp.reading.writes import writes_of
-from nodl.infer.cpp.running.constructors import declared_value, fields_of
+from nodl.infer.cpp.running.constructors import as_result, declared_value, fields_of
 from nodl.infer.cpp.running.launch_values import decided, in_doubt, settled
 from nodl.infer.cpp.running.left_out import forget_writes
 from nodl.infer.cpp.running.machine import (
@@ -140,6 +140,7 @@ def return_statement(run: Machine, node: Node, frame: Frame) -> int:
     value = BOTTOM
     for child in children(node):
         value = run.evaluate(child, frame)
+        value = as_result(run, value, child, frame)
     if run.left:
         return RETURN
     frame.returned = join(frame.returned, value)

@@ -149,6 +149,12 @@ def given_to(call: Node, frame: Frame) -> list[Node]:
     return children(_given(call, frame))
 
 
+def given_in_braces(call: Node, frame: Frame) -> bool:
+    """Return whether the arguments of an object's declaration stand in braces."""
+    given = _given(call, frame)
+    return given is not None and given.type == "initializer_list"
+
+
 def _given(call: Node, frame: Frame) -> Node | None:
     if call.type == "declaration":
         made = [each for each in children(call) if each.type.endswith("declarator")]

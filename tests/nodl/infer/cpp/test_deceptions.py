@@ -12,6 +12,7 @@ pytest.importorskip("tree_sitter_cpp", reason="the extra cpp is not installed")
 
 PUB = 'create_publisher<std_msgs::msg::String>("a", 1);'
 MAKE = f"static void make(rclcpp::Node * n) {{ n->{PUB} }}\n"
+OF_NODE = f"struct K {{ K(rclcpp::Node * n) {{ n->{PUB} }} }};\n"
 HIDDEN = {
     "in a table of functions": in_class(
         "for (auto & f : table) { f(this); }",
@@ -138,6 +139,29 @@ HIDDEN = {
     "in an inherited constructor": HEAD
     + f"struct B : rclcpp::Node {{ B(std::string s) : Node(s) {{ {PUB} }} }};\nstruct D : B {{ using B::B; }};\n"
     + 'int main() { D d("n"); }\n',
+    "by a value that stands for an object, in an option": in_class(
+        "o_ = this;", "std::optional<K> o_;", OF_NODE
+    ),
+    "by a value that stands for an object, in a variant": in_class(
+        "std::variant<int, K> v = this;", before=OF_NODE
+    ),
+    "by a value that stands for an object, in a pair": in_class(
+        "std::pair<int, K> p(1, this);", before=OF_NODE
+    ),
+    "by a value that stands for an object, in a closure": in_class(
+        "auto f = [this]() -> K { return {this}; }; f();", before=OF_NODE
+    ),
+    "by a value that stands for an object, in what a function gives": in_class(
+        "std::function<K()> f = [this]() { return this; }; f();", before=OF_NODE
+    ),
+    "by a value that stands for an object, bound to a reference": in_class(
+        "const K & k = this;", before=OF_NODE
+    ),
+    "by a constructor that takes a list": in_class(
+        "K k{this, this};",
+        before="struct K { K(rclcpp::Node *, rclcpp::Node *) {} K(std::initializer_list<rclcpp::Node *> l) { "
+        f"for (auto * n : l) {{ n->{PUB} }} }} }};\n",
+    ),
     "with the name in the second branch": in_class(
         'std::string t = "b"; if (which()) { t = "a"; } create_publisher<std_msgs::msg::String>(t, 1);',
         "bool which();",
