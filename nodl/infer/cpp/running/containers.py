@@ -11,8 +11,8 @@ from nodl.infer.cpp.reading.type_names import NO_TYPE, Type
 from nodl.infer.cpp.running.arithmetic import added
 from nodl.infer.cpp.running.assignments import assign, with_entry
 from nodl.infer.cpp.running.constructors import (
-    begun_stream,
     as_element,
+    begun_stream,
     construct,
     copies,
     default_value,
