@@ -24,6 +24,15 @@ class FoundEndpoint(NamedTuple):
     qos: QosPolicies = ()
 
 
+class DeclaredParameter(NamedTuple):
+    """The cell of a node for a parameter that is declared; without a name, for some whose names are not known.
+
+    It holds the type of which every value is certainly taken; an empty text if there is none.
+    """
+
+    name: str
+
+
 class NodeRecord:
     """A node under its allocation site."""
 
@@ -39,8 +48,11 @@ class NodeRecord:
         self.assigned: dict[str, Value] = {}  # set by the program itself
         self.arguments: Value = BOTTOM  # cli_args of the node
         self.use_global_arguments: Value = (True,)
+        self.allow_undeclared: Value = (False,)
+        self.declares_given: Value = (False,)  # automatically_declare_parameters_from_overrides
         self.gaps: dict[tuple[SourceRef, str], None] = {}
-        self.cells = ContentCells()  # parameters that the program sets itself
+        # Parameters that the program sets itself, and which there are (``DeclaredParameter``).
+        self.cells = ContentCells()
 
     def __repr__(self) -> str:
         return f"NodeRecord({self.source})"

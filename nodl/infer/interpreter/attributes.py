@@ -8,8 +8,10 @@ from functools import partial
 
 from nodl.infer.interpreter import imports
 from nodl.infer.interpreter.define import enumeration_member, is_enumeration, linearized, program_classes
+from nodl.infer.interpreter.elements import note_private
 from nodl.infer.interpreter.run import Arguments, AttributeReader, Run
 from nodl.infer.models import foreign
+from nodl.infer.models.signatures import NODE_PRIVATE
 from nodl.infer.text import Text
 from nodl.infer.values import (
     ABSENT,
@@ -45,6 +47,8 @@ MAX_DOTS = 8
 
 
 def _of_instance(run: Run, obj: Instance, name: str, node: ast.AST, frame: Frame) -> Value:
+    if name in NODE_PRIVATE:
+        note_private(run, obj, name, node, frame)
     held = obj.cells.get(name)
     if name == "__dict__":
         return run.variables_of(node, frame)

@@ -16,6 +16,7 @@ from nodl.infer.interpreter.define import (
     setter_of,
 )
 from nodl.infer.interpreter.run import Arguments, Run
+from nodl.infer.models.signatures import NODE_PRIVATE
 from nodl.infer.text import Text, constant_text
 from nodl.infer.values import (
     ABSENT,
@@ -256,6 +257,8 @@ def store_attribute(run: Run, owners: Value, name: str, value: Value, node: ast.
             call = partial(run.call, setter, Arguments([(owner,), value]), node, frame)
             call() if certain else run.state.perhaps(call)
         elif isinstance(owner, (Instance, ClassValue, ModuleValue)):
+            if name in NODE_PRIVATE:
+                note_private(run, owner, name, node, frame)
             if isinstance(owner, Instance) and _is_of_one_thread(owner):
                 value = join(value, unknown("an attribute that each thread has for itself"))
             kept = BOTTOM if certain else owner.cells.get(name, BOTTOM)
@@ -268,6 +271,12 @@ def store_attribute(run: Run, owners: Value, name: str, value: Value, node: ast.
                 run.gap(node, frame, "a variable of a module out of sys.modules is set")
             if isinstance(owner, External):
                 _patched(run, owner, name, value, node, frame)
+
+
+def note_private(run: Run, owner: object, name: str, node: ast.AST, frame: Frame) -> None:
+    """Add a gap where the program asks rclpy's node for ``name`` (one of ``NODE_PRIVATE``), or sets it."""
+    if owner in run.findings.node_of:
+        run.gap(node, frame, f"{name} of rclpy's node is used, which is not followed")
 
 
 def _is_of_one_thread(owner: Instance) -> bool:

@@ -19,6 +19,7 @@ from nodl.infer.models import (
 )
 from nodl.infer.models.signatures import (
     COMMON_CALLBACKS,
+    GOES_THROUGH,
     LIFECYCLE_HOOKS,
     NODE_ENDPOINTS,
     library_node,
@@ -36,6 +37,8 @@ from nodl.infer.values import (
     Unknown,
     Value,
     external,
+    join,
+    present,
     result_of,
     unknown,
 )
@@ -276,7 +279,12 @@ def _call_node_method(run: Run, receiver: Instance, path: str, name: str, call: 
         return ANY
     model = ros.NODE_METHODS.get(name)
     if model is not None:
-        return model(run, ros.record_of_instance(run, receiver, call), call)
+        found = model(run, ros.record_of_instance(run, receiver, call), call)
+        through = (
+            run.attribute((receiver,), each, call.node, call.frame) for each in GOES_THROUGH.get(name, ())
+        )
+        own = any(not isinstance(atom, ForeignMethod) for value in through for atom in value)
+        return join(found, unknown("what rclpy finds by a method of the program")) if own else found
     run.escape(call.args, opened=False, objects=name in ("add_waitable", "add_rate"))
     return result_of(path)
 
@@ -322,7 +330,8 @@ _PARAMETER_VALUES = {
 
 
 def _of_type(value: Value, kind: type | None) -> Value:
-    """Return ``value``, unknown where it is of another type: then the field holds its zero."""
+    """Return ``value``, unknown where it is of another type: then the field holds its zero, as where there is none."""
+    value = tuple(kind() if kind is not None and atom is None else atom for atom in value)
     if kind is None or all(_is_of(atom, kind) for atom in value):
         return value
     return unknown("a field for another type than the parameter has")
@@ -345,7 +354,7 @@ def _is_of(atom: object, kind: type) -> bool:
 def instance_attribute(run: Run, obj: Instance, path: str, name: str) -> Value:
     """Return an attribute of an object whose class is foreign."""
     if path == ros.PARAMETER_CLASS and name in _PARAMETER_VALUES:
-        return _of_type(obj.cells.get("value", ANY), _PARAMETER_VALUES[name])
+        return _of_type(present(obj.cells.get("value", ANY)), _PARAMETER_VALUES[name])
     if path in ros.ENDPOINT_CLASSES and name in ros.ENDPOINT_NAMES:
         return obj.cells.get("name", ANY)
     if path in stdlib.OPEN_ATTRIBUTES:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import partial
 
 from nodl.builtin_interfaces import LOGGER_SERVICES, PARAMETER_SERVICES
-from nodl.infer.findings import NodeRecord
+from nodl.infer.findings import DeclaredParameter, NodeRecord
 from nodl.infer.interpreter.conditions import truth
+from nodl.infer.interpreter.define import program_classes
 from nodl.infer.interpreter.elements import elements
 from nodl.infer.interpreter.formatting import as_texts, text_value
 from nodl.infer.interpreter.run import Call, Run
@@ -19,6 +21,7 @@ from nodl.infer.models.signatures import (
     NODE_CALLBACKS,
     NODE_ENDPOINTS,
     NODE_HOOKS,
+    NODE_PRIVATE,
     SUBSCRIPTION,
     Argument,
     CallbackArgument,
@@ -44,6 +47,7 @@ from nodl.infer.values import (
     NONE,
     OF_LAUNCH,
     RESULT,
+    ClassValue,
     Dictionary,
     External,
     ForeignMethod,
@@ -93,16 +97,25 @@ def initialise_node(run: Run, instance: Instance, path: str, call: Call) -> None
     use_global = call.args.at(-1, "use_global_arguments")
     if use_global is not None:
         record.use_global_arguments = use_global
+    record.allow_undeclared = call.args.at(-1, "allow_undeclared_parameters") or (False,)
+    given = call.args.at(-1, "automatically_declare_parameters_from_overrides")
+    record.declares_given = given or (False,)
+    for declared in ("use_sim_time", "start_type_description_service"):
+        run.state.write(record.cells, DeclaredParameter(declared), ("",))
     if record.lifecycle:
         enabled = call.args.at(-1, "enable_communication_interface")
         record.communication_interface = enabled is None or truth(enabled) is not False
+    classes = program_classes(instance.cls) if isinstance(instance.cls, ClassValue) else []
+    for name in sorted({name for cls in classes for name in NODE_PRIVATE.intersection(cls.cells)}):
+        run.findings.gap(call.source, f"the program replaces {name} of rclpy's node, which is not followed")
     for name in sorted(NODE_HOOKS):
         own = _expect_own(run, instance, name, call)
         if own and name == "get_name":
             run.findings.gap(call.source, "rclpy names parameter services by the get_name() of the program")
     overrides = call.args.at(-1, "parameter_overrides")
     if overrides:
-        assign_parameters(run, record, overrides, call)
+        for name, value in _parameters_in(run, overrides, call):
+            _assign(run, record, name, value, call)
     if truth(call.args.at(-1, "enable_logger_service") or (False,)) is not False:
         for service, service_type in LOGGER_SERVICES.items():
             add_endpoint(run, record, EndpointKind.SERVICE_SERVER, f"~/{service}", service_type, call)
@@ -397,14 +410,57 @@ def _name(call: Call) -> Value:
 
 
 def _declare_parameter(run: Run, record: NodeRecord, call: Call) -> Value:
-    default = _default_value(call.args.at(1, "value"))
-    ignored = truth(call.args.at(3, "ignore_override") or (False,))
-    for name in constant_strings(_name(call)):
-        record.declare(name, default)
-        if ignored is not False:  # what launch says does not count, or perhaps not
-            record.assigned[name] = default
-            run.state.write(record.cells, name, join(default or NONE, BOTTOM if ignored else ABSENT))
+    default = call.args.at(1, "value")
+    plain = (call.args.at(2, "descriptor") or NONE) == NONE
+    ignored = call.args.at(3, "ignore_override")
+    known = constant_strings(_name(call))
+    for name in known:
+        _declare(run, record, name, default, ignored, plain)
+    if len(known) < len(_name(call)):
+        run.state.write(record.cells, DeclaredParameter(""), ("",))
     return parameter_object(run, call, _name(call), _inputs(run, record, _name(call), call))
+
+
+def _declare(
+    run: Run, record: NodeRecord, name: str, given: Value | None, ignored: Value | None, plain: bool
+) -> None:
+    """Declare a parameter. ``plain``: without a descriptor, so that any value of the default's type may be set."""
+    default, ignore = _default_value(given), truth(ignored or (False,))
+    record.declare(name, default)
+    kinds = {type(constant_text(atom)) for atom in default}
+    kind = kinds.pop().__name__ if plain and len(kinds) == 1 else ""
+    run.state.write(record.cells, DeclaredParameter(name), (kind,))
+    if ignore is not False:  # what launch says does not count, or perhaps not
+        record.assigned[name] = default
+        run.state.write(record.cells, name, join(default or NONE, BOTTOM if ignore else ABSENT))
+
+
+def _is_declared(run: Run, record: NodeRecord, name: str) -> bool | None:
+    """Return whether rclpy knows the parameter, which it needs to see what launch sets; ``None``: perhaps."""
+    held = record.cells.get(DeclaredParameter(name), ABSENT)
+    if held != ABSENT:
+        return None if ABSENT[0] in held else True
+    automatic, launched = truth(record.declares_given), _launched(run, record)
+    if automatic and launched is not None:
+        if name in launched.parameters:
+            return True
+        automatic = False
+    handed = any(run.findings.node_of.get(each) is record for each in run.handed)
+    others = handed or not record.created or DeclaredParameter("") in record.cells
+    return None if automatic is not False or others or name.startswith(_OF_LIBRARIES) else False
+
+
+_OF_LIBRARIES = ("qos_overrides.", "diagnostic_updater.")  # parameters that libraries declare
+
+
+def _undeclare_parameter(run: Run, record: NodeRecord, call: Call) -> Value:
+    known = constant_strings(_name(call))
+    for cell in (cell for name in known for cell in (name, DeclaredParameter(name))):
+        kept = BOTTOM if len(known) == len(_name(call)) == 1 else record.cells.get(cell, BOTTOM)
+        run.state.write(record.cells, cell, join(kept, ABSENT))
+    if len(known) < len(_name(call)):
+        run.findings.gap(call.source, "which parameter is undeclared is not known")
+    return NONE
 
 
 def _default_value(default: Value | None) -> Value:
@@ -417,11 +473,19 @@ def _default_value(default: Value | None) -> Value:
 _UNNAMED = unknown("a parameter whose name is not known")
 
 
-def _inputs(run: Run, record: NodeRecord, names: Value, call: Call) -> Value:
-    """Return the values of parameters: what the program set them to, else what launch and the defaults say."""
+def _inputs(run: Run, record: NodeRecord, names: Value, call: Call, undeclared: Value | None = None) -> Value:
+    """Return the values of parameters: what the program set them to, else what launch and the defaults say.
+
+    ``undeclared``: the value of one that is not declared; without it, it is taken for one that is.
+    """
     known = constant_strings(names)
     result = _UNNAMED if len(known) < len(names) else BOTTOM
     for name in known:
+        if undeclared is not None:
+            declared = _is_declared(run, record, name)
+            result = join(result, BOTTOM if declared else undeclared)
+            if declared is False:
+                continue
         held = record.cells.get(name, ABSENT)
         result = join(result, present(held))
         if ABSENT[0] not in held:
@@ -432,6 +496,14 @@ def _inputs(run: Run, record: NodeRecord, names: Value, call: Call) -> Value:
         else:
             result = join(result, run.of_launch(Input(name, record)))
     return result
+
+
+def _held(run: Run, record: NodeRecord, names: Value, call: Call) -> Value:
+    """Return what ``get_parameter`` gives: without a declaration an error, or ``None`` where that is allowed."""
+    allowed = truth(record.allow_undeclared)
+    if allowed is None:
+        return join(_inputs(run, record, names, call), NONE)
+    return _inputs(run, record, names, call, NONE if allowed else None)
 
 
 def _launched(run: Run, record: NodeRecord) -> LaunchedNode | None:
@@ -463,11 +535,13 @@ def _declare_parameters(run: Run, record: NodeRecord, call: Call) -> Value:
     prefixes = constant_strings(namespace)
     listed = call.args.at(1, "parameters") or ANY
     known = len(prefixes) == len(namespace) == 1
+    ignored = call.args.at(2, "ignore_override")
     found: list[Value] = [] if len(prefixes) == len(namespace) else [_UNNAMED]
     for entry in _entries(run, listed, call):
         parts = elements(run, entry, call.node, call.frame)
         if parts.exact is None or not parts.exact:
             run.findings.gap(call.source, "the list of declared parameters is not known")
+            run.state.write(record.cells, DeclaredParameter(""), ("",))
             known = False
             continue
         default = parts.exact[1] if len(parts.exact) > 1 else None
@@ -475,8 +549,9 @@ def _declare_parameters(run: Run, record: NodeRecord, call: Call) -> Value:
         known = known and len(names) == len(parts.exact[0]) == 1
         if len(names) < len(parts.exact[0]):
             found.append(_UNNAMED)
+            run.state.write(record.cells, DeclaredParameter(""), ("",))
         for full in (f"{prefix}.{name}" if prefix else name for name in names for prefix in prefixes):
-            record.declare(full, _default_value(default))
+            _declare(run, record, full, default, ignored, len(parts.exact) < 3)
             value = _inputs(run, record, (full,), call)
             found.append(parameter_object(run, call, (full,), value, full))
     exact = known and elements(run, listed, call.node, call.frame).exact is not None
@@ -490,7 +565,7 @@ def _entries(run: Run, value: Value, call: Call) -> list[Value]:
 
 
 def _get_parameter(run: Run, record: NodeRecord, call: Call) -> Value:
-    return parameter_object(run, call, _name(call), _inputs(run, record, _name(call), call))
+    return parameter_object(run, call, _name(call), _held(run, record, _name(call), call))
 
 
 def _get_parameters(run: Run, record: NodeRecord, call: Call) -> Value:
@@ -498,7 +573,7 @@ def _get_parameters(run: Run, record: NodeRecord, call: Call) -> Value:
     if names is None:
         return ANY
     found = (
-        parameter_object(run, call, each, _inputs(run, record, each, call), f"parameter {index}")
+        parameter_object(run, call, each, _held(run, record, each, call), f"parameter {index}")
         for index, each in enumerate(names)
     )
     return run.sequence(call.node, "list", Items(tuple(found)))
@@ -514,9 +589,10 @@ def _get_parameters_by_prefix(run: Run, record: NodeRecord, call: Call) -> Value
     found = run.allocate(call.node, "by prefix", Dictionary)
     start = f"{prefix}." if prefix else ""
     for name in dict.fromkeys((*record.parameters, *launched.parameters)):
-        if name.startswith(start):
-            held = parameter_object(run, call, (name,), _inputs(run, record, (name,), call), name)
-            run.state.store(found, Key(name.removeprefix(start)), held)
+        declared = _is_declared(run, record, name)
+        if name.startswith(start) and declared is not False:
+            held: Value = parameter_object(run, call, (name,), _inputs(run, record, (name,), call), name)
+            run.state.store(found, Key(name.removeprefix(start)), join(held, BOTTOM if declared else ABSENT))
     return (found,)
 
 
@@ -524,33 +600,74 @@ def _get_parameter_or(run: Run, record: NodeRecord, call: Call) -> Value:
     others = (a for a in call.args.at(1, "alternative_value") or BOTTOM if isinstance(a, Instance))
     default = join_all(present(other.cells.get("value", BOTTOM)) for other in others)
     for name in constant_strings(_name(call)):
-        record.declare(name, _default_value(default or None))
-    return parameter_object(run, call, _name(call), _inputs(run, record, _name(call), call))
+        declared = _is_declared(run, record, name)
+        by_others = DeclaredParameter("") in record.cells  # with a default that is not known
+        if (declared is None and not by_others) or (declared and not record.default(name)):
+            record.declare(name, _default_value(default or None))
+    # One that may be declared for the launch's sake has the launch's value, or else this default.
+    undeclared = None if truth(record.declares_given) else default or NONE
+    return parameter_object(run, call, _name(call), _inputs(run, record, _name(call), call, undeclared))
 
 
-def _set_parameters(run: Run, record: NodeRecord, call: Call) -> Value:
-    assign_parameters(run, record, call.args.at(0, "parameter_list") or ANY, call)
+def _set_parameters(run: Run, record: NodeRecord, call: Call, together: bool = False) -> Value:
+    """Set parameters; where a callback, a descriptor or a type may refuse a value, the one before stays possible.
+
+    ``together``: all of them or none.
+    """
+    given = list(_parameters_in(run, call.args.at(0, "parameter_list") or ANY, call))
+    taken = [_is_taken(record, name, value) for name, value in given]
+    for (name, value), certain in zip(given, taken, strict=True):
+        before = BOTTOM if certain and (all(taken) or not together) else record.cells.get(name, ABSENT)
+        _assign(run, record, name, join(value, before), call)
+        declared = DeclaredParameter(name)
+        if record.cells.get(declared, ABSENT) == ABSENT and truth(record.allow_undeclared) is not False:
+            run.state.write(record.cells, declared, ("",))
+    if _PRE_SET in record.cells:
+        run.findings.gap(call.source, "a callback may change the parameters before they are set")
     return ANY
 
 
-def assign_parameters(run: Run, record: NodeRecord, listed: Value, call: Call) -> None:
-    """Set the node's parameters to what the ``Parameter`` objects hold; unknown entries become a gap."""
+_PRE_SET, _ON_SET = DeclaredParameter("[changed]"), DeclaredParameter("[refused]")  # cells for callbacks
+
+
+def _is_taken(record: NodeRecord, name: str, value: Value) -> bool:
+    """Return whether setting a parameter to ``value`` certainly succeeds."""
+    kinds = {type(constant_text(atom)).__name__ for atom in value}
+    plain = len(kinds) == 1 and record.cells.get(DeclaredParameter(name)) == (*kinds,)
+    return plain and _ON_SET not in record.cells
+
+
+def _set_callback(name: str, cell: DeclaredParameter) -> NodeMethod:
+    registered = _callback_method(name)
+
+    def method(run: Run, record: NodeRecord, call: Call) -> Value:
+        run.state.write(record.cells, cell, (True,))
+        return registered(run, record, call)
+
+    return method
+
+
+def _parameters_in(run: Run, listed: Value, call: Call) -> Iterator[tuple[str, Value]]:
+    """Return name and value of each ``Parameter`` object in the list; unknown entries become a gap."""
     lists = tuple(atom for atom in listed if atom is not None)
     for entry in _entries(run, lists, call) if lists else ():
         for atom in entry:
             if isinstance(atom, Instance):
-                names = atom.cells.get("name", ANY)
+                names = present(atom.cells.get("name", ANY))
                 known = constant_strings(names)
                 if len(known) < len(names):
                     run.findings.gap(call.source, "which parameter is set in code is not known")
                 for name in known:
-                    value = present(atom.cells.get("value", ANY))
-                    record.assigned[name] = join(record.assigned.get(name, BOTTOM), value)
-                    run.state.write(record.cells, name, value)
-                    if name == "use_sim_time" and truth(value) is not False:
-                        add_endpoint(run, record, SUBSCRIPTION, "/clock", "rosgraph_msgs/msg/Clock", call)
+                    yield name, present(atom.cells.get("value", ANY))
             elif isinstance(atom, Unknown):
                 run.findings.gap(call.source, f"parameters set in code are not known: {atom.why}")
+
+
+def _assign(run: Run, record: NodeRecord, name: str, value: Value, call: Call) -> None:
+    record.assigned[name] = join(record.assigned.get(name, BOTTOM), present(value))
+    run.state.write(record.cells, name, value)
+    if name == "use_sim_time" and truth(present(value)) is not False:
+        add_endpoint(run, record, SUBSCRIPTION, "/clock", "rosgraph_msgs/msg/Clock", call)
 
 
 NODE_METHODS: dict[str, NodeMethod] = {
@@ -563,7 +680,11 @@ NODE_METHODS: dict[str, NodeMethod] = {
     "get_parameter_or": _get_parameter_or,
     "get_parameters_by_prefix": _get_parameters_by_prefix,
     "set_parameters": _set_parameters,
-    "set_parameters_atomically": _set_parameters,
+    "set_parameters_atomically": partial(_set_parameters, together=True),
+    "undeclare_parameter": _undeclare_parameter,
+    "add_pre_set_parameters_callback": _set_callback("add_pre_set_parameters_callback", _PRE_SET),
+    "add_on_set_parameters_callback": _set_callback("add_on_set_parameters_callback", _ON_SET),
+    "set_parameters_callback": _set_callback("set_parameters_callback", _ON_SET),
     "waitUntilNav2Active": _wait_until_active,
     "lifecycleStartup": _manage_lifecycle,
     "lifecycleShutdown": _manage_lifecycle,

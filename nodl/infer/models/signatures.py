@@ -170,6 +170,23 @@ NODE_HOOKS = frozenset({
 })  # fmt: skip
 
 
+# Attributes of rclpy's node by which it knows parameters and makes interfaces, and that are not for programs.
+NODE_PRIVATE = frozenset({
+    "_parameters", "_parameter_overrides", "_descriptors", "_allow_undeclared_parameters",
+    "_pre_set_parameters_callbacks", "_on_set_parameters_callbacks", "_declare_parameter_common",
+    "_set_parameters_atomically", "_set_parameters_atomically_common", "_apply_descriptor", "_apply_descriptors",
+    "_apply_descriptor_and_set", "_call_pre_set_parameters_callback", "_Node__node", "_Node__handle",
+})  # fmt: skip
+
+# Methods of a node that rclpy's own go through, and so a program's own.
+GOES_THROUGH = {
+    "get_parameter": ("has_parameter",),
+    "get_parameter_or": ("has_parameter",),
+    "get_parameters": ("get_parameter", "has_parameter"),
+    "declare_parameter": ("declare_parameters",),
+}
+
+
 class LibraryNode(NamedTuple):
     """A node class of a library. ``name``: what the node is called unless its user says otherwise."""
 

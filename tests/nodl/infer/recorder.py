@@ -135,6 +135,10 @@ def _node_class(recorder: Recorder) -> type:
             self._namespace = remap.namespace(space, self._name).name
             self._resolver = NodeNames(self._name, self._namespace, remap)
             self._parameters: dict[str, Parameter] = {}
+            self._declared: dict[str, tuple[type, object]] = {}
+            self._on_set: list[Any] = []
+            self._pre_set: list[Any] = []
+            self._allow_undeclared_parameters = allow_undeclared_parameters
             everywhere = recorder.words if use_global_arguments else None
             launched = recorder.parameters if use_global_arguments and recorder.words is None else {}
             self._overrides = {
@@ -190,30 +194,47 @@ def _node_class(recorder: Recorder) -> type:
             return Anything()
 
         def add_on_set_parameters_callback(self, callback: Any) -> None:
+            self._on_set.append(callback)
             recorder.callbacks.append(lambda: callback([]))
 
+        def add_pre_set_parameters_callback(self, callback: Any) -> None:
+            self._pre_set.append(callback)
+
         def declare_parameter(
-            self, name: str, value: object = None, descriptor: object = None, **_: object
+            self, name: str, value: object = None, descriptor: Any = None, ignore_override: bool = False
+        ) -> Any:
+            return self.declare_parameters("", [(name, value, descriptor)], ignore_override)[0]
+
+        def declare_parameters(
+            self, namespace: str, parameters: Any, ignore_override: bool = False
+        ) -> list[Parameter]:
+            prefix = f"{namespace}." if namespace else ""
+            return [self._declare(ignore_override, prefix + entry[0], *entry[1:]) for entry in parameters]
+
+        def _declare(
+            self, ignored: bool, name: str, value: object = None, descriptor: object = None
         ) -> Parameter:
-            given = self._overrides.get(name, value)
+            given = value if ignored else self._overrides.get(name, value)
             typed = type(value) in (bool, int, float, str, list) and descriptor is None
             if typed and type(given) is not type(value):
                 raise InvalidParameterTypeError
             self._parameters[name] = Parameter(name, None, given)
+            self._declared[name] = type(value), descriptor
             return self._parameters[name]
 
-        def declare_parameters(self, namespace: str, parameters: Any, *_: object) -> list[Parameter]:
-            prefix = f"{namespace}." if namespace else ""
-            return [self.declare_parameter(prefix + entry[0], *entry[1:2]) for entry in parameters]
+        def undeclare_parameter(self, name: str) -> None:
+            del self._parameters[name]
 
-        def get_parameter(self, name: str) -> Parameter:
-            return self._parameters[name]
+        def get_parameter(self, name: str) -> Any:
+            if self.has_parameter(name) or not self._allow_undeclared_parameters:
+                return self._parameters[name]
+            return Parameter(name)
 
         def get_parameter_or(self, name: str, alternative: Parameter) -> Parameter:
-            return self._parameters.get(name, alternative)
+            return self._parameters[name] if self.has_parameter(name) else alternative
 
-        def get_parameters(self, names: list[str]) -> list[Parameter]:
-            return [self._parameters[name] for name in names]
+        def get_parameters(self, names: list[str]) -> list[Any]:
+            return [self.get_parameter(name) for name in names]
 
         def get_parameters_by_prefix(self, prefix: str) -> dict[str, Parameter]:
             start = f"{prefix}." if prefix else ""
@@ -223,7 +244,22 @@ def _node_class(recorder: Recorder) -> type:
             return name in self._parameters
 
         def set_parameters(self, parameter_list: list[Parameter]) -> None:
-            self._parameters.update({p.name: p for p in parameter_list})
+            for parameter in parameter_list:
+                self.set_parameters_atomically([parameter])
+
+        def set_parameters_atomically(self, parameter_list: list[Parameter]) -> None:
+            for before in self._pre_set:
+                parameter_list = before(parameter_list)
+            if not self._allow_undeclared_parameters:
+                assert all(p.name in self._parameters for p in parameter_list), "not declared"
+            known = [(p, *self._declared[p.name]) for p in parameter_list if p.name in self._declared]
+            refused = any(
+                getattr(descriptor, "read_only", False) is True
+                or (kind is not type(p.value) and not descriptor)
+                for p, kind, descriptor in known
+            )
+            if not refused and all(callback(parameter_list).successful for callback in self._on_set):
+                self._parameters.update({p.name: p for p in parameter_list})
 
         def get_name(self) -> str:
             return str(self._name)
@@ -283,6 +319,8 @@ def stand_in(recorder: Recorder) -> dict[str, types.ModuleType]:
         "rclpy.executors": {"SingleThreadedExecutor": Executor, "MultiThreadedExecutor": Executor},
         "rclpy.qos": {"QoSProfile": Anything, "qos_profile_sensor_data": None},
         "rclpy.service_introspection": {"ServiceIntrospectionState": Anything()},
+        "rcl_interfaces": {},
+        "rcl_interfaces.msg": {"ParameterDescriptor": Anything, "SetParametersResult": Anything},
         "std_msgs": {}, "std_msgs.msg": {name: type(name, (Anything,), {}) for name in ("String", "Bool", "Int32")},
         "std_srvs": {}, "std_srvs.srv": {name: type(name, (Anything,), {}) for name in ("Empty", "Trigger", "SetBool")},
         "example_interfaces": {}, "example_interfaces.action": {"Fibonacci": Anything},

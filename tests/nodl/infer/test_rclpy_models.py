@@ -186,7 +186,7 @@ PARAMETERS = {
     "self.declare_parameter('t', 'd'); n = self.get_parameter('t').get_parameter_value().string_value": "param:t",
     "self.declare_parameters('', [('t', 'd')]); n = self.get_parameter('t').value": "param:t",
     "self.declare_parameters('p', [('t', 'd')]); n = self.get_parameter('p.t').value": "param:p.t",
-    "n = self.get_parameter_or('t', Parameter('t', Parameter.Type.STRING, 'd')).value": "param:t",
+    "self.declare_parameter('t', 'd'); n = self.get_parameter_or('t', Parameter('t', value='e')).value": "param:t",
 }
 
 
