@@ -81,6 +81,9 @@ def initialise_node(run: Run, instance: Instance, path: str, call: Call) -> None
     """Model ``Node.__init__``: the instance becomes a node."""
     record = record_of_instance(run, instance, call)
     run.understood.add(call.node)
+    if record.created:  # another node made here, that has no parameters yet
+        for cell, held in list(record.cells.items()):
+            run.state.write(record.cells, cell, join(held, ABSENT))
     record.created = True
     record.source = call.source
     library = library_node(path)
