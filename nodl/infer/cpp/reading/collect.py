@@ -174,6 +174,7 @@ class _Collector:
             or head.lstrip().startswith("virtual")
             or any(child.type == "virtual_specifier" for child in declarator.named_children)
         )
+        made.overrides = any(child.type == "virtual_specifier" for child in declarator.named_children)
         made.static = "static" in words
         return made
 

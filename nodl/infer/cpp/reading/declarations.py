@@ -53,6 +53,7 @@ class Function:
     static: bool = False
     variadic: bool = False
     specialises: tuple[str, ...] | None = None  # arguments as written, its own or those of its class
+    overrides: bool = False  # says so
     written: VariableWrites | None = None  # what it does to variables, when asked
     _words: frozenset[str] | None = None
 
@@ -74,6 +75,13 @@ class Function:
             written = _LITERAL.sub("", source.decode("utf-8", "replace"))
             self._words = frozenset(_MENTIONED.findall(written))
         return self._words
+
+    @property
+    def constant(self) -> bool:
+        """Return True for a ``const`` method."""
+        declarator = function_declarator(self.node)
+        qualifiers = declarator.named_children if declarator is not None else []
+        return any(each.type == "type_qualifier" and text(each) == "const" for each in qualifiers)
 
     @property
     def line(self) -> int:

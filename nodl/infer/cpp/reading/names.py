@@ -424,6 +424,49 @@ class Names:
                 return found
         return []
 
+    @_once
+    def unlike(self, cls: Class) -> frozenset[str]:
+        """Return names of virtual methods with another signature in a derived class, which does not override them."""
+        return frozenset(
+            name
+            for each in self.ancestry(cls)
+            for name, own in self.methods.get(each, {}).items()
+            for base in self.ancestry(each)[1:]
+            for method in self.methods.get(base, {}).get(name, ())
+            if method.virtual and name[0] != "~" and not any(self.overrides(f, method) for f in own)
+        )
+
+    def overrides(self, own: Function, base: Function) -> bool | None:
+        """Return whether a method of a derived class overrides a virtual one of the same name; ``None``: perhaps."""
+        if len(own.parameters) != len(base.parameters) or own.constant != base.constant:
+            return False
+        alike = [
+            self._alike(own, a.type, base, b.type)
+            for a, b in zip(own.parameters, base.parameters, strict=True)
+        ]
+        if all(alike) or own.overrides:
+            return True
+        return False if False in alike else None
+
+    def _alike(self, own: Function, mine: str, base: Function, other: str) -> bool | None:
+        """Return whether two methods write the same type; ``None`` if that is not known."""
+        if mine.split() == other.split():
+            return True
+        kinds = [self.resolve(mine, own.scope, own.file), self.resolve(other, base.scope, base.file)]
+        marks = [
+            (re.findall(r"[&*]", each), "const" in each and each.endswith(("&", "*")))
+            for each in (mine, other)
+        ]
+        if kinds[0] == kinds[1]:
+            return marks[0] == marks[1]
+        classes = (
+            *self.classes.get(own.owner.rpartition("::")[2], ()),
+            *self.classes.get(base.owner.rpartition("::")[2], ()),
+        )
+        if any({*each.templates} & {*re.findall(r"\w+", f"{mine} {other}")} for each in classes):
+            return True  # as the template's arguments say
+        return False if all(_BUILT_IN.fullmatch(each.name) for each in kinds) else None
+
     def _brought_in(self, cls: Class, name: str, own: Iterable[Function]) -> Iterator[Function]:
         """Yield the methods of ``using Base::name``, without those that the class declares itself."""
         taken = {tuple(p.type for p in each.parameters) for each in own}
@@ -583,8 +626,14 @@ def _complete(function: Function, declared: Iterable[Function]) -> None:
         if len(each.parameters) != len(function.parameters):
             continue
         function.virtual = function.virtual or each.virtual
+        function.overrides = function.overrides or each.overrides
         for own, other in zip(function.parameters, each.parameters, strict=False):
             own.default = own.default or other.default
+
+
+_BUILT_IN = re.compile(
+    r"(?:(?:unsigned|signed|long|short|int|char|bool|float|double) ?)+|(?:std::)?(?:string|size_t)|u?int\d+_t"
+)
 
 
 def hidden(names: Names, cls: Class) -> frozenset[str]:

@@ -58,7 +58,8 @@ def methods_meant(
     Of a method that hides a base's that of the class that the receiver has at compile time; if that is not known, each
     that it may be, with a gap. ``receiver``: ``None`` inside of a class.
     """
-    if name not in hidden(run.names, cls):
+    unlike = name in run.names.unlike(cls)
+    if name not in hidden(run.names, cls) and not unlike:
         return run.names.find_methods(cls, name)
     is_own = receiver is None or receiver.type == "this"
     seen = class_around(run, frame) if is_own else seen_class(run, receiver, frame)
@@ -66,10 +67,33 @@ def methods_meant(
     virtual = any(each.virtual for owner in ancestry for each in run.names.methods[owner].get(name, ()))
     if seen in ancestry and seen is not None and not virtual:
         return run.names.find_methods(seen, name)
+    found = (
+        _last_overriders(run, cls, seen, name) if unlike and seen is not None and seen in ancestry else None
+    )
+    if found is not None:
+        return found
     if not _methods_matter(run, cls, name):
         return run.names.find_methods(cls, name)
     run.gap(call, frame, f"{cls.name} hides {name} of a base: which of them is called is not known")
     return [each for owner in ancestry for each in run.names.methods[owner].get(name, ())]
+
+
+def _last_overriders(run: Machine, cls: Class, seen: Class, name: str) -> list[Function] | None:
+    """Return what the methods of ``seen`` are in an object of ``cls``; ``None`` if what overrides them is not known."""
+    found: list[Function] = []
+    for method in run.names.find_methods(seen, name):
+        last = method
+        for each in run.names.ancestry(cls) if method.virtual else ():
+            if each is seen or seen not in run.names.ancestry(each):
+                continue
+            told = {f: run.names.overrides(f, method) for f in run.names.methods.get(each, {}).get(name, ())}
+            if True in told.values():
+                last = next(f for f, overrides in told.items() if overrides)
+                break
+            if None in told.values():
+                return None
+        found.append(last)
+    return found
 
 
 def class_around(run: Machine, frame: Frame) -> Class | None:
