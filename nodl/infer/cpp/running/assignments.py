@@ -12,6 +12,7 @@ from nodl.infer.cpp.running.arithmetic import added, as_type, computed
 from nodl.infer.cpp.running.constructors import gives_pointer, in_braces, made_of
 from nodl.infer.cpp.running.contents import copied, elements_copied, overwrite
 from nodl.infer.cpp.running.effects import referred_to
+from nodl.infer.cpp.running.implicit_calls import called_unseen
 from nodl.infer.cpp.running.machine import Frame, Machine, expression
 from nodl.infer.cpp.running.references import (
     REFERRED_TO,
@@ -243,6 +244,8 @@ def _assign_name(run: Machine, target: Node, value: Value, frame: Frame) -> None
     owner = frame.owner_of(name)
     if owner is not None and name in owner.references:
         set_through(run, target, value, frame)
+    if owner is not None and owner.types.get(name, "").endswith("&"):
+        called_unseen(run, [value])  # by the variable behind the reference
     if owner is not None:
         run.store.set((owner, name), value)
         return

@@ -5,12 +5,11 @@ Run until nothing changes. A callback that makes no interface runs too when it m
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import partial
 
 from nodl.infer.cpp.reading.declarations import Class
-from nodl.infer.cpp.running.effects import effects_of, may_mean
+from nodl.infer.cpp.running.effects import effects_of, may_mean, with_held
 from nodl.infer.cpp.running.invocation import HOOKS, call_lambda, invoke
 from nodl.infer.cpp.running.left_out import forget_writes
 from nodl.infer.cpp.running.machine import NEXT, Frame, Machine
@@ -25,7 +24,6 @@ from nodl.infer.cpp.running.values import (
     Text,
     Value,
     as_one_map,
-    functions_in,
     in_any_order,
     join,
     open_sequence,
@@ -84,27 +82,9 @@ def run_callbacks(run: Machine) -> None:
 def run_meanwhile(run: Machine) -> None:
     """Know nothing of what callbacks may write, which run where the program spins and goes on."""
     registered = [] if run.calls_back else [atom for atom, _ in run.callbacks.values()]
-    for code in dict.fromkeys(each for atom in registered for each in _with_held(run, atom)):
+    for code in dict.fromkeys(each for atom in registered for each in with_held(run, atom)):
         if forget_writes(run, code.function if isinstance(code, Bound) else code) is None:
             forget_everything(run, "what a callback may have written meanwhile")
-
-
-def _with_held(run: Machine, atom: object) -> Iterator[Lambda | Bound]:
-    """Yield a callback, then the functions in variables that it mentions, and those that these mention."""
-    waiting = [atom] if isinstance(atom, Lambda | Bound) else []
-    code: set[object] = set()  # of what was found
-    names: set[str] = set()  # of variables that were looked into
-    while waiting:
-        each = waiting.pop()
-        yield each
-        mentioned = (run.store.callables.keys() & effects_of(run, each).words) - names
-        names |= mentioned
-        for cell in (cell for name in sorted(mentioned) for cell in list(run.store.callables[name])):
-            for other in functions_in(run.store.get(cell) or BOTTOM):
-                key = other.node.id if isinstance(other, Lambda) else other.function
-                if key not in code:
-                    code.add(key)
-                    waiting.append(other)
 
 
 def _round(rounds: _Rounds) -> bool:
@@ -158,7 +138,7 @@ def _run(run: Machine, atom: object, frame: Frame, conditional: bool) -> None:
 
 def _matters(rounds: _Rounds, atom: object) -> bool:
     """Return whether it may make an interface or a node, give one away, or change what a callback has read."""
-    for each in _with_held(rounds.run, atom):
+    for each in with_held(rounds.run, atom):
         effects = effects_of(rounds.run, each)
         written = effects.written.assigned | effects.written.changed | effects.written.seen
         if (

@@ -26,6 +26,7 @@ from nodl.infer.cpp.running.callbacks import run_meanwhile
 from nodl.infer.cpp.running.constructors import cast, construct, made, made_of
 from nodl.infer.cpp.running.containers import CONTAINER_METHODS, container_call, is_standard
 from nodl.infer.cpp.running.contents import copied, handed_over
+from nodl.infer.cpp.running.implicit_calls import called_unseen
 from nodl.infer.cpp.running.invocation import CallSite, call_functions, call_values, pointed_to
 from nodl.infer.cpp.running.left_out import forget_writes
 from nodl.infer.cpp.running.machine import Frame, Machine, expression
@@ -61,6 +62,7 @@ from nodl.infer.cpp.running.values import (
     Atom,
     Bound,
     Const,
+    Group,
     Lambda,
     Obj,
     Seq,
@@ -361,6 +363,7 @@ def method_call(run: Machine, site: CallSite) -> Value:
         return receiver
     if name == "reset" and (_declared_pointer(run, subject, frame) or _is_pointer(run, site, receiver)):
         value = run.evaluate(site.given[0], frame) if site.given else BOTTOM
+        called_unseen(run, [run.evaluate(each, frame) for each in site.given[1:]])  # a deleter
         assign(run, subject, value, frame)  # pointer.reset(new Foo(...))
         return BOTTOM
     if name == "emplace" and _declared_pointer(run, subject, frame):  # of an optional
@@ -427,12 +430,17 @@ def _is_pointer(run: Machine, site: CallSite, held: Value) -> bool:
     return is_auto and bool(held) and objects and text(field_of(site.callee, "operator")) == "."
 
 
+_OF_PAIR = ("first", "second")
+
+
 def _on_atom(run: Machine, atom: object, name: str, site: CallSite) -> Value:
     if isinstance(atom, Obj):
         return on_object(run, atom, name, site)
     if isinstance(atom, Lambda | Bound):
         values = site.values
         return call_values(run, (atom,), values, site.node, site.frame) if name == "operator()" else BOTTOM
+    if isinstance(atom, Group) and name in _OF_PAIR and len(atom.items) == 2:
+        return site.call_value(atom.items[name == "second"])
     if CREATES.fullmatch(name) and not isinstance(atom, Unknown):
         atom = Unknown("what is no node")
     if not isinstance(atom, Unknown) or name in CONTAINER_METHODS:

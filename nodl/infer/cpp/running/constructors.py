@@ -22,7 +22,7 @@ from nodl.infer.cpp.reading.type_names import NO_TYPE, Type
 from nodl.infer.cpp.running.arithmetic import as_type
 from nodl.infer.cpp.running.contents import copied, elements_copied, handed_over, items_of, takes_another
 from nodl.infer.cpp.running.foreign import unmodelled
-from nodl.infer.cpp.running.implicit_calls import check_implicit_calls
+from nodl.infer.cpp.running.implicit_calls import called_unseen, check_implicit_calls, keep_closures
 from nodl.infer.cpp.running.machine import MAX_DEPTH, NEXT, Frame, Machine
 from nodl.infer.cpp.running.overloads import candidates, fits
 from nodl.infer.cpp.running.plain_types import MAPS, NUMBERS, ORDERED, SEQUENCES, STREAMS, TEXT_CLASSES
@@ -31,7 +31,9 @@ from nodl.infer.cpp.running.static_types import check_hidden, given_in_braces, g
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     END,
+    Bound,
     Group,
+    Lambda,
     Map,
     Obj,
     Seq,
@@ -86,7 +88,9 @@ def initial_value(run: Machine, value: Node, frame: Frame, reference: bool = Fal
         inner = children(value)
         if len(inner) == 1:
             return initial_value(run, inner[0], frame, reference)
-        return BOTTOM if not inner else run.evaluate(value, frame)
+        found = run.evaluate(value, frame) if inner else BOTTOM
+        called_unseen(run, [found])  # of a deleter
+        return found
     found = run.evaluate(value, frame)
     if reference or leads_into(value) or gives_pointer(run, value):
         return found
@@ -148,14 +152,17 @@ def made_of(
     return None
 
 
-def as_result(run: Machine, value: Value, node: Node, frame: Frame) -> Value:
+def as_result(run: Machine, node: Node, frame: Frame) -> Value:
     """Return what ``return value`` makes of the type that the function says it gives; a closure's is not read."""
-    declarator = (
-        field_of(frame.function.node, "declarator") if frame.function and frame.outer is None else None
-    )
-    if frame.function is None or declarator is None or declarator.type != "function_declarator":
-        return value
-    found = made_of(run, run.type_of(type_text(frame.function.node), frame), value, node, frame)
+    function = frame.function if frame.outer is None else None
+    declarator = field_of(function.node, "declarator") if function is not None else None
+    if function is None or declarator is None or declarator.type != "function_declarator":
+        return run.evaluate(node, frame)
+    kind = run.type_of(type_text(function.node), frame)
+    if node.type == "initializer_list" and run.held_class(kind, frame) is not None:
+        return made(run, node, kind, children(node), frame)
+    value = run.evaluate(node, frame)
+    found = made_of(run, kind, value, node, frame)
     return value if found is None else found
 
 
@@ -170,6 +177,9 @@ def _is_explicit(cls: Class, constructor: Function) -> bool:
 def made(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame: Frame) -> Value:
     """Make an object of ``kind`` from arguments in parentheses or braces."""
     cls = run.class_of(kind, frame)
+    if cls is None and kind.name in SEQUENCES | MAPS and len(kind.arguments) > 1 + (kind.name in MAPS):
+        compared = [each for each in given if each.type in ("identifier", "lambda_expression")]
+        called_unseen(run, [run.evaluate(each, frame) for each in compared])  # a comparator, a hash
     if cls is None and kind.name in SEQUENCES:
         return _sequence(run, node, kind, given, frame)
     if cls is None and kind.name in MAPS:
@@ -189,8 +199,8 @@ def made(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame: Fra
     if cls is not None and is_aggregate(run, cls) and given:
         return _aggregate(run, node, kind, cls, given, frame, values)
     values = values or [run.evaluate(each, frame) for each in given]
-    if cls is None and len(values) == 1 and _all_of(kind, values[0]):
-        return values[0]  # a copy of a library's object
+    if cls is None and len(values) == 1 and (_all_of(kind, values[0]) or _keeps(kind, values[0])):
+        return values[0]  # a copy of a library's object, or a closure
     return construct(run, kind, values, node, frame)
 
 
@@ -327,6 +337,11 @@ def _all_of(kind: Type, value: Value) -> bool:
     return bool(value) and all(isinstance(atom, Obj) and atom.type.name == kind.name for atom in value)
 
 
+def _keeps(kind: Type, value: Value) -> bool:
+    """Return whether a closure is kept as it is, in the ``T`` of a template."""
+    return bool(value) and all(isinstance(atom, Lambda | Bound) for atom in value) and "::" not in kind.name
+
+
 def as_map(items: Sequence[Value]) -> Value:
     """Return a map of these pairs, the first of each key; a map among them comes back, all else gives an unknown."""
     entries: list[tuple[Value, Value]] = []
@@ -444,12 +459,15 @@ def construct(
                 if is_plain(value):
                     keep_reference(run, each, frame)
         construct_class(run, made_object, cls, kind, arguments, node, frame)
+        keep_closures(run, made_object, cls)
         return (made_object,)
     model = LIBRARY_CLASSES.get(kind.name)
     if model is not None:
         call = Call(node, frame, list(arguments), kind.arguments, receiver=made_object)
         found = model(run, call)
         return (made_object,) if found is None else found
+    if kind.name.startswith("std::") and (heap or kind.name != "std::function"):
+        called_unseen(run, arguments)
     if not is_harmless_class(kind.name):
         whom = f"the constructor of {kind.name}"
         handed_over(run, whom, arguments, node, frame)

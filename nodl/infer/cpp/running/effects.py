@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, TypeAlias
 
@@ -14,7 +14,7 @@ from nodl.infer.cpp.reading.names import Names
 from nodl.infer.cpp.reading.writes import FILLS, VariableWrites, declared_in, written_by
 from nodl.infer.cpp.running.foreign import Leaving, leaving
 from nodl.infer.cpp.running.memory import Cell, name_of
-from nodl.infer.cpp.running.values import Bound, Lambda, Obj
+from nodl.infer.cpp.running.values import BOTTOM, Atom, Bound, Lambda, Obj, functions_in
 from nodl.infer.cpp.syntax import Node, callee_name, field_of, text, walk, words_in
 
 if TYPE_CHECKING:
@@ -220,6 +220,24 @@ def effects_of(run: Machine, of: Function | Lambda | Bound) -> CallEffects:
     if key not in run.effects or not run.effects[key].idle.isdisjoint(used):
         run.effects[key] = CallEffects(run, of)
     return run.effects[key]
+
+
+def with_held(run: Machine, atom: Atom) -> Iterator[Lambda | Bound]:
+    """Yield a callback, then the functions in variables that it mentions, and those that these mention."""
+    waiting = [atom] if isinstance(atom, Lambda | Bound) else []
+    code: set[object] = set()  # of what was found
+    names: set[str] = set()  # of variables that were looked into
+    while waiting:
+        each = waiting.pop()
+        yield each
+        mentioned = (run.store.callables.keys() & effects_of(run, each).words) - names
+        names |= mentioned
+        for cell in (cell for name in sorted(mentioned) for cell in list(run.store.callables[name])):
+            for other in functions_in(run.store.get(cell) or BOTTOM):
+                key = other.node.id if isinstance(other, Lambda) else other.function
+                if key not in code:
+                    code.add(key)
+                    waiting.append(other)
 
 
 def only_changes_variables(run: Machine, words: Iterable[str]) -> bool:

@@ -18,6 +18,7 @@ from nodl.infer.cpp.running.assignments import assign
 from nodl.infer.cpp.running.constructors import as_parameter, bind_parameters
 from nodl.infer.cpp.running.contents import copied, handed_over
 from nodl.infer.cpp.running.effects import effects_of, looked_at
+from nodl.infer.cpp.running.implicit_calls import called_unseen
 from nodl.infer.cpp.running.left_out import forget_writes, leave_out
 from nodl.infer.cpp.running.machine import MAX_DEPTH, NEXT, Frame, Machine
 from nodl.infer.cpp.running.memory import MEMORY_DEPTH, CallOutcome, Changes
@@ -128,6 +129,7 @@ def call_values(run: Machine, callee: Value, values: Sequence[Value], node: Node
             if "*" in name and ("->*" in name or ".*" in name):
                 run.gap(node, frame, f"which method {name} is is not known; it may make interfaces")
                 forget_everything(run, f"what {name} may have written")
+            called_unseen(run, [(atom,)], once=True)
             handed_over(run, f"{name}()", values, node, frame)
             found.append(unknown(f"the result of {name}()"))
     run.left = run.left and len(found) == 1
@@ -152,7 +154,7 @@ def call_lambda(run: Machine, atom: Lambda, values: Sequence[Value], node: Node,
                 frame,
                 "a closure calls itself, or is called deeper than is followed; it may make interfaces",
             )
-        return _too_deep(run, atom, node, frame)
+        return _too_deep(run, atom, values, node, frame)
     outer = atom.frame
     inner = Frame(
         outer.file, outer.scope, outer.function, None, outer.bindings, outer,
@@ -182,10 +184,13 @@ def call_lambda(run: Machine, atom: Lambda, values: Sequence[Value], node: Node,
     return inner.returned
 
 
-def _too_deep(run: Machine, of: Function | Lambda, node: Node, frame: Frame) -> Value:
+def _too_deep(
+    run: Machine, of: Function | Lambda, values: Sequence[Value], node: Node, frame: Frame
+) -> Value:
     """Know nothing of what a call that is not followed any deeper gives back, or may write."""
     if forget_writes(run, of) is None:
         forget_everything(run, "what a recursion may have written")
+    called_unseen(run, values)
     may_be_written(run, "a recursion", [], children(field_of(node, "arguments")), frame)
     return unknown("a recursion")
 
@@ -337,7 +342,7 @@ def invoke(
     if function in run.active or frame.depth > MAX_DEPTH:
         if run.makes_interfaces(function):
             run.gap(node, frame, f"{function} calls itself, or is called deeper than is followed")
-        return _too_deep(run, function, node, frame)
+        return _too_deep(run, function, values, node, frame)
     if leave_out(run, function, values, node, frame):
         return unknown(f"the result of {function.name}()")
     values = _seen_once(run, function, this_object, function.parameters, values, node, frame)

@@ -13,6 +13,7 @@ from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.constructors import text_of
 from nodl.infer.cpp.running.contents import copied
 from nodl.infer.cpp.running.effects import effects_of
+from nodl.infer.cpp.running.implicit_calls import called_unseen
 from nodl.infer.cpp.running.machine import NEXT, Frame, Machine, registered
 from nodl.infer.cpp.running.references import is_plain
 from nodl.infer.cpp.running.static_types import is_pointer
@@ -197,6 +198,7 @@ def _once(run: Machine, atom: Lambda, elements: Sequence[Value], node: Node, fra
 @_standard("std::function", "std::optional", "std::make_optional", "std::shared_ptr", "std::unique_ptr", "std::begin",
            "std::weak_ptr", "std::mem_fn", "std::remove_reference", "std::launder", "std::exchange")  # fmt: skip
 def _itself(run: Machine, values: Sequence[Value], node: Node, frame: Frame) -> Value:
+    called_unseen(run, values[1:])  # a deleter
     return values[0] if values else BOTTOM
 
 

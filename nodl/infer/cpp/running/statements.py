@@ -139,8 +139,7 @@ def return_statement(run: Machine, node: Node, frame: Frame) -> int:
     """Adds the value and what was written to the ways out of the call."""
     value = BOTTOM
     for child in children(node):
-        value = run.evaluate(child, frame)
-        value = as_result(run, value, child, frame)
+        value = as_result(run, child, frame)
     if run.left:
         return RETURN
     frame.returned = join(frame.returned, value)
