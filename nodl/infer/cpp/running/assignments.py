@@ -63,6 +63,13 @@ def assignment(run: Machine, node: Node, frame: Frame) -> Value:
     right = field_of(node, "right")
     if left is None:
         return BOTTOM
+    if (
+        left.type == "conditional_expression"
+    ):  # ``a ? b : c = d``, which the parser takes for ``(a ? b : c) = d``
+        for each in (left, right):
+            run.evaluate(each, frame)
+        forget(run, left, frame, told=False)
+        return unknown("one of two values of which the second is assigned")
     if any(child.is_error for child in node.children):
         assign(run, left, unknown("what the parser did not understand"), frame)
         return run.evaluate(right, frame)
@@ -141,7 +148,7 @@ def object_class(run: Machine, left: Node, frame: Frame) -> Class | None:
     by_auto = holder is not None and re.search(r"\bauto ?&+$", holder.types.get(text(inner), "")) is not None
     if by_auto or inner.type in ("subscript_expression", "field_expression", "call_expression"):
         return run.held_class(seen_type(run, inner, frame), frame)
-    return None if is_pointer(run, inner, frame) else run.class_of(declared_type(run, inner, frame)[0], frame)
+    return None if is_address(run, inner, frame) else run.class_of(declared_type(run, inner, frame)[0], frame)
 
 
 def _combined(operator: str, before: Value, value: Value) -> Value:

@@ -50,6 +50,7 @@ from nodl.infer.cpp.running.static_types import (
     declared_type,
     methods_meant,
     points_to_plain,
+    tested,
 )
 from nodl.infer.cpp.running.unknown_calls import (
     changed_by_standard,
@@ -103,6 +104,9 @@ def call_expression(run: Machine, node: Node, frame: Frame) -> Value:
         return unknown("a call")
     site = CallSite(run, node, callee, frame)
     name = callee_name(callee)
+    if name == "noexcept":
+        run.kill(field_of(node, "arguments"), frame, "noexcept() does not run what stands in it")
+        return unknown("what noexcept() says")
     if _RUNS_OTHERS.search(name):
         if callee.type in _NAMES:
             _ = site.values  # made before anything spins: ``spin(std::make_shared<Talker>())``
@@ -191,6 +195,8 @@ def _cast(run: Machine, name: str, site: CallSite) -> Value:
     if cls is not None and not text(template_arguments(site.callee)[0]).endswith(("&", "*")):
         made = made_of(run, site.types[0], value, site.node, site.frame, True)
         return copied(run, value, site.node, site.frame, cls) if made is None else made
+    if site.types[0].name == "bool":
+        value = tested(run, site.given[0], value, site.frame)
     return cast(run, site.types[0], value)
 
 

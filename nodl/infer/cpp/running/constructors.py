@@ -27,7 +27,14 @@ from nodl.infer.cpp.running.machine import MAX_DEPTH, NEXT, Frame, Machine
 from nodl.infer.cpp.running.overloads import candidates, fits
 from nodl.infer.cpp.running.plain_types import MAPS, NUMBERS, ORDERED, SEQUENCES, STREAMS, TEXT_CLASSES
 from nodl.infer.cpp.running.references import as_referred_to, forget, is_plain, keep_reference, leads_into
-from nodl.infer.cpp.running.static_types import check_hidden, given_in_braces, given_to, seen_class, seen_type
+from nodl.infer.cpp.running.static_types import (
+    check_hidden,
+    given_in_braces,
+    given_to,
+    seen_class,
+    seen_type,
+    tested,
+)
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     END,
@@ -66,6 +73,8 @@ def declared_value(
     if pointer or kind.pointer or _is_auto(written) or kind.name in NUMBERS:
         by_reference = pointer or (kind.pointer and "optional" not in written)
         found = initial_value(run, value, frame, by_reference or (_is_auto(written) and "&" in written))
+        if kind.name == "bool" and not by_reference:
+            found = tested(run, value, found, frame)
         if "optional" in written and not pointer:
             found = copied(run, found, node, frame, run.class_of(kind, frame))
         return found if pointer or kind.pointer else as_type(kind.name, found)
@@ -190,7 +199,8 @@ def made(run: Machine, node: Node, kind: Type, given: Sequence[Node], frame: Fra
         if kind.name in TEXT_CLASSES:
             parts = [run.evaluate(each, frame) for each in given]
             return begun_stream(parts[0]) if kind.name in STREAMS else text_of(run, parts)
-        return as_type(kind.name, run.evaluate(given[0], frame))
+        found = run.evaluate(given[0], frame)
+        return as_type(kind.name, tested(run, given[0], found, frame) if kind.name == "bool" else found)
     values: list[Value] | None = None
     if cls is not None and len(given) == 1 and not given[0].type.startswith("initializer_"):
         values = [run.evaluate(given[0], frame)]
@@ -528,6 +538,7 @@ def construct_class(
         return
     this.bindings[cls] = run.names.bindings(cls, kind)
     own = run.names.find_methods(cls, cls.name) if cls.name in run.names.methods[cls] else []
+    own = [each for each in own if arguments or not takes_another(each)]
     fitting = candidates(own, arguments)
     is_of_text = any(isinstance(atom, Text) for value in arguments for atom in value)
     if len(fitting) > 1 and (is_of_text or any(run.makes_interfaces(f) or _holds_text(f) for f in fitting)):

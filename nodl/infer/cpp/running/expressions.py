@@ -27,6 +27,7 @@ from nodl.infer.cpp.running.static_types import (
     declared_type,
     is_pointer,
     seen_type,
+    tested,
 )
 from nodl.infer.cpp.running.values import (
     BOTTOM,
@@ -240,14 +241,13 @@ def nothing_known(run: Machine, node: Node, frame: Frame) -> Value:
 @expression("cast_expression")
 def c_cast(run: Machine, node: Node, frame: Frame) -> Value:
     """Convert ``(T) x`` like ``static_cast<T>(x)``."""
-    kind = run.type_of(text(field_of(node, "type")), frame)
-    value = run.evaluate(field_of(node, "value"), frame)
-    made = (
-        None
-        if text(field_of(node, "type")).endswith(("*", "&"))
-        else made_of(run, kind, value, node, frame, True)
-    )
-    return cast(run, kind, value) if made is None else made
+    kind, given = run.type_of(text(field_of(node, "type")), frame), field_of(node, "value")
+    value = run.evaluate(given, frame)
+    is_object = not text(field_of(node, "type")).endswith(("*", "&"))
+    made = made_of(run, kind, value, node, frame, True) if is_object else None
+    if made is not None:
+        return made
+    return cast(run, kind, tested(run, given, value, frame) if kind.name == "bool" else value)
 
 
 @expression("lambda_expression")
@@ -258,6 +258,9 @@ def lambda_(run: Machine, node: Node, frame: Frame) -> Value:
         depth=frame.depth, captured=True,
     )  # fmt: skip
     inner = run.frame((node.id, frame, frame.path), inner)
+    this = current_object(frame)
+    if this is not None and re.search(r"\*\s*this\b", text(field_of(node, "captures"))):
+        (inner.this,) = copied(run, (this,), node, frame, this.cls)
     is_mutable = re.search(r"\)\s*mutable\b", text(field_of(node, "declarator"))) is not None
     if is_mutable and (run.subtree_matters(node) or '"' in text(node)):
         run.gap(node, frame, "a mutable closure changes what it captured: what it makes is not followed")
@@ -352,8 +355,11 @@ def binary(run: Machine, node: Node, frame: Frame) -> Value:
     if run.left:
         return BOTTOM
     if operator in ("&&", "||", "and", "or"):
+        left = tested(run, left_node, left, frame)
         return _logical(run, operator in ("||", "or"), left, right_node, frame)
     right = run.evaluate(right_node, frame)
+    if operator in ("==", "!=") and text(right_node) == "0":  # of a pointer
+        left = tested(run, left_node, left, frame)
     own = by_operator(run, operator, left, [right], node, frame)
     if own is not None:
         if operator == "<<" and has_text(left):  # it gives the stream that it wrote to
@@ -379,12 +385,12 @@ def _logical(run: Machine, either: bool, left: Value, right_node: Node | None, f
             run.kill(right_node, frame, "the condition before decides")
         return (either,)
     if known is not None:
-        value = decided(run, run.evaluate(right_node, frame))
+        value = decided(run, tested(run, right_node, run.evaluate(right_node, frame), frame))
         return (value,) if value is not None else unknown("a condition")
     found: list[Value] = []
 
     def second() -> int:
-        found.append(run.evaluate(right_node, frame))
+        found.append(tested(run, right_node, run.evaluate(right_node, frame), frame))
         return NEXT
 
     run.branches([second, lambda: NEXT], tested=True)
@@ -442,7 +448,7 @@ def unary(run: Machine, node: Node, frame: Frame) -> Value:
     if own is not None:
         return own
     if operator in ("!", "not"):
-        known = decided(run, value)
+        known = decided(run, tested(run, field_of(node, "argument"), value, frame))
         return unknown("a condition") if known is None else (not known,)
     if operator == "-" and len(value) == 1 and isinstance(value[0], int):
         return (-value[0],)
@@ -498,7 +504,8 @@ def method_pointer(run: Machine, node: Node, frame: Frame) -> Value | None:
 @expression("conditional_expression")
 def conditional(run: Machine, node: Node, frame: Frame) -> Value:
     """Evaluate ``a ? b : c``: the side that is chosen, the other one dead; both joined if that is not decided."""
-    condition = run.evaluate(field_of(node, "condition"), frame)
+    asked = field_of(node, "condition")
+    condition = tested(run, asked, run.evaluate(asked, frame), frame)
     if run.left:
         return BOTTOM
     known = decided(run, condition)

@@ -473,7 +473,9 @@ def _as_returned(run: Machine, function: Function, inner: Frame) -> Value:
         return inner.returned
     kind = run.type_of(type_text(function.node), inner)
     cls = run.held_class(kind, inner)
-    return copied(run, inner.returned, function.node, inner, cls) if cls is not None else inner.returned
+    if cls is None or all(not isinstance(atom, Obj) or atom.cls is cls for atom in inner.returned):
+        return inner.returned  # made in place, or copied where it is given back
+    return copied(run, inner.returned, function.node, inner, cls)
 
 
 # Transitions of a lifecycle node (rclcpp_lifecycle/node_interfaces/lifecycle_node_interface.hpp).

@@ -10,7 +10,8 @@ from nodl.infer.cpp.libraries import is_harmless_class
 from nodl.infer.cpp.reading.collect import declared_names
 from nodl.infer.cpp.reading.declarations import type_text
 from nodl.infer.cpp.reading.writes import writes_of
-from nodl.infer.cpp.running.constructors import as_result, declared_value, fields_of
+from nodl.infer.cpp.running.constructors import as_result, declared_value, fields_of, gives_pointer
+from nodl.infer.cpp.running.contents import copied, elements_copied
 from nodl.infer.cpp.running.launch_values import decided, in_doubt, settled
 from nodl.infer.cpp.running.left_out import forget_writes
 from nodl.infer.cpp.running.machine import (
@@ -26,10 +27,12 @@ from nodl.infer.cpp.running.machine import (
 )
 from nodl.infer.cpp.running.memory import Changes
 from nodl.infer.cpp.running.references import bind_reference
+from nodl.infer.cpp.running.static_types import seen_type, tested
 from nodl.infer.cpp.running.values import (
     BOTTOM,
     Const,
     Group,
+    Map,
     Obj,
     Seq,
     Text,
@@ -39,7 +42,7 @@ from nodl.infer.cpp.running.values import (
     unknown,
 )
 from nodl.infer.cpp.running.variables import member
-from nodl.infer.cpp.syntax import Node, children, field_of, parse_expression, text, unwrapped, walk
+from nodl.infer.cpp.syntax import Node, children, field_of, last_name, parse_expression, text, unwrapped, walk
 
 
 def in_a_block(handler: StatementHandler) -> StatementHandler:
@@ -140,11 +143,55 @@ def return_statement(run: Machine, node: Node, frame: Frame) -> int:
     value = BOTTOM
     for child in children(node):
         value = as_result(run, child, frame)
+        if frame.function is not None and type_text(frame.function.node) == "bool":
+            value = tested(run, child, value, frame)
+        value = _as_given_back(run, child, value, frame)
     if run.left:
         return RETURN
     frame.returned = join(frame.returned, value)
     frame.exits.append(run.store.changes(frame.mark))
     return RETURN
+
+
+def _as_given_back(run: Machine, given: Node, value: Value, frame: Frame) -> Value:
+    """Copy what a function gives back by value, unless it is a variable of its own or made for it."""
+    around = given.parent
+    while around is not None and around.type not in ("function_definition", "lambda_expression"):
+        around = around.parent
+    declarator = field_of(around, "declarator")
+    behind = next((text(each) for each in children(declarator) if each.type == "trailing_return_type"), "")
+    written = behind.removeprefix("->").strip() or (type_text(around) if around is not None else "")
+    if (
+        declarator is None
+        or not declarator.type.endswith("function_declarator")
+        or _is_made_here(run, given, frame)
+    ):
+        return value
+    if written.endswith(("&", "*")) or "decltype" in written:
+        return value
+    by_auto = written in ("", "auto")
+    kind = seen_type(run, given, frame) if by_auto else run.type_of(written, frame)
+    if kind.pointer or (by_auto and gives_pointer(run, given)):
+        return value
+    cls = run.class_of(kind, frame) if kind.name else None
+    if any(isinstance(atom, Seq | Map) for atom in value):
+        return elements_copied(run, kind, value, given, frame)
+    return copied(run, value, given, frame, cls) if cls is not None else value
+
+
+def _is_made_here(run: Machine, given: Node, frame: Frame) -> bool:
+    """Return whether it is a variable of the function itself, or an object that a call or braces make."""
+    inner = unwrapped(given)
+    if inner is None or inner.type == "identifier":
+        name = text(inner)
+        return name in frame.names and not frame.types.get(name, "").endswith(("&", "*"))
+    if inner.type == "call_expression":
+        name = last_name(field_of(inner, "function"))
+        listed = run.names.functions_by_name.get(name, ())
+        declarators = [field_of(each.node, "declarator") for each in listed]
+        by_value = all(each is not None and each.type == "function_declarator" for each in declarators)
+        return name in run.names.classes or (bool(listed) and by_value)
+    return inner.type in ("compound_literal_expression", "initializer_list", "lambda_expression")
 
 
 @statement("throw_statement")
@@ -208,8 +255,9 @@ def condition_of(run: Machine, condition: Node | None, frame: Frame) -> Value:
         run.execute(inner, frame)
         declared = field_of(inner, "declarator") or inner
         named = [each for each in walk(declared) if each.type == "identifier"]
-        return (run.store.get((frame, text(named[0]))) or BOTTOM) if named else BOTTOM
-    return run.evaluate(inner, frame)
+        held = (run.store.get((frame, text(named[0]))) or BOTTOM) if named else BOTTOM
+        return tested(run, named[0], held, frame) if named else BOTTOM
+    return tested(run, inner, run.evaluate(inner, frame), frame)
 
 
 @statement("preproc_if", "preproc_ifdef", "preproc_elif")

@@ -14,12 +14,13 @@ from nodl.infer.cpp.reading.names import hidden
 from nodl.infer.cpp.reading.type_names import NO_TYPE, Type
 from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.machine import Frame, Machine
-from nodl.infer.cpp.running.values import Obj, lost
+from nodl.infer.cpp.running.values import Obj, Param, Value, lost, unknown
 from nodl.infer.cpp.syntax import (
     Node,
     callee_name,
     children,
     field_of,
+    last_name,
     parse_expression,
     template_arguments,
     text,
@@ -200,17 +201,23 @@ def is_pointer(run: Machine, node: Node, frame: Frame) -> bool:
 
 def is_address(run: Machine, node: Node, frame: Frame) -> bool:
     """Return whether a variable, member or element is a pointer: other than an optional it holds no object itself."""
+    written = _written_type(run, node, frame)
+    return seen_type(run, node, frame).pointer and "optional" not in written and "&" not in written
+
+
+def _written_type(run: Machine, node: Node, frame: Frame) -> str:
+    """Return how a variable or member is declared; empty for anything else."""
     name = text(field_of(node, "field") or node)
     holder = frame.owner_of(name) if node.type == "identifier" else None
+    if holder is not None:
+        return holder.types.get(name, "")
     this = current_object(frame)
     around = this.cls if this is not None else None
     argument = field_of(node, "argument") if node.type == "field_expression" else None
     cls = around if argument is None or argument.type == "this" else seen_class(run, argument, frame)
     field = next((each.fields[name] for each in run.names.ancestry(cls) if name in each.fields), None)
-    written = (
-        holder.types.get(name, "") if holder is not None else text(field.node) if field is not None else ""
-    )
-    return seen_type(run, node, frame).pointer and "optional" not in written and "&" not in written
+    outside = run.names.find_global(name, frame.scope, frame.file) if field is None else None
+    return text(field.node if field is not None else outside.node if outside is not None else None)
 
 
 def _is_reference(run: Machine, node: Node, frame: Frame) -> bool:
@@ -300,6 +307,92 @@ def element_type(kind: Type) -> Type:
     return kind.arguments[-1] if kind.arguments and kind.last != "array" else (*kind.arguments, NO_TYPE)[0]
 
 
+def tested(run: Machine, node: Node | None, value: Value, frame: Frame) -> Value:
+    """Return what a condition tests: a number in an optional or behind a pointer does not say whether that is set."""
+    is_number = _is_number(run, node, frame) if any(isinstance(a, int | Param) for a in value) else True
+    may_be_set = any(
+        is_number is False if isinstance(atom, Param) else isinstance(atom, int) and not (atom or is_number)
+        for atom in value
+    )
+    return unknown("whether an optional or pointer is set") if may_be_set else value
+
+
+def _is_number(run: Machine, node: Node | None, frame: Frame) -> bool | None:
+    """Return whether an expression is a number itself, not an optional or pointer; ``None`` if that is not known."""
+    node = unwrapped(node)
+    kind = node.type if node is not None else ""
+    if node is None:
+        return None
+    if kind in ("argument_list", "initializer_list", "comma_expression"):
+        return _is_number(run, next(reversed(children(node)), None), frame)
+    if kind in ("assignment_expression", "update_expression"):
+        return _is_number(run, field_of(node, "left") or field_of(node, "argument"), frame)
+    if kind == "conditional_expression":
+        sides = [_is_number(run, field_of(node, each), frame) for each in ("consequence", "alternative")]
+        return sides[0] if sides[0] == sides[1] else None
+    if kind == "call_expression":
+        return _gives_number(run, node, frame)
+    if text(node).startswith("&"):
+        return False
+    if kind == "pointer_expression":
+        return _is_number_type(run, seen_type(run, node, frame)._replace(pointer=False))
+    if kind not in _VARIABLES:
+        return True  # a literal, a comparison, a sum
+    holder = frame.owner_of(text(node))
+    written = holder.types.get(text(node), "") if holder is not None else ""
+    initial = holder.initial.get(text(node)) if holder is not None else None
+    if initial is not None and holder is not None and run.type_of(written, holder).name == "auto":
+        is_item = initial.parent is not None and initial.parent.type == "for_range_loop"
+        return None if is_item or "*" in written else _is_number(run, initial, holder)
+    static = static_by_name(run, text(node), frame) if holder is None else None
+    if static is not None:
+        field = static[0].fields[static[1]]
+        seen = run.names.resolve(field.type, static[0].scope, static[0].file)
+        return _is_number_type(run, seen._replace(pointer=field.pointer or seen.pointer))
+    return _is_number_type(run, seen_type(run, node, frame), _written_type(run, node, frame))
+
+
+_VARIABLES = (
+    "identifier", "field_identifier", "qualified_identifier", "field_expression", "subscript_expression",
+)  # fmt: skip
+
+
+def _is_number_type(run: Machine, kind: Type, written: str = "") -> bool | None:
+    if kind.pointer and "atomic" not in written:
+        return False
+    return True if _NUMBER.fullmatch(kind.name) or kind.last in run.names.enums else None
+
+
+_NUMBER = re.compile(
+    r"bool|char|double|float|short|bit_field|(?:un)?signed(?: \w+)*|long(?: \w+)*|"
+    r"(?:std::)?(?:u?int(?:_\w+)?(?:\d+_t)?|size_t|atomic_\w+)"
+)
+
+
+def _gives_number(run: Machine, call: Node, frame: Frame) -> bool | None:
+    """Return ``_is_number`` of a call."""
+    callee = unwrapped(field_of(call, "function")) or call
+    name, owner = last_name(callee), field_of(callee, "argument")
+    listed = run.names.functions_by_name.get(name, ())
+    if name == "static_cast" or (not listed and _NUMBER.fullmatch(text(callee))):
+        made = template_arguments(callee)
+        return _is_number_type(run, run.type_of(text(made[0]), frame) if made else Type(name))
+    if owner is not None and name in _GIVES_ELEMENT and not listed:
+        return _is_number_type(run, _of_call(run, call, frame))
+    if owner is not None and name == "value" and not listed:
+        return _is_number_type(run, seen_type(run, owner, frame)._replace(pointer=False))
+    if not listed:
+        return True if owner is not None and _COUNTS.fullmatch(name) else None
+    found = {
+        _is_number_type(run, run.names.resolve(type_text(each.node), each.scope, each.file))
+        if (field_of(each.node, "declarator") or each.node).type == "function_declarator"
+        else None
+        for each in listed
+    }
+    return found.pop() if len(found) == 1 else None
+
+
+_COUNTS = re.compile(r"empty|size|length|count|contains|has_value|value_or|compare|\w+s_with|r?find\w*")
 GIVES_INNER = frozenset({"get", "lock", "value", "release"})
 _MAKES = re.compile(r"(?:^|::)(?:make_(?:shared|unique)|\w+_cast)$")
 _PLAIN = re.compile(

@@ -1,0 +1,97 @@
+"""Programs that make ``new`` when they are compiled and run, where an easy reading gives ``old``.
+
+``COVERED``: ``new`` is listed, or a name is open, or there is a gap. ``KNOWN``: ``new`` alone is listed.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tests.nodl.infer.cpp.workspace import gaps, in_class, infer, names
+
+pytest.importorskip("tree_sitter_cpp", reason="the extra cpp is not installed")
+
+PUB = "void pub(const std::string & t) { create_publisher<std_msgs::msg::String>(t, 1); }\n"
+EITHER = '{ pub("new"); } else { pub("old"); }'
+FOUND = "std::optional<int> f(int k) { if (k < 0) { return std::nullopt; } return k; }"
+CONFIG = 'struct C { std::string t = "new"; void set(const std::string & s) { t = s; } };\n'
+
+# what the constructor does, what stands before its class
+COVERED = {
+    "an optional that holds zero is not empty": (f"if (auto id = f(0)) {EITHER}", FOUND),
+    "an optional that holds false is not empty": (f"std::optional<bool> o = false; if (o) {EITHER}", ""),
+    "nor is one that is a member": (f"C c; c.id = 0; if (c.id) {EITHER}", "struct C { std::optional<int> id; };"),
+    "or an argument": ('pub(g(0) ? "new" : "old");', "bool g(std::optional<int> o) { return o ? true : false; }"),
+    "or an element": (f"std::map<int, std::optional<int>> m; m[1] = 0; if (m[1]) {EITHER}", ""),
+    "or turned into a condition": (f"auto o = f(0); bool b = static_cast<bool>(o); if (b) {EITHER}", FOUND),
+    "a pointer to zero is set": (f"int z = 0; int * p = &z; if (p) {EITHER}", ""),
+    "a pointer that is negated twice": (f"bool z = false; auto p = &z; if (!!p) {EITHER}", ""),
+    "a pointer that is compared with zero": (f"int z = 0; int * p = &z; if (p != 0) {EITHER}", ""),
+    "a pointer that a function gives as a condition": (
+        f"int z = 0; if (is_set(&z)) {EITHER}", "bool is_set(int * p) { return p; }",
+    ),
+    "a pointer to an entry": (
+        f"if (find(1)) {EITHER}",
+        "std::map<int, int> m{{1, 0}}; const int * find(int k) { auto it = m.find(k); "
+        "return it == m.end() ? nullptr : &it->second; }",
+    ),
+    "a closure that has a copy of its object": (
+        "O o; pub(o.get());",
+        'struct O { std::string n = "new"; std::string get() { auto f = [*this]() { return n; }; n = "old"; '
+        "return f(); } };",
+    ),
+    "an optional of a base holds no derived object": (
+        "std::optional<A> p; p = R(); pub(p->n());",
+        'struct A { virtual std::string n() { return "new"; } };\n'
+        'struct R : A { std::string n() override { return "old"; } };',
+    ),
+    "what noexcept asks does not run": ('std::string r = "new"; (void)noexcept(r = "old"); pub(r);', ""),
+    "an assignment behind a question": (
+        'int k = 1; std::string x; pub((k > 0 ? x = "new" : x = "old"));', "",
+    ),
+}  # fmt: skip
+KNOWN = {
+    "a method gives back a copy": (
+        'H h; h.config().t = "old"; pub(h.c_.t);', CONFIG + "struct H { C c_; C config() const { return c_; } };",
+    ),
+    "a method gives back a copy of an element": (
+        'H h; h.at(0).set("old"); pub(h.c_[0].t);',
+        CONFIG + "struct H { std::vector<C> c_{C()}; C at(int i) const { return c_[i]; } };",
+    ),
+    "a function gives back a copy of a global": (
+        'config().set("old"); pub(g.t);', CONFIG + "C g; C config() { return g; }",
+    ),
+    "a method gives back a reference": (
+        'H h; h.config().t = "new"; pub(h.c_.t);',
+        CONFIG + 'struct H { C c_{"old"}; C & config() { return c_; } };',
+    ),
+    "a method gives back a pointer to what it shares": (
+        'H h; h.config()->t = "new"; pub(h.c_->t);',
+        CONFIG + 'struct H { std::shared_ptr<C> c_ = std::make_shared<C>(C{"old"}); '
+        "std::shared_ptr<C> config() { return c_; } };",
+    ),
+    "what is made for a result is not copied": (
+        "pub(f().n);",
+        'struct O { std::string n = "new"; O() = default; O(const O &) : n("old") {} }; O f() { return O(); }',
+    ),
+    "a number itself decides": (f"int z = 0; if (!z) {EITHER}", ""),
+    "so does one that a function gives": (f"if (!f()) {EITHER}", "bool f() { return false; }"),
+    "one that an atomic holds": (f"std::atomic<bool> z{{false}}; if (!z) {EITHER}", ""),
+    "one that auto stands for": (f"auto z = false; if (!z) {EITHER}", ""),
+    "one in a class": (f"if (!Kind::fast) {EITHER}", "struct Kind { static constexpr bool fast = false; };"),
+    "one that an optional shows": (f"std::optional<bool> z = false; if (!*z) {EITHER}", ""),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("body", "before"), COVERED.values(), ids=COVERED)
+def test_the_new_name_is_covered(body: str, before: str, tmp_path: Path) -> None:
+    system = infer(tmp_path, in_class(body, PUB, before=f"{before}\n"))
+    assert gaps(system) or any(each == "new" or "?" in each for each in names(system))
+
+
+@pytest.mark.parametrize(("body", "before"), KNOWN.values(), ids=KNOWN)
+def test_the_new_name_alone_is_listed(body: str, before: str, tmp_path: Path) -> None:
+    system = infer(tmp_path, in_class(body, PUB, before=f"{before}\n"))
+    assert (names(system), gaps(system)) == (["new"], [])
