@@ -84,7 +84,11 @@ class _Collector:
         elif kind in ("declaration", "field_declaration"):
             self.declaration(child, scope, templates, cls)
         elif kind == "friend_declaration":
-            return
+            classes = {each.qualified for listed in self.index.classes.values() for each in listed}
+            around = next(n for n in range(len(scope), -1, -1) if "::".join(scope[:n]) not in classes)
+            for each in children(child):
+                if each.type == "function_definition":  # of the namespace around
+                    self.function(each, scope[:around], templates, None)
         elif kind in ("preproc_if", "preproc_ifdef", "preproc_else", "preproc_elif", "linkage_specification",
                       "declaration_list", "ERROR", "export_declaration"):  # fmt: skip
             self.collect(child, scope, templates, cls)

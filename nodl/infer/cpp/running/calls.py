@@ -160,9 +160,27 @@ def _named_call(run: Machine, name: str, site: CallSite) -> Value:
         run.resolve(site.node, site.frame)
         values = site.values
         return call_values(run, run.store.get((owner, name)) or BOTTOM, values, site.node, site.frame)
+    if _hides_dependent(run, name, site.frame):
+        return _free_call(run, name, site, site.frame.scope)
     found = _own_method(run, name, site)
     found = _method_around(run, name, site) if found is None else found
     return _free_call(run, name, site, site.frame.scope) if found is None else found
+
+
+def _hides_dependent(run: Machine, name: str, frame: Frame) -> bool:
+    """Return whether a name means a function though a base has such a method: one whose type depends on the parameters
+    of the template ([temp.dep]/3).
+    """
+    cls = class_around(run, frame)
+    if cls is None or not cls.templates or name in cls.uses or name in run.names.methods[cls]:
+        return False
+    depends_on = {*cls.templates}
+    bases = {
+        base for written, base in run.names.bases(cls) if depends_on.isdisjoint(re.findall(r"\w+", written))
+    }
+    return not any(run.names.find_methods(base, name) for base in bases) and bool(
+        run.names.find_functions(name, frame.scope, frame.file)
+    )
 
 
 def _method_around(run: Machine, name: str, site: CallSite) -> Value | None:
@@ -256,7 +274,7 @@ def _free_call(run: Machine, name: str, site: CallSite, scope: Scope) -> Value:
         kind = site.types[0] if site.types else NO_TYPE
         return construct(run, kind._replace(pointer=False), site.values, node, frame, heap=True)
     functions = run.names.find_functions(name, scope, frame.file)
-    functions = [*functions, *_beside_arguments(run, name, functions, site)]
+    functions = _declared_before(run, [*functions, *_beside_arguments(run, name, functions, site)], site)
     if functions:
         return call_functions(run, functions, site.values, node, frame, site.types)
     qualified = as_algorithm(qualified, site.given)
@@ -277,15 +295,38 @@ def _free_call(run: Machine, name: str, site: CallSite, scope: Scope) -> Value:
     return _made_or_unknown(run, name, qualified, site)
 
 
+def _declared_before(run: Machine, functions: list[Function], site: CallSite) -> list[Function]:
+    """Return the overloads that a call sees, which in a template may be later ones; all if it seems to see none."""
+    around, cls = site.frame.function, class_around(run, site.frame)
+    if len(functions) < 2 or (around is not None and around.templates) or (cls is not None and cls.templates):
+        return functions
+
+    def is_seen(each: Function) -> bool:
+        if each.file.file != site.frame.file.file or each.node.start_byte < site.node.start_byte:
+            return True
+        taken = [_SPACE.sub("", p.type) for p in each.parameters]
+        return any(
+            other.file.file != each.file.file or other.node.start_byte < site.node.start_byte
+            for other in run.names.declared.get(each.name, ())
+            if [_SPACE.sub("", p.type) for p in other.parameters] == taken
+        )
+
+    return [each for each in functions if is_seen(each)] or functions
+
+
+_SPACE = re.compile(r"\s+")
+
+
 def _beside_arguments(run: Machine, name: str, found: list[Function], site: CallSite) -> list[Function]:
     """Return functions of that name that ``found`` lacks, in the namespaces of the arguments' classes
     ([basic.lookup.argdep]).
     """
-    listed = run.names.functions.get(name, ())
-    if len({each.scope for each in listed}) < 2 or _is_global(site):
+    listed = run.names.functions.get(name.rpartition("::")[2], ())
+    if not listed or "::" in text(site.callee):
         return []
     objects = (atom for value in site.values for atom in value if isinstance(atom, Obj))
-    spaces = {tuple(each.cls.qualified.split("::")[:-1]) for each in objects if each.cls is not None}
+    classes = (cls for each in objects for cls in run.names.ancestry(each.cls))
+    spaces = {tuple(each.qualified.split("::")[:-1]) for each in classes}
     return [each for each in listed if each.scope in spaces and not each.owner and each not in found]
 
 

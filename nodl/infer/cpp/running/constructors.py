@@ -31,6 +31,7 @@ from nodl.infer.cpp.running.static_types import (
     check_hidden,
     given_in_braces,
     given_to,
+    kinds_of,
     seen_class,
     seen_type,
     tested,
@@ -539,7 +540,13 @@ def construct_class(
     this.bindings[cls] = run.names.bindings(cls, kind)
     own = run.names.find_methods(cls, cls.name) if cls.name in run.names.methods[cls] else []
     own = [each for each in own if arguments or not takes_another(each)]
-    fitting = candidates(own, arguments)
+    given_here = given_to(node, frame) if len(own) > 1 else []
+    fitting = candidates(own, arguments, kinds_of(run, given_here, frame))
+    if given_here and given_here[0].parent is not None and given_here[0].parent.type == "initializer_list":
+        listed = [f for f in own if f.parameters and "initializer_list" in f.parameters[0].type]
+        if listed:  # comes first, whatever else fits ([over.match.list])
+            fitting = [listed[0], *(each for each in fitting if each is not listed[0])]
+            arguments = [(Seq(tuple(arguments)),)]
     is_of_text = any(isinstance(atom, Text) for value in arguments for atom in value)
     if len(fitting) > 1 and (is_of_text or any(run.makes_interfaces(f) or _holds_text(f) for f in fitting)):
         run.gap(node, frame, f"which constructor of {cls.name} is meant here is not known")

@@ -15,6 +15,7 @@ from nodl.infer.cpp.running.contents import copied, elements_copied, items_of
 from nodl.infer.cpp.running.invocation import by_operator, pointed_to
 from nodl.infer.cpp.running.launch_values import decided, in_doubt, settled
 from nodl.infer.cpp.running.machine import NEXT, Frame, Machine, expression
+from nodl.infer.cpp.running.overloads import as_number
 from nodl.infer.cpp.running.references import (
     as_referred_to,
     forget_everything,
@@ -26,6 +27,7 @@ from nodl.infer.cpp.running.static_types import (
     current_object,
     declared_type,
     is_pointer,
+    kinds_of,
     seen_type,
     tested,
 )
@@ -372,7 +374,8 @@ def binary(run: Machine, node: Node, frame: Frame) -> Value:
     if operator == "<<" and not (len(left) == 1 and isinstance(left[0], int)):
         return _streamed(run, left_node, left, right_node, right, frame)
     if operator == "+" and (has_text(left) or has_text(right)):
-        return added(left, right)
+        kinds = kinds_of(run, [each for each in (left_node, right_node) if each is not None], frame)
+        return unknown("a sum of letters") if all(map(as_number, kinds)) else added(left, right)
     if len(left) == 1 and len(right) == 1:
         return computed(operator, settled(run, left)[0], settled(run, right)[0])
     return unknown(f"the value of {text(node)[:60]}")

@@ -24,7 +24,7 @@ from nodl.infer.cpp.running.machine import MAX_DEPTH, NEXT, Frame, Machine
 from nodl.infer.cpp.running.memory import MEMORY_DEPTH, CallOutcome, Changes
 from nodl.infer.cpp.running.overloads import candidates, chosen
 from nodl.infer.cpp.running.references import forget, forget_everything, is_plain, through
-from nodl.infer.cpp.running.static_types import given_to
+from nodl.infer.cpp.running.static_types import given_to, kinds_of
 from nodl.infer.cpp.running.unknown_calls import may_be_written as may_be_written
 from nodl.infer.cpp.running.unknown_calls import unknown_call
 from nodl.infer.cpp.running.values import (
@@ -311,7 +311,8 @@ def call_methods(
     special = _one_of_special(run, methods, node, frame)
     if special is not None:
         return special
-    fitting = candidates(methods, values)
+    kinds = kinds_of(run, given_to(node, frame), frame) if len(methods) > 1 else ()
+    fitting = candidates(methods, values, kinds)
     if not fitting:
         name = "::".join(filter(None, (methods[0].owner, methods[0].name)))
         return unknown_call(run, name, values, node, [], frame)

@@ -442,7 +442,11 @@ def _vexing(run: Machine, node: Node, declarator: Node, frame: Frame) -> None:
         if _is_static(node):
             _static_local(run, node, name, written, initial, frame)
             return
+        path = frame.path
+        if len(node.children_by_field_name("declarator")) > 1:
+            frame.path = (*path, name)  # each variable is an object of its own
         found = initial()
+        frame.path = path
         if any(
             isinstance(each, Obj) and each.cls is None and not is_harmless_class(each.type.name)
             for each in found

@@ -6,7 +6,7 @@ A member that a derived class hides shares its cell with the hidden one; where a
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from functools import partial
 
 from nodl.infer.cpp.reading.declarations import Class, Function, type_text
@@ -14,6 +14,7 @@ from nodl.infer.cpp.reading.names import hidden
 from nodl.infer.cpp.reading.type_names import NO_TYPE, Type
 from nodl.infer.cpp.reading.writes import writes_of
 from nodl.infer.cpp.running.machine import Frame, Machine
+from nodl.infer.cpp.running.overloads import as_number
 from nodl.infer.cpp.running.values import Obj, Param, Value, lost, unknown
 from nodl.infer.cpp.syntax import (
     Node,
@@ -190,6 +191,8 @@ def _given(call: Node, frame: Frame) -> Node | None:
         return field_of(made[0], "value") if made else None
     if call.type == "field_initializer":
         return call.named_children[-1]
+    if call.type == "compound_literal_expression":
+        return field_of(call, "value")
     return call if call.type in ("argument_list", "initializer_list") else field_of(call, "arguments")
 
 
@@ -392,6 +395,39 @@ def _gives_number(run: Machine, call: Node, frame: Frame) -> bool | None:
     return found.pop() if len(found) == 1 else None
 
 
+def kinds_of(run: Machine, given: Sequence[Node], frame: Frame) -> list[str]:
+    """Return of each argument which kind of number it is, ``text`` of a text, empty if that is not known."""
+    return [_kind_of(run, unwrapped(each), frame) for each in given]
+
+
+def _kind_of(run: Machine, node: Node | None, frame: Frame) -> str:
+    written, kind = text(node).lower(), node.type if node is not None else ""
+    if node is None or kind == "char_literal":
+        return "char" if written.startswith("'") else ""
+    if kind in ("string_literal", "raw_string_literal", "concatenated_string"):
+        return "text"
+    if kind in ("true", "false"):
+        return "bool"
+    if kind == "number_literal":
+        suffix = written[len(written.rstrip("ulz")) :]
+        return _OF_SUFFIX.get("".join(sorted(suffix)), "") if written.rstrip("ulz").isdigit() else ""
+    if kind == "unary_expression":
+        inner = _kind_of(run, field_of(node, "argument"), frame)
+        return "bool" if written.startswith("!") else inner if inner in ("int", "long") else ""
+    if kind not in _VARIABLES and kind != "call_expression":
+        return ""
+    seen, callee = seen_type(run, node, frame), last_name(field_of(node, "function"))
+    if kind == "call_expression" and not _gives_number(run, node, frame):
+        return "" if callee in run.names.functions_by_name or _MAY_BE_LETTER.fullmatch(callee) else "text"
+    return "text" if seen.last in ("string", "string_view") else "" if seen.pointer else as_number(seen.name)
+
+
+_MAY_BE_LETTER = re.compile(
+    r"at|front|back|get\w*|value\w*|to(?:lower|upper)|\w+_cast|exchange|m(?:in|ax)|move|forward"
+)
+
+
+_OF_SUFFIX = {"": "int", "u": "unsigned int", "l": "long", "lu": "unsigned long"}
 _COUNTS = re.compile(r"empty|size|length|count|contains|has_value|value_or|compare|\w+s_with|r?find\w*")
 GIVES_INNER = frozenset({"get", "lock", "value", "release"})
 _MAKES = re.compile(r"(?:^|::)(?:make_(?:shared|unique)|\w+_cast)$")

@@ -51,6 +51,14 @@ COVERED = {
     "an assignment behind a question": (
         'int k = 1; std::string x; pub((k > 0 ? x = "new" : x = "old"));', "",
     ),
+    "braces prefer a list": (
+        "O o{1, 2}; pub(o.n);",
+        'struct O { std::string n; O(int, int) : n("old") {} O(std::initializer_list<int>) : n("new") {} };',
+    ),
+    "a sum of letters is a number": (
+        "pub(n('a' + 'b'));", 'std::string n(char) { return "old"; } std::string n(int) { return "new"; }',
+    ),
+    "a fraction": ("pub(n(1.0));", 'std::string n(double) { return "new"; } std::string n(int) { return "old"; }'),
 }  # fmt: skip
 KNOWN = {
     "a method gives back a copy": (
@@ -82,6 +90,54 @@ KNOWN = {
     "one that auto stands for": (f"auto z = false; if (!z) {EITHER}", ""),
     "one in a class": (f"if (!Kind::fast) {EITHER}", "struct Kind { static constexpr bool fast = false; };"),
     "one that an optional shows": (f"std::optional<bool> z = false; if (!*z) {EITHER}", ""),
+    "a number without sign": (
+        "pub(n(1u));", 'std::string n(int) { return "old"; } std::string n(unsigned) { return "new"; }',
+    ),
+    "a template rather than a conversion": (
+        "pub(n(1));", 'std::string n(long) { return "old"; } template <typename T> std::string n(T) { return "new"; }',
+    ),
+    "a letter is a number rather than a text": (
+        "pub(n('c'));",
+        'std::string n(int) { return "new"; } std::string n(const std::string &) { return "old"; }',
+    ),
+    "a small number": (
+        "uint8_t k = 1; pub(n(k));", 'std::string n(uint8_t) { return "new"; } std::string n(int) { return "old"; }',
+    ),
+    "a later overload is not seen": (
+        "pub(get());",
+        'std::string n(double) { return "new"; } std::string get() { return n(1); } '
+        'std::string n(int) { return "old"; }',
+    ),
+    "a later overload that makes nothing is not seen": (
+        "get(this);",
+        'void n(rclcpp::Node * k, double) { k->create_publisher<std_msgs::msg::String>("new", 1); } '
+        "void get(rclcpp::Node * k) { n(k, 1); } void n(rclcpp::Node *, int) { }",
+    ),
+    "a base that depends on a template is not looked into": (
+        "R<int> r; pub(r.get());",
+        'std::string n() { return "new"; } template <typename T> struct A { std::string n() { return "old"; } };\n'
+        "template <typename T> struct R : A<T> { std::string get() { return n(); } };",
+    ),
+    "unless it is brought in": (
+        "R<int> r; pub(r.get());",
+        'std::string n() { return "old"; } template <typename T> struct A { std::string n() { return "new"; } };\n'
+        "template <typename T> struct R : A<T> { using A<T>::n; std::string get() { return n(); } };",
+    ),
+    "a friend is found by its argument": (
+        "pub(label(q::X{}));",
+        'namespace q { struct X { friend std::string label(const X &) { return "new"; } }; }\n'
+        'std::string label(int) { return "old"; }',
+    ),
+    "a function is found by the base of its argument": (
+        "pub(label(Y{}));",
+        'namespace q { struct X {}; std::string label(const X &) { return "new"; } }\n'
+        'struct Y : q::X {}; std::string label(int) { return "old"; }',
+    ),
+    "a function is found by its argument beside one that is brought in": (
+        "using z::label; pub(label(q::X{}));",
+        'namespace z { std::string label(int) { return "old"; } }\n'
+        'namespace q { struct X {}; std::string label(const X &) { return "new"; } }',
+    ),
 }  # fmt: skip
 
 
