@@ -42,10 +42,8 @@ def fits(function: Function, arguments: Sequence[Value]) -> bool:
     """Return whether a function takes so many arguments, none of which looks as if it were of another type."""
     if not _takes(function, len(arguments)):
         return False
-    return all(
-        _likeness(*each, function.templates) >= 0
-        for each in zip(function.parameters, arguments, strict=False)
-    )
+    pairs = zip(function.parameters, arguments, strict=False)
+    return all(_likeness(parameter, value, "", function.templates) >= 0 for parameter, value in pairs)
 
 
 _EXACT = 3
