@@ -52,7 +52,7 @@ from nodl.infer.cpp.running.values import (
     unknown,
 )
 from nodl.infer.cpp.running.variables import static_member
-from nodl.infer.cpp.syntax import Node, children, field_of, text, unwrapped
+from nodl.infer.cpp.syntax import Node, children, field_of, last_name, text, unwrapped
 from nodl.name_template import UnknownPart
 
 
@@ -80,12 +80,14 @@ def assignment(run: Machine, node: Node, frame: Frame) -> Value:
     if operator == "=":
         is_shown = is_address(run, left, frame) or gives_pointer(run, right or left)
         cls = object_class(run, left, frame) if not is_shown else None
-        before = run.evaluate(left, frame) if cls is not None else BOTTOM
+        # A function of the program may make the variable that it gives.
+        is_ours = last_name(field_of(left, "function")) in run.names.functions_by_name
+        before = run.evaluate(left, frame) if cls is not None or is_ours else BOTTOM
         if cls is not None and not run.names.find_methods(cls, "operator="):
             of_other = made_of(run, Type(cls.qualified), value, node, frame)
             value = value if of_other is None else of_other
         objects = bool(before) and all(isinstance(atom, Obj) and atom.cls is not None for atom in before)
-        if objects and _assigned(run, before, value, node, frame):
+        if cls is not None and objects and _assigned(run, before, value, node, frame):
             return before
         if not is_shown:
             value = copied(run, value, node, frame, cls)

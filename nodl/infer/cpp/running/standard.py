@@ -157,7 +157,7 @@ def _calls_back(run: Machine, values: Sequence[Value], node: Node, frame: Frame)
         if isinstance(atom, Seq) and atom.place
         for item in atom.items
     ]
-    for atom in (atom for value in values for atom in value if isinstance(atom, Lambda)):
+    for atom in (atom for value in values for atom in value if _runs_now(run, atom)):
         once = partial(_once, run, atom, [join(*items)] if items else [], node, frame)
         # Before what follows, or not.
         run.branches([once, lambda: NEXT], doubt="what a closure that runs meanwhile writes")
@@ -190,7 +190,13 @@ _ALGORITHMS = ("std::for_each", "std::transform", "std::sort", "std::any_of", "s
 """They call their closure, and keep it not."""
 
 
-def _once(run: Machine, atom: Lambda, elements: Sequence[Value], node: Node, frame: Frame) -> int:
+def _runs_now(run: Machine, atom: object) -> bool:
+    """Return whether it is a closure, or an object whose ``operator()`` writes something."""
+    own = run.methods_of(atom, "operator()")
+    return isinstance(atom, Lambda) or any(writes_of(each.node) for each in own)
+
+
+def _once(run: Machine, atom: Lambda | Obj, elements: Sequence[Value], node: Node, frame: Frame) -> int:
     run.calls.call_values(run, (atom,), elements, node, frame)
     return NEXT
 

@@ -126,6 +126,8 @@ def sequence(run: Machine, listed: list[Node], frame: Frame) -> int:
 @statement("expression_statement")
 def expression_statement(run: Machine, node: Node, frame: Frame) -> int:
     """Evaluates it; leaves like a return where a call certainly throws or ends the program."""
+    if "=" in text(node) and any(child.is_error and text(child) == ")" for child in node.children):
+        run.gap(node, frame, "this C++ could not be parsed, and writes something")  # ``f((a = b, c), d);``
     for child in children(node):
         run.evaluate(child, frame)
         if run.left or (child.type == "call_expression" and _ends_program(run, child, frame)):

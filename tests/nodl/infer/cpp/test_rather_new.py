@@ -58,6 +58,17 @@ COVERED = {
     "a sum of letters is a number": (
         "pub(n('a' + 'b'));", 'std::string n(char) { return "old"; } std::string n(int) { return "new"; }',
     ),
+    "an algorithm calls an object that it has by reference": (
+        'std::vector<std::string> a{"new"}; F f; std::for_each(a.begin(), a.end(), std::ref(f)); pub(f.s);',
+        'struct F { std::string s = "old"; void operator()(const std::string & t) { s = t; } };',
+    ),
+    "a static variable that a method gives a reference to": (
+        'A b; b.s() = "new"; pub(b.s());',
+        'struct A { std::string & s() { static std::string x = "old"; return x; } };',
+    ),
+    "assignments and commas in an argument": (
+        'std::string a; create_publisher<std_msgs::msg::String>((a = "old", a = "new", a), 1);', "",
+    ),
     "a fraction": ("pub(n(1.0));", 'std::string n(double) { return "new"; } std::string n(int) { return "old"; }'),
 }  # fmt: skip
 KNOWN = {
