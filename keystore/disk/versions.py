@@ -117,6 +117,13 @@ class Versions:
         return [max(others, key=lambda name: tuple(map(int, name.split("."))))] if others else []
 
 
+def imported_at(version: Path) -> Path:
+    """Return the place where ``version`` was imported, which a command is to be given; another keystore is its own."""
+    folder = version.parent
+    is_version = folder.name.endswith(".d") and _VERSION.fullmatch(version.name)
+    return folder.with_name(folder.name.removesuffix(".d")) if is_version else version
+
+
 def write_tree(root: Path, entries: Mapping[str, Content | Link], *, durable: bool = False) -> None:
     """Make a new directory with these files, by their paths below it."""
     os.mkdir(root, 0o700)

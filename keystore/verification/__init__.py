@@ -12,6 +12,7 @@ from keystore.add_ons import zenoh_files
 from keystore.disk import layout, safe_files
 from keystore.disk.crl_file import revoked_serials
 from keystore.disk.deployed import find_differences
+from keystore.disk.versions import imported_at
 from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import KeystoreError, NotInstalledError, storage_errors
 from keystore.formats.governance import Governance
@@ -112,9 +113,8 @@ def _check_zenoh(view: KeystoreView, now: datetime) -> Iterator[Finding]:
 
 
 def _check_deployment(view: KeystoreView) -> Iterator[Finding]:
-    fix = repair.run(
-        view.root, "import", "HOST.bundle", note="the bundle in force, or a newer one: restores it"
-    )
+    at = imported_at(view.root)
+    fix = repair.run(at, "import", "HOST.bundle", note="the bundle in force, or a newer one: restores it")
     for place, problem in find_differences(view):
         yield Finding(Severity.ERROR, "bundle-differs", place, problem, fix)
 
