@@ -18,7 +18,7 @@ from enclave_launch.admission.middleware import middleware_of, why_not
 from enclave_launch.diagnostics import Diagnostic, refusal
 from enclave_launch.diagnostics.enclaves import middleware_refused
 from enclave_launch.diagnostics.evaluation import program_not_executable
-from enclave_launch.errors import LaunchFileError, ManifestError
+from enclave_launch.errors import LaunchFileError, ManifestError, UsageError
 from enclave_launch.evaluation.evaluate import evaluate
 from enclave_launch.evaluation.programs import missing_programs
 from enclave_launch.host.plan_host import PlanHost
@@ -119,12 +119,18 @@ def launch_source(
     *,
     options: ResolveOptions | None = None,
 ) -> LaunchSource:
-    """Describe what to launch without reading it: ``run`` evaluates it once, unsecured, as launch does."""
+    """Describe what to launch without reading it: ``run`` evaluates it once, unsecured, as launch does.
+
+    Raises ``UsageError`` for arguments that are no pairs of texts."""
     chosen = options or ResolveOptions()
     seed = int.from_bytes(os.urandom(8), "big")
+    given = tuple(arguments)
+    for pair in given:
+        if not (isinstance(pair, tuple) and len(pair) == 2 and all(isinstance(each, str) for each in pair)):
+            raise UsageError(f"launch arguments are pairs of texts, as in [('count', '2')]; this is {pair!r}")
     return LaunchSource(
         os.path.abspath(launch_file),
-        tuple(arguments),
+        given,
         tuple(map(os.path.abspath, chosen.prefixes)),
         {**chosen.launch_configurations},
         chosen.host_options()._replace(anonymous_seed=seed),

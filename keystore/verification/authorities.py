@@ -97,7 +97,13 @@ def _check_key(view: KeystoreView, role: Role, access: CaAccess) -> Iterator[Fin
     try:
         view.authority(role, access)
     except SigningUnavailableError as error:
-        yield Finding(Severity.ERROR, "ca-key", name, str(error), repair.BACKUP)
+        is_locked = b"ENCRYPTED" in reference or name.endswith(".p11")
+        fix = (
+            f"give the passphrase or PIN that belongs to it, or {repair.BACKUP}"
+            if is_locked
+            else repair.BACKUP
+        )
+        yield Finding(Severity.ERROR, "ca-key", name, str(error), fix)
 
 
 def _check_governance(

@@ -17,6 +17,7 @@ from enclave_launch import (
     ProvisionError,
     ResolveOptions,
     RunSettings,
+    UsageError,
     provision,
     resolve,
     run_async,
@@ -31,6 +32,13 @@ OPTIONS = ResolveOptions(prefixes=(DEMO,))
 @pytest.fixture(autouse=True)
 def own_log_directory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("ROS_LOG_DIR", str(tmp_path / "log"))
+
+
+@pytest.mark.parametrize("arguments", [{"count": "2"}, [("count", 2)], ["count:=2"], [["count", "2"]]])
+def test_arguments_that_are_no_pairs_of_texts_are_wrong_usage(arguments: Any) -> None:
+    with pytest.raises(UsageError, match=r"^launch arguments are pairs of texts, as in \[\('count', '2'\)\]"):
+        resolve(TALKER_LISTENER, arguments, options=OPTIONS)
+    assert resolve(TALKER_LISTENER, [("count", "2")], options=OPTIONS).processes
 
 
 @pytest.mark.dds

@@ -203,6 +203,9 @@ def test_a_wrong_passphrase_is_told_without_showing_anything(tmp_path: Path) -> 
     wrong = CaAccess(passphrase=Secret(file=tmp_path / "wrong"))
     with pytest.raises(SigningUnavailableError, match="is the passphrase right") as caught:
         provision(root, [policy("/a")], options=options(access=wrong))
+    assert {finding.repair for finding in verify(root, access=wrong).findings} == {
+        "give the passphrase or PIN that belongs to it, or restore it from a backup"
+    }
     frames = [entry.frame.f_locals for entry in caught.traceback]
     assert "tr0ub4dor" not in repr(frames) + str(caught.value) + repr(wrong)
     assert caught.value.__cause__ is None and caught.value.__suppress_context__
