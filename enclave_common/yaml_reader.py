@@ -53,30 +53,28 @@ def load_yaml(text: str, limit: int = MAX_CHARACTERS) -> Any:
 
 def load_yaml_with_lines(text: str, limit: int = MAX_CHARACTERS) -> YamlDocument:
     """Load as ``load_yaml``, and note the line of each mapping and list."""
-
-    def document(node: yaml.Node | None) -> YamlDocument:
-        constructor = _Constructor()
-        root = None if node is None else constructor.construct_document(node)
-        return YamlDocument(root, constructor.lines)
-
-    return _read(text, limit, document)
+    return _read(text, limit, _document)
 
 
 def load_strict_yaml(text: str) -> YamlDocument:
-    """Load a document that a person wrote for us, without aliases, and with no key twice: only one would count.
+    """Load a document that a person wrote for us. It has no aliases, and no key twice: only one would count.
 
     Raises:
-        YAMLError: as ``load_yaml``, and ``MarkedYAMLError`` with the place of an alias or of a key that came before.
+        YAMLError: as ``load_yaml``, and ``MarkedYAMLError`` with the place of an alias or of a repeated key.
         ValueError, OverflowError: as ``load_yaml``.
     """
 
     def document(node: yaml.Node | None) -> YamlDocument:
         _refuse_aliases_and_repeated_keys(node)
-        constructor = _Constructor()
-        root = None if node is None else constructor.construct_document(node)
-        return YamlDocument(root, constructor.lines)
+        return _document(node)
 
     return _read(text, MAX_CHARACTERS, document)
+
+
+def _document(node: yaml.Node | None) -> YamlDocument:
+    constructor = _Constructor()
+    root = None if node is None else constructor.construct_document(node)
+    return YamlDocument(root, constructor.lines)
 
 
 def problem_of(error: yaml.YAMLError, file: str) -> str:

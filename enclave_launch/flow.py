@@ -121,7 +121,7 @@ def launch_source(
 ) -> LaunchSource:
     """Describe what to launch without reading it: ``run`` evaluates it once, unsecured, as launch does.
 
-    Raises ``UsageError`` for arguments that are no pairs of texts."""
+    Raises ``UsageError`` for arguments that are not pairs of strings."""
     chosen = options or ResolveOptions()
     seed = int.from_bytes(os.urandom(8), "big")
     given = tuple(arguments)

@@ -48,7 +48,7 @@ def _beside(path: str) -> str:
     folder, name = os.path.split(path)
     try:
         beside = os.listdir(folder or ".")
-    except OSError:  # there is no such folder, or it may not be looked into
+    except OSError:  # no such folder, or no permission to list it
         return ""
     return did_you_mean(name, [each for each in beside if each.endswith((".py", ".xml", ".yaml", ".yml"))])
 

@@ -22,7 +22,7 @@ def public_half(pem: bytes, place: str) -> PublicKey:
 
 
 USABLE_KINDS = ("P-256", "RSA-2048")
-"""What DDS-Security 1.1 has (section 9.3.2.1), and what Cyclone DDS takes besides other curves of 256 bits."""
+"""The kinds of DDS-Security 1.1 (section 9.3.2.1). Cyclone DDS accepts other curves of 256 bits, too."""
 
 
 class RequestedKey(NamedTuple):

@@ -149,7 +149,7 @@ def _write_settings(opened: Store, options: CreateOptions) -> bool:
 
 
 def _restore_ca(opened: Store, role: Role) -> bool:
-    """Write a lost trust file again as the register knows it: another CA over the same key would issue for nobody."""
+    """Restore a lost trust file from the register. Another CA over the same key would have issued no certificate."""
     trusted = opened.register.trusted_authorities(role)
     is_lost = not os.path.lexists(opened.root / layout.ca_cert(role))
     if not (trusted and is_lost and KeystoreView(opened.root).key_file(role)):

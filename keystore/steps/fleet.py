@@ -52,7 +52,7 @@ class FleetReport(NamedTuple):
 
 
 class Reference(NamedTuple):
-    """What the CA's own keystore knows. ``trusted``: the CAs of its trust files; ``in_use``: those that sign."""
+    """The state of the CA's own keystore. ``trusted``: the CAs of its trust files; ``in_use``: those that sign."""
 
     in_use: frozenset[str]
     trusted: frozenset[str]

@@ -64,7 +64,7 @@ def verify(
             before = _register_file(view)
             found = list(_findings(view, access or CaAccess(), now or utc_now(), required or Requirements()))
             if not found or _register_file(view) == before:
-                break  # else a command wrote meanwhile, and files of before and after were compared
+                break  # otherwise a command wrote in between, and files of two states were compared
     found.sort(key=lambda finding: (order.index(finding.severity), finding.place, finding.code))
     return VerifyReport(view.root, len(view.enclaves()), tuple(found))
 

@@ -1,4 +1,4 @@
-"""What OpenSSL says of the CAs and of the enclaves' certificates: what it refuses, every DDS implementation refuses."""
+"""Check CAs and enclaves' certificates with OpenSSL: what it refuses, every DDS implementation refuses."""
 
 from __future__ import annotations
 

@@ -147,9 +147,8 @@ def rule_findings(document: DryRun, rules: Iterable[Never]) -> list[Diagnostic]:
         sources = _enclaves_named(plan, rule.source)
         named = _enclaves_named(plan, rule.target)
         targets = named or list(_with_grant(plan, _TAKES, rule.target))
-        senders = (
-            {} if named else _with_grant(plan, _SENDS, rule.target)
-        )  # who receives may be in another launch
+        # The receiver of a name may be in another launch.
+        senders = {} if named else _with_grant(plan, _SENDS, rule.target)
         if not sources or not (targets or senders):
             text = f"no {rule.source} or no {rule.target} in this plan"
             idle.append(finding("rule-idle", rule.source, text, rule.place))

@@ -34,18 +34,12 @@ FORM: Option = ("--format", one_of("text", "json"), "how to print (text)")
 
 def read_plan(words: Sequence[str], options: argparse.Namespace) -> DryRun:
     """Return the plan that ``words`` name; raises UsageError, also for options that a saved plan does not take."""
-    if not is_saved_plan(words):
-        return plan_of(words, options)
-    _refuse_idle_options(words, options)
-    return read_saved(Path(words[0]))
+    return _saved_as_named(words, options)[1] if is_saved_plan(words) else plan_of(words, options)
 
 
 def read_document(words: Sequence[str], options: argparse.Namespace) -> Mapping[str, Any]:
     """Return the JSON of the plan that ``words`` name, as it was saved or would be; raises as ``read_plan``."""
-    if not is_saved_plan(words):
-        return _planned(words, options)
-    _refuse_idle_options(words, options)
-    return _saved(Path(words[0]))[0]
+    return _saved_as_named(words, options)[0] if is_saved_plan(words) else _planned(words, options)
 
 
 def is_saved_plan(words: Sequence[str]) -> bool:
@@ -53,8 +47,8 @@ def is_saved_plan(words: Sequence[str]) -> bool:
     return words[0].endswith(".json")
 
 
-def _refuse_idle_options(words: Sequence[str], options: argparse.Namespace) -> None:
-    """Raise ``UsageError`` for arguments and options of planning: who gives them believes that they count."""
+def _saved_as_named(words: Sequence[str], options: argparse.Namespace) -> tuple[Mapping[str, Any], DryRun]:
+    """Read a saved plan; raises ``UsageError`` for arguments and options of planning, which would have no effect."""
     defaults = {written.split()[0]: kind.get("default") for written, kind, _ in (*POLICY, *EVALUATION)}
     values = {flag: getattr(options, flag[2:].replace("-", "_"), None) for flag in defaults}
     idle = [*words[1:], *(flag for flag, value in values.items() if value and value != defaults[flag])]
@@ -62,6 +56,7 @@ def _refuse_idle_options(words: Sequence[str], options: argparse.Namespace) -> N
         raise UsageError(
             f"{idle[0]} has no effect: {words[0]} is a saved plan; plan the launch file again with it"
         )
+    return _saved(Path(words[0]))
 
 
 def plan_of(words: Sequence[str], options: argparse.Namespace) -> DryRun:

@@ -379,7 +379,8 @@ class Reach:
                 self._use(word)
 
 
-_POINTER = re.compile(r"_ptr\b|Ptr\b|\*|&|\bweak_")
+_POINTS = re.compile(r"_ptr\b|Ptr\b|\*|\bweak_")
+_POINTER = re.compile(f"{_POINTS.pattern}|&")
 _WORD = re.compile(r"[A-Za-z_]\w*")
 
 
@@ -476,7 +477,6 @@ def _is_object(name: Node | None) -> bool:
     return not _POINTS.search(whole) and ("&" not in whole or "const" in whole or "&&" in whole)
 
 
-_POINTS = re.compile(r"_ptr\b|Ptr\b|\*|\bweak_")
 _PARTS_OF_TYPES = ("qualified_identifier", "template_type", "template_argument_list", "abstract_function_declarator",
                    "parameter_list")  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""``copy.copy`` and ``copy.deepcopy``: new containers and objects that hold what was copied, or copies of it."""
+"""Model ``copy.copy`` and ``copy.deepcopy``: new containers and objects that hold the same contents, or copies."""
 
 from __future__ import annotations
 

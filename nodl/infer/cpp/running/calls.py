@@ -489,7 +489,7 @@ def _on_atom(run: Machine, atom: object, name: str, site: CallSite) -> Value:
     if isinstance(atom, Group) and name in _OF_PAIR and len(atom.items) == 2:
         return site.call_value(atom.items[name == "second"])
     if CREATES.fullmatch(name) and not isinstance(atom, Unknown):
-        atom = Unknown("what is no node")
+        atom = Unknown("an object that is not a node")
     if not isinstance(atom, Unknown) or name in CONTAINER_METHODS:
         return container_call(run, atom, name, site)
     return _on_unknown(run, atom, name, site)

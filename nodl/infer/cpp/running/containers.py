@@ -109,7 +109,7 @@ _PARAMETER_VIEWS = frozenset({
 
 
 _AT_A_PLACE = ("std::vector", "std::list", "std::deque")
-"""Whose ``emplace`` first gets where."""
+"""The first argument of their ``emplace`` is the position."""
 
 
 def _added(run: Machine, atom: object, name: str, site: CallSite) -> Value:

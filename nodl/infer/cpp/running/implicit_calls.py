@@ -1,4 +1,4 @@
-"""What runs without a call that can be read: conversions, some operators, destructors, kept closures.
+"""Follow what C++ runs without a call in the text: conversions, some operators, destructors, closures that are kept.
 
 Where they run is not followed, so what they change is a gap or no longer known.
 """
