@@ -13,12 +13,15 @@ from enclave_launch.flow import provision as provision
 from enclave_launch.flow import resolve as resolve
 from enclave_launch.flow import run as run
 from enclave_launch.flow import run_async as run_async
+from enclave_launch.flow import run_async_unsecured as run_async_unsecured
+from enclave_launch.flow import run_unsecured as run_unsecured
 from enclave_launch.flow import start as start
+from enclave_launch.flow import start_unsecured as start_unsecured
 from enclave_launch.options import ResolveOptions as ResolveOptions
 from enclave_launch.options import RunSettings as RunSettings
 from enclave_launch.options import SecurityOptions as SecurityOptions
 from enclave_launch.plan import LaunchPlan as LaunchPlan
-from enclave_launch.running import Launch as Launch
+from enclave_launch.running import UnsecuredLaunch as UnsecuredLaunch
 from enclave_launch.runtime.running_launch import RunningLaunch as RunningLaunch
 from enclave_launch.runtime.running_launch import RunningProcess as RunningProcess
 from enclave_launch.runtime.running_launch import endpoint_seen as endpoint_seen

@@ -4,7 +4,7 @@
     launch = provision(plan, "keystore")                keys, certificates, signed permissions
     status = run(launch)                                every process starts with its enclave
 
-``run`` also takes a bare plan, ``evaluate_launch``'s result or a ``launch_source``, and starts it unsecured.
+``run_unsecured`` starts a bare plan, the result of ``evaluate_launch`` or a ``launch_source`` without enclaves.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from keystore.steps.options import ProvisionOptions
 from nodl.ament_index import MISSING_PREFIX, launch_file_path, search_prefixes
 
 if TYPE_CHECKING:
-    from enclave_launch.running import Launch
+    from enclave_launch.running import UnsecuredLaunch
     from enclave_launch.runtime.running_launch import RunningLaunch
     from enclave_launch.secured import ProvisionedLaunch
 
@@ -119,7 +119,7 @@ def launch_source(
     *,
     options: ResolveOptions | None = None,
 ) -> LaunchSource:
-    """Describe what to launch without reading it: ``run`` evaluates it once, unsecured, as launch does.
+    """Describe what to launch without reading it: ``run_unsecured`` evaluates it once, as launch does.
 
     Raises ``UsageError`` for arguments that are not pairs of strings."""
     chosen = options or ResolveOptions()
@@ -164,30 +164,81 @@ def provision(
     return provision_plan(plan, settings, chosen.keystore or ProvisionOptions())
 
 
-def run(launch: Launch, *, options: RunSettings | None = None) -> int:
-    """Start what was planned and stay until all has ended; handles SIGINT and SIGTERM. Gives the exit status.
+def run(launch: ProvisionedLaunch, *, options: RunSettings | None = None) -> int:
+    """Start a provisioned launch, secured, and stay until all has ended. Handle SIGINT and SIGTERM.
 
-    Before anything is started raises ``RuntimeFailure`` when something it needs is not there, and, for a provisioned
-    launch, ``LaunchFileError`` for a program that cannot be executed. An unsecured launch starts the others, as launch
-    does, and gives 1 in the end.
+    Args:
+        launch: What ``provision`` returned.
+        options: Log limit, recording, deadline and more.
+
+    Returns:
+        The exit status: 0 if all ended well, otherwise 1.
+
+    Raises:
+        UsageError: ``launch`` was not provisioned.
+        RuntimeFailure: Something that the launch needs is not there. Nothing was started.
+        LaunchFileError: A program cannot be executed. Nothing was started.
     """
-    from enclave_launch.running import run_launched  # asyncio
+    from enclave_launch.running import check_provisioned, run_launched  # asyncio
 
+    check_provisioned(launch, run.__name__)
     return run_launched(launch, options or RunSettings())
 
 
-def start(launch: Launch, *, options: RunSettings | None = None) -> RunningLaunch:
-    """Start what was planned and return at once: a handle to inspect it, wait for it and stop it.
+def run_unsecured(launch: UnsecuredLaunch, *, options: RunSettings | None = None) -> int:
+    """Start a launch without enclaves, as plain ``ros2 launch`` does, and stay until all has ended.
 
-    Signals stay the caller's. Raises as ``run``.
+    Args:
+        launch: What ``launch_source``, ``evaluate_launch`` or ``resolve`` returned.
+        options: Log limit, recording, deadline and more.
+
+    Returns:
+        The exit status: 0 if all ended well, otherwise 1. A program that cannot be executed gives 1 in the end, and
+        the others are started, as launch does.
+
+    Raises:
+        UsageError: ``launch`` was provisioned.
+        RuntimeFailure: Something that the launch needs is not there. Nothing was started.
     """
-    from enclave_launch.running import start_launched  # asyncio
+    from enclave_launch.running import check_unsecured, run_launched  # asyncio
 
+    check_unsecured(launch, run_unsecured.__name__)
+    return run_launched(launch, options or RunSettings())
+
+
+def start(launch: ProvisionedLaunch, *, options: RunSettings | None = None) -> RunningLaunch:
+    """Start a provisioned launch, secured, and return at once: a handle to inspect it, wait for it and stop it.
+
+    The caller handles signals. Raises as ``run``.
+    """
+    from enclave_launch.running import check_provisioned, start_launched  # asyncio
+
+    check_provisioned(launch, start.__name__)
     return start_launched(launch, options or RunSettings())
 
 
-async def run_async(launch: Launch, *, options: RunSettings | None = None) -> int:
-    """Run inside a running event loop; signals stay the caller's, cancelling ends every process first."""
-    from enclave_launch.running import run_launched_async  # asyncio
+def start_unsecured(launch: UnsecuredLaunch, *, options: RunSettings | None = None) -> RunningLaunch:
+    """Start a launch without enclaves and return at once, as ``start`` does. Raises as ``run_unsecured``."""
+    from enclave_launch.running import check_unsecured, start_launched  # asyncio
 
+    check_unsecured(launch, start_unsecured.__name__)
+    return start_launched(launch, options or RunSettings())
+
+
+async def run_async(launch: ProvisionedLaunch, *, options: RunSettings | None = None) -> int:
+    """Run a provisioned launch, secured, inside a running event loop.
+
+    The caller handles signals. Cancelling ends every process first. Raises as ``run``.
+    """
+    from enclave_launch.running import check_provisioned, run_launched_async  # asyncio
+
+    check_provisioned(launch, run_async.__name__)
+    return await run_launched_async(launch, options or RunSettings())
+
+
+async def run_async_unsecured(launch: UnsecuredLaunch, *, options: RunSettings | None = None) -> int:
+    """Run a launch without enclaves inside a running event loop, as ``run_async`` does."""
+    from enclave_launch.running import check_unsecured, run_launched_async  # asyncio
+
+    check_unsecured(launch, run_async_unsecured.__name__)
     return await run_launched_async(launch, options or RunSettings())

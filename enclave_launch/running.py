@@ -9,10 +9,10 @@ import os
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
-from typing import Union
 
 from enclave_common.dependencies import installed
 from enclave_common.terminal import warn
+from enclave_launch.errors import UsageError
 from enclave_launch.evaluation.programs import check_programs
 from enclave_launch.expiry_watch import watched
 from enclave_launch.options import RunSettings
@@ -25,11 +25,31 @@ from enclave_launch.runtime.running_launch import RunningLaunch
 from enclave_launch.runtime.warden_process import WardenProcess
 from enclave_launch.secured import PlanProvider, ProvisionedLaunch
 
-Launch = Union[LaunchSource, EvaluatedLaunch, LaunchPlan, "ProvisionedLaunch"]
-_UNSECURED = (LaunchSource, EvaluatedLaunch, LaunchPlan)
+UnsecuredLaunch = LaunchSource | EvaluatedLaunch | LaunchPlan
+"""What can be started without enclaves."""
+_Launch = UnsecuredLaunch | ProvisionedLaunch
 
 
-def run_launched(launch: Launch, settings: RunSettings) -> int:
+def check_provisioned(launch: object, caller: str) -> None:
+    """Raise UsageError unless ``launch`` was provisioned, so that nothing starts unsecured by a forgotten step."""
+    if not isinstance(launch, ProvisionedLaunch):
+        raise UsageError(
+            f"{caller}() starts what provision() returned, and this {type(launch).__name__} has no keystore; "
+            f"secured: {caller}(provision(resolve(launch_file), keystore)), "
+            f"without enclaves: {caller}_unsecured(...)"
+        )
+
+
+def check_unsecured(launch: object, caller: str) -> None:
+    """Raise UsageError if ``launch`` was provisioned, or is nothing that can be started."""
+    if not isinstance(launch, UnsecuredLaunch):
+        raise UsageError(
+            f"{caller}() starts what launch_source(), evaluate_launch() or resolve() returned, not this "
+            f"{type(launch).__name__}; what provision() returned: {caller.replace('_unsecured', '')}(...)"
+        )
+
+
+def run_launched(launch: _Launch, settings: RunSettings) -> int:
     """Block until all is over. Raises ``RuntimeFailure`` and, provisioned, ``LaunchFileError`` before the start."""
     live = _live(launch, settings)
     with _expiry_watch(launch):
@@ -38,7 +58,7 @@ def run_launched(launch: Launch, settings: RunSettings) -> int:
             return run_launch(live(warden=warden))
 
 
-async def run_launched_async(launch: Launch, settings: RunSettings) -> int:
+async def run_launched_async(launch: _Launch, settings: RunSettings) -> int:
     """Run inside a running event loop."""
     live = _live(launch, settings)
     with _expiry_watch(launch):
@@ -47,7 +67,7 @@ async def run_launched_async(launch: Launch, settings: RunSettings) -> int:
             return await live().run()
 
 
-def start_launched(launch: Launch, settings: RunSettings) -> RunningLaunch:
+def start_launched(launch: _Launch, settings: RunSettings) -> RunningLaunch:
     """Start in a thread of its own; raises EnclaveLaunchError before anything was started."""
     live = _live(launch, settings)
     _check_programs(launch)
@@ -61,8 +81,8 @@ def start_launched(launch: Launch, settings: RunSettings) -> RunningLaunch:
     return RunningLaunch(main)
 
 
-def _live(launch: Launch, settings: RunSettings) -> partial[LiveLaunch]:
-    own = frozenset[str]() if isinstance(launch, _UNSECURED) else launch.secret_variables
+def _live(launch: _Launch, settings: RunSettings) -> partial[LiveLaunch]:
+    own = frozenset[str]() if isinstance(launch, UnsecuredLaunch) else launch.secret_variables
     needed = None if isinstance(launch, LaunchSource) else bool(_evaluated(launch).evaluation.launcher_calls)
     return partial(
         LiveLaunch,
@@ -73,24 +93,24 @@ def _live(launch: Launch, settings: RunSettings) -> partial[LiveLaunch]:
     )
 
 
-def _expiry_watch(launch: Launch) -> AbstractContextManager[None]:
-    if isinstance(launch, _UNSECURED):
+def _expiry_watch(launch: _Launch) -> AbstractContextManager[None]:
+    if isinstance(launch, UnsecuredLaunch):
         return nullcontext()
 
     return watched(launch, warn)
 
 
-def _zenoh_router(launch: Launch) -> AbstractContextManager[object]:
-    return nullcontext() if isinstance(launch, _UNSECURED) else launch.serve_router(warn)
+def _zenoh_router(launch: _Launch) -> AbstractContextManager[object]:
+    return nullcontext() if isinstance(launch, UnsecuredLaunch) else launch.serve_router(warn)
 
 
-def _check_programs(launch: Launch) -> None:
+def _check_programs(launch: _Launch) -> None:
     # Unsecured, those that can be executed are started, as launch does.
-    if not isinstance(launch, _UNSECURED):
+    if not isinstance(launch, UnsecuredLaunch):
         check_programs(launch.plan.evaluation.processes)
 
 
-def _source(launch: Launch) -> LaunchSource:
+def _source(launch: _Launch) -> LaunchSource:
     return launch if isinstance(launch, LaunchSource) else _evaluated(launch).source
 
 
@@ -100,8 +120,8 @@ def _evaluated(launch: EvaluatedLaunch | LaunchPlan | ProvisionedLaunch) -> Eval
     return (launch if isinstance(launch, LaunchPlan) else launch.plan).evaluated
 
 
-def _gate(launch: Launch, settings: RunSettings) -> EnclaveGate | None:
-    if isinstance(launch, _UNSECURED):
+def _gate(launch: _Launch, settings: RunSettings) -> EnclaveGate | None:
+    if isinstance(launch, UnsecuredLaunch):
         return None
 
     evaluation = launch.plan.evaluation
@@ -114,15 +134,15 @@ def _gate(launch: Launch, settings: RunSettings) -> EnclaveGate | None:
     )
 
 
-def _companion(launch: Launch, settings: RunSettings) -> LaunchCompanion | None:
+def _companion(launch: _Launch, settings: RunSettings) -> LaunchCompanion | None:
     companion = settings.companion or _recording(launch, settings)
     if companion is None or settings.watch is None:
         return companion or settings.watch
     return Together(companion, settings.watch)
 
 
-def _recording(launch: Launch, settings: RunSettings) -> LaunchCompanion | None:
-    secured = not isinstance(launch, _UNSECURED)
+def _recording(launch: _Launch, settings: RunSettings) -> LaunchCompanion | None:
+    secured = not isinstance(launch, UnsecuredLaunch)
     if settings.record is False or (settings.record is None and not secured):
         return None
     if settings.record is None and not installed("enclave_launch.recording"):
@@ -134,5 +154,5 @@ def _recording(launch: Launch, settings: RunSettings) -> LaunchCompanion | None:
     source = _source(launch)
     distro = source.host_options.distro or os.environ.get("ROS_DISTRO", "")
     run = new_run(source.launch_file, distro, "none", secured=secured)
-    explainers = [] if isinstance(launch, _UNSECURED) else [Explainer(launch.plan)]
+    explainers = [] if isinstance(launch, UnsecuredLaunch) else [Explainer(launch.plan)]
     return Recording(run, explainers, optional=settings.record is None)

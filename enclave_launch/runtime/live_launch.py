@@ -367,12 +367,13 @@ def require_signals() -> None:
     """Raise RuntimeFailure unless this is the main thread, which takes the signals, without an event loop."""
     if threading.current_thread() is not threading.main_thread():
         raise RuntimeFailure(
-            "run() takes the signals of the process, which only its main thread can; "
-            "in another thread use asyncio.run(run_async(...))"
+            "run() and run_unsecured() take the signals of the process, which only its main thread can; "
+            "in another thread use asyncio.run(run_async(...)), or run_async_unsecured(...)"
         )
     if asyncio._get_running_loop() is not None:
         raise RuntimeFailure(
-            "run() would block the event loop that is running here; await run_async(...) instead"
+            "run() and run_unsecured() would block the event loop that is running here; "
+            "await run_async(...), or run_async_unsecured(...)"
         )
 
 

@@ -21,7 +21,7 @@ from enclave_common.files import write_text
 from enclave_common.terminal import warn
 from enclave_common.words import counted, some_of
 from enclave_launch.errors import ManifestError, RuntimeFailure, translated
-from enclave_launch.flow import run
+from enclave_launch.flow import run_unsecured
 from enclave_launch.options import RunSettings
 from enclave_launch.plan import LaunchPlan
 from enclave_launch.recording.audit import Audit, audit_json, audit_text
@@ -111,7 +111,7 @@ def audit_launch(plan: LaunchPlan, options: argparse.Namespace, settings: RunSet
     warn(*plan.problems)
     audit = Audit(plan)
     recording = Recording(new_run(plan.launch_file, plan.distro, "none"), [audit])
-    status = run(plan, options=settings._replace(companion=recording))
+    status = run_unsecured(plan, options=settings._replace(companion=recording))
     report = audit.report()
     sys.stdout.write(audit_text(report))
     if options.audit_report is not None:

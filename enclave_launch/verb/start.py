@@ -15,7 +15,7 @@ from enclave_launch.add_ons import zenoh_start
 from enclave_launch.errors import UsageError, keystore_errors, translated
 from enclave_launch.evaluation.programs import check_programs
 from enclave_launch.expiry_watch import renewal_deadline
-from enclave_launch.flow import launch_source, provision, run
+from enclave_launch.flow import launch_source, provision, run, run_unsecured
 from enclave_launch.options import RunSettings, SecurityOptions
 from enclave_launch.plan import LaunchPlan, on_zenoh
 from enclave_launch.policy.sharing import gains_by_sharing
@@ -77,7 +77,7 @@ def _launch_plainly(
     """Launch without enclaves: nobody has to know what the nodes say to each other."""
     launch = launch_source(target.launch_file, target.arguments, options=resolve_options(options))
     print(f"secure-launch: {unsecured_notice(os.environ)}", file=sys.stderr)
-    return run(launch, options=_run_settings(options)._replace(companion=companion))
+    return run_unsecured(launch, options=_run_settings(options)._replace(companion=companion))
 
 
 def _launch(

@@ -12,7 +12,7 @@ from enclave_launch.drift.expected import out_of_sight
 from enclave_launch.drift_watch import DriftWatch, WatchOptions
 from enclave_launch.dry_run import DryRun
 from enclave_launch.errors import ProvisionError, UsageError, translated
-from enclave_launch.flow import run
+from enclave_launch.flow import run_unsecured
 from enclave_launch.options import RunSettings
 from enclave_launch.plan import LaunchPlan
 from enclave_launch.report.plan_json import plan_document
@@ -26,7 +26,7 @@ from nodl.graph.observing import chosen_source
 def watch_plain_launch(plan: LaunchPlan, options: argparse.Namespace, settings: RunSettings) -> int:
     """Run and watch an unsecured launch; return its status, 1 if there were alarms. Raises UsageError."""
     watch = DriftWatch(_dry_run(plan), _options(options))
-    return watch.status(run(plan, options=settings._replace(watch=watch)))
+    return watch.status(run_unsecured(plan, options=settings._replace(watch=watch)))
 
 
 def check_watch(plan: LaunchPlan) -> None:

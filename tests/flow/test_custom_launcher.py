@@ -16,7 +16,6 @@ from enclave_launch import (
     ManifestError,
     ProvisionError,
     ResolveOptions,
-    RunSettings,
     UsageError,
     provision,
     resolve,
@@ -127,12 +126,6 @@ def echo_file(tmp_path: Path, text: str) -> Path:
     path = tmp_path / "echo.launch.xml"
     path.write_text(f"<launch>{text}</launch>")
     return path
-
-
-def test_a_plan_runs_unsecured_inside_a_running_loop(tmp_path: Path) -> None:
-    file = echo_file(tmp_path, f'<executable cmd="touch {tmp_path}/done"/>')
-    assert asyncio.run(run_async(resolve(file), options=RunSettings(noninteractive=True))) == 0
-    assert (tmp_path / "done").exists()
 
 
 EchoVariables = Callable[[str], dict[str, str]]

@@ -22,6 +22,7 @@ from enclave_launch import (
     provision,
     resolve,
     start,
+    start_unsecured,
 )
 from enclave_launch.plan import LaunchSource
 from enclave_launch.runtime.run_events import EndpointCreated, EndpointRefused, LaunchOver, RunEvent
@@ -59,7 +60,7 @@ def options(workspace: Workspace) -> ResolveOptions:
 def launch(stand_in: Path, tmp_path: Path) -> Iterator[RunningLaunch]:
     """As a test of one's own robot would have it: up before the test, down behind it."""
     workspace = make_workspace(tmp_path, stand_in, [TALKER])
-    with start(source(workspace), options=RunSettings(record=True)) as running:
+    with start_unsecured(source(workspace), options=RunSettings(record=True)) as running:
         running.wait_until(endpoint_seen("talker-1", "/robot/t/reset"), timeout=30)
         yield running
 
@@ -83,7 +84,7 @@ def test_events_of_a_program_that_ends_at_once_come_before_the_end_of_the_launch
     short = Program(
         "short", f"node short\npublisher a {STRING}\naction_server act test_msgs/action/Fibonacci\n"
     )
-    with start(
+    with start_unsecured(
         source(make_workspace(tmp_path, stand_in, [short])), options=RunSettings(record=True)
     ) as running:
         events = list(running.events())
@@ -121,7 +122,7 @@ def test_a_refused_endpoint_is_an_event_of_a_secured_launch_without_being_asked_
 def test_a_respawned_process_shows_the_endpoints_of_its_latest_life(stand_in: Path, tmp_path: Path) -> None:
     script = f"node a\npublisher a {STRING}\n"
     workspace = make_workspace(tmp_path, stand_in, [Program("again", script, attributes='respawn="true"')])
-    with start(source(workspace), options=RunSettings(record=True)) as running:
+    with start_unsecured(source(workspace), options=RunSettings(record=True)) as running:
         pids = set()
         for event in running.events():
             if isinstance(event, EndpointCreated) and event.endpoint.name == "/a":
@@ -134,7 +135,7 @@ def test_a_respawned_process_shows_the_endpoints_of_its_latest_life(stand_in: Pa
 
 def test_what_nobody_records_is_said_to_be_unknown(stand_in: Path, tmp_path: Path) -> None:
     workspace = make_workspace(tmp_path, stand_in, [TALKER])
-    with start(source(workspace)) as running:
+    with start_unsecured(source(workspace)) as running:
         assert not running.is_recorded
         with pytest.raises(RuntimeFailure, match=r"not recorded; start it with RunSettings\(record=True\)"):
             running.wait_until(endpoint_seen("talker-1", "/robot/news"), timeout=30)
@@ -147,7 +148,7 @@ def test_a_launch_that_must_be_recorded_and_cannot_is_not_started(
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     workspace = make_workspace(tmp_path, stand_in, [TALKER])
     with pytest.raises(RuntimeFailure, match="nothing can be recorded: recording needs a C compiler"):
-        start(source(workspace), options=RunSettings(record=True))
+        start_unsecured(source(workspace), options=RunSettings(record=True))
 
 
 def test_real_rclpy_on_asyncio(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -169,7 +170,7 @@ def test_real_rclpy_on_asyncio(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     )
 
     async def main() -> int:
-        launch = start(launch_source(file), options=RunSettings(record=True))
+        launch = start_unsecured(launch_source(file), options=RunSettings(record=True))
         try:
             await asyncio.to_thread(launch.wait_until, endpoint_seen("py-1", "/robot/renamed/out"), 60)
         finally:

@@ -10,10 +10,24 @@ import sys
 import textwrap
 import threading
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from enclave_launch import RuntimeFailure, launch_source, run, run_async
+from enclave_launch import (
+    RuntimeFailure,
+    UsageError,
+    evaluate_launch,
+    launch_source,
+    provision,
+    resolve,
+    run,
+    run_async,
+    run_async_unsecured,
+    run_unsecured,
+    start,
+    start_unsecured,
+)
 
 pytestmark = pytest.mark.usefixtures("ros_log_dir")
 
@@ -35,11 +49,44 @@ def python(script: str, *words: str, options: tuple[str, ...] = ()) -> subproces
     )
 
 
+def test_a_launch_that_nobody_provisioned_is_not_started_unless_the_call_says_unsecured(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    file = launch_file(tmp_path, "echo hello")
+    for bare in (resolve(file), evaluate_launch(file), launch_source(file)):
+        unprovisioned: Any = bare
+        for call in (run, start, lambda launch: asyncio.run(run_async(launch))):
+            with pytest.raises(
+                UsageError, match=r"what provision\(\) returned, and this \w+ has no keystore"
+            ):
+                call(unprovisioned)
+        assert "hello" not in capfd.readouterr().out
+        assert run_unsecured(bare) == 0
+        assert asyncio.run(run_async_unsecured(bare)) == 0
+        with start_unsecured(bare) as running:
+            assert running.wait(timeout=30) == 0
+        assert capfd.readouterr().out.count("[a-1] hello") == 3
+
+
+def test_a_provisioned_launch_is_not_started_unsecured(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    provisioned: Any = provision(resolve(launch_file(tmp_path, "echo hello")), tmp_path / "ks")
+    for call in (run_unsecured, start_unsecured, lambda launch: asyncio.run(run_async_unsecured(launch))):
+        with pytest.raises(
+            UsageError, match=r"not this ProvisionedLaunch; what provision\(\) returned: \w+\(...\)"
+        ):
+            call(provisioned)
+    assert "hello" not in capfd.readouterr().out
+    assert run(provisioned) == 0
+    assert "[a-1] hello" in capfd.readouterr().out
+
+
 STRICT = ("-X", "dev", "-W", "error")  # asyncio debug mode; unclosed or never awaited is an error
 
 STATE = """
 import asyncio, logging, os, resource, signal, sys, threading
-from enclave_launch import launch_source, run, run_async
+from enclave_launch import launch_source, run_async_unsecured, run_unsecured
 
 def state():
     return {
@@ -65,7 +112,7 @@ def test_three_runs_in_a_row_leave_the_process_as_it_was(tmp_path: Path) -> None
 hard = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
 resource.setrlimit(resource.RLIMIT_NOFILE, (min(256, hard), hard))
 before = state()
-assert [run(launch_source(sys.argv[1])) for _ in range(3)] == [0, 0, 0]
+assert [run_unsecured(launch_source(sys.argv[1])) for _ in range(3)] == [0, 0, 0]
 assert not differences(before), differences(before)
 """
     result = python(script, str(launch_file(tmp_path, "echo hello")), options=STRICT)
@@ -76,7 +123,7 @@ assert not differences(before), differences(before)
 def test_cancelled_at_any_moment_it_ends_every_process_and_leaves_nothing(tmp_path: Path) -> None:
     script = f"""{STATE}
 async def cancelled(seconds, times):
-    task = asyncio.ensure_future(run_async(launch_source(sys.argv[1])))
+    task = asyncio.ensure_future(run_async_unsecured(launch_source(sys.argv[1])))
     for _ in range(times):
         await asyncio.sleep(seconds)
         task.cancel()
@@ -104,7 +151,7 @@ with open(f"/proc/self/task/{{os.getpid()}}/children") as children:
 def test_with_a_time_limit(tmp_path: Path) -> None:
     async def main() -> None:
         with pytest.raises(asyncio.TimeoutError):
-            await asyncio.wait_for(run_async(launch_source(launch_file(tmp_path, "sleep 60"))), 0.3)
+            await asyncio.wait_for(run_async_unsecured(launch_source(launch_file(tmp_path, "sleep 60"))), 0.3)
 
     asyncio.run(main())
 
@@ -126,16 +173,16 @@ def in_thread(function: object) -> list[object]:
 
 def test_in_another_thread_signals_cannot_be_taken_and_the_async_call_works(tmp_path: Path) -> None:
     file = launch_file(tmp_path, "true")
-    (refusal,) = in_thread(lambda: run(launch_source(file)))
+    (refusal,) = in_thread(lambda: run_unsecured(launch_source(file)))
     assert isinstance(refusal, RuntimeFailure)
     assert "main thread" in str(refusal) and "run_async" in str(refusal)
-    assert in_thread(lambda: asyncio.run(run_async(launch_source(file)))) == [0]
+    assert in_thread(lambda: asyncio.run(run_async_unsecured(launch_source(file)))) == [0]
 
 
 def test_the_blocking_call_in_a_running_loop_says_which_to_use(tmp_path: Path) -> None:
     async def main() -> None:
         with pytest.raises(RuntimeFailure, match=r"await run_async"):
-            run(launch_source(launch_file(tmp_path, "true")))
+            run_unsecured(launch_source(launch_file(tmp_path, "true")))
 
     asyncio.run(main())
 
@@ -145,7 +192,8 @@ def test_started_with_standard_streams_closed(closed: str, tmp_path: Path, ros_l
     """As some supervisors do; what we open must not take their places."""
     file = launch_file(tmp_path, "echo hello")
     script = (
-        "import sys; from enclave_launch import launch_source, run; sys.exit(run(launch_source(sys.argv[1])))"
+        "import sys; from enclave_launch import launch_source, run_unsecured; "
+        "sys.exit(run_unsecured(launch_source(sys.argv[1])))"
     )
     command = f'"$0" -c "$1" "$2" {closed}'
     result = subprocess.run(
@@ -166,7 +214,8 @@ def test_a_reader_of_our_output_that_goes_away_does_not_end_the_launch(
 ) -> None:
     file = launch_file(tmp_path, "sh -c 'for i in 1 2 3 4 5 6; do echo $i; sleep 0.1; done'")
     script = (
-        "import sys; from enclave_launch import launch_source, run; sys.exit(run(launch_source(sys.argv[1])))"
+        "import sys; from enclave_launch import launch_source, run_unsecured; "
+        "sys.exit(run_unsecured(launch_source(sys.argv[1])))"
     )
     command = '("$0" -c "$1" "$2"; echo "status $?" >&2) | head -n 3'
     result = subprocess.run(

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from enclave_launch import RunningLaunch, RuntimeFailure, evaluate_launch, printed, start, started
+from enclave_launch import RunningLaunch, RuntimeFailure, evaluate_launch, printed, start_unsecured, started
 from enclave_launch.plan import LaunchSource
 from enclave_launch.runtime import run_events
 from enclave_launch.runtime.run_events import LaunchOver, ProcessOutput, RunEvent
@@ -27,7 +27,7 @@ def launched(directory: Path, *commands: str, attributes: str = "") -> RunningLa
     )
     file = directory / "test.launch.xml"
     file.write_text(f"<launch>{elements}</launch>")
-    return start(evaluate_launch(file))
+    return start_unsecured(evaluate_launch(file))
 
 
 def test_it_runs_beside_the_caller_and_ends_by_itself(tmp_path: Path) -> None:
@@ -148,7 +148,7 @@ def test_an_error_of_the_launch_file_ends_it_with_the_reason(tmp_path: Path) -> 
         "    return LaunchDescription([\n"
         "        RegisterEventHandler(OnProcessExit(on_exit=check)), ExecuteProcess(cmd=['sh', '-c', 'exit 3'])])\n"
     )
-    launch = start(evaluate_launch(file))
+    launch = start_unsecured(evaluate_launch(file))
     assert launch.wait(20) == 1
     failed = [event for event in launch.events() if isinstance(event, run_events.LaunchFailed)]
     assert "no such robot" in failed[0].reason
@@ -178,7 +178,7 @@ def sees(directory: Path, robot: str) -> RunningLaunch:
     directory.mkdir()
     file = directory / "sees.launch.py"
     file.write_text(SEES.replace("{robot}", robot).replace("{go}", str(directory / "go")))
-    return start(LaunchSource(str(file)))
+    return start_unsecured(LaunchSource(str(file)))
 
 
 def test_several_launches_in_one_program_each_with_an_environment_of_its_own(tmp_path: Path) -> None:

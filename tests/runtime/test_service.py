@@ -23,8 +23,8 @@ from tests.runtime.conftest import alive, eventually, read_pid, require_descript
 PROGRAM = """
 import sys
 from pathlib import Path
-from enclave_launch import RunSettings, launch_source, run
-sys.exit(run(launch_source(sys.argv[1]), options=RunSettings(noninteractive={noninteractive}, debug={debug})))
+from enclave_launch import RunSettings, launch_source, run_unsecured
+sys.exit(run_unsecured(launch_source(sys.argv[1]), options=RunSettings(noninteractive={noninteractive}, debug={debug})))
 """
 
 PRELUDE = """
