@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager, nullcontext
@@ -128,17 +129,35 @@ def _provision_on_zenoh(
 
 
 def launch_owner(plan: LaunchPlan) -> str:
-    """Return the owner of this launch's share of an enclave: the launch file, or the program that launches."""
+    """Return the owner of this launch's shares: the launch file with its arguments, or the program that launches.
+
+    The same file with ``robot:=r1`` and with ``robot:=r2`` is two owners: neither takes anything from the other.
+    """
+    arguments = dict(plan.inputs.source.arguments)  # of one given twice launch takes the last
+    words = (shlex.quote(f"{name}:={value}") for name, value in sorted(arguments.items()))
+    return " ".join((_launched_file(plan), *words))
+
+
+def _launched_file(plan: LaunchPlan) -> str:
     return os.path.realpath(sys.argv[0] if plan.launch_file.startswith("<") else plan.launch_file)
+
+
+def _is_of_file(owner: str, launch_file: str) -> bool:
+    return f"{owner} ".startswith(f"{launch_file} ")
 
 
 def with_shares_reported(plan: LaunchPlan, keystore: str) -> LaunchPlan:
     """Return the plan with a warning for each enclave that other launches on ``keystore`` share.
 
-    Raises ``ProvisionError`` if shares cannot be read.
+    The same file with other arguments is reported only where its share permits more. Raises ``ProvisionError`` if
+    shares cannot be read.
     """
     with keystore_errors():
-        found = list(shared_enclaves(keystore, launch_owner(plan), plan.derived.policy.enclaves))
+        found = [
+            one
+            for one in shared_enclaves(keystore, launch_owner(plan), plan.derived.policy.enclaves)
+            if one.added or not all(_is_of_file(owner, _launched_file(plan)) for owner in one.others)
+        ]
     return plan._replace(warnings=(*plan.warnings, *(enclave_of_several_launches(*one) for one in found)))
 
 

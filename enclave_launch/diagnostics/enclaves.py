@@ -32,7 +32,7 @@ def enclave_attribute_unused(process: str, enclave: str, attribute: str, place: 
 def enclave_of_several_launches(enclave: str, others: Sequence[str], added: Sequence[str]) -> Diagnostic:
     """Report an enclave that ``others`` share, and what their share permits the processes of this launch."""
     cost = f"; its processes may then also {some_of(added, 4)}" if added else ""
-    text = f"enclave {enclave} is shared with {', '.join(others)}{cost}"
+    text = f"enclave {enclave} is shared with {some_of(others, 4)}{cost}"
     remedy = (
         "--enclave-scope gives enclaves of their own, secure-keystore shares drops what is not used any more"
     )

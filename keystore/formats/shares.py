@@ -1,6 +1,7 @@
 """The shares of an enclave's permissions: what each launch requests, and all of it together. Performs no I/O.
 
-Launches may meet in an enclave (with the default scope all use ``/``): each owns its share, by its launch file."""
+Launches may meet in an enclave (with the default scope all use ``/``). Each launch file, with its arguments, owns a
+share."""
 
 from __future__ import annotations
 

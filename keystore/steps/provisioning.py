@@ -77,20 +77,26 @@ def provision(
         chosen.launch.take()  # a new keystore had no place for it before
         chosen.launch.enclaves.update(policy.path for policy in policies)
         gone = left_over(root, chosen.launch.owner, (policy.path for policy in policies))
-        report = report._replace(warnings=(*report.warnings, *_left_over(root, gone)))
+        report = report._replace(warnings=(*report.warnings, *_left_over(root, chosen.launch.owner, gone)))
     else:
         drop_share_files(root, [policy.path for policy in policies], chosen)
     return report
 
 
-def _left_over(root: Path, enclaves: list[str]) -> list[str]:
-    if not enclaves:
-        return []
-    return [
-        f"{counted(len(enclaves), 'enclave')} of this launch left over, with all that was granted: "
-        f"{some_of(enclaves, 8)}; to revoke and remove: secure-keystore remove {shlex.quote(str(root))} "
-        f"{' '.join(enclaves)}"
-    ]
+def _left_over(root: Path, owner: str, shares: Mapping[str, bool]) -> Iterator[str]:
+    """Say which enclaves a launch no longer needs. Of those that others use, only its share may go."""
+    keystore = shlex.quote(str(root))
+    if alone := [name for name, is_shared in shares.items() if not is_shared]:
+        yield (
+            f"{counted(len(alone), 'enclave')} of this launch left over, with all that was granted: "
+            f"{some_of(alone, 8)}; to revoke and remove: secure-keystore remove {keystore} {' '.join(alone)}"
+        )
+    if shared := [name for name, is_shared in shares.items() if is_shared]:
+        yield (
+            f"{some_of(shared, 8)}: other launches use this too, and it still has the share of this launch, which "
+            f"does not need it any more; to end all shares of this launch, before it is started again: "
+            f"secure-keystore shares {keystore} --drop {shlex.quote(owner)}"
+        )
 
 
 def drop_share_files(root: Path, enclaves: Iterable[str], options: ProvisionOptions) -> None:

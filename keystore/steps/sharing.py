@@ -176,14 +176,11 @@ def given_up(root: Path, owner: str) -> list[EnclaveShare]:
     return mine
 
 
-def left_over(root: Path, owner: str, enclaves: Iterable[str]) -> list[str]:
-    """Return the enclaves in which ``owner`` still has a share, though it requests only ``enclaves`` now."""
+def left_over(root: Path, owner: str, enclaves: Iterable[str]) -> dict[str, bool]:
+    """Return the enclaves beyond ``enclaves`` in which ``owner`` has a share, and whether others use them too."""
     present = set(enclaves)
-    return [
-        name
-        for name in enclaves_with_shares(root)
-        if name not in present and _own(read_shares(root, name), owner)
-    ]
+    shares = {name: read_shares(root, name) for name in enclaves_with_shares(root) if name not in present}
+    return {name: len(found) > 1 for name, found in shares.items() if _own(found, owner)}
 
 
 def refuse_running(root: Path, enclaves: Iterable[str]) -> None:

@@ -1,8 +1,8 @@
 """List which launches have shares of which enclaves, or drop the shares of one.
 
-Each launch on a keystore owns what it asks for; an enclave that several of them use gets all of it. A launch that is
-never started again keeps its share until it is dropped: with --drop OWNER, as it is listed. What no other launch asks
-for is then taken away for good.
+A launch is a launch file with its arguments. Each launch on a keystore owns what it asks for; an enclave that several
+of them use gets all of it. A launch that is never started again keeps its share until it is dropped: with --drop OWNER,
+as it is listed. What no other launch asks for is then taken away for good.
 """
 
 from __future__ import annotations

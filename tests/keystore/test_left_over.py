@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 
 import pytest
@@ -43,3 +44,19 @@ def test_a_launch_tells_what_it_no_longer_asks_for(tmp_path: Path) -> None:
         hold.close()
         assert any("left over" in one and "/b" in one for one in report.warnings) is told
         assert not any("/others" in one for one in report.warnings)
+
+
+def test_of_an_enclave_that_another_launch_uses_only_the_share_may_go(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    root = tmp_path / "ks"
+    for owner, asked in (("/x.launch.xml", "/both"), ("/y.launch.xml", "/both"), ("/x.launch.xml", "/own")):
+        hold = LaunchHold(root, owner)
+        report = provision(root, [policy(asked)], options=options(launch=hold))
+        hold.close()
+    (warning,) = report.warnings
+    assert "/both: other launches use this too" in warning and "secure-keystore remove" not in warning
+    assert main(shlex.split(warning.partition("secure-keystore ")[2])) == 0
+    capsys.readouterr()
+    assert main(["shares", str(root)]) == 0
+    assert capsys.readouterr().out == "'/y.launch.xml': /both\n"
