@@ -29,6 +29,7 @@ def secure_nodl() -> int:
 
 def _run(command: str, module: str) -> int:
     try:
+        import_module("enclave_common.own_packages").prefer_own_nodl()
         guarded = import_module("enclave_common.command_line").guarded
         return int(guarded(command, lambda: int(import_module(module).main())))
     except KeyboardInterrupt:  # while that module was imported

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from enclave_common import VERSION
 from enclave_common.lazy_names import lazy_names
+from enclave_common.own_packages import prefer_own_nodl
 
 __version__ = VERSION
+
+prefer_own_nodl()  # before any module of ours imports it
 
 _MODULES = {
     "enclave_launch.dry_run": ("DryRun",),

@@ -93,6 +93,8 @@ class Steady:
         return now - begins >= wait or now - since >= max(wait, self._patience.longest)
 
 
+# Ours first, before anything imports nodl (``enclave_common.own_packages``).
+_FOLLOW = "import sys, enclave_launch; from nodl.graph.follow import main; sys.exit(main())"
 _INTERVAL = 1.0  # seconds between two comparisons
 _LONGEST_START = 60.0  # of an observer, on a machine that does much else
 _MOST_PARENTS = 64
@@ -207,7 +209,7 @@ class _Observer:
         # Its arguments name its enclave: no override may reach it.
         environment = {key: text for key, text in os.environ.items() if not key.startswith("ROS_SECURITY_")}
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "nodl.graph.follow", str(domain), *directory],
+            [sys.executable, "-c", _FOLLOW, str(domain), *directory],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 import shutil
 import subprocess
@@ -10,6 +11,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.install.test_foreign_nodl import write_foreign_nodl
 from tests.recording.stand_in_launch import PACKAGE, Program, build_stand_in, make_workspace
 from tests.ros2.conftest import Workspace
 from tests.ros2.upstream import install_metadata
@@ -264,8 +266,9 @@ def test_a_node_that_the_plan_did_not_foresee(allowed: bool, demo: Workspace) ->
 
 
 OTHER = '''
-"""ros2launch_security as it meets ours: same option, same extension points."""
+"""ros2launch_security as it meets ours: same option, same extension points, and a package nodl that is not ours."""
 
+import nodl
 from launch_ros.actions.node import NodeActionExtension
 from ros2launch.option import OptionExtension
 
@@ -322,7 +325,17 @@ def test_a_process_that_ends_badly_shows_in_the_exit_status(demo: Workspace) -> 
     assert status == 1
 
 
-def test_beside_ros2launch_security_ours_wins(demo: Workspace) -> None:
+@pytest.mark.parametrize("is_first", [True, False])
+def test_beside_ros2launch_security_ours_wins(
+    demo: Workspace, is_first: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if is_first:
+        write_foreign_nodl(demo.site)
+    else:
+        late = write_foreign_nodl(demo.directory / "late")
+        monkeypatch.setenv(
+            "PYTHONPATH", os.pathsep.join(filter(None, [os.environ.get("PYTHONPATH"), str(late)]))
+        )
     (demo.site / "other_security.py").write_text(OTHER)
     install_metadata(
         demo.site,
