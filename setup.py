@@ -20,22 +20,54 @@ VERSION = "0.1.0"
 REQUIRES = ["lxml>=4.8", "pyyaml>=5.4", "cryptography>=3.4.8", "asn1crypto>=1.4", "pydantic>=1.8"]
 PACKAGE_DATA = {
     "enclave_common": ["py.typed"],
-    "enclave_launch": ["py.typed", "__init__.pyi", "recording/recorder.c", "report/html/assets/*"],
-    "nodl": ["py.typed", "schemas/*", "library/documents/*", "library/documents/*/*", "document/common/*/*"],
+    "enclave_launch": ["py.typed", "__init__.pyi"],
+    "nodl": ["py.typed", "schemas/*", "document/common/*/*"],
+    "enclave_addons": [
+        "py.typed",
+        "library/documents/*",
+        "library/documents/*/*",
+        "recording/recorder.c",
+        "review/html/assets/*",
+    ],
     "keystore": ["py.typed", "__init__.pyi", "schemas/*"],
 }
 ENTRY_POINTS = {
     "console_scripts": [
         "secure-launch = enclave_common.entry:secure_launch",
-        "secure-plan = enclave_common.entry:secure_plan",
+        "secure-plan = enclave_addons.entry:secure_plan",
         "secure-keystore = enclave_common.entry:secure_keystore",
         "secure-nodl = enclave_common.entry:secure_nodl",
     ],
-    "launch.frontend.launch_extension": ["enclave_launch = enclave_launch.ros2.attributes"],
+    "launch.frontend.launch_extension": ["enclave_launch = enclave_addons.ros2.attributes"],
     "launch_ros.node_action": [
-        "security_enclaves = enclave_launch.ros2.node_action:EnclaveNodeActionExtension"
+        "security_enclaves = enclave_addons.ros2.node_action:EnclaveNodeActionExtension"
     ],
-    "ros2launch.option": ["security_enclaves = enclave_launch.ros2.option:EnclaveOption"],
+    "ros2launch.option": ["security_enclaves = enclave_addons.ros2.option:EnclaveOption"],
+    "enclave_launch.describer": [
+        "library = enclave_addons.library.access:LibraryAccess",
+        "inference = enclave_addons.inference.describer:SourceInference",
+    ],
+    "secure_keystore.verb": [
+        "export = enclave_addons.deployment.keystore_verb.export",
+        "import = enclave_addons.deployment.keystore_verb.import",
+        "units = enclave_addons.deployment.keystore_verb.units",
+        "request = enclave_addons.deployment.keystore_verb.request",
+        "sign = enclave_addons.deployment.keystore_verb.sign",
+        "fleet = enclave_addons.deployment.keystore_verb.fleet",
+        "zenoh = enclave_addons.zenoh.verb.zenoh",
+        "denials = enclave_addons.zenoh.verb.denials",
+    ],
+    "secure_nodl.verb": [
+        "check-record = enclave_addons.recording.verb.check_record",
+        "infer = enclave_addons.inference.verb.infer",
+        "library = enclave_addons.library.verb.library",
+        "observe = enclave_addons.observation.verb.observe",
+    ],
+    "secure_plan.verb": [
+        "drift = enclave_addons.observation.verb.drift",
+        "export = enclave_addons.deployment.plan_verb.export",
+        "hosts = enclave_addons.deployment.plan_verb.hosts",
+    ],
 }
 
 if int(setuptools.__version__.split(".")[0]) >= 61 and Path("pyproject.toml").is_file():
@@ -48,7 +80,7 @@ else:
         name=NAME,
         version=VERSION,
         packages=setuptools.find_packages(
-            include=["enclave_common*", "enclave_launch*", "nodl*", "keystore*"]
+            include=["enclave_common*", "enclave_launch*", "nodl*", "keystore*", "enclave_addons*"]
         ),
         package_data=PACKAGE_DATA,
         data_files=DATA_FILES,

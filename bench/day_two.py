@@ -24,12 +24,12 @@ import yaml
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
+from enclave_addons.deployment.host_bundles import BundleOptions, export_hosts, pinned  # noqa: E402
+from enclave_addons.deployment.importing import ImportOptions, ImportReport, Restart, import_bundle  # noqa: E402
+from enclave_addons.review.verb import main as secure_plan  # noqa: E402
 from enclave_launch.enclave import EnclaveScope  # noqa: E402
 from enclave_launch.flow import provision, resolve  # noqa: E402
 from enclave_launch.options import ResolveOptions, SecurityOptions  # noqa: E402
-from enclave_launch.verb.secure_plan import main as secure_plan  # noqa: E402
-from keystore.steps.host_bundles import BundleOptions, export_hosts, pinned  # noqa: E402
-from keystore.steps.importing import ImportOptions, ImportReport, Restart, import_bundle  # noqa: E402
 from keystore.steps.options import ProvisionOptions  # noqa: E402
 from keystore.steps.removal import RemoveOptions, remove  # noqa: E402
 from keystore.steps.renewal import RenewOptions, renew  # noqa: E402

@@ -34,11 +34,11 @@ from typing import NamedTuple
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
+from enclave_addons.deployment.fleet import fleet_status  # noqa: E402
+from enclave_addons.deployment.host_bundles import BundleOptions, export_hosts, pinned  # noqa: E402
+from enclave_addons.deployment.importing import ImportOptions, import_bundle  # noqa: E402
 from keystore.formats.domains import Domains  # noqa: E402
 from keystore.formats.policy import EnclavePolicy, Operation, Profile, Qualifier, Rule  # noqa: E402
-from keystore.steps.fleet import fleet_status  # noqa: E402
-from keystore.steps.host_bundles import BundleOptions, export_hosts, pinned  # noqa: E402
-from keystore.steps.importing import ImportOptions, import_bundle  # noqa: E402
 from keystore.steps.options import ProvisionOptions  # noqa: E402
 from keystore.steps.provisioning import provision  # noqa: E402
 from keystore.steps.renewal import RenewOptions, renew  # noqa: E402

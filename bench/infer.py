@@ -30,8 +30,8 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT))
 
-from nodl.infer import InferredSystem, infer_paths  # noqa: E402
-from nodl.infer.report.written import expand  # noqa: E402
+from enclave_addons.inference import InferredSystem, infer_paths  # noqa: E402
+from enclave_addons.inference.report.written import expand  # noqa: E402
 from nodl.names import expand_name  # noqa: E402
 from nodl.node_interface import Certainty, Endpoint, EndpointKind, NodeInterface  # noqa: E402
 

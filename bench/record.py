@@ -20,8 +20,8 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from enclave_launch.recording.programs import recorder_library, with_recorder
-from tests.recording.stand_in_launch import Program, asks, build_stand_in, make_workspace
+from enclave_addons.recording.programs import recorder_library, with_recorder
+from tests.addons.recording.stand_in_launch import Program, asks, build_stand_in, make_workspace
 
 ROOT = Path(__file__).resolve().parent.parent
 ROUNDS = int(os.environ.get("BENCH_RUNS", "9"))

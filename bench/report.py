@@ -16,9 +16,9 @@ import tempfile
 import time
 from pathlib import Path
 
-from enclave_launch.report.html.page import html_report
-from tests.report.browser import Page, browser
-from tests.report.conftest import contents, large
+from enclave_addons.review.html.page import html_report
+from tests.addons.review.report.browser import Page, browser
+from tests.addons.review.report.conftest import contents, large
 
 RUNS = 5
 _FRAMES = "new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"

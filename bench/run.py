@@ -42,7 +42,7 @@ ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "tests" / "ros2"))
 
 if TYPE_CHECKING:
-    from tests.ros2 import upstream
+    from tests.addons.ros2 import upstream
 else:
     import upstream
 
@@ -182,8 +182,8 @@ def variants(workspace: Workspace, count: int) -> Mapping[str, Variant]:
         "secured, warm": Variant(secure_launch(*secured_by(warm), file)),
     }
     if workspace.site.is_dir():
-        peer = [sys.executable, str(ROOT / "tests/ros2/ros2_launch.py")]
-        path = (str(workspace.site), str(ROOT / "tests/ros2"), str(ROOT), *REAL_LAUNCH)
+        peer = [sys.executable, str(ROOT / "tests/addons/ros2/ros2_launch.py")]
+        path = (str(workspace.site), str(ROOT / "tests/addons/ros2"), str(ROOT), *REAL_LAUNCH)
         found["ros2 launch"] = Variant([*peer, file], path)
         found["ros2 launch, warm"] = Variant([*peer, *secured_by(warm), file], path)
     return found

@@ -24,7 +24,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
-from enclave_launch.drift_watch import SettlingTimes
+from enclave_addons.observation.drift_watch import SettlingTimes
 
 ROOT = Path(__file__).resolve().parent.parent
 DEMO_WS = ROOT / "fixtures" / "demo_ws"
@@ -143,7 +143,7 @@ def observer_below(pid: int) -> int | None:
                 words = (entry / "cmdline").read_bytes()
             except OSError:
                 continue
-            if parent == pid and b"nodl.graph.follow" in words:
+            if parent == pid and b"enclave_addons.observation.graph.follow" in words:
                 return int(entry.name)
     return None
 

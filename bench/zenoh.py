@@ -17,14 +17,14 @@ from pathlib import Path
 from time import process_time
 from typing import Any
 
+from enclave_addons.zenoh.grants import grants_of_policy
+from enclave_addons.zenoh.rules import access_rules
+from enclave_addons.zenoh.writing import write_zenoh
 from keystore.formats.domains import Domains
 from keystore.formats.policy import EnclavePolicy, Operation, Profile, Qualifier, Rule
 from keystore.steps.creation import CreateOptions, create_keystore
 from keystore.steps.options import ProvisionOptions
 from keystore.steps.provisioning import provision
-from keystore.zenoh.grants import grants_of_policy
-from keystore.zenoh.rules import access_rules
-from keystore.zenoh.writing import write_zenoh
 
 _OPERATIONS = tuple(Operation)
 _MESSAGES = 20_000

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, NoReturn, Protocol
 
 from enclave_common import VERSION
+from enclave_common.add_ons import add_ons
 from enclave_common.dependencies import missing_dependency
 from enclave_common.terminal import OutputError
 from enclave_common.words import did_you_mean
@@ -136,11 +137,21 @@ class CommandParser(argparse.ArgumentParser):
         return self.verbs[name]
 
     def add_verb_modules(self, package: str, names: Iterable[str]) -> Iterator[tuple[CommandParser, Any]]:
-        """Add a verb for each module of ``package``, and yield its parser and module; those of an add-on that is not
-        installed say so when they are used."""
-        for name in names:
+        """Add the verbs of a command: modules of ``package``, and those that add-ons bring as entry points.
+
+        Args:
+            package: The package with the core's verbs. The program's name and ``verb`` make the group of entry
+                points, such as ``secure_nodl.verb``.
+            names: The core's verbs.
+
+        Yields:
+            The parser of each verb and its module. A verb whose module is absent reports that when it is used.
+        """
+        modules = {name: f"{package}.{name.replace('-', '_')}" for name in names}
+        brought = add_ons(f"{self.prog.replace('-', '_')}.verb")
+        for name, path in (modules | {name: each.value for name, each in brought.items()}).items():
             try:
-                module: Any = import_module(f"{package}.{name.replace('-', '_')}")
+                module: Any = import_module(path)
             except ModuleNotFoundError as error:
                 self._add_absent_verb(name, error)
                 continue

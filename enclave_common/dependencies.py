@@ -6,7 +6,7 @@ import sys
 from importlib import import_module
 from importlib.util import find_spec
 
-_OURS = ("enclave_launch", "nodl", "keystore")
+_OURS = ("enclave_addons", "enclave_launch", "nodl", "keystore")
 _OF_A_NODE = ("rclpy", "rcl_interfaces.srv", "service_msgs.msg", "unique_identifier_msgs.msg")
 _APT_AND_PIP = {
     "asn1crypto": ("python3-asn1crypto", "asn1crypto"),

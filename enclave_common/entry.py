@@ -9,25 +9,21 @@ from importlib import import_module
 
 def secure_launch() -> int:
     """Run ``secure-launch``."""
-    return _run("secure-launch", "enclave_launch.verb.secure_launch")
-
-
-def secure_plan() -> int:
-    """Run ``secure-plan``."""
-    return _run("secure-plan", "enclave_launch.verb.secure_plan")
+    return run("secure-launch", "enclave_launch.verb.secure_launch")
 
 
 def secure_keystore() -> int:
     """Run ``secure-keystore``."""
-    return _run("secure-keystore", "keystore.verb")
+    return run("secure-keystore", "keystore.verb")
 
 
 def secure_nodl() -> int:
     """Run ``secure-nodl``."""
-    return _run("secure-nodl", "nodl.verb")
+    return run("secure-nodl", "nodl.verb")
 
 
-def _run(command: str, module: str) -> int:
+def run(command: str, module: str) -> int:
+    """Import the program ``module`` and run its ``main`` as ``command``. Return the exit status."""
     try:
         import_module("enclave_common.own_packages").prefer_own_nodl()
         guarded = import_module("enclave_common.command_line").guarded

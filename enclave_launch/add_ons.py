@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from enclave_launch.plan import LaunchPlan
     from keystore.steps.options import ProvisionOptions
 
-_ROOM = "enclave_launch.zenoh"
+_ROOM = "enclave_addons.zenoh"
 
 
 class LaunchRouter(Protocol):

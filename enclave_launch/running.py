@@ -145,11 +145,11 @@ def _recording(launch: _Launch, settings: RunSettings) -> LaunchCompanion | None
     secured = not isinstance(launch, UnsecuredLaunch)
     if settings.record is False or (settings.record is None and not secured):
         return None
-    if settings.record is None and not installed("enclave_launch.recording"):
+    if settings.record is None and not installed("enclave_addons.recording"):
         return None
-    from enclave_launch.recording.denials import Explainer  # an add-on: recording
-    from enclave_launch.recording.learning import new_run
-    from enclave_launch.recording.recording import Recording
+    from enclave_addons.recording.denials import Explainer  # an add-on: recording
+    from enclave_addons.recording.learning import new_run
+    from enclave_addons.recording.recording import Recording
 
     source = _source(launch)
     distro = source.host_options.distro or os.environ.get("ROS_DISTRO", "")

@@ -1,5 +1,22 @@
 """The public names of keystore for type checkers."""
 
+from enclave_addons.deployment.fleet import FleetReport as FleetReport
+from enclave_addons.deployment.fleet import fleet_status as fleet_status
+from enclave_addons.deployment.host_bundles import BundleOptions as BundleOptions
+from enclave_addons.deployment.host_bundles import HostBundle as HostBundle
+from enclave_addons.deployment.host_bundles import export_hosts as export_hosts
+from enclave_addons.deployment.host_bundles import pinned as pinned
+from enclave_addons.deployment.host_keys import RequestOptions as RequestOptions
+from enclave_addons.deployment.host_keys import request as request
+from enclave_addons.deployment.hosts import Hosts as Hosts
+from enclave_addons.deployment.hosts import load_hosts as load_hosts
+from enclave_addons.deployment.importing import ImportOptions as ImportOptions
+from enclave_addons.deployment.importing import ImportReport as ImportReport
+from enclave_addons.deployment.importing import import_bundle as import_bundle
+from enclave_addons.deployment.public_files import PublicFiles as PublicFiles
+from enclave_addons.deployment.public_files import export as export
+from enclave_addons.deployment.request_signing import accept_certificates as accept_certificates
+from enclave_addons.deployment.request_signing import sign_requests as sign_requests
 from keystore.disk.share_files import LaunchHold as LaunchHold
 from keystore.errors import DamagedKeystoreError as DamagedKeystoreError
 from keystore.errors import InvalidEnclaveNameError as InvalidEnclaveNameError
@@ -15,8 +32,6 @@ from keystore.formats.governance import DomainRule as DomainRule
 from keystore.formats.governance import Governance as Governance
 from keystore.formats.governance import Protection as Protection
 from keystore.formats.governance import TopicRule as TopicRule
-from keystore.formats.hosts import Hosts as Hosts
-from keystore.formats.hosts import load_hosts as load_hosts
 from keystore.formats.policy import EnclavePolicy as EnclavePolicy
 from keystore.formats.policy import Operation as Operation
 from keystore.formats.policy import Policy as Policy
@@ -29,8 +44,6 @@ from keystore.formats.subject import SubjectScheme as SubjectScheme
 from keystore.formats.validity import Validity as Validity
 from keystore.signing.ca_access import CaAccess as CaAccess
 from keystore.signing.ca_access import Secret as Secret
-from keystore.steps.bundle import PublicFiles as PublicFiles
-from keystore.steps.bundle import export as export
 from keystore.steps.creation import CreateOptions as CreateOptions
 from keystore.steps.creation import CreateReport as CreateReport
 from keystore.steps.creation import ImportedCa as ImportedCa
@@ -39,18 +52,7 @@ from keystore.steps.expiry import Expiry as Expiry
 from keystore.steps.expiry import StatusReport as StatusReport
 from keystore.steps.expiry import expires_soon as expires_soon
 from keystore.steps.expiry import status as status
-from keystore.steps.fleet import FleetReport as FleetReport
-from keystore.steps.fleet import fleet_status as fleet_status
 from keystore.steps.governance import set_governance as set_governance
-from keystore.steps.host_bundles import BundleOptions as BundleOptions
-from keystore.steps.host_bundles import HostBundle as HostBundle
-from keystore.steps.host_bundles import export_hosts as export_hosts
-from keystore.steps.host_bundles import pinned as pinned
-from keystore.steps.host_keys import RequestOptions as RequestOptions
-from keystore.steps.host_keys import request as request
-from keystore.steps.importing import ImportOptions as ImportOptions
-from keystore.steps.importing import ImportReport as ImportReport
-from keystore.steps.importing import import_bundle as import_bundle
 from keystore.steps.opening import ChangeOptions as ChangeOptions
 from keystore.steps.options import EnclaveReport as EnclaveReport
 from keystore.steps.options import ProvisionOptions as ProvisionOptions
@@ -66,8 +68,6 @@ from keystore.steps.removal import RemoveReport as RemoveReport
 from keystore.steps.removal import remove as remove
 from keystore.steps.renewal import RenewOptions as RenewOptions
 from keystore.steps.renewal import renew as renew
-from keystore.steps.request_signing import accept_certificates as accept_certificates
-from keystore.steps.request_signing import sign_requests as sign_requests
 from keystore.steps.rollover import Step as Step
 from keystore.steps.rollover import roll_over as roll_over
 from keystore.steps.sharing import LaunchShares as LaunchShares

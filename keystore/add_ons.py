@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from keystore.steps.options import ProvisionOptions
     from keystore.verification.finding import Finding
 
-_ROOM = "keystore.zenoh"
+_ROOM = "enclave_addons.zenoh"
 
 
 class ZenohFiles(NamedTuple):

@@ -21,9 +21,9 @@ THOROUGH = (
     "evaluation/test_error_text.py",
     "evaluation/test_explore.py",
     "launch_ros/test_enclave_scopes.py",
-    "nodl/infer/cpp/test_in_a_launch.py",
-    "nodl/infer/test_deceptions.py",
-    "nodl/infer/test_in_a_launch.py",
+    "enclave_addons/inference/cpp/test_in_a_launch.py",
+    "enclave_addons/inference/test_deceptions.py",
+    "enclave_addons/inference/test_in_a_launch.py",
     "policy/test_components.py",
 )
 """Tables in these folders that take more than three seconds each: together half of the time."""

@@ -22,7 +22,7 @@ from enclave_common.command_line import CommandParser, parsers
 ROOT = Path(__file__).resolve().parents[1]
 PARSERS = {
     "secure-launch": "enclave_launch.verb.options",
-    "secure-plan": "enclave_launch.verb.secure_plan",
+    "secure-plan": "enclave_addons.review.verb",
     "secure-keystore": "keystore.verb",
     "secure-nodl": "nodl.verb",
 }

@@ -15,7 +15,7 @@ ROOT = Path(__file__).parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 MODULES = {
     "secure-launch": "enclave_launch",
-    "secure-plan": "enclave_launch.verb.secure_plan",
+    "secure-plan": "enclave_addons.review.verb",
     "secure-nodl": "nodl.verb",
     "secure-keystore": "keystore.verb",
 }

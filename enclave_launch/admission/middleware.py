@@ -59,7 +59,7 @@ def vendor_of(middleware: str) -> Vendor | None:
 
 def zenoh_absence() -> str:
     """Return what to do if the add-on that secures Zenoh is not installed, empty if it is."""
-    return absence("enclave_launch.zenoh") or absence("keystore.zenoh")
+    return absence("enclave_addons.zenoh")
 
 
 def why_not(middleware: str, accepted: Collection[str] = ()) -> str | None:

@@ -10,14 +10,18 @@ import contextlib
 import os
 from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
-from enclave_common.dependencies import installed
 from enclave_common.words import counted
 from enclave_launch.errors import ManifestError, translated
+from enclave_launch.interfaces.describers import (
+    InferredNodes,
+    SourceDescriber,
+    library_describer,
+    source_describer,
+)
 from enclave_launch.interfaces.descriptions import ProgramStart, meeting
-from enclave_launch.interfaces.library_access import LibraryAccess
-from enclave_launch.interfaces.situation import StartedProgram
+from enclave_launch.interfaces.situation import StartedPlugin, StartedProgram
 from enclave_launch.options import ResolveOptions
 from enclave_launch.plan import Found, InterfaceOrigin, Missing
 from enclave_launch.policy.node_permissions import UNSEEN
@@ -27,11 +31,6 @@ from nodl.errors import ConflictingNoDLError, NoDLError
 from nodl.lookup import Lookup, ManifestLookup
 from nodl.node_interface import ClientLibrary, NodeInterface
 from nodl.source_ref import SourceRef
-
-if TYPE_CHECKING:
-    from nodl.infer.executable import InferredExecutable
-    from nodl.infer.reach import SourcesInReach
-    from nodl.infer.start import Start
 
 SOURCE_VARIABLE = "SECURE_LAUNCH_SOURCE"
 """Folders with sources of compiled nodes, separated as in ``PATH``; after those that ``--source`` names."""
@@ -82,9 +81,8 @@ class InterfaceFinder:
         self._prefixes = prefixes
         self._distro = distro
         self._lookup = ManifestLookup(prefixes, self._options.manifests)
-        self._library = LibraryAccess(prefixes, self._options, distro, launch, self._plugin)
+        self._library = library_describer(prefixes, self._options, distro, launch, self._plugin)
         self._known: dict[_Subject, _Known] = {}
-        self._infers = self._options.infer and installed("nodl.infer")
 
     def __call__(
         self, started: ResolvedProcess | ResolvedComponent, container: ResolvedProcess | None = None
@@ -144,22 +142,20 @@ class InterfaceFinder:
             return _Known((Found((_container(subject),)),))
         recorded = self._library.recorded(subject.package, name)
         if recorded:
-            interfaces = tuple(hit.document.interface for hit in recorded)
-            doubt = next((hit.doubt for hit in recorded if hit.doubt), "")
-            found.append(Found(interfaces, InterfaceOrigin.RECORDED, doubt))
+            found.append(recorded)
         analysed = None
         by_hand = any(each.origin is InterfaceOrigin.PACKAGE for each in found)
-        if not by_hand or (self._infers and self._sources.hold(subject.package)):
+        if not by_hand or (self._sources is not None and self._sources.hold(subject.package)):
             analysed = self._inferred(subject, started, compiled_only=by_hand)
-        if analysed:
+        if analysed is not None and analysed.interfaces:
             found.append(Found(analysed.interfaces, InterfaceOrigin.ANALYSIS))
         hit = self._library.find(subject.package, name)
         if hit:
-            found.append(Found((hit.document.interface,), InterfaceOrigin.LIBRARY, hit.doubt))
+            found.append(hit)
         if analysed is not None and analysed.not_made and not found:
             return _Known((), (analysed.why,), not_made=True)
         searched = [analysed.why] if analysed is not None and analysed.why else []
-        if self._options.infer and not self._infers:
+        if self._options.infer and self._sources is None:
             searched.append("inference is not part of this installation")
         if self._options.library:
             searched.append("the library has no document of it")
@@ -169,37 +165,25 @@ class InterfaceFinder:
 
     def _inferred(
         self, subject: _Subject, started: StartedProgram, *, compiled_only: bool = False
-    ) -> InferredExecutable | None:
-        if not self._infers or subject.package is None:
+    ) -> InferredNodes | None:
+        if self._sources is None or subject.package is None:
             return None
-        from nodl.infer.executable import infer_executable  # an add-on: inference
-
         if self._options.progress is not None:
             self._options.progress(str(subject))
-        return infer_executable(
-            subject.package,
-            executable=subject.executable,
-            plugin=subject.plugin,
-            prefixes=self._prefixes,
-            sources=self._sources,
-            start_of=started,
-            compiled_only=compiled_only,
+        return self._sources.infer(
+            subject.package, subject.executable, subject.plugin, started, compiled_only=compiled_only
         )
 
-    def _plugin(self, plugin_class: str, instance: str, start: Start) -> tuple[NodeInterface, ...]:
-        if not self._infers:
-            return ()
-        from nodl.infer.executable import infer_plugin  # an add-on: inference
-
-        return infer_plugin(plugin_class, instance, self._sources, start)
+    def _plugin(self, plugin_class: str, instance: str, start: StartedPlugin) -> tuple[NodeInterface, ...]:
+        return () if self._sources is None else self._sources.infer_plugin(plugin_class, instance, start)
 
     @cached_property
-    def _sources(self) -> SourcesInReach:
-        from nodl.infer.reach import SourcesInReach  # an add-on: inference
-
+    def _sources(self) -> SourceDescriber | None:
+        if not self._options.infer:
+            return None
         named = [str(folder) for folder in self._options.source_folders]
         named += [folder for folder in os.environ.get(SOURCE_VARIABLE, "").split(os.pathsep) if folder]
-        return SourcesInReach(self._prefixes, named)
+        return source_describer(self._prefixes, named)
 
 
 def _shortly(places: Sequence[str]) -> str:

@@ -125,8 +125,8 @@ def _plan_text(plan: LaunchPlan, options: argparse.Namespace, keystore: str | No
     if options.format == "policy":
         return _policy_text(plan)
 
+    from enclave_addons.review.verb.report import report_text  # cryptography
     from enclave_launch.dry_run import DryRun  # pydantic
-    from enclave_launch.verb.secure_plan.report import report_text  # cryptography
 
     there = keystore if keystore is not None and os.path.isdir(keystore) else None
     dry_run = DryRun(**plan_document(plan))

@@ -39,11 +39,11 @@ from keystore.steps.signing_process import SigningProcess
 def launch_target(target: LaunchTarget, options: argparse.Namespace, keystore: str | None) -> int:
     """Learn from, audit or start ``target``, as the options say. Return the exit status."""
     if options.learn is not None:
-        from enclave_launch.verb.recorded import learn_launch  # an add-on: recording
+        from enclave_addons.recording.launch_options import learn_launch  # an add-on: recording
 
         return learn_launch(target, options, lambda companion: start(target, options, keystore, companion))
     if options.audit:
-        from enclave_launch.verb.recorded import audit_launch  # an add-on: recording
+        from enclave_addons.recording.launch_options import audit_launch  # an add-on: recording
 
         return audit_launch(resolve_target(target, options), options, _run_settings(options))
     return start(target, options, keystore)
@@ -58,7 +58,7 @@ def start(
     """Launch ``target``, secured if ``keystore`` is given, wait until it is over, and return the exit status."""
     if keystore is None:
         if options.watch:
-            from enclave_launch.verb.watch import watch_plain_launch  # an add-on: observation
+            from enclave_addons.observation.launch_options import watch_plain_launch  # an add-on: observation
 
             plan = resolve_target(target, options)
             warn(*plan.problems, *plan.warnings)
@@ -88,7 +88,7 @@ def _launch(
     if not options.provision_only:
         _check_before_keys_are_made(plan, keystore)
         if options.watch and not plan.problems:
-            from enclave_launch.verb.watch import check_watch  # an add-on: observation
+            from enclave_addons.observation.launch_options import check_watch  # an add-on: observation
 
             check_watch(plan)
     if options.strategy == "Permissive":
@@ -106,7 +106,9 @@ def _launch(
     if options.restart_expiring:
         deadline = renewal_deadline(launch, utc_now())
     if options.watch:
-        from enclave_launch.verb.watch import watch_of_secured_launch  # an add-on: observation
+        from enclave_addons.observation.launch_options import (
+            watch_of_secured_launch,  # an add-on: observation
+        )
 
         watch = watch_of_secured_launch(launch, options)
     settings = _run_settings(options)._replace(companion=companion, deadline=deadline, watch=watch)

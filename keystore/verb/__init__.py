@@ -21,8 +21,8 @@ from keystore.errors import KeystoreError
 from keystore.verb.common import FOLDED, add_table
 
 VERBS = (
-    "create", "create-enclave", "apply-policy", "list", "status", "verify", "renew", "remove", "export",
-    "import", "units", "request", "sign", "fleet", "governance", "shares", "tool-enclave", "zenoh", "denials",
+    "create", "create-enclave", "apply-policy", "list", "status", "verify", "renew", "remove", "governance", "shares",
+    "tool-enclave",
 )  # fmt: skip
 
 

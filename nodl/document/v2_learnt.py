@@ -1,4 +1,4 @@
-"""What our section of a NoDL v2 document says of names that were learnt from runs (written by ``nodl.record``).
+"""What our section of a NoDL v2 document says of names that were learnt from runs (written by recording).
 
     codegen:
       enclave_launch:

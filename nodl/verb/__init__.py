@@ -25,7 +25,7 @@ from enclave_common.files import write_text
 from enclave_common.terminal import printable, safe_output
 from nodl.errors import NoDLError
 
-VERBS = ("check-record", "convert", "infer", "library", "observe", "show", "validate")
+VERBS = ("convert", "show", "validate")
 PREFIX: Option = (
     "--prefix DIR", {**TEXTS, "type": os.path.abspath},
     "ament install prefix, searched before AMENT_PREFIX_PATH (repeatable)",

@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[2]
 DEMO = ROOT / "fixtures" / "demo_ws"
 MODULES = {
     "secure-launch": "enclave_launch",
-    "secure-plan": "enclave_launch.verb.secure_plan",
+    "secure-plan": "enclave_addons.review.verb",
     "secure-keystore": "keystore.verb",
 }
 

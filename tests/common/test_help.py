@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from enclave_addons.review import verb as secure_plan
 from enclave_common.command_line import CommandParser, Option, parsers
 from enclave_launch.verb import options as secure_launch
-from enclave_launch.verb import secure_plan
 from keystore import verb as secure_keystore
 from nodl import verb as secure_nodl
 

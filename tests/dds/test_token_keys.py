@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+from enclave_addons.deployment.host_keys import parse_requests
 from keystore import (
     EnclavePolicy,
     ImportOptions,
@@ -24,7 +25,6 @@ from keystore import (
     pinned,
     sign_requests,
 )
-from keystore.steps.host_keys import parse_requests
 from tests.dds.conftest import missing
 from tests.dds.our_keystore import allow, node, provision
 from tests.dds.probe import Participant, Probe

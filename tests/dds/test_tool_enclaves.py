@@ -14,14 +14,14 @@ from typing import NamedTuple
 import pytest
 
 import keystore
+from enclave_addons.observation.graph.cyclone import CycloneObserver, ObserverError
+from enclave_addons.observation.graph.model import Graph
 from keystore import Domains, EnclavePolicy, Operation, Profile, create_tool_enclave
-from nodl.graph.cyclone import CycloneObserver, ObserverError
-from nodl.graph.model import Graph
+from tests.addons.observation.graph.conftest import Start
+from tests.addons.observation.graph.conftest import start as start
+from tests.addons.observation.graph.nodes import LOOPBACK, Implementation, topic, wait_for
 from tests.dds.our_keystore import PARAMETER_SERVICES, allow, provision
 from tests.dds.probe import Participant, Probe
-from tests.graph.conftest import Start
-from tests.graph.conftest import start as start
-from tests.graph.nodes import LOOPBACK, Implementation, topic, wait_for
 
 pytestmark = pytest.mark.dds
 

@@ -30,7 +30,7 @@ _COLCON = """
 # As colcon would place this workspace's packages, from their install rules.
 from pathlib import Path
 from shutil import rmtree
-from enclave_launch.verb.secure_plan.source_prefix import install_sources
+from enclave_addons.review.verb.source_prefix import install_sources
 rmtree("install", ignore_errors=True)
 prefixes = install_sources(Path("src"), Path("install"))
 listed = ":".join(str(prefix.resolve()) for prefix in prefixes.values())

@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 
 import enclave_launch
+from tests.addons.observation.graph.nodes import LOOPBACK
+from tests.addons.recording.conftest import rclpy_python
 from tests.dds import sros2_style
 from tests.dds.conftest import domain_id as domain_id
 from tests.docs.my_robot import DEMO_NODES, RCLPY_NODES, make_my_robot
 from tests.docs.pages import Command, make_colcon, parts, read_aloud, reader_environment, write_files
-from tests.graph.nodes import LOOPBACK
-from tests.recording.conftest import rclpy_python
 
 ROOT = Path(__file__).parent.parent.parent
 DOCS = ROOT / "docs"

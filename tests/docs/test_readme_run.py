@@ -11,8 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.addons.observation.graph.nodes import LOOPBACK
 from tests.dds.conftest import domain_id as domain_id
-from tests.graph.nodes import LOOPBACK
 
 ROOT = Path(__file__).parent.parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")

@@ -17,7 +17,7 @@ DEMO_WS = Path(__file__).parents[2] / "fixtures/demo_ws"
 TALKER = ("--prefix", str(DEMO_WS), "demo_nodes", "talker_listener.launch.xml")
 COMMANDS = {
     "secure-launch": "enclave_launch",
-    "secure-plan": "enclave_launch.verb.secure_plan",
+    "secure-plan": "enclave_addons.review.verb",
     "secure-keystore": "keystore.verb",
     "secure-nodl": "nodl.verb",
 }

@@ -16,10 +16,10 @@ from pathlib import Path
 
 from hypothesis import HealthCheck, given, seed, settings
 
+from tests.addons.inference.cpp.random_programs.generator import program
+from tests.addons.inference.cpp.random_programs.judge import judged, runs
 from tests.fuzz.inputs import damaged
 from tests.fuzz.targets import Target, targets
-from tests.nodl.infer.cpp.random_programs.generator import program
-from tests.nodl.infer.cpp.random_programs.judge import judged, runs
 
 PROGRAMS, BATCH = "cpp-programs", 30
 ROUND = 1_000  # inputs of one target before it is another one's turn

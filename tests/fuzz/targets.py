@@ -14,6 +14,12 @@ from unittest.mock import patch
 
 import yaml
 
+from enclave_addons.deployment.host_keys import parse_requests, requests_text
+from enclave_addons.deployment.hosts import parse_hosts
+from enclave_addons.observation.graph.discovery_info import decode as decode_discovery_info
+from enclave_addons.observation.graph.json_form import NotAGraph, graph_document
+from enclave_addons.observation.graph.json_form import graph_from_document as observed_from
+from enclave_addons.recording.record.lines import read_lines
 from enclave_common.shell_words import split_words
 from enclave_common.xml_tree import RefusedXml
 from enclave_common.yaml_reader import load_yaml
@@ -28,27 +34,21 @@ from keystore.formats.certificate import read_certificates
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.governance import parse_governance
 from keystore.formats.governance_yaml import parse_governance_yaml
-from keystore.formats.hosts import parse_hosts
 from keystore.formats.permissions_document import parse_permissions
 from keystore.formats.policy_xml import parse_policy
 from keystore.formats.register import parse_register
 from keystore.formats.shares import parse_shares
 from keystore.formats.validity import parse_duration, parse_time
 from keystore.signing import smime
-from keystore.steps.host_keys import parse_requests, requests_text
 from keystore.verification.files import holds_private_key
 from nodl.document.v1 import parse_v1
 from nodl.document.v2 import parse_v2
 from nodl.errors import InvalidNoDLError
-from nodl.graph.discovery_info import decode as decode_discovery_info
-from nodl.graph.json_form import NotAGraph, graph_document
-from nodl.graph.json_form import graph_from_document as observed_from
-from nodl.record.lines import read_lines
 from nodl.remap import InvalidRemapRuleError, parse_rule
 from nodl.ros_arguments import parse_ros_arguments
-from tests.graph.made import one_node
-from tests.graph.test_discovery_info import encoded
-from tests.nodl.infer.random_programs import random_program, silently_missing
+from tests.addons.inference.random_programs import random_program, silently_missing
+from tests.addons.observation.graph.made import one_node
+from tests.addons.observation.graph.test_discovery_info import encoded
 
 FIXTURES = Path(__file__).parents[2] / "fixtures/demo_ws/share/demo_nodes"
 GOLDEN = Path(__file__).parents[1] / "keystore/golden_permissions"

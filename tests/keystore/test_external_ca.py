@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from enclave_addons.deployment.host_keys import Request, parse_requests, requests_text
 from keystore import (
     BundleOptions,
     ImportOptions,
@@ -23,7 +24,6 @@ from keystore import (
     verify,
 )
 from keystore.disk.view import KeystoreView
-from keystore.steps.host_keys import Request, parse_requests, requests_text
 from keystore.verb import main
 from tests.keystore.kit import actions, openssl, options, policy
 

@@ -15,6 +15,7 @@ import pytest
 from asn1crypto import cms
 from cryptography.hazmat.primitives.asymmetric import ec
 
+from enclave_addons.zenoh.writing import write_zenoh
 from keystore import (
     CaAccess,
     CreateOptions,
@@ -46,7 +47,6 @@ from keystore.signing.authority import Authority
 from keystore.signing.certificate_request import public_half
 from keystore.signing.public_key import fingerprint
 from keystore.signing.smime import sign_document
-from keystore.zenoh.writing import write_zenoh
 from tests.keystore import kit
 
 YEAR = timedelta(days=365)

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
+from enclave_addons.deployment.host_keys import Request, requests_text
 from keystore import Role, Severity, request, verify
 from keystore.disk import layout
 from keystore.formats.certificate import CertificateFacts, given_certificates
 from keystore.signing.openssl import refusals
-from keystore.steps.host_keys import Request, requests_text
 from keystore.verb import main
 from tests.keystore.kit import filled, openssl
 

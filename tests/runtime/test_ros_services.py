@@ -1,7 +1,7 @@
 """What stands before the launcher's own calls: its enclave, and the gate before a component.
 
 rclpy's wheels hold a Fast DDS without security: a stand-in answers here, for these two questions alone. Loading and
-lifecycle transitions are tested on real rclpy (tests/ros_graph).
+lifecycle transitions are tested on real rclpy (tests/addons/observation/ros_graph).
 """
 
 from __future__ import annotations

@@ -1,0 +1,68 @@
+"""What a run found: nodes with their endpoints and parameters, gaps, places that are dead for a reason."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from enclave_addons.inference.cpp.running.values import BOTTOM, Notes, Text, Value, join
+from nodl.dependence import ALWAYS, When
+from nodl.node_interface import EndpointKind
+from nodl.source_ref import SourceRef
+
+Condition = tuple[str, int, str]  # file, line of the #if, symbol: what the preprocessor decides elsewhere
+
+
+@dataclass(frozen=True)
+class Follows:
+    """A name that a library makes of the final name of another topic, as remapped: ``how`` is ``remapped`` (``ending``
+    stands behind it) or ``camera_info``."""
+
+    how: str
+    topic: Text
+    ending: str = ""
+
+
+@dataclass(frozen=True)
+class PossibleEndpoint:
+    """An interface made at ``source``; ``follows`` where its name derives from another topic, ``when``: in which
+    releases a library makes it."""
+
+    kind: EndpointKind
+    name: Text
+    type: str
+    source: SourceRef
+    exact: bool = True
+    follows: Follows | None = None
+    when: When = ALWAYS
+
+
+@dataclass(eq=False)
+class AllocatedNode:
+    """A node under construction. ``description``: the class of a library that makes it for itself;
+    ``parameter_services``: they, or its parameter events, are not certainly switched off."""
+
+    source: SourceRef
+    parameters: Notes
+    overrides: Notes
+    set_values: Notes  # what the program gives parameters later
+    lifecycle: bool
+    names: Value = BOTTOM
+    namespaces: Value = BOTTOM
+    endpoints: dict[PossibleEndpoint, list[tuple[Condition, ...]]] = field(default_factory=dict)
+    unconditional: set[PossibleEndpoint] = field(default_factory=set)
+    gaps: dict[tuple[SourceRef, str], None] = field(default_factory=dict)
+    arguments: list[tuple[str | None, ...]] = field(default_factory=list)
+    use_global_arguments: bool = True
+    parameter_services: bool = False
+    description: str = ""
+
+    def declare(self, name: str, default: Value) -> None:
+        self.parameters[name] = join(self.parameters.get(name, BOTTOM), default)
+
+    def default(self, name: str) -> Value:
+        """Return what the program gives for the parameter itself: in its node options, else where it declares it."""
+        given: Value = self.overrides.get(name) or self.parameters.get(name, BOTTOM)
+        return given
+
+    def gap(self, source: SourceRef, why: str) -> None:
+        self.gaps.setdefault((source, why))

@@ -1,0 +1,1 @@
+"""The verb of ``secure-nodl`` that infers interfaces from sources."""

@@ -1,0 +1,1 @@
+"""The verb of ``secure-nodl`` that lists and checks the library."""

@@ -1,0 +1,1 @@
+"""The verb of ``secure-nodl`` that compares records with other descriptions."""

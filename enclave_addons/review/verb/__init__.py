@@ -1,0 +1,55 @@
+"""``secure-plan VERB``: what works on plans without running anything. A verb is a file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from enclave_addons.review.verb.plans import WORDS
+from enclave_common.command_line import (
+    CommandParser,
+    Option,
+    add_verbosity,
+    add_version,
+    complete,
+    guarded,
+)
+from enclave_common.terminal import safe_output
+from enclave_launch.errors import EnclaveLaunchError
+from enclave_launch.verb.options import EVALUATION, POLICY
+
+PLAN: tuple[Option, ...] = (("words", WORDS, "a plan or what to plan"),)
+RESOLVING = (*POLICY, *EVALUATION)
+"""As of ``secure-launch``; a saved plan takes none."""
+VERBS = ("show", "check", "diff", "flow", "suggest", "report", "evidence")
+DESCRIPTION = """\
+Look at what a launch file would start and allow, without starting anything: show it, check it, compare two
+revisions, ask which enclave can influence which, place it on hosts, export it to systemd, Compose or Kubernetes.
+A plan is a launch file, given as to secure-launch, or the JSON that secure-launch --dry-run --format json printed
+(a file that ends in .json).
+"""
+
+
+def build_parser() -> CommandParser:
+    """Build the parser: a subparser for each verb, described by the head of its file."""
+    parser = CommandParser(prog="secure-plan", description=DESCRIPTION)
+    add_version(parser)
+    parser.add_verbs()
+    for verb, module in parser.add_verb_modules("enclave_addons.review.verb", VERBS):
+        verb.add_options(getattr(module, "WORDS", PLAN))
+        for title, options in module.OPTIONS.items():
+            verb.add_options(options, title)
+        verb.add_options(RESOLVING)
+        verb.fold(RESOLVING, "secure-launch --help")
+        # A launch prefix is only of use where something is started.
+        verb.set_defaults(launch_prefix=None, launch_prefix_filter=None)
+    add_verbosity(parser)
+    return parser
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line ``argv``. Gives the exit status, never a traceback for what a user can cause."""
+    with safe_output():
+        parser = build_parser()
+        complete(parser)
+        options = parser.parse_args(argv)
+        return guarded("secure-plan", lambda: int(options.run(options)), EnclaveLaunchError)

@@ -1,0 +1,216 @@
+"""Judge a plan for ``check``: each finding with the reason why the repository accepts it, if it does."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from datetime import datetime
+from fnmatch import fnmatchcase
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+import yaml
+
+from enclave_addons.review.checks import check_plan
+from enclave_addons.review.checks.keystore import against_keystore, against_router
+from enclave_addons.review.checks.rules import finding
+from enclave_addons.review.document import PlanDocument, plan_from_document
+from enclave_addons.review.information_flow import FlowGraph, FlowStep, Hop, flow_graph, shortest_paths
+from enclave_addons.review.verb.keystores import (
+    DEFAULT_MARGIN,
+    endings,
+    on_zenoh,
+    signed_grants,
+    zenoh_findings,
+)
+from enclave_common.command_line import PATH, Option
+from enclave_common.files import read_text
+from enclave_common.yaml_reader import load_strict_yaml, problem_of
+from enclave_launch.dry_run import Diagnostic, DryRun
+from enclave_launch.errors import UsageError, translated
+from keystore.formats.permissions_patterns import can_meet
+
+EXPECTATIONS = "enclaves.review.yaml"
+EXPECT: Option = ("--expect FILE", PATH, f"default: {EXPECTATIONS}, if it exists")
+WITHIN: Option = ("--within TIME", {"default": DEFAULT_MARGIN}, "what expires soon (30d)")
+
+
+def judged(
+    document: DryRun,
+    expect: Path | None,
+    keystore: Path | str | None = None,
+    within: str = DEFAULT_MARGIN,
+    now: datetime | None = None,
+) -> list[tuple[Diagnostic, str | None]]:
+    """Return findings of a dry run, of the rules in ``expect``, and of ``keystore``, if one is given.
+
+    Raises ``UsageError`` for rules that are missing or not understood, ``ProvisionError`` for the keystore.
+    """
+    expected = expectations(expect)
+    findings = [*check_plan(document), *rule_findings(document, expected.never)]
+    if keystore is not None:
+        findings += _of_keystore(document, keystore, within, now)
+    return [(finding, expected.reason_to_accept(finding)) for finding in findings]
+
+
+def _of_keystore(
+    document: DryRun, keystore: Path | str, within: str, now: datetime | None
+) -> list[Diagnostic]:
+    plan = plan_from_document(document)
+    found = against_keystore(plan, signed_grants(keystore), endings(keystore, within, now))
+    if plan.on_zenoh:
+        found += against_router(plan, on_zenoh(keystore), zenoh_findings(keystore, now))
+    return found
+
+
+def expectations(file: Path | None) -> Expectations:
+    """Read the expectations; raises ``UsageError`` for a named file that is missing, and for invalid content."""
+    if file is None:
+        if not os.path.exists(EXPECTATIONS):
+            return Expectations()
+        file = Path(EXPECTATIONS)
+    with translated(OSError, UsageError, f"{file}: "), translated(ValueError, UsageError, f"{file}: "):
+        text = read_text(file)
+        try:
+            content, lines = load_strict_yaml(text)
+        except yaml.YAMLError as error:
+            raise UsageError(problem_of(error, str(file))) from None
+    return read_expectations(content or {}, str(file), lines)
+
+
+_TAKES = ("subscribe", "serve_services", "serve_actions")
+_SENDS = ("publish", "call_services", "call_actions")
+
+
+class Never(NamedTuple):
+    """No influence from ``source`` to ``target``, over any number of enclaves; ``place``: file and line of the rule."""
+
+    source: str
+    target: str
+    why: str
+    place: tuple[str, int]
+
+
+class Accepted(NamedTuple):
+    """Findings with this code about a subject that matches (shell wildcards), and why they are accepted."""
+
+    code: str
+    subject: str
+    why: str
+
+    def covers(self, diagnostic: Diagnostic) -> bool:
+        return diagnostic.code == self.code and fnmatchcase(diagnostic.subject, self.subject)
+
+
+class Expectations(NamedTuple):
+    """All that an ``enclaves.review.yaml`` says; empty without one."""
+
+    never: tuple[Never, ...] = ()
+    accept: tuple[Accepted, ...] = ()
+
+    def reason_to_accept(self, diagnostic: Diagnostic) -> str | None:
+        """Return why a finding was accepted, None if it was not."""
+        return next((accepted.why for accepted in self.accept if accepted.covers(diagnostic)), None)
+
+
+def read_expectations(
+    content: Any, place: str, lines: Mapping[int, int] = MappingProxyType({})
+) -> Expectations:
+    """Read a parsed YAML document (docs/secure-plan.md); raises ``UsageError`` if it is not such a file.
+
+    ``lines``: of its entries, by ``id``.
+    """
+    if not isinstance(content, Mapping) or content.keys() - {"never", "accept"}:
+        raise UsageError(f"{place}: expected a mapping with 'never' and 'accept'")
+    return Expectations(
+        tuple(
+            Never(source, target, why, (place, lines.get(id(item), 0)))
+            for item in _items(content, "never", place)
+            for source, target, why in [_texts(item, ("from", "to"), ("why",), f"{place}: never")]
+        ),
+        tuple(
+            Accepted(code, subject or "*", why)
+            for item in _items(content, "accept", place)
+            for code, why, subject in [_texts(item, ("code", "why"), ("subject",), f"{place}: accept")]
+        ),
+    )
+
+
+def rule_findings(document: DryRun, rules: Iterable[Never]) -> list[Diagnostic]:
+    """Return an error for each forbidden flow, with one shortest way, then a warning for each rule that names nothing
+    in this plan."""
+    plan = plan_from_document(document)
+    graph = flow_graph(plan)
+    broken, idle = [], []
+    for rule in rules:
+        sources = _enclaves_named(plan, rule.source)
+        named = _enclaves_named(plan, rule.target)
+        targets = named or list(_with_grant(plan, _TAKES, rule.target))
+        # The receiver of a name may be in another launch.
+        senders = {} if named else _with_grant(plan, _SENDS, rule.target)
+        if not sources or not (targets or senders):
+            text = f"no {rule.source} or no {rule.target} in this plan"
+            idle.append(finding("rule-idle", rule.source, text, rule.place))
+            continue
+        received, sent = _ways(graph, sources, targets), _ways(graph, sources, senders)
+        if possible := received or sent:
+            source, target, steps = min(possible, key=lambda way: (len(way[2]), way))
+            text = _broken_text(rule, source, steps, None if received else senders[target])
+            broken.append(finding("flow-forbidden", source, text, rule.place, fails=True))
+    return [*broken, *idle]
+
+
+def _broken_text(rule: Never, source: str, steps: Sequence[FlowStep], sent: Hop | None) -> str:
+    ways = [f"{step.source} -> {step.target} by {step.hops[0]}" for step in steps]
+    if sent is not None:
+        ways.append(f"{steps[-1].target if steps else source} may send on {sent}, whoever receives it")
+    how = "; ".join(ways) or f"both are in enclave {source}"
+    return f"{rule.source} must never reach {rule.target}{f' ({rule.why})' if rule.why else ''}: {how}"
+
+
+def _ways(
+    graph: FlowGraph, sources: Iterable[str], targets: Collection[str]
+) -> list[tuple[str, str, tuple[FlowStep, ...]]]:
+    """Return a shortest way from each source to each target that it reaches; without steps to itself."""
+    pairs = [(source, target) for source in sources for target in targets]
+    paths = [(pair, [()] if pair[0] == pair[1] else shortest_paths(graph, *pair)) for pair in pairs]
+    return [(*pair, found[0]) for pair, found in paths if found]
+
+
+def _enclaves_named(plan: PlanDocument, pattern: str) -> list[str]:
+    of_nodes = {node.enclave for node in plan.nodes if fnmatchcase(node.fqn, pattern)}
+    return sorted(of_nodes | {path for path in plan.enclaves if fnmatchcase(path, pattern)})
+
+
+def _with_grant(plan: PlanDocument, operations: Collection[str], pattern: str) -> dict[str, Hop]:
+    """Return the enclaves that have one of these operations on a matching name, each with the first such grant.
+
+    What every node has does not count.
+    """
+    granted = {
+        path: sorted(
+            each
+            for each in grants - plan.built_in(path)
+            if each.operation in operations and can_meet(each.name, pattern)
+        )
+        for path, grants in sorted(plan.enclaves.items())
+    }
+    return {path: Hop(*each[0]) for path, each in granted.items() if each}
+
+
+def _items(content: Mapping[str, Any], key: str, place: str) -> list[Any]:
+    items = content.get(key) or []
+    if not isinstance(items, list):
+        raise UsageError(f"{place}: '{key}' must be a list")
+    return items
+
+
+def _texts(item: Any, needed: tuple[str, ...], optional: tuple[str, ...], place: str) -> list[str]:
+    if not isinstance(item, Mapping) or item.keys() - {*needed, *optional} or not item.keys() >= set(needed):
+        also = f", and may have {', '.join(optional)}" if optional else ""
+        raise UsageError(f"{place}: each entry needs {', '.join(needed)}{also}; this one is {item!r}")
+    values = [item.get(key, "") for key in (*needed, *optional)]
+    if not all(isinstance(value, str) for value in values):
+        raise UsageError(f"{place}: texts expected in {item!r}")
+    return values
