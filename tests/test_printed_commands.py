@@ -155,7 +155,9 @@ def test_every_command_in_a_message_or_a_page_is_one_that_its_parser_takes(
     assert [why for each in commands if (why := refused(each, monkeypatch))] == []
 
 
-@pytest.mark.parametrize("folder", ["diagnostics", "recording", "review"])
+@pytest.mark.parametrize(
+    "folder", ["enclave_launch/diagnostics", "enclave_addons/recording", "enclave_addons/review/checks"]
+)
 def test_every_option_in_a_remedy_is_one_of_our_commands(folder: str) -> None:
     known = {
         option
@@ -166,7 +168,7 @@ def test_every_option_in_a_remedy_is_one_of_our_commands(folder: str) -> None:
     }
     named = {
         (where, option)
-        for where, text in messages(f"enclave_launch/{folder}")
+        for where, text in messages(folder)
         for option in re.findall(r"(?<![\w-])--[a-z][a-z-]+", text)
     }
     assert named and [each for each in named if each[1] not in known | OF_OTHERS] == []

@@ -100,7 +100,9 @@ class Steady:
 
 
 # Ours first, before anything imports nodl (``enclave_common.own_packages``).
-_FOLLOW = "import sys, enclave_launch; from nodl.graph.follow import main; sys.exit(main())"
+_FOLLOW = (
+    "import sys, enclave_launch; from enclave_addons.observation.graph.follow import main; sys.exit(main())"
+)
 _INTERVAL = 1.0  # seconds between two comparisons
 _LONGEST_START = 60.0  # of an observer, on a machine that does much else
 _MOST_PARENTS = 64

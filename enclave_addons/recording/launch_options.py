@@ -16,6 +16,16 @@ from collections.abc import Callable
 from enum import Enum
 from pathlib import Path
 
+from enclave_addons.recording.audit import Audit, audit_json, audit_text
+from enclave_addons.recording.learning import (
+    RECORDS,
+    LearntFolder,
+    QuietWatch,
+    keep_record,
+    new_run,
+    prepare_folder,
+    write_manifests,
+)
 from enclave_addons.recording.markers import MarkerRun, questions
 from enclave_addons.recording.recording import Recording
 from enclave_common.dependencies import installed
@@ -26,16 +36,6 @@ from enclave_launch.errors import ManifestError, RuntimeFailure, translated
 from enclave_launch.flow import run_unsecured
 from enclave_launch.options import RunSettings
 from enclave_launch.plan import LaunchPlan
-from enclave_launch.recording.audit import Audit, audit_json, audit_text
-from enclave_launch.recording.learning import (
-    RECORDS,
-    LearntFolder,
-    QuietWatch,
-    keep_record,
-    new_run,
-    prepare_folder,
-    write_manifests,
-)
 from enclave_launch.runtime.companion import LaunchCompanion
 from enclave_launch.verb.target import LaunchTarget
 from nodl.errors import NoDLError

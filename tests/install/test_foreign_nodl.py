@@ -52,9 +52,8 @@ def beside_it(request: pytest.FixtureRequest, tmp_path: Path) -> dict[str, str]:
 @pytest.mark.parametrize("command", COMMANDS)
 def test_each_command_works_beside_it(command: str, beside_it: dict[str, str], tmp_path: Path) -> None:
     words, expected = COMMANDS[command]
-    entry = (
-        f"import sys; from enclave_common.entry import {command.replace('-', '_')} as main; sys.exit(main())"
-    )
+    home = "enclave_addons.entry" if command == "secure-plan" else "enclave_common.entry"
+    entry = f"import sys; from {home} import {command.replace('-', '_')} as main; sys.exit(main())"
     assert expected in do("python", "-c", entry, *words, cwd=tmp_path, more=beside_it)
 
 

@@ -10,10 +10,10 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from tests.recording.stand_in_launch import PACKAGE, Program, build_stand_in, make_workspace
-from tests.ros2.conftest import Workspace
-from tests.ros2.upstream import install_metadata
 
+from tests.addons.recording.stand_in_launch import PACKAGE, Program, build_stand_in, make_workspace
+from tests.addons.ros2.conftest import Workspace
+from tests.addons.ros2.upstream import install_metadata
 from tests.install.test_foreign_nodl import write_foreign_nodl
 
 pytestmark = pytest.mark.real_launch
