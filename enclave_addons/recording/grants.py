@@ -21,7 +21,7 @@ from enclave_launch.policy.derivation import LIST_NAMES
 from enclave_launch.policy.node_permissions import OPERATIONS
 from keystore.formats.permissions import DdsRules, dds_rules
 from keystore.formats.permissions_names import dds_topics, full_name
-from keystore.formats.permissions_patterns import covers, has_wildcard
+from keystore.formats.permissions_patterns import covers
 from keystore.formats.policy import Operation, Qualifier, Rule
 
 WORDS = {
@@ -154,17 +154,10 @@ class PlannedGrants:
 
 def permits(rules: DdsRules, need: Need) -> bool:
     """Return True if ``rules`` allow all DDS topics of ``need``."""
-    return all(_allowed(rules, topic, direction) for topic, direction in _topics(need))
+    return all(rules.permits(direction, topic) for topic, direction in _topics(need))
 
 
 def _topics(need: Need) -> Iterator[tuple[str, str]]:
     published, subscribed = dds_topics(need.operation, need.name)
     yield from ((topic, "publish") for topic in published)
     yield from ((topic, "subscribe") for topic in subscribed)
-
-
-def _allowed(rules: DdsRules, topic: str, direction: str) -> bool:
-    if any(covers(pattern, topic) for pattern in getattr(rules.deny, direction)):
-        return False
-    allowed = getattr(rules.allow, direction)
-    return topic in allowed or any(covers(pattern, topic) for pattern in allowed if has_wildcard(pattern))

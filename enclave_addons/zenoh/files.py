@@ -29,14 +29,11 @@ from keystore.disk import layout, safe_files
 from keystore.disk.crl_file import revoked_serials
 from keystore.disk.register_file import read_register
 from keystore.disk.share_files import read_shares
-from keystore.disk.signed_documents import trusted_document
+from keystore.disk.signed_documents import own_document
 from keystore.disk.view import KeystoreView
 from keystore.errors import DamagedKeystoreError, InvalidInputError, KeystoreError, printable
 from keystore.formats.certificate import CertificateFacts, read_certificate
-from keystore.formats.domains import HIGHEST_ID, Domains
-from keystore.formats.permissions import TopicSets
-from keystore.formats.permissions_document import Grant, grant_for
-from keystore.formats.policy import Qualifier
+from keystore.formats.permissions_document import parse_permissions
 from keystore.formats.register import Register
 from keystore.formats.role import Role
 from keystore.formats.subject import subject_name
@@ -150,16 +147,16 @@ def _subject(
     cert, place = (layout.enclave_file(enclave, name) for name in (layout.CERT, layout.PERMISSIONS))
     facts = read_certificate(safe_files.read(view.root, cert), printable(view.root / cert))
     name = _common_name(register, revoked, enclave, facts)
-    document = trusted_document(view, place)
+    document = own_document(view, place)
     last = register.permissions(enclave) if register is not None else None
     if last is not None and last.document != hashlib.sha256(document).hexdigest():
         raise DamagedKeystoreError(f"{printable(view.root / place)} is not what was signed last for it")
-    grant = grant_for(document, subject_name(name), printable(view.root / place))
-    if grant is None:
-        raise DamagedKeystoreError(f"{printable(view.root / place)} has no grant for {subject_name(name)}")
+    permissions = parse_permissions(document, printable(view.root / place))
+    if permissions.subject != subject_name(name):
+        raise DamagedKeystoreError(f"{printable(view.root / place)} is not for {subject_name(name)}")
     types = types_of_shares(enclave, read_shares(view.root, enclave)) if register is not None else {}
-    grants = grants_of_topics(_topics(grant, Qualifier.ALLOW), _topics(grant, Qualifier.DENY), types)
-    return Subject(enclave, name, access_rules(enclave, grants, _domains(grant))), grants.gaps
+    grants = grants_of_topics(permissions.rules.allow, permissions.rules.deny, types)
+    return Subject(enclave, name, access_rules(enclave, grants, permissions.domains)), grants.gaps
 
 
 def _common_name(
@@ -181,17 +178,3 @@ def _common_name(
             "a revoked certificate has the same name, and Zenoh goes by names; secure-keystore renew gives it another"
         )
     return name
-
-
-def _topics(grant: Grant, qualifier: Qualifier) -> TopicSets:
-    rules = [rule for rule in grant.rules if rule.qualifier is qualifier]
-    return TopicSets(
-        tuple(sorted({topic for rule in rules for topic in rule.publish})),
-        tuple(sorted({topic for rule in rules for topic in rule.subscribe})),
-    )
-
-
-def _domains(grant: Grant) -> Domains:
-    allowed = [rule for rule in grant.rules if rule.qualifier is Qualifier.ALLOW]
-    spans = [span for rule in allowed for span in rule.domains]
-    return Domains((low, HIGHEST_ID if high is None else high) for low, high in spans)

@@ -1,26 +1,26 @@
-"""Documents that this keystore signed: the governance in force, and what may be signed again.
+"""Documents that this keystore signed: the governance in force, and what another tool signed with our CA.
 
-What is in force has exactly the form that we write. What is about to be signed again may have another one, such as
-SROS2's, but must have been signed by us before: by the present permissions CA, by one of the trust bundle during a
+What is in force has, byte for byte, the form that we write. A foreign document (SROS2's) counts for one thing only, to
+be taken over: it must have been signed by us, by the present permissions CA, by one of the trust bundle during a
 roll-over, or by a retired one.
 """
 
 from __future__ import annotations
 
 import os
-import re
-from collections.abc import Iterator
+import shlex
+from collections.abc import Callable, Iterator
 
 from keystore.disk import layout, safe_files
+from keystore.disk.register_file import read_register
 from keystore.disk.view import KeystoreView
-from keystore.errors import DamagedKeystoreError, KeystoreError, OtherFormError, printable
+from keystore.errors import DamagedKeystoreError, InvalidInputError, OtherFormError, printable
 from keystore.formats.certificate import CertificateFacts, read_certificates
 from keystore.formats.domains import Domains
+from keystore.formats.governance import Governance, parse_governance, read_foreign_governance
 from keystore.formats.register import Register
 from keystore.formats.role import Role
 from keystore.signing import smime
-
-_IDS = re.compile(rb"<id>\s*(\d{1,3})\s*</id>|<min>\s*(\d{1,3})\s*</min>\s*<max>\s*(\d{1,3})\s*</max>")
 
 
 def signed_governance(view: KeystoreView) -> smime.SignedDocument:
@@ -29,19 +29,38 @@ def signed_governance(view: KeystoreView) -> smime.SignedDocument:
     return smime.read(safe_files.read(view.root, layout.GOVERNANCE), place)
 
 
+def governance_in_force(view: KeystoreView) -> Governance:
+    """Return what ``governance.p7s`` says; its signature is not checked. Raises DamagedKeystoreError."""
+    return parse_governance(signed_governance(view).document, printable(view.root / layout.GOVERNANCE))
+
+
 def governance_domains(view: KeystoreView) -> Domains:
-    """Return the domains that the governance lists; raises DamagedKeystoreError if there are none."""
+    """Return the domains of the governance signed last, in a keystore of another tool too.
+
+    Raises DamagedKeystoreError if nobody can tell.
+    """
     place = printable(view.root / layout.GOVERNANCE)
-    return _listed_domains(
-        smime.read_any(safe_files.read(view.root, layout.GOVERNANCE), place).document, view
-    )
+    register = read_register(view.root)
+    if register is not None and register.governance:
+        return parse_governance(register.governance, place).domains()
+    try:
+        return governance_in_force(view).domains()
+    except OtherFormError:
+        return foreign_governance(view)[0].domains()
 
 
-def _listed_domains(document: bytes, view: KeystoreView) -> Domains:
-    found = _IDS.findall(document)
-    if not found:
-        raise DamagedKeystoreError(f"{printable(view.root / layout.GOVERNANCE)} lists no domain")
-    return Domains(tuple((int(one or low), int(one or high)) for one, low, high in found))
+def foreign_governance(view: KeystoreView) -> tuple[Governance, tuple[str, ...]]:
+    """Return the governance of another tool as it would be written here, and what of it is lost.
+
+    Raises DamagedKeystoreError for one that none of our CAs signed, or that DDS implementations read differently.
+    """
+    place = printable(view.root / layout.GOVERNANCE)
+    try:
+        return read_foreign_governance(foreign_document(view, layout.GOVERNANCE), place)
+    except (InvalidInputError, DamagedKeystoreError) as error:
+        raise DamagedKeystoreError(
+            f"{error}; put yours in force: secure-keystore governance {shlex.quote(str(view.root))} FILE.yaml"
+        ) from None
 
 
 def governance_stands(view: KeystoreView, domains: Domains | None, register: Register | None = None) -> bool:
@@ -50,32 +69,38 @@ def governance_stands(view: KeystoreView, domains: Domains | None, register: Reg
     try:
         signed = signed_governance(view)
         smime.check(signed, [view.ca(Role.PERMISSIONS)], layout.GOVERNANCE)
+        if not signed.embeds(view.ca(Role.PERMISSIONS).der):
+            return False
+        if register is not None and register.governance and signed.document != register.governance:
+            return False
+        governance = parse_governance(signed.document, layout.GOVERNANCE)
     except DamagedKeystoreError:
         return False
-    if not signed.embeds(view.ca(Role.PERMISSIONS).der):
-        return False
-    if register is not None and register.governance and signed.document != register.governance:
-        return False
-    return domains is None or _listed_domains(signed.document, view).covers(domains)
+    return domains is None or governance.domains().covers(domains)
 
 
-def trusted_document(view: KeystoreView, relative: str) -> bytes:
-    """Return the XML inside a ``.p7s`` of any form; raises DamagedKeystoreError if none of our CAs signed it."""
+def own_document(view: KeystoreView, relative: str) -> bytes:
+    """Return the XML inside a ``.p7s`` in our form.
+
+    Raises DamagedKeystoreError if none of our CAs signed it, OtherFormError if one did, in another form.
+    """
+    try:
+        return _trusted(view, relative, smime.read)
+    except OtherFormError:
+        foreign_document(view, relative)
+        raise
+
+
+def foreign_document(view: KeystoreView, relative: str) -> bytes:
+    """Return the XML inside a ``.p7s`` in any form; raises DamagedKeystoreError if none of our CAs signed it."""
+    return _trusted(view, relative, smime.read_any)
+
+
+def _trusted(view: KeystoreView, relative: str, read: Callable[[bytes, str], smime.SignedDocument]) -> bytes:
     place = printable(view.root / relative)
-    signed = smime.read_any(safe_files.read(view.root, relative), place)
+    signed = read(safe_files.read(view.root, relative), place)
     smime.check(signed, list(own_permissions_cas(view)), place)
     return signed.document
-
-
-def is_to_be_written_again(view: KeystoreView, relative: str, error: KeystoreError) -> bool:
-    """Return whether only the form of a document is wrong: one of our CAs signed it, so a renewal writes it again."""
-    if not isinstance(error, OtherFormError):
-        return False
-    try:
-        trusted_document(view, relative)
-    except KeystoreError:
-        return False
-    return True
 
 
 def own_permissions_cas(view: KeystoreView) -> Iterator[CertificateFacts]:

@@ -7,6 +7,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 from typing import NamedTuple
+from xml.etree.ElementTree import Element
 
 from keystore.errors import InvalidInputError, printable
 
@@ -70,6 +71,31 @@ class Domains(_Ranges):
     def xml(self) -> str:
         """Render the ``domains`` element of governance and permissions: one line, no blanks in leaves."""
         return f"<domains>{''.join(_element(first, last) for first, last in self.ranges)}</domains>"
+
+
+def read_domains(element: Element, lost: list[str]) -> Domains:
+    """Read a ``domains`` element, adding to ``lost`` what cannot be written again: ids that no ROS domain has.
+
+    Raises InvalidInputError for a number that DDS implementations read in different ways, and where nothing is left.
+    """
+    found = []
+    for part in element:
+        texts = [(number.text or "").strip() for number in ([part] if part.tag == "id" else part)]
+        # To Cyclone DDS a leading zero means octal. A range with ``min`` alone is that id to both.
+        if not all(re.fullmatch(r"0|[1-9][0-9]*", text) for text in texts) or (
+            len(part) and part[0].tag == "max"
+        ):
+            raise InvalidInputError(
+                f"domain id {printable(' '.join(texts))}: DDS implementations read it in different ways"
+            )
+        first, last = int(texts[0]), int(texts[-1])
+        if first > HIGHEST_ID:
+            lost.append(f"domain ids from {first}")
+            continue
+        if last > HIGHEST_ID:
+            lost.append(f"domain ids from {HIGHEST_ID + 1} to {last}")
+        found.append((first, min(last, HIGHEST_ID)))
+    return Domains(found)
 
 
 def _element(first: int, last: int) -> str:

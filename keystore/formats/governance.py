@@ -8,17 +8,16 @@ without an error. Defaults are SROS2's. Element order is the schema's, which Fas
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, field, fields, replace
 from enum import Enum
-from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import Any
+from xml.etree.ElementTree import Element
 
 from keystore.errors import InvalidInputError, printable
-from keystore.formats.domains import Domains
-from keystore.formats.safe_xml import check_schema, parse_xml
-
-if TYPE_CHECKING:
-    from lxml import etree
+from keystore.formats.domains import Domains, read_domains
+from keystore.formats.permissions_names import is_dds_expression
+from keystore.formats.safe_xml import not_as_written, parse_foreign, parse_own
 
 
 class Protection(str, Enum):
@@ -48,10 +47,10 @@ class TopicRule:
     data_protection_kind: Protection = Protection.ENCRYPT
 
     def __post_init__(self) -> None:
-        expression = self.topic_expression
-        if not expression or not expression.isascii() or not expression.isprintable() or " " in expression:
+        if not is_dds_expression(self.topic_expression):
             raise InvalidInputError(
-                f"governance: topic_expression {printable(expression)} is empty or has blanks"
+                f"governance: topic_expression {printable(self.topic_expression)} is not one that Cyclone DDS and "
+                "Fast DDS read alike: letters, digits, '_', '/', and the wildcards * ? [abc] [a-z] [!abc]"
             )
         if self.data_protection_kind not in _DATA_KINDS:
             raise InvalidInputError("governance: data_protection_kind is NONE, SIGN or ENCRYPT")
@@ -59,8 +58,8 @@ class TopicRule:
 
 @dataclass(frozen=True, slots=True)
 class DomainRule:
-    """Rules for a set of domains. The last topic rule matches every topic, unless it was read from a document without
-    such a rule: what no rule matches is refused by both implementations."""
+    """Rules for a set of domains. The last topic rule matches every topic, and is added where it is missing: what no
+    rule matches is refused by both implementations."""
 
     domains: Domains = field(default_factory=lambda: Domains.single(0))
     allow_unauthenticated_participants: bool = False
@@ -121,16 +120,16 @@ class Governance:
 
 
 _HEAD = (
-    '<?xml version="1.0" encoding="UTF-8"?>\n'
-    '<dds xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" xsi:noNamespaceSchemaLocation='
-    '"http://www.omg.org/spec/DDS-SECURITY/20170901/omg_shared_ca_governance.xsd">\n<domain_access_rules>\n'
+    b'<?xml version="1.0" encoding="UTF-8"?>\n'
+    b'<dds xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" xsi:noNamespaceSchemaLocation='
+    b'"http://www.omg.org/spec/DDS-SECURITY/20170901/omg_shared_ca_governance.xsd">\n<domain_access_rules>\n'
 )
 
 
 def governance_document(governance: Governance) -> bytes:
-    """Render canonical XML (UTF-8, LF, no blanks in values), the form both implementations read alike."""
+    """Render canonical XML (ASCII, LF, no blanks in values), the form both implementations read alike."""
     rules = "".join(_domain_rule(rule) for rule in governance.domain_rules)
-    return f"{_HEAD}{rules}</domain_access_rules>\n</dds>\n".encode()
+    return _HEAD + f"{rules}</domain_access_rules>\n</dds>\n".encode("ascii")
 
 
 def _domain_rule(rule: DomainRule) -> str:
@@ -152,8 +151,7 @@ def _leaf(name: str, value: bool | str | Protection) -> str:
         text = "true" if value else "false"
     else:
         text = value.value if isinstance(value, Protection) else value
-    # Only a topic expression could hold a character that XML reserves.
-    return f"<{name}>{escape(text, quote=False)}</{name}>\n"
+    return f"<{name}>{text}</{name}>\n"
 
 
 DOMAIN_SETTINGS = tuple(
@@ -164,41 +162,47 @@ TOPIC_SETTINGS = tuple(each.name for each in fields(TopicRule) if each.name != "
 
 
 def parse_governance(document: bytes, where: str) -> Governance:
-    """Parse a governance document, ours or SROS2's, with no other rules than it has; raises InvalidInputError with
-    file:line."""
-    root = parse_xml(document, where)
-    check_schema(root, "governance.xsd", where, "DDS governance document")
-    return Governance(tuple(_read_rule(element) for element in root.iter("domain_rule")))
+    """Read what ``governance_document`` wrote. Raises OtherFormError for any other document."""
+    root = parse_own(document, _HEAD, where)
+    with suppress(InvalidInputError, LookupError, ValueError):
+        found = _read(root, [])
+        if governance_document(found) == document:
+            return found
+    raise not_as_written(where)
 
 
-def _read_rule(element: etree._Element) -> DomainRule:
-    rule = DomainRule(
-        domains=Domains(tuple(_range(part) for part in element[0])),
+def read_foreign_governance(document: bytes, where: str) -> tuple[Governance, tuple[str, ...]]:
+    """Read a governance that another tool or a person wrote: as it would be written here, and what of it could not be
+    carried over, in words.
+
+    Raises InvalidInputError with file:line for what DDS implementations refuse or read in different ways.
+    """
+    lost: list[str] = []
+    root = parse_foreign(document, "governance.xsd", where, "DDS governance document")
+    return _read(root, lost), tuple(lost)
+
+
+def _read(root: Element, lost: list[str]) -> Governance:
+    return Governance(tuple(_read_rule(element, lost) for element in root.iter("domain_rule")))
+
+
+def _read_rule(element: Element, lost: list[str]) -> DomainRule:
+    return DomainRule(
+        domains=read_domains(element[0], lost),
         **{name: _setting(element, name) for name in DOMAIN_SETTINGS},
+        topic_rules=tuple(map(_read_topic_rule, element.iter("topic_rule"))),
     )
-    # As read: the rule for every topic that a new DomainRule gets is not in force if the document lacks it.
-    object.__setattr__(rule, "topic_rules", tuple(map(_read_topic_rule, element.iter("topic_rule"))))
-    return rule
 
 
-def _read_topic_rule(element: etree._Element) -> TopicRule:
+def _read_topic_rule(element: Element) -> TopicRule:
     settings = {name: _setting(element, name) for name in TOPIC_SETTINGS}
     return TopicRule(_text(element, "topic_expression"), **settings)
 
 
-def _text(element: etree._Element, name: str) -> str:
+def _text(element: Element, name: str) -> str:
     return (element.findtext(name) or "").strip()
 
 
-def _setting(element: etree._Element, name: str) -> Any:
+def _setting(element: Element, name: str) -> Any:
     text = _text(element, name)
     return Protection(text) if name.endswith("_kind") else text in ("true", "1")
-
-
-def _range(element: etree._Element) -> tuple[int, int]:
-    if element.tag == "id":
-        return int(element.text or "0"), int(element.text or "0")
-    low, high = element.findtext("min"), element.findtext("max")
-    # The schema's open ranges: only "min" means that id to Cyclone DDS and Fast DDS (measured).
-    first = int(low or "0")
-    return first, int(high) if high is not None else first

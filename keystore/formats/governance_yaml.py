@@ -13,7 +13,7 @@ from pydantic import Field, StrictBool, StrictInt, StrictStr
 from keystore.errors import InvalidInputError
 from keystore.formats.domains import Domains
 from keystore.formats.given_file import read_given
-from keystore.formats.governance import DomainRule, Governance, Protection, TopicRule, parse_governance
+from keystore.formats.governance import DomainRule, Governance, Protection, TopicRule, read_foreign_governance
 from keystore.formats.strict_yaml import Strict, StrictDocument, parse_strict
 
 
@@ -41,16 +41,15 @@ class _Document(StrictDocument, frozen=True):
     domain_rules: list[_Domain]
 
 
-def load_governance_yaml(path: Path) -> Governance:
-    """Read the file; raises InvalidInputError naming the file and the line or the entry."""
-    return parse_governance_yaml(read_given(path), str(path))
-
-
 def governance_of(path: Path) -> Governance:
-    """Read a governance as a person keeps it: our YAML, or the XML that is signed; raises InvalidInputError."""
-    if path.suffix == ".xml":
-        return parse_governance(read_given(path), str(path))
-    return load_governance_yaml(path)
+    """Read a governance as a person keeps it, our YAML or XML; raises InvalidInputError naming the file and the line
+    or the entry."""
+    if path.suffix != ".xml":
+        return parse_governance_yaml(read_given(path), str(path))
+    governance, lost = read_foreign_governance(read_given(path), str(path))
+    if lost:
+        raise InvalidInputError(f"{path}: cannot be written as it is: {'; '.join(lost)}")
+    return governance
 
 
 def parse_governance_yaml(text: bytes, where: str) -> Governance:

@@ -1,37 +1,39 @@
 """What one enclave may do -> its DDS-Security permissions document, ready to be signed. Performs no I/O.
 
-Exactly the grants that ``ros2 security create_permission`` would write for the same policy, in a form
-that Cyclone DDS and Fast DDS both read, and without what breaks either of them:
+Exactly the grants that ``ros2 security create_permission`` would write for the same policy, in the one form that
+Cyclone DDS and Fast DDS read alike, and without what breaks either of them:
 
 - one grant (of two with one subject only the first is ever used), ``deny_rule`` before ``allow_rule``
   because the first rule that matches decides, ``default`` DENY, always an ``allow_rule``;
 - denials decided here wherever possible, see ``_resolve_denials``;
-- no blanks in values, no comments, ids and full ranges of domains, no empty topic;
+- ASCII, no blanks in values, no comments, ids and full ranges of domains, no empty topic;
 - one line per element and no indentation: the whole document travels in each handshake.
 
+Only a document in this form counts (``permissions_document.parse_permissions``), so all of it is decided here.
 This is on the way to a start: text is put together directly, lxml is not needed.
 Sources: DDS-Security 1.1 section 9.4.1.3, and measurements on Cyclone DDS 0.10.2 and Fast DDS 2.9.1.
 """
 
 from __future__ import annotations
 
+import re
 from datetime import datetime
 from functools import lru_cache
-from html import escape
 from typing import NamedTuple
 
 from keystore.errors import printable
 from keystore.formats.domains import Domains
 from keystore.formats.permissions_names import DISCOVERY_TOPIC, Topics, add_dds_topics, full_name
-from keystore.formats.permissions_patterns import can_meet, covers, has_wildcard
+from keystore.formats.permissions_patterns import any_matches, can_meet, covers, has_wildcard
 from keystore.formats.policy import EnclavePolicy, PolicyError, Qualifier
 from keystore.formats.validity import Validity
 
-_HEAD = (
-    '<?xml version="1.0" encoding="UTF-8"?>\n'
-    '<dds xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" xsi:noNamespaceSchemaLocation='
-    '"http://www.omg.org/spec/DDS-SECURITY/20170901/omg_shared_ca_permissions.xsd">\n<permissions>\n'
+HEAD = (
+    b'<?xml version="1.0" encoding="UTF-8"?>\n'
+    b'<dds xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" xsi:noNamespaceSchemaLocation='
+    b'"http://www.omg.org/spec/DDS-SECURITY/20170901/omg_shared_ca_permissions.xsd">\n<permissions>\n'
 )
+_PLAIN = re.compile(r"[!#-%'-;=?-~]+\Z")  # nothing that XML would have to escape
 _TAIL = "<default>DENY</default>\n</grant>\n</permissions>\n</dds>\n"
 
 
@@ -58,29 +60,49 @@ class DdsRules(NamedTuple):
     allow: TopicSets
     hazards: tuple[str, ...] = ()
 
+    def permits(self, direction: str, topic: str) -> bool:
+        """Return whether a participant may ``publish`` or ``subscribe`` a DDS topic: the first rule that matches
+        decides."""
+        for rule, verdict in ((self.first, True), (self.deny, False), (self.allow, True)):
+            if any_matches(getattr(rule, direction), topic):
+                return verdict
+        return False
+
+
+class Permissions(NamedTuple):
+    """What a permissions document says. ``name`` is the grant's, ``subject`` that of the certificate it is for
+    (``CN=/talker``)."""
+
+    name: str
+    subject: str
+    validity: Validity
+    domains: Domains
+    rules: DdsRules
+
+    def document(self) -> bytes:
+        """Render the document (ASCII, LF). Raises ``PolicyError`` for a name or subject that no grant can have."""
+        domains = self.domains.xml()
+        parts = [
+            f'<grant name="{_plain(self.name)}">\n<subject_name>{_plain(self.subject)}</subject_name>\n',
+            _dates(self.validity),
+        ]
+        for tag, topics in (("allow_rule", self.rules.first), ("deny_rule", self.rules.deny)):
+            if topics:
+                parts.append(_rule(tag, domains, topics))
+        parts.append(_rule("allow_rule", domains, self.rules.allow))
+        parts.append(_TAIL)
+        return HEAD + "".join(parts).encode("ascii")
+
 
 def permissions_document(
     subject: str, policy: EnclavePolicy, *, validity: Validity, domains: Domains
 ) -> bytes:
-    """Render the permissions document (UTF-8, LF) for the certificate with this ``subject`` (``CN=/talker``).
+    """Render the permissions document of a policy for the certificate with this ``subject`` and ``validity``.
 
-    ``validity`` is the certificate's. Raises ``PolicyError`` for a name that no ROS node can have and for a wildcard
-    outside the subset that all DDS implementations read alike.
+    Raises ``PolicyError`` for a name that no ROS node can have and for a wildcard outside the subset that all DDS
+    implementations read alike.
     """
-    rules = dds_rules(policy)
-    domain_set = domains.xml()
-    parts = [
-        _HEAD,
-        f'<grant name="{escape(_line(policy.path))}">\n',
-        f"<subject_name>{escape(_line(subject))}</subject_name>\n",
-        _dates(validity),
-    ]
-    for tag, topics in (("allow_rule", rules.first), ("deny_rule", rules.deny)):
-        if topics:
-            parts.append(_rule(tag, domain_set, topics))
-    parts.append(_rule("allow_rule", domain_set, rules.allow))
-    parts.append(_TAIL)
-    return "".join(parts).encode()
+    return Permissions(policy.path, subject, validity, domains, dds_rules(policy)).document()
 
 
 def dds_rules(policy: EnclavePolicy) -> DdsRules:
@@ -186,7 +208,7 @@ def _utc(time: datetime) -> str:
     return time.strftime("%Y-%m-%dT%H:%M:%S")
 
 
-def _line(text: str) -> str:
-    if not text or text != text.strip() or not text.isprintable():
+def _plain(text: str) -> str:
+    if not _PLAIN.match(text):
         raise PolicyError(f"{printable(text)} cannot be the subject or name of a grant")
     return text

@@ -1,227 +1,177 @@
-"""A permissions document, ours or another tool's: read, held against another one, given new dates.
+"""A permissions document, read: ours byte for byte, or another tool's that is taken over; and two of them compared.
 
-The permissions that an enclave has are the only record of what it may do. The signature is not checked here."""
+DDS implementations read bytes, and not all of them as an XML parser does (encodings, entities, elements that stand
+twice, numbers). So what is read counts only if it would be written so. The signature is not checked here.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Iterator
+from contextlib import suppress
+from typing import NamedTuple
+from xml.etree.ElementTree import Element
 
-from keystore.errors import DamagedKeystoreError
-from keystore.formats.permissions_names import ros_rules
-from keystore.formats.permissions_patterns import can_meet, covers, matches
-from keystore.formats.policy import Qualifier, Rule
-from keystore.formats.safe_xml import check_schema, parse_xml
-from keystore.formats.validity import Validity
-
-if TYPE_CHECKING:
-    from lxml import etree
-
-DomainRanges = tuple[tuple[int, int | None], ...]
-_HIGHEST_DOMAIN = 1 << 16
-_DECLARATION = '<?xml version="1.0" encoding="UTF-8"?>\n'
+from keystore.errors import InvalidInputError, printable
+from keystore.formats.domains import Domains, read_domains
+from keystore.formats.permissions import HEAD, DdsRules, Permissions, TopicSets
+from keystore.formats.permissions_names import is_dds_expression, ros_rules
+from keystore.formats.permissions_patterns import can_meet, covers
+from keystore.formats.policy import Operation, PolicyError, Qualifier, Rule
+from keystore.formats.safe_xml import not_as_written, parse_foreign, parse_own
+from keystore.formats.subject import names_enclave
+from keystore.formats.validity import Validity, parse_time
 
 
-@dataclass(frozen=True, slots=True)
-class DdsRule:
-    """One ``allow_rule`` or ``deny_rule``; ``domains`` are pairs (first, last), last ``None`` when open.
+def parse_permissions(document: bytes, where: str = "permissions.xml") -> Permissions:
+    """Read what ``Permissions.document`` wrote. Raises OtherFormError for any other document."""
+    root = parse_own(document, HEAD, where)
+    with suppress(InvalidInputError, LookupError, ValueError):
+        found = _read(root[0][0], [])
+        if found.document() == document:
+            return found
+    raise not_as_written(where)
 
-    ``partitions``: of those parts that are not for the default partition, the one of ROS."""
 
-    qualifier: Qualifier
-    domains: DomainRanges
+class TakenOver(NamedTuple):
+    """A foreign document as it would be written here, and what of it could not be carried over, in words."""
+
+    permissions: Permissions
+    lost: tuple[str, ...]
+
+
+def read_foreign_permissions(document: bytes, enclave: str, where: str) -> TakenOver:
+    """Read what another tool signed for ``enclave``: the first grant for it, as far as it can be written here.
+
+    Nothing is granted that the document does not grant. Raises ``InvalidInputError`` (with file:line) for what DDS
+    implementations refuse or read in different ways.
+    """
+    root = parse_foreign(document, "permissions.xsd", where, "DDS permissions document")
+    grants = list(root.iter("grant"))
+    mine = next((grant for grant in grants if _is_for(grant, enclave)), None)
+    if mine is None:
+        raise InvalidInputError(f"{where}: no grant for {enclave}")
+    lost = [
+        f"the grant for {printable(_text(grant, 'subject_name'))}" for grant in grants if grant is not mine
+    ]
+    if _text(mine, "default") != "DENY":
+        lost.append("default ALLOW: everything that no rule names")
+    found = _read(mine, lost)
+    first, allow = found.rules.first, found.rules.allow
+    whole = _topic_sets((*first.publish, *allow.publish), (*first.subscribe, *allow.subscribe))
+    found = found._replace(rules=found.rules._replace(allow=whole))
+    with suppress(PolicyError):
+        found.document()
+        return TakenOver(found, tuple(lost))
+    raise InvalidInputError(f"{where}: the grant has a name that cannot be written here")
+
+
+def _is_for(grant: Element, enclave: str) -> bool:
+    return names_enclave(_text(grant, "subject_name").strip().removeprefix("CN="), enclave)
+
+
+def _read(grant: Element, lost: list[str]) -> Permissions:
+    """Read a grant into the order that we write: an allow rule before the deny rule, the deny rule, an allow rule."""
+    rules = [_rule(child, lost) for child in grant if child.tag in ("allow_rule", "deny_rule")]
+    domains = next((rule.domains for rule in rules if rule.is_allowed), rules[0].domains)
+    denials = [at for at, rule in enumerate(rules) if not rule.is_allowed]
+    kept: tuple[list[_Rule], list[_Rule], list[_Rule]] = ([], [], [])
+    for at, rule in enumerate(rules):
+        if rule.is_allowed and rule.domains != domains:
+            lost.append(f"an allow rule for domains {rule.domains}: a grant is for one set of domains")
+        elif not rule.is_allowed:
+            kept[1].append(rule)
+        else:
+            kept[0 if denials and at < denials[0] else 2].append(rule)
+    if denials and any(rule.is_allowed for rule in rules[denials[0] : denials[-1]]):
+        lost.append("an allow rule before a later deny rule: denials come first")
+    first, deny, allow = (
+        _topic_sets(
+            (topic for rule in part for topic in rule.publish),
+            (topic for rule in part for topic in rule.subscribe),
+        )
+        for part in kept
+    )
+    return Permissions(
+        grant.get("name", ""),
+        _text(grant, "subject_name").strip(),
+        Validity(
+            parse_time(_text(grant, "validity/not_before")), parse_time(_text(grant, "validity/not_after"))
+        ),
+        domains,
+        DdsRules(first, deny, allow),
+    )
+
+
+class _Rule(NamedTuple):
+    is_allowed: bool
+    domains: Domains
     publish: tuple[str, ...]
     subscribe: tuple[str, ...]
-    partitions: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Grant:
-    """A grant of a permissions document. ``not_before`` and ``not_after`` as written; their zone depends on the DDS
-    implementation."""
-
-    name: str
-    subject_name: str
-    not_before: str
-    not_after: str
-    rules: tuple[DdsRule, ...]
-    default: Qualifier
-
-    @property
-    def ros_rules(self) -> tuple[tuple[Rule, ...], tuple[str, ...]]:
-        """Return the grant in terms of a policy, and the DDS topics that no policy rule can express."""
-        found: list[Rule] = []
-        unknown: list[str] = []
-        for qualifier in (Qualifier.DENY, Qualifier.ALLOW):
-            mine = [rule for rule in self.rules if rule.qualifier is qualifier]
-            publish = [topic for rule in mine for topic in rule.publish]
-            subscribe = [topic for rule in mine for topic in rule.subscribe]
-            rules, rest = ros_rules(publish, subscribe, qualifier)
-            found.extend(rules)
-            unknown.extend(rest)
-        return tuple(sorted(set(found))), tuple(sorted(set(unknown)))
-
-
-def parse_permissions(document: bytes, where: str = "permissions.xml") -> tuple[Grant, ...]:
-    """Parse all grants of the document; raises ``InvalidInputError`` (with file:line) for what DDS would not read."""
-    root = check_permissions_schema(document, where)
-    return tuple(_grant(element) for element in root.iter("grant"))
-
-
-def check_permissions_schema(document: bytes, where: str = "permissions.xml") -> etree._Element:
-    """Parse and compare with the bundled schema. Raises ``InvalidInputError`` with file:line."""
-    root = parse_xml(document, where)
-    check_schema(root, "permissions.xsd", where, "DDS permissions document")
-    return root
-
-
-def _grant(element: etree._Element) -> Grant:
-    return Grant(
-        name=element.get("name", ""),
-        subject_name=_text(element, "subject_name"),
-        not_before=_text(element, "validity/not_before"),
-        not_after=_text(element, "validity/not_after"),
-        rules=tuple(_rule(child) for child in element if child.tag in ("allow_rule", "deny_rule")),
-        default=Qualifier(_text(element, "default")),
+def _rule(element: Element, lost: list[str]) -> _Rule:
+    allowed = element.tag == "allow_rule"
+    return _Rule(
+        allowed,
+        read_domains(element[0], lost),
+        tuple(_topics(element, "publish", allowed, lost)),
+        tuple(_topics(element, "subscribe", allowed, lost)),
     )
 
 
-def _rule(element: etree._Element) -> DdsRule:
-    return DdsRule(
-        qualifier=Qualifier.ALLOW if element.tag == "allow_rule" else Qualifier.DENY,
-        domains=tuple(_domain(child) for child in element[0]),
-        publish=_topics(element, "publish"),
-        subscribe=_topics(element, "subscribe"),
-        partitions=tuple(name for part in element.iter("partitions") for name in _foreign_partitions(part)),
-    )
+def _topics(rule: Element, direction: str, allowed: bool, lost: list[str]) -> Iterator[str]:
+    for criteria in rule.iterfind(direction):
+        if allowed and any(part.tag != "topics" for part in criteria):
+            lost.append(f"{direction} of partitions or data tags, which ROS does not use")
+            continue
+        for expression in (topic.text or "" for topic in criteria.iterfind("topics/topic")):
+            what = f"{direction} {printable(expression)}: DDS implementations read it in different ways"
+            if is_dds_expression(expression):
+                yield expression
+            elif allowed:
+                lost.append(what)
+            else:
+                raise InvalidInputError(f"a denial of {what}")  # to leave it out would grant it
 
 
-def _foreign_partitions(element: etree._Element) -> list[str]:
-    names = [partition.text or "" for partition in element]
-    return [] if any(matches(name, "") for name in names) else names
+def _topic_sets(
+    publish: Iterator[str] | tuple[str, ...], subscribe: Iterator[str] | tuple[str, ...]
+) -> TopicSets:
+    return TopicSets(tuple(sorted(set(publish))), tuple(sorted(set(subscribe))))
 
 
-def _domain(element: etree._Element) -> tuple[int, int | None]:
-    if element.tag == "id":
-        value = int(element.text or "0")
-        return value, value
-    maximum = element.findtext("max")
-    return int(element.findtext("min") or "0"), None if maximum is None else int(maximum)
-
-
-def _topics(element: etree._Element, tag: str) -> tuple[str, ...]:
-    return tuple(topic.text or "" for topic in element.iterfind(f"{tag}/topics/topic"))
-
-
-def _text(element: etree._Element, path: str) -> str:
+def _text(element: Element, path: str) -> str:
     return element.findtext(path) or ""
 
 
-class Permitted(NamedTuple):
-    """One topic expression of a rule, with its direction (``publish``, ``subscribe``) and domains."""
-
-    direction: str
-    topic: str
-    domains: DomainRanges
-
-    def __str__(self) -> str:
-        return f"{self.direction} {self.topic}"
-
-
-def grant_for(document: bytes, subject: str, place: str) -> Grant | None:
-    """Return the grant that DDS uses for ``subject``: the first. Raises InvalidInputError for another document."""
-    grants = parse_permissions(document, place)
-    return next((grant for grant in grants if grant.subject_name.strip() == subject), None)
-
-
-def rules_text(grant: Grant) -> str:
-    """Return what the grant allows, apart from its subject and dates; equal for equal rules in any layout."""
-    return f"{grant.default.value} {[_plain(rule) for rule in grant.rules]}"
-
-
-def _plain(rule: DdsRule) -> tuple[str, DomainRanges, tuple[str, ...], tuple[str, ...]]:
-    return rule.qualifier.value, rule.domains, rule.publish, rule.subscribe
-
-
-def taken_away(old: Grant, new: Grant) -> tuple[str, ...]:
-    """Return what ``old`` permits and ``new`` surely or possibly does not, sorted words (``publish rt/chatter``)."""
-    lost = {str(one) for one in _lost(old, new)}
-    if old.default is Qualifier.ALLOW and new.default is not Qualifier.ALLOW:
-        lost.add("everything that no rule names")
-    return tuple(sorted(lost))
-
-
-def _lost(old: Grant, new: Grant) -> Iterator[Permitted]:
-    allowed, present = _permitted(old, Qualifier.ALLOW), _permitted(new, Qualifier.ALLOW)
-    exact = set(present)
-    for one in allowed:
-        if one not in exact and not any(_includes(other, one) for other in present):
-            yield one
-    denied = _permitted(old, Qualifier.DENY)
-    for denial in _permitted(new, Qualifier.DENY):
-        if not any(_includes(before, denial) for before in denied):
-            yield from (
-                one
-                for one in allowed
-                if denial.direction == one.direction and can_meet(denial.topic, one.topic)
-            )
-
-
-def _permitted(grant: Grant, qualifier: Qualifier) -> list[Permitted]:
-    return [
-        Permitted(direction, topic, rule.domains)
-        for rule in grant.rules
-        if rule.qualifier is qualifier
-        for direction, topics in (("publish", rule.publish), ("subscribe", rule.subscribe))
-        for topic in topics
-    ]
-
-
-def _includes(wide: Permitted, narrow: Permitted) -> bool:
-    return (
-        wide.direction == narrow.direction
-        and covers(wide.topic, narrow.topic)
-        and all(any(_within(inner, outer) for outer in wide.domains) for inner in narrow.domains)
+def granted_rules(permissions: Permissions) -> Iterator[Rule]:
+    """Yield what is allowed in terms of a policy: DDS topics that are none of ROS by their own names."""
+    allow = permissions.rules.allow
+    rules, others = ros_rules(allow.publish, allow.subscribe)
+    yield from rules
+    yield from (Rule(Operation.PUBLISH, Qualifier.ALLOW, topic) for topic in allow.publish if topic in others)
+    yield from (
+        Rule(Operation.SUBSCRIBE, Qualifier.ALLOW, topic) for topic in allow.subscribe if topic in others
     )
 
 
-def _within(inner: tuple[int, int | None], outer: tuple[int, int | None]) -> bool:
-    last, end = (_HIGHEST_DOMAIN if high is None else high for high in (inner[1], outer[1]))
-    return outer[0] <= inner[0] and last <= end
+def taken_away(old: Permissions, new: Permissions) -> tuple[str, ...]:
+    """Return what ``old`` permits and ``new`` surely or possibly does not, sorted words (``publish rt/chatter``)."""
+    return tuple(sorted(set(_lost(old, new))))
 
 
-def redated(
-    document: bytes, old_subjects: Collection[str], subject: str, validity: Validity, place: str
-) -> bytes:
-    """Return ``document`` with the grant of one of ``old_subjects`` given to ``subject`` for ``validity``.
-
-    Only the first such grant stays: of several for one subject the implementations use only that one, and foreign
-    grants have no place in a document every peer gets to see. Raises InvalidInputError for what is no permissions
-    document and DamagedKeystoreError if no grant matches.
-    """
-    from lxml import etree
-
-    root = check_permissions_schema(document, place)
-    grants = list(root.iter("grant"))
-    mine = next((grant for grant in grants if _subject(grant) in old_subjects), None)
-    if mine is None:
-        raise DamagedKeystoreError(f"{place} has no grant for {subject}")
-    for grant in grants:
-        parent = grant.getparent()
-        if grant is not mine and parent is not None:
-            parent.remove(grant)
-    _set(mine, "subject_name", subject)
-    _set(mine, "validity/not_before", f"{validity.not_before:%Y-%m-%dT%H:%M:%S}")
-    _set(mine, "validity/not_after", f"{validity.not_after:%Y-%m-%dT%H:%M:%S}")
-    return (_DECLARATION + etree.tostring(root, encoding="unicode") + "\n").encode()
+def _lost(old: Permissions, new: Permissions) -> Iterator[str]:
+    narrower = not new.domains.covers(old.domains)
+    for direction in TopicSets._fields:
+        allowed, present = _expressions(old.rules.allow, direction), _expressions(new.rules.allow, direction)
+        for topic in allowed:
+            if narrower or not (topic in present or any(covers(other, topic) for other in present)):
+                yield f"{direction} {topic}"
+        before = _expressions(old.rules.deny, direction)
+        for denial in _expressions(new.rules.deny, direction):
+            if not any(covers(one, denial) for one in before):
+                yield from (f"{direction} {topic}" for topic in allowed if can_meet(denial, topic))
 
 
-def _subject(grant: etree._Element) -> str:
-    return (grant.findtext("subject_name") or "").strip()
-
-
-def _set(grant: etree._Element, path: str, text: str) -> None:
-    element = grant.find(path)
-    if element is not None:
-        element.text = text
+def _expressions(topics: TopicSets, direction: str) -> frozenset[str]:
+    return frozenset(getattr(topics, direction))

@@ -22,7 +22,7 @@ _NODE = rf"{_TOKEN}\Z"
 _FULL_NAME = re.compile(rf"(?:/{_TOKEN})+\Z")
 # What may stand in an expression with wildcards: names plus * ? [abc] [a-z] [!abc], the subset that
 # Cyclone DDS and Fast DDS read alike.
-_PATTERN = r"(?:[A-Za-z0-9_/*?]|\[!?(?:[A-Za-z0-9_](?:-[A-Za-z0-9_])?)+\])+\Z"
+_PATTERN = re.compile(r"(?:[A-Za-z0-9_/*?]|\[!?(?:[A-Za-z0-9_](?:-[A-Za-z0-9_])?)+\])+\Z")
 
 Topics = tuple[str, ...]
 Forms = tuple[tuple[str, str], ...]
@@ -47,6 +47,11 @@ _FORMS: dict[Operation, tuple[Forms, Forms]] = {
     Operation.CALL: (_ACTION_REQUESTS, _ACTION_ANSWERS),
     Operation.EXECUTE: (_ACTION_ANSWERS, _ACTION_REQUESTS),
 }
+
+
+def is_dds_expression(text: str) -> bool:
+    """Return whether Cyclone DDS and Fast DDS read this expression for DDS topics alike."""
+    return bool(_PATTERN.match(text))
 
 
 def full_name(expression: str, profile: Profile) -> str:
@@ -135,7 +140,7 @@ def _problem(expression: str) -> str | None:
     body = expression[1:] if expression[0] == "~" else expression
     if expression[0] == "~" and body[:1] not in ("", "/"):
         return "must have '/' after '~'"
-    if body and not re.match(_PATTERN, body):
+    if body and not _PATTERN.match(body):
         return "is not a valid name (letters, digits, '_', '/', and the wildcards * ? [abc] [a-z] [!abc])"
     if "//" in body or expression[-1] == "/":
         return "has an empty part"

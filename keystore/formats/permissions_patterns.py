@@ -4,8 +4,7 @@
 
 from __future__ import annotations
 
-import ctypes
-import sys
+from collections.abc import Collection
 from functools import lru_cache
 
 _ALPHABET = frozenset("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789_/")
@@ -14,25 +13,20 @@ _ANY_TEXT = None  # stands for "*" among the elements of a pattern
 
 Element = frozenset[str] | None
 
-UNRELATED_NAMES = (
-    "ros_discovery_info", "rt/tf", "rt/chatter", "rt/robot1/cmd_vel", "rt/arm/joint_7/state", "rq/map/get_mapRequest",
-    "rq/talker/set_parametersRequest", "rq/x/yRequest", "rr/map/get_mapReply", "rr/arm/homeReply", "rr/x/yReply", "X",
+_TOPICS = (
+    "tf", "chatter", "robot1/cmd_vel", "arm/joint_7/state", "front/camera/image_raw", "parameter_events", "X", "z/9/_a",
 )  # fmt: skip
-"""DDS topics that have nothing in common, to try out what an expression matches."""
-_LIBC = ctypes.CDLL(None)
-_FNM_NOESCAPE = 2 if sys.platform == "linux" else 1  # as Fast DDS calls it; BSD and macOS number it otherwise
+EVERY_KIND = {
+    "every topic": tuple(f"rt/{name}" for name in _TOPICS),
+    "every request": tuple(f"rq/{name}Request" for name in _TOPICS),
+    "every reply": tuple(f"rr/{name}Reply" for name in _TOPICS),
+}
+"""DDS topics of each kind that have nothing in common, to try out what an enclave may do."""
 
 
-def matches(expression: str, name: str) -> bool:
-    """Return whether it matches as one of the DDS implementations reads it: by fnmatch(3), as Fast DDS does, with more
-    than the subset above; without the blanks around it, as Cyclone DDS does."""
-    return bool(_LIBC.fnmatch(expression.strip().encode(), name.encode(), _FNM_NOESCAPE) == 0)
-
-
-def matches_everything(expression: str) -> bool:
-    """Return whether it matches all names, or all but a few: most of the unrelated ones."""
-    matched = sum(matches(expression, name) for name in UNRELATED_NAMES)
-    return matched * 4 >= len(UNRELATED_NAMES) * 3
+def any_matches(expressions: Collection[str], topic: str) -> bool:
+    """Return whether one of the expressions matches this topic."""
+    return topic in expressions or any(has_wildcard(one) and can_meet(one, topic) for one in expressions)
 
 
 def has_wildcard(name: str) -> bool:

@@ -6,6 +6,7 @@ keystore can be put back from a backup or copied in; the register says whether i
     authorities     every CA this keystore made or was given: waiting, in use, or retired
     certificates    by serial number; of each enclave one is in force
     documents       what was signed for whom, by hash; governance as text
+    settings        as which subjects and for how long is signed, as text
     crl_number      of the CRL published last, 0 before the first (RFC 5280 section 5.2.3: it only grows)
 """
 
@@ -79,7 +80,7 @@ class SignedPermissions(NamedTuple):
 class Register:
     """The contents of a register; each change gives a new one. ``authorities``: role and DER certificate -> state.
     ``crl_published``: whether there is a CRL by the CA in use. ``written``: the machine's clock when it was written
-    last. Each change gives a new register."""
+    last. ``settings``: what ``secure-keystore.json`` was made with."""
 
     authorities: Mapping[tuple[Role, bytes], AuthorityState] = field(default_factory=dict)
     certificates: Mapping[int, IssuedCertificate] = field(default_factory=dict)
@@ -88,6 +89,7 @@ class Register:
     crl_number: int = 0
     crl_published: bool = False
     written: datetime | None = None
+    settings: bytes = b""
 
     @cached_property
     def _by_enclave(self) -> dict[str, list[IssuedCertificate]]:
@@ -207,6 +209,7 @@ def register_json(register: Register) -> bytes:
         "crl_number": register.crl_number,
         "crl_published": register.crl_published,
         "governance": register.governance.decode(),
+        "settings": register.settings.decode(),
         "written": iso(register.written) if register.written is not None else None,
     }
     rows: dict[str, Iterable[list[Any]]] = {
@@ -252,6 +255,7 @@ def parse_register(text: bytes, place: str) -> Register:
             int(content["crl_number"]),
             bool(content["crl_published"]),
             _time(content["written"]) if content.get("written") is not None else None,
+            content["settings"].encode(),
         )
     except (ValueError, KeyError, TypeError, AttributeError, IndexError, OverflowError, RecursionError):
         raise DamagedKeystoreError(

@@ -6,10 +6,10 @@ from datetime import timedelta
 
 from keystore.errors import DamagedKeystoreError
 from keystore.formats.certificate import CertificateFacts
-from keystore.formats.permissions_document import Grant, grant_for, rules_text
+from keystore.formats.permissions import Permissions
+from keystore.formats.permissions_document import parse_permissions
 from keystore.formats.register import UNKNOWN, IssuedCertificate, SignedPermissions
 from keystore.formats.subject import subject_name
-from keystore.formats.validity import parse_time
 from keystore.signing.public_key import fingerprint
 
 
@@ -29,17 +29,15 @@ def certificate_record(
 
 
 def permissions_record(enclave: str, common_name: str, document: bytes) -> SignedPermissions:
-    """Return the record of a signed document; raises DamagedKeystoreError, InvalidInputError."""
-    grant = grant_for(document, subject_name(common_name), f"the permissions of {enclave}")
-    if grant is None:
-        raise DamagedKeystoreError(
-            f"the permissions of {enclave} have no grant for {subject_name(common_name)}"
-        )
+    """Return the record of a document of ours; raises DamagedKeystoreError for one that is not for this subject."""
+    permissions = parse_permissions(document, f"the permissions of {enclave}")
+    if permissions.subject != subject_name(common_name):
+        raise DamagedKeystoreError(f"the permissions of {enclave} are not for {subject_name(common_name)}")
     return SignedPermissions(
-        enclave, common_name, fingerprint(document), rules_digest(grant), parse_time(grant.not_after)
+        enclave, common_name, fingerprint(document), rules_digest(permissions), permissions.validity.not_after
     )
 
 
-def rules_digest(grant: Grant) -> str:
-    """Return a digest that is equal for grants that permit the same, whatever their subject and dates."""
-    return fingerprint(rules_text(grant).encode())
+def rules_digest(permissions: Permissions) -> str:
+    """Return a digest that is equal for documents that permit the same, whatever their subject and dates."""
+    return fingerprint(f"{permissions.domains} {permissions.rules[:3]}".encode())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import shlex
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import timedelta
 from pathlib import Path
 
@@ -144,6 +144,7 @@ def _write_settings(opened: Store, options: CreateOptions) -> bool:
     if os.path.lexists(opened.root / layout.SETTINGS) or os.path.lexists(opened.root / layout.PUBLIC):
         return False
     with opened.batch() as batch:
+        batch.record(replace(opened.register, settings=options.settings.to_json()))
         batch.file(layout.SETTINGS, options.settings.to_json())
     return True
 
@@ -303,10 +304,10 @@ def _unsigned_default(root: Path) -> bytes | None:
     place = root / layout.GOVERNANCE_XML
     try:
         found = parse_governance(present, printable(place))
-        if found == Governance.for_domains(found.domains()):
-            return present
-    except InvalidInputError:
-        pass
+    except DamagedKeystoreError:
+        found = None
+    if found is not None and found == Governance.for_domains(found.domains()):
+        return present
     raise DamagedKeystoreError(
         f"{printable(place)} is not the default governance, and its signature governance.p7s is missing; look at "
         f"it and remove it: rm {shlex.quote(str(place))}"

@@ -19,12 +19,13 @@ from keystore.disk.view import KeystoreView
 from keystore.errors import (
     DamagedKeystoreError,
     KeystoreError,
+    OtherFormError,
     SigningUnavailableError,
     UnsafeKeystoreError,
     printable,
 )
 from keystore.formats.certificate import CertificateFacts
-from keystore.formats.permissions_document import grant_for, taken_away
+from keystore.formats.permissions_document import parse_permissions, taken_away
 from keystore.formats.register import Register
 from keystore.formats.role import Role
 from keystore.formats.subject import names_enclave, subject_name
@@ -122,15 +123,13 @@ def beyond_and_missing(
     """Return what the signed permissions grant beyond what is wanted, and what they lack; nothing if unreadable."""
     if state.facts is None or state.facts.common_name is None:
         return (), ()
-    subject, place = subject_name(state.facts.common_name), layout.PERMISSIONS
+    place = layout.PERMISSIONS
     try:
-        signed = safe_files.read(view.root, layout.enclave_file(state.enclave, layout.PERMISSIONS))
-        present = grant_for(smime.read(signed, place).document, subject, place)
-        document = wanted(subject, state.facts.validity)
-        requested = grant_for(document, subject, place) if document is not None else None
+        signed = safe_files.read(view.root, layout.enclave_file(state.enclave, place))
+        present = parse_permissions(smime.read(signed, place).document, place)
+        document = wanted(subject_name(state.facts.common_name), state.facts.validity)
+        requested = parse_permissions(document, place) if document is not None else present
     except KeystoreError:
-        return (), ()
-    if present is None or requested is None:
         return (), ()
     return taken_away(present, requested), taken_away(requested, present)
 
@@ -276,6 +275,11 @@ def _permissions_problem(enclave: _Enclave, expected: bytes | None) -> str | Non
     document = present.document
     if expected is not None and document != expected:
         return OTHER_PERMISSIONS
+    if expected is None:
+        try:
+            parse_permissions(document)
+        except OtherFormError:
+            return "the signed permissions are not, byte for byte, what is written here"
     twin = enclave.read(layout.PERMISSIONS_XML)
     # A deployed enclave has none: nothing reads it but people.
     if twin is None or twin.replace(b"\r\n", b"\n") == document:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Iterator, Mapping
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -11,14 +10,12 @@ from typing import NamedTuple
 from keystore.disk import layout, safe_files
 from keystore.disk.crl_file import crl_validity
 from keystore.disk.view import KeystoreView, keystore_at
-from keystore.errors import DamagedKeystoreError, InvalidInputError
 from keystore.formats.certificate import read_certificate
 from keystore.formats.enclave_name import validate_enclave_name
+from keystore.formats.permissions_document import parse_permissions
 from keystore.formats.role import Role
-from keystore.formats.validity import Validity, later, parse_time, utc_now
+from keystore.formats.validity import Validity, later, utc_now
 from keystore.signing import smime
-
-_DATE = rb"<not_(before|after)>\s*([^<]{1,40}?)\s*</not_"
 
 
 class Expiry(NamedTuple):
@@ -109,16 +106,11 @@ def _enclave_expiries(view: KeystoreView, name: str) -> Iterator[Expiry]:
         yield _expiry("certificate", name, read_certificate(cert, f"{directory}/{layout.CERT}").validity)
     signed = safe_files.read_if_there(view.root, f"{directory}/{layout.PERMISSIONS}")
     if signed is not None:
-        yield _expiry("permissions", name, _permissions_validity(signed, f"{directory}/{layout.PERMISSIONS}"))
+        place = f"{directory}/{layout.PERMISSIONS}"
+        yield _expiry(
+            "permissions", name, parse_permissions(smime.read(signed, place).document, place).validity
+        )
 
 
 def _expiry(what: str, enclave: str | None, validity: Validity) -> Expiry:
     return Expiry(validity.not_after, what, enclave, validity.not_before)
-
-
-def _permissions_validity(signed: bytes, place: str) -> Validity:
-    found = dict(reversed(re.findall(_DATE, smime.read_any(signed, place).document)))
-    try:
-        return Validity(parse_time(found[b"before"].decode()), parse_time(found[b"after"].decode()))
-    except (KeyError, UnicodeDecodeError, InvalidInputError):
-        raise DamagedKeystoreError(f"{place} states no validity") from None

@@ -8,7 +8,7 @@ from datetime import datetime
 from pathlib import Path
 
 from keystore.disk import layout, safe_files
-from keystore.disk.signed_documents import governance_stands, signed_governance, trusted_document
+from keystore.disk.signed_documents import governance_stands, own_document, signed_governance
 from keystore.disk.store import Store, refresh_copies
 from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import DamagedKeystoreError, printable
@@ -25,9 +25,11 @@ from keystore.steps.opening import ChangeOptions, opened_for_change
 
 def mirror_governance(opened: Store) -> bool:
     """Rewrite ``governance.xml`` from the signed document if it differs. Returns whether it did."""
-    present = safe_files.read_if_there(opened.root, layout.GOVERNANCE_XML)
-    document = trusted_document(KeystoreView(opened.root), layout.GOVERNANCE)
-    if present is None or present.replace(b"\r\n", b"\n") == document:
+    present, document = (
+        safe_files.read_if_there(opened.root, layout.GOVERNANCE_XML),
+        opened.register.governance,
+    )
+    if present is None or not document or present == document:
         return False
     with opened.batch() as batch:
         batch.file(layout.GOVERNANCE_XML, document)
@@ -59,12 +61,12 @@ def governance_for(view: KeystoreView, register: Register, domains: Domains) -> 
     Raises DamagedKeystoreError if no CA of this keystore signed it, InvalidInputError without a rule.
     """
     try:
-        document = register.governance or trusted_document(view, layout.GOVERNANCE)
+        document = register.governance or own_document(view, layout.GOVERNANCE)
+        governance = parse_governance(document, printable(view.root / layout.GOVERNANCE))
     except DamagedKeystoreError as error:
         raise DamagedKeystoreError(
             f"{error}; put yours in force: secure-keystore governance {shlex.quote(str(view.root))} FILE.yaml"
         ) from None
-    governance = parse_governance(document, printable(view.root / layout.GOVERNANCE))
     if not governance.domains().covers(domains):
         document = governance_document(governance.extended_to(domains))
     return document

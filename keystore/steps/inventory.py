@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from keystore.disk import layout
-from keystore.disk.signed_documents import signed_governance
+from keystore.disk.signed_documents import governance_in_force
 from keystore.disk.view import KeystoreView, keystore_at
 from keystore.formats.certificate import CertificateFacts
 from keystore.formats.domains import Domains
-from keystore.formats.governance import DomainRule, TopicRule, parse_governance
-from keystore.formats.permissions_document import Grant, parse_permissions
-from keystore.formats.policy import Operation, Qualifier, Rule
+from keystore.formats.governance import DomainRule, TopicRule
+from keystore.formats.permissions_document import granted_rules, parse_permissions
+from keystore.formats.policy import Rule
 from keystore.formats.role import Role
 from keystore.formats.validity import iso
 from keystore.signing import smime
@@ -111,7 +111,7 @@ class GovernanceFacts(NamedTuple):
 def governance_facts(keystore: Path | str) -> GovernanceFacts:
     """Read the governance in force; raises NotAKeystoreError, DamagedKeystoreError and InvalidInputError."""
     view = keystore_at(keystore)
-    governance = parse_governance(signed_governance(view).document, layout.GOVERNANCE)
+    governance = governance_in_force(view)
     return GovernanceFacts([_plain(rule) for rule in governance.domain_rules], tuple(weaknesses(governance)))
 
 
@@ -140,22 +140,7 @@ def granted(keystore: Path | str) -> dict[str, frozenset[Rule]]:
         signed = view.enclave_file(enclave, layout.PERMISSIONS)
         if signed is not None:
             place = layout.enclave_file(enclave, layout.PERMISSIONS)
-            grants = parse_permissions(smime.read(signed, place).document, place)
-            found[enclave] = frozenset(rule for grant in grants for rule in _allowed(grant))
+            found[enclave] = frozenset(
+                granted_rules(parse_permissions(smime.read(signed, place).document, place))
+            )
     return found
-
-
-def _allowed(grant: Grant) -> Iterator[Rule]:
-    """Yield what a grant allows: DDS topics that are none of ROS by their own names, a default of ALLOW as ``*``."""
-    rules, others = grant.ros_rules
-    yield from (rule for rule in rules if rule.qualifier is Qualifier.ALLOW)
-    for rule in grant.rules:
-        if rule.qualifier is Qualifier.ALLOW:
-            yield from (_topic(Operation.PUBLISH, topic) for topic in rule.publish if topic in others)
-            yield from (_topic(Operation.SUBSCRIBE, topic) for topic in rule.subscribe if topic in others)
-    if grant.default is Qualifier.ALLOW:
-        yield from (_topic(Operation.PUBLISH, "*"), _topic(Operation.SUBSCRIBE, "*"))
-
-
-def _topic(operation: Operation, name: str) -> Rule:
-    return Rule(operation, Qualifier.ALLOW, name)

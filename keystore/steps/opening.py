@@ -13,11 +13,13 @@ from enclave_common.words import counted
 from keystore.disk import layout, lock, safe_files, store
 from keystore.disk.crl_file import crl_number, revoked_serials
 from keystore.disk.register_file import needs_register
-from keystore.disk.signed_documents import trusted_document
+from keystore.disk.signed_documents import foreign_document, foreign_governance, own_document
 from keystore.disk.store import Store
 from keystore.disk.view import KeystoreView
-from keystore.errors import DamagedKeystoreError, KeystoreError, printable
+from keystore.errors import DamagedKeystoreError, KeystoreError, OtherFormError, printable
 from keystore.formats.certificate import CertificateFacts, given_certificates, read_certificates
+from keystore.formats.governance import governance_document, parse_governance
+from keystore.formats.permissions_document import parse_permissions, read_foreign_permissions
 from keystore.formats.register import UNKNOWN, AuthorityState, IssuedCertificate, Register, SignedPermissions
 from keystore.formats.role import Role
 from keystore.formats.validity import iso
@@ -57,6 +59,7 @@ def opened_for_change(
             take_over(opened)
         elif opened.has_register:
             _adopt_newer_crl(opened)
+            _restore_settings(opened)
         yield opened
         opened.keep_adopted()
 
@@ -93,6 +96,19 @@ def _adopt_newer_crl(opened: Store) -> None:
             opened.notes.append("the CRL is newer than the register: what it revokes was recorded")
 
 
+def _restore_settings(opened: Store) -> None:
+    """Go by the settings that are on record: what another hand wrote decides about nothing that is signed."""
+    present, recorded = safe_files.read_if_there(opened.root, layout.SETTINGS), opened.register.settings
+    if (present or b"") == recorded:
+        return
+    if recorded:
+        with opened.batch() as batch:
+            batch.file(layout.SETTINGS, recorded)
+    else:
+        opened.remove(layout.SETTINGS)
+    opened.notes.append(f"{layout.SETTINGS} made what it was")
+
+
 def take_over(opened: Store) -> None:
     """Record what can be known of a keystore that SROS2 made, or whose register was lost: all that its CAs really
     signed.
@@ -100,15 +116,18 @@ def take_over(opened: Store) -> None:
     Raises DamagedKeystoreError for a CRL that cannot be trusted: nobody knows then who was revoked.
     """
     view = KeystoreView(opened.root)
-    register = _authorities(view)
+    settings = safe_files.read_if_there(opened.root, layout.SETTINGS) or b""
+    register = replace(_authorities(view), settings=settings)
+    lost: list[str] = []
     with suppress(KeystoreError):  # signed by another CA: the next governance is recorded
-        register = replace(register, governance=trusted_document(view, layout.GOVERNANCE))
+        register = replace(register, governance=_governance(view, lost))
     register = register.with_certificates(_issued(view))
-    register = register.with_documents(_documents(view, register))
+    register = register.with_documents(_documents(view, register, lost))
     opened.adopt(_with_crl(view, register))
     opened.notes.append(
         f"register made from the files in this keystore: {counted(len(opened.register.certificates), 'certificate')}"
     )
+    opened.notes += [f"not taken over: {one}" for one in lost]
 
 
 def _authorities(view: KeystoreView) -> Register:
@@ -152,12 +171,44 @@ def _issued(view: KeystoreView) -> Iterator[IssuedCertificate]:
             yield certificate_record(enclave, facts, issuer)
 
 
-def _documents(view: KeystoreView, register: Register) -> Iterator[SignedPermissions]:
+def _governance(view: KeystoreView, lost: list[str]) -> bytes:
+    try:
+        document = own_document(view, layout.GOVERNANCE)
+        parse_governance(document, layout.GOVERNANCE)
+    except OtherFormError:
+        governance, missing = foreign_governance(view)
+        lost += [f"of the governance: {one}" for one in missing]
+        return governance_document(governance)
+    return document
+
+
+def _documents(view: KeystoreView, register: Register, lost: list[str]) -> Iterator[SignedPermissions]:
+    """Record the permissions as they are, or of another tool's document as they will be written here."""
     for one in register.certificates.values():
-        if one.in_force:
-            with suppress(KeystoreError):  # not signed by us, or not for this subject: it counts for nothing
-                document = trusted_document(view, layout.enclave_file(one.enclave, layout.PERMISSIONS))
-                yield permissions_record(one.enclave, one.subject, document)
+        if not one.in_force or view.enclave_file(one.enclave, layout.PERMISSIONS) is None:
+            continue
+        try:
+            document, missing = taken_over(view, one.enclave)
+            yield permissions_record(one.enclave, one.subject, document)
+        except KeystoreError as error:
+            missing = (str(error),)
+        lost += [f"of the permissions of {one.enclave}: {what}" for what in missing]
+
+
+def taken_over(view: KeystoreView, enclave: str) -> tuple[bytes, tuple[str, ...]]:
+    """Return the permissions that one of our CAs signed, as they are written here, and what of them is lost.
+
+    Raises a KeystoreError for what none of our CAs signed, or DDS implementations read in different ways.
+    """
+    place = layout.enclave_file(enclave, layout.PERMISSIONS)
+    try:
+        document = own_document(view, place)
+        parse_permissions(document, printable(view.root / place))
+    except OtherFormError:
+        foreign, where = foreign_document(view, place), printable(view.root / place)
+        found = read_foreign_permissions(foreign, enclave, where)
+        return found.permissions.document(), found.lost
+    return document, ()
 
 
 def _with_crl(view: KeystoreView, register: Register) -> Register:

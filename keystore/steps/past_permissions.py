@@ -7,11 +7,11 @@ too; to sign it again, or to compare with it, would give back what was taken awa
 from __future__ import annotations
 
 from keystore.disk import layout
-from keystore.disk.signed_documents import governance_domains, trusted_document
+from keystore.disk.signed_documents import governance_domains, own_document
 from keystore.disk.view import KeystoreView
 from keystore.errors import DamagedKeystoreError, KeystoreError, printable
-from keystore.formats.permissions import permissions_document
-from keystore.formats.permissions_document import Grant, parse_permissions, redated, taken_away
+from keystore.formats.permissions import Permissions, permissions_document
+from keystore.formats.permissions_document import parse_permissions, taken_away
 from keystore.formats.policy import EnclavePolicy
 from keystore.formats.register import Register, SignedPermissions
 from keystore.formats.role import Role
@@ -20,6 +20,7 @@ from keystore.formats.validity import Validity
 from keystore.signing.public_key import fingerprint
 from keystore.signing.records import rules_digest
 from keystore.steps.enclave_state import PermissionsSource
+from keystore.steps.opening import taken_over
 
 UNKNOWN_RIGHTS = "do what it was granted before"
 
@@ -34,17 +35,17 @@ def what_is_taken_away(
     last = register.permissions(enclave)
     if last is None:
         return ()
-    grant = _granted_last(view, last)
+    granted = _granted_last(view, last)
     probe = wanted(f"CN={last.subject}", view.ca(Role.IDENTITY).validity)
     if probe is None:
         present = view.enclave_file(enclave, layout.PERMISSIONS)
         if present is not None:
             return ()  # it keeps what it has
         probe = _nothing(view, enclave, f"CN={last.subject}", view.ca(Role.IDENTITY).validity)
-    (new,) = parse_permissions(probe)
+    new = parse_permissions(probe)
     if rules_digest(new) == last.rules:
         return ()
-    return taken_away(grant, new) if grant is not None else (UNKNOWN_RIGHTS,)
+    return taken_away(granted, new) if granted is not None else (UNKNOWN_RIGHTS,)
 
 
 def previous_permissions(
@@ -58,48 +59,40 @@ def previous_permissions(
     if view.enclave_file(enclave, layout.PERMISSIONS) is None:
         return _nothing(view, enclave, subject, validity)
     try:
-        document = _document(view, enclave, last)
-        mine = _grant(document, enclave)
-        if last is not None and (mine is None or rules_digest(mine) != last.rules):
+        permissions = _present(view, enclave, last)
+        if last is not None and rules_digest(permissions) != last.rules:
             raise DamagedKeystoreError(
                 f"{printable(view.root / place)} is not what was signed last for {enclave}"
             )
-        names = {mine.subject_name.strip()} if mine is not None else set()
-        return redated(document, names, subject, validity, printable(place))
+        return permissions._replace(subject=subject, validity=validity).document()
     except KeystoreError as error:
         raise DamagedKeystoreError(
             f"{error}. What it may do is not known then: give it with secure-keystore apply-policy"
         ) from None
 
 
-def _document(view: KeystoreView, enclave: str, last: SignedPermissions | None) -> bytes:
+def _present(view: KeystoreView, enclave: str, last: SignedPermissions | None) -> Permissions:
+    """Return what the enclave has: signed by us, and for it, under any subject it can have had.
+
+    Of another tool's document counts what the register took over.
+    """
+    place = layout.enclave_file(enclave, layout.PERMISSIONS)
     twin = view.enclave_file(enclave, layout.PERMISSIONS_XML)
     if last is not None and twin is not None and fingerprint(twin) == last.document:
-        return twin
-    return trusted_document(view, layout.enclave_file(enclave, layout.PERMISSIONS))
+        return parse_permissions(twin, printable(view.root / place))
+    document = own_document(view, place) if last is None else taken_over(view, enclave)[0]
+    permissions = parse_permissions(document, printable(view.root / place))
+    if not names_enclave(permissions.subject.removeprefix("CN="), enclave):
+        raise DamagedKeystoreError(f"{printable(view.root / place)} is for {printable(permissions.subject)}")
+    return permissions
 
 
-def _granted_last(view: KeystoreView, last: SignedPermissions) -> Grant | None:
+def _granted_last(view: KeystoreView, last: SignedPermissions) -> Permissions | None:
     try:
-        grant = _grant(_document(view, last.enclave, last), last.enclave)
+        permissions = _present(view, last.enclave, last)
     except KeystoreError:
         return None
-    return grant if grant is not None and rules_digest(grant) == last.rules else None
-
-
-def _grant(document: bytes, enclave: str) -> Grant | None:
-    """Return the first grant of a document for this enclave, under any subject it can have had."""
-    grants = parse_permissions(document, f"the permissions of {enclave}")
-    prefix = "CN="
-    return next(
-        (
-            grant
-            for grant in grants
-            if grant.subject_name.strip().startswith(prefix)
-            and names_enclave(grant.subject_name.strip().removeprefix(prefix), enclave)
-        ),
-        None,
-    )
+    return permissions if rules_digest(permissions) == last.rules else None
 
 
 def _nothing(view: KeystoreView, enclave: str, subject: str, validity: Validity) -> bytes:

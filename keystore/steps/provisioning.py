@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import shlex
 from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -20,12 +21,11 @@ from keystore.disk import layout, store
 from keystore.disk.register_file import refuse_foreign_authorities
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.share_files import read_shares
-from keystore.disk.signed_documents import governance_domains, signed_governance
+from keystore.disk.signed_documents import governance_domains, governance_in_force
 from keystore.disk.store import Batch, Store
 from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import InvalidInputError, KeystoreError, StorageError, printable
 from keystore.formats.enclave_name import check_distinct, validate_enclave_name
-from keystore.formats.governance import Governance, governance_document, parse_governance
 from keystore.formats.policy import EnclavePolicy, Operation, Policy, Profile, Qualifier, Rule
 from keystore.formats.role import Role
 from keystore.formats.subject import SubjectScheme
@@ -352,15 +352,6 @@ def exposures(view: KeystoreView) -> Iterator[str]:
     for finding in check_parents(view.root):
         if finding.severity.fails:
             yield f"{finding.place} {finding.message}; {finding.repair}"
-    for weakness in _weak_governance(view):
-        yield f"the governance is weaker than the default: {weakness}"
-
-
-def _weak_governance(view: KeystoreView) -> Iterator[str]:
-    try:
-        document = signed_governance(view).document
-        if document == governance_document(Governance.for_domains(governance_domains(view))):
-            return
-        yield from weaknesses(parse_governance(document, layout.GOVERNANCE))
-    except KeystoreError:
-        return  # a governance that cannot be read is repaired or refused by the comparison
+    with suppress(KeystoreError):
+        for weakness in weaknesses(governance_in_force(view)):
+            yield f"the governance is weaker than the default: {weakness}"

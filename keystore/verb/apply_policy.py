@@ -30,7 +30,8 @@ def run(arguments: argparse.Namespace) -> int:
     common.warn(document.warnings, arguments)
     wildcards = document.policy.wildcards()
     granted = (
-        f"enclave {path} is granted by wildcard: {', '.join(names)}" for path, names in wildcards.items()
+        f"enclave {path} is granted by wildcard (* also matches /): {', '.join(names)}"
+        for path, names in wildcards.items()
     )
     common.warn(granted, arguments)
     options = common.provision_options(arguments, domains=common.domains(arguments))

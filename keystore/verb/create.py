@@ -10,7 +10,7 @@ import argparse
 from enclave_common.command_line import PATH, TEXT
 from keystore.errors import InvalidInputError
 from keystore.formats.domains import Domains
-from keystore.formats.governance_yaml import load_governance_yaml
+from keystore.formats.governance_yaml import governance_of
 from keystore.formats.role import Role
 from keystore.formats.subject import SubjectScheme
 from keystore.formats.validity import DEFAULT_LIFETIME, parse_end, utc_now
@@ -57,7 +57,7 @@ def run(arguments: argparse.Namespace) -> int:
         imported[Role.IDENTITY] = ImportedCa(arguments.external_identity_ca)
     options = CreateOptions(
         domains=Domains.parse(arguments.domain_id),
-        governance=load_governance_yaml(arguments.governance) if arguments.governance else None,
+        governance=governance_of(arguments.governance) if arguments.governance else None,
         subjects=SubjectScheme.COMPATIBLE if arguments.compatible_subjects else SubjectScheme.EXACT,
         ca_lifetime=parse_end(arguments.ca_valid_for, now) - now,
         lifetime=lifetime,

@@ -8,7 +8,7 @@ from __future__ import annotations
 import argparse
 
 from enclave_common.command_line import PATH
-from keystore.formats.governance_yaml import load_governance_yaml
+from keystore.formats.governance_yaml import governance_of
 from keystore.steps.governance import set_governance
 from keystore.steps.opening import ChangeOptions
 from keystore.verb import common
@@ -22,7 +22,7 @@ OPTIONS: common.Table = (
 
 def run(arguments: argparse.Namespace) -> int:
     """Sign the governance if it differs, and print whether it did. Returns 0."""
-    governance = load_governance_yaml(arguments.file)
+    governance = governance_of(arguments.file)
     options = ChangeOptions(**common.change(arguments))
     changed = set_governance(arguments.keystore, governance, options=options)
     print(

@@ -16,6 +16,7 @@ from keystore.disk.versions import imported_at
 from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import KeystoreError, NotInstalledError, storage_errors
 from keystore.formats.governance import Governance
+from keystore.formats.register import Register
 from keystore.formats.validity import utc_now
 from keystore.signing.ca_access import CaAccess
 from keystore.verification import repair
@@ -93,7 +94,7 @@ def _findings(
     except KeystoreError as error:
         yield Finding(Severity.ERROR, "unreadable", layout.PUBLIC, str(error), repair.BACKUP)
         return
-    yield from _check_settings(view)
+    yield from _check_settings(view, register)
     yield from _check_deployment(view)
     try:
         revoked = frozenset(revoked_serials(view))
@@ -119,7 +120,15 @@ def _check_deployment(view: KeystoreView) -> Iterator[Finding]:
         yield Finding(Severity.ERROR, "bundle-differs", place, problem, fix)
 
 
-def _check_settings(view: KeystoreView) -> Iterator[Finding]:
+def _check_settings(view: KeystoreView, register: Register | None) -> Iterator[Finding]:
+    place, present = layout.SETTINGS, safe_files.read_if_there(view.root, layout.SETTINGS)
+    if register is not None and register.settings != (present or b""):
+        yield Finding(
+            Severity.ERROR, "settings-changed", place,
+            "not what this keystore was made with: new certificates would get other subjects, or another lifetime",
+            repair.run(view.root, "renew", note="makes it what it was"),
+        )  # fmt: skip
+        return
     try:
         _ = view.settings
     except KeystoreError as error:

@@ -8,10 +8,10 @@ from datetime import datetime
 
 from keystore.disk import layout, safe_files
 from keystore.disk.crl_file import crl_validity, load_crl
-from keystore.disk.register_file import describe
-from keystore.disk.signed_documents import is_to_be_written_again
+from keystore.disk.register_file import describe, needs_register
+from keystore.disk.signed_documents import foreign_document
 from keystore.disk.view import KeystoreView
-from keystore.errors import KeystoreError, SigningUnavailableError, UnsafeKeystoreError
+from keystore.errors import KeystoreError, OtherFormError, SigningUnavailableError, UnsafeKeystoreError
 from keystore.formats.certificate import CertificateFacts
 from keystore.formats.governance import Governance, parse_governance
 from keystore.formats.register import Register
@@ -23,7 +23,7 @@ from keystore.signing.ca_access import CaAccess
 from keystore.signing.public_key import cyclone_takes, is_weak, issued_by, key_kind
 from keystore.verification import repair
 from keystore.verification.finding import Finding, Severity
-from keystore.verification.governance import check_strength, check_topics
+from keystore.verification.governance import check_strength
 
 
 def check_authorities(
@@ -116,16 +116,17 @@ def _check_governance(
         signed = smime.read(p7s, place)
         smime.check(signed, view.ca_bundle(Role.PERMISSIONS), place)
         governance = parse_governance(signed.document, place)
+    except OtherFormError as error:
+        yield _foreign_governance(view, register, error)
+        return
     except KeystoreError as error:
-        if not is_to_be_written_again(view, place, error):
-            yield Finding(Severity.ERROR, "governance", place, str(error), again)
+        yield Finding(Severity.ERROR, "governance", place, str(error), again)
         return
     if not signed.embeds(view.ca(Role.PERMISSIONS).der):
         yield Finding(
             Severity.ERROR, "embedded-differs", place,
             "carries another certificate than that of the permissions CA: older DDS versions refuse it", again,
         )  # fmt: skip
-    yield from check_topics(view.root, governance)
     yield from check_strength(view.root, governance, required)
     if register is not None and register.governance and signed.document != register.governance:
         yield Finding(
@@ -138,6 +139,17 @@ def _check_governance(
             Severity.ERROR, "twin-differs", layout.GOVERNANCE_XML,
             "differs from the signed governance.p7s in force", repair.run(view.root, "renew"),
         )  # fmt: skip
+
+
+def _foreign_governance(view: KeystoreView, register: Register | None, error: OtherFormError) -> Finding:
+    place, fix = layout.GOVERNANCE, repair.sign_governance(view.root)
+    try:
+        foreign_document(view, place)
+    except KeystoreError as worse:
+        return Finding(Severity.ERROR, "governance", place, str(worse), fix)
+    if needs_register(view) or (register is not None and register.governance):
+        fix = repair.run(view.root, "renew", note="writes it again, or takes the keystore over")
+    return Finding(Severity.ERROR, "other-form", place, str(error), fix)
 
 
 def _check_crl(view: KeystoreView, now: datetime) -> Iterator[Finding]:

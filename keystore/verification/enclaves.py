@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import datetime
@@ -12,22 +11,22 @@ from cryptography import x509
 
 from enclave_common.words import counted
 from keystore.disk import layout, safe_files
-from keystore.disk.signed_documents import is_to_be_written_again, signed_governance
+from keystore.disk.register_file import needs_register
+from keystore.disk.signed_documents import foreign_document, governance_in_force
 from keystore.disk.view import KeystoreView
 from keystore.errors import (
     DamagedKeystoreError,
-    InvalidInputError,
     KeystoreError,
+    OtherFormError,
     UnsafeKeystoreError,
     printable,
 )
 from keystore.formats.certificate import NOT_OUR_FORM, CertificateFacts, read_certificate
 from keystore.formats.domains import Domains
-from keystore.formats.governance import parse_governance
-from keystore.formats.permissions_document import Grant, parse_permissions
-from keystore.formats.permissions_patterns import matches_everything
+from keystore.formats.permissions import DdsRules, Permissions, TopicSets
+from keystore.formats.permissions_document import parse_permissions
+from keystore.formats.permissions_patterns import EVERY_KIND, has_wildcard
 from keystore.formats.permissions_size import FAST_DDS_LIMIT_BYTES, WARN_BYTES
-from keystore.formats.policy import Qualifier
 from keystore.formats.register import Register
 from keystore.formats.role import Role
 from keystore.formats.subject import (
@@ -38,15 +37,22 @@ from keystore.formats.subject import (
     scheme_of,
     subject_name,
 )
-from keystore.formats.validity import LATEST, Validity, iso, parse_time
+from keystore.formats.validity import Validity, iso
 from keystore.signing import smime
-from keystore.signing.public_key import cyclone_takes, is_our_form, is_weak, issued_by, key_kind, key_matches
+from keystore.signing.public_key import (
+    cyclone_takes,
+    fingerprint,
+    is_our_form,
+    is_weak,
+    issued_by,
+    key_kind,
+    key_matches,
+)
 from keystore.verification import repair
 from keystore.verification.finding import Finding, Severity
 from keystore.verification.governance import check_domains
 from keystore.verification.issued import check_certificate_issued, check_permissions_issued
 
-_WILDCARD = re.compile(r"[*?\[]")
 _BROKEN_HASHES = frozenset({"md5", "sha1"})
 
 
@@ -77,8 +83,7 @@ def check_enclaves(
             yield check.leaf(Severity.ERROR, "shared-key", f"has the same key as {holder}")
     yield from _check_subjects(view, names)
     with contextlib.suppress(KeystoreError):  # of the governance, which is reported where it is checked
-        governance = parse_governance(signed_governance(view).document, layout.GOVERNANCE)
-        yield from check_domains(view.root, governance, granted)
+        yield from check_domains(view.root, governance_in_force(view), granted)
 
 
 def _check_subjects(view: KeystoreView, names: dict[str, str]) -> Iterator[Finding]:
@@ -260,10 +265,12 @@ class _EnclaveCheck:
         try:
             signed = smime.read(p7s, place)
             smime.check(signed, self._view.ca_bundle(Role.PERMISSIONS), place)
-            grants = parse_permissions(signed.document, place)
+            permissions = parse_permissions(signed.document, place)
+        except OtherFormError as error:
+            yield self._foreign(error)
+            return
         except KeystoreError as error:
-            if not is_to_be_written_again(self._view, place, error):
-                yield self._distrusted("permissions", str(error))
+            yield self._distrusted("permissions", str(error))
             return
         if not signed.embeds(self._view.ca(Role.PERMISSIONS).der):
             yield self.error(
@@ -276,69 +283,68 @@ class _EnclaveCheck:
             yield self.error(
                 "twin-differs", layout.PERMISSIONS_XML, "differs from the signed permissions.p7s in force"
             )
-        yield from self._grants(grants)
+        yield from self._grant(permissions)
         if len(p7s) >= WARN_BYTES:
             severity = Severity.ERROR if len(p7s) > FAST_DDS_LIMIT_BYTES else Severity.WARNING
             text = f"{len(p7s)} bytes; Fast DDS carries at most {FAST_DDS_LIMIT_BYTES}"
             yield self._finding(severity, "too-large", layout.PERMISSIONS, text, "split the enclave")
 
-    def _grants(self, grants: tuple[Grant, ...]) -> Iterator[Finding]:
-        if len(grants) > 1:
-            text = f"{counted(len(grants), 'grant')}; of those with one subject only the first counts"
-            yield self._finding(Severity.WARNING, "several-grants", layout.PERMISSIONS, text, self._renew())
+    def _foreign(self, error: OtherFormError) -> Finding:
+        """Report what is not as we write it: to be taken over where another tool made the keystore, else distrusted."""
+        try:
+            foreign_document(self._view, f"{self._directory}/{layout.PERMISSIONS}")
+        except KeystoreError as worse:
+            return self._distrusted("permissions", str(worse))
+        last = self._register.permissions(self._enclave) if self._register is not None else None
+        twin = self._read(layout.PERMISSIONS_XML)
+        if last is not None and twin is not None and fingerprint(twin) == last.document:
+            fix = repair.run(self._view.root, "renew", self._enclave, note="signs permissions.xml again")
+        elif needs_register(self._view):
+            fix = repair.run(self._view.root, "renew", note="takes the keystore over")
+        else:
+            fix = repair.grant_again(self._view.root, self._enclave)
+        return self._finding(Severity.ERROR, "other-form", layout.PERMISSIONS, str(error), fix)
+
+    def _grant(self, permissions: Permissions) -> Iterator[Finding]:
+        self.domains = permissions.domains
         if self.facts is None:
             return
-        subject = subject_name(self.facts.common_name or "")
-        mine = next((grant for grant in grants if grant.subject_name.strip() == subject), None)
-        if mine is None:
-            yield self._distrusted("wrong-grant", f"no grant for {subject}, the subject of cert.pem")
+        if permissions.subject != subject_name(self.facts.common_name or ""):
+            text = f"for {printable(permissions.subject)}, which is not the subject of cert.pem"
+            yield self._distrusted("wrong-grant", text)
             return
-        yield from self._validity(mine, self.facts)
-        yield from self._reach(grants, mine)
-        topics = {topic for rule in mine.rules for topic in (*rule.publish, *rule.subscribe)}
-        if wide := sorted(filter(_WILDCARD.search, topics)):
-            shown = ", ".join(wide[:4]) + (" ..." if len(wide) > 4 else "")
-            yield self._finding(Severity.NOTE, "wildcard", layout.PERMISSIONS, f"grants by wildcard: {shown}")
-
-    def _reach(self, grants: tuple[Grant, ...], mine: Grant) -> Iterator[Finding]:
-        if mine.default is Qualifier.ALLOW:
-            yield self._distrusted(
-                "default-allow", "permits on Cyclone DDS whatever no rule names (its default is ALLOW)"
-            )
-        if others := sorted({grant.subject_name for grant in grants} - {mine.subject_name}):
-            yield self._finding(
-                Severity.EXPOSURE, "foreign-grant", layout.PERMISSIONS,
-                f"also grants to {', '.join(map(printable, others[:4]))}, so to any participant of that name",
-                self._renew(),
-            )  # fmt: skip
-        allowed = [rule for rule in mine.rules if rule.qualifier is Qualifier.ALLOW]
-        topics = {topic for rule in allowed for topic in (*rule.publish, *rule.subscribe)}
-        if wide := sorted(filter(matches_everything, topics)):
-            text = f"grants every topic, or nearly ({', '.join(map(printable, wide[:4]))})"
+        yield from self._validity(permissions.validity, self.facts.validity)
+        rules = permissions.rules
+        wide = sorted({one for one in (*rules.allow.publish, *rules.allow.subscribe) if has_wildcard(one)})
+        if not wide:
+            return
+        shown = ", ".join(wide[:4]) + (" ..." if len(wide) > 4 else "")
+        kinds = {direction: _open_kinds(rules, direction) for direction in TopicSets._fields}
+        everything = [direction for direction, found in kinds.items() if len(found) == len(EVERY_KIND)]
+        if everything:
+            text = f"may {' and '.join(everything)} everything, or nearly, by {shown} (* also matches /)"
             fix = repair.run(self._view.root, "apply-policy", "POLICY.xml", note="that names what it needs")
             yield self._finding(Severity.EXPOSURE, "everything", layout.PERMISSIONS, text, fix)
-        if partitions := sorted({name for rule in mine.rules for name in rule.partitions}):
-            yield self._distrusted(
-                "partitions",
-                f"a rule is for partitions {', '.join(map(printable, partitions[:4]))} only: ROS uses none, so "
-                "Cyclone DDS and Fast DDS refuse its endpoints",
-            )
-        ranges = [(low, low if high is None else high) for rule in mine.rules for low, high in rule.domains]
-        with contextlib.suppress(InvalidInputError):
-            self.domains = Domains(tuple(ranges)) if ranges else None
-
-    def _validity(self, grant: Grant, facts: CertificateFacts) -> Iterator[Finding]:
-        try:
-            validity = Validity(parse_time(grant.not_before), parse_time(grant.not_after))
-        except InvalidInputError as error:
-            yield self.error("permissions-dates", layout.PERMISSIONS, str(error))
             return
-        if parse_time(grant.not_after) > LATEST:
-            text = f"valid until {grant.not_after}: Cyclone DDS refuses what ends after {iso(LATEST)}"
-            yield self.error("permissions-dates", layout.PERMISSIONS, text)
-        elif not validity.covers(self._now):
-            dates = f"valid from {grant.not_before} to {grant.not_after}"
+        opened = [f"{direction} {kind}" for direction, found in kinds.items() for kind in found]
+        text = f"grants by wildcard (* also matches /): {shown}" + "".join(
+            f"; it may {one}" for one in opened
+        )
+        yield self._finding(Severity.NOTE, "wildcard", layout.PERMISSIONS, text)
+
+    def _validity(self, permissions: Validity, certificate: Validity) -> Iterator[Finding]:
+        if not permissions.covers(self._now):
+            dates = f"valid from {iso(permissions.not_before)} to {iso(permissions.not_after)}"
             yield self.error("permissions-expired", layout.PERMISSIONS, dates)
-        elif validity.not_after != facts.validity.not_after:
+        elif permissions.not_after != certificate.not_after:
             text = "not valid as long as the certificate"
             yield self._finding(Severity.WARNING, "validity-differs", layout.PERMISSIONS, text, self._renew())
+
+
+def _open_kinds(rules: DdsRules, direction: str) -> list[str]:
+    """Return of which kinds it grants all names, or nearly: most of those that have nothing in common."""
+    return [
+        kind
+        for kind, names in EVERY_KIND.items()
+        if sum(rules.permits(direction, name) for name in names) * 4 >= len(names) * 3
+    ]

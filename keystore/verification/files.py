@@ -22,7 +22,6 @@ from keystore.errors import DamagedKeystoreError, InvalidEnclaveNameError, print
 from keystore.formats.certificate import read_certificate, read_certificates
 from keystore.formats.enclave_name import check_distinct, is_enclave_name, validate_enclave_name
 from keystore.formats.role import Role
-from keystore.signing import smime
 from keystore.signing.public_key import is_our_form
 from keystore.verification import repair
 from keystore.verification.finding import Finding, Severity
@@ -307,8 +306,6 @@ def _is_our_form(name: str, data: bytes) -> bool:
             read_certificates(data, name)
         elif name == layout.ENCLAVE_CRL:
             return is_crl(data)
-        elif name.endswith(".p7s"):
-            smime.read(data, name)
     except DamagedKeystoreError:
         return False
     return True

@@ -15,7 +15,6 @@ from keystore.formats.governance import (
     Protection,
     TopicRule,
 )
-from keystore.formats.permissions_patterns import UNRELATED_NAMES, matches
 from keystore.verification import repair
 from keystore.verification.finding import Finding, Severity
 
@@ -71,23 +70,6 @@ def check_strength(root: Path, governance: Governance, required: Governance | No
             Severity.EXPOSURE, "governance-weak", layout.GOVERNANCE, f"weaker than the default: {weakness}",
             f"{again}; if that is intended: verify --require-governance FILE",
         )  # fmt: skip
-
-
-def check_topics(root: Path, governance: Governance) -> Iterator[Finding]:
-    """Check that no topic is without a rule."""
-    for rule in governance.domain_rules:
-        expressions = [topic.topic_expression for topic in rule.topic_rules]
-        left = [name for name in UNRELATED_NAMES if not any(matches(one, name) for one in expressions)]
-        if left:
-            yield Finding(
-                Severity.ERROR, "topics-not-governed", layout.GOVERNANCE,
-                f"no topic rule matches {left[0]} and others in domains {rule.domains}: Cyclone DDS and Fast DDS "
-                "refuse every topic without a rule",
-                repair.run(
-                    root, "governance", "FILE.yaml",
-                    note="adds the rule for * that is missing; must reach all participants together",
-                ),
-            )  # fmt: skip
 
 
 def check_domains(root: Path, governance: Governance, granted: dict[str, Domains]) -> Iterator[Finding]:

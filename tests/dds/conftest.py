@@ -5,6 +5,7 @@ Where a component is missing the tests that need it are skipped; under ``CI=true
 
 from __future__ import annotations
 
+import contextlib
 import fcntl
 import hashlib
 import importlib.util
@@ -34,8 +35,8 @@ def missing(what: str, how: str) -> None:
     pytest.skip(message)
 
 
-@pytest.fixture
-def domain_id() -> Iterator[int]:
+@contextlib.contextmanager
+def domain() -> Iterator[int]:
     """A DDS domain that no other test on this machine uses meanwhile, whatever process it runs in."""
     folder = Path(tempfile.gettempdir()) / f"enclave-launch-dds-domains-{os.getuid()}"
     folder.mkdir(mode=0o700, exist_ok=True)
@@ -47,18 +48,32 @@ def domain_id() -> Iterator[int]:
                 continue
             yield candidate
             return
-    pytest.fail("all DDS domains are in use by other tests")
+    raise RuntimeError("all DDS domains are in use by other tests")
+
+
+@pytest.fixture
+def domain_id() -> Iterator[int]:
+    with domain() as chosen:
+        yield chosen
 
 
 @pytest.fixture(scope="session")
 def cyclone() -> Probe:
+    return cyclone_probe()
+
+
+@pytest.fixture(scope="session")
+def fastdds() -> Probe:
+    return fastdds_probe()
+
+
+def cyclone_probe() -> Probe:
     if importlib.util.find_spec("cyclonedds") is None:
         missing("Cyclone DDS", "pip install --no-binary cyclonedds '.[dds]' with CYCLONEDDS_HOME set")
     return Probe("Cyclone DDS", (sys.executable, str(HERE / "cyclone_probe.py")), crowd=7)
 
 
-@pytest.fixture(scope="session")
-def fastdds() -> Probe:
+def fastdds_probe() -> Probe:
     # Handshakes of three and more at once sometimes take Fast DDS 2.9 half a minute, of two always a second.
     return Probe("Fast DDS", (str(_built_fastdds_probe()),), crowd=1)
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from keystore import CaAccess, RemoveOptions, Role, remove, verify
+from keystore import CaAccess, DamagedKeystoreError, RemoveOptions, Role, remove, renew, verify
 from keystore.disk.view import KeystoreView
 from keystore.signing import smime
 from tests.dds import our_keystore
@@ -48,6 +48,25 @@ def test_permissions_behind_a_second_boundary(dds: Probe, domain_id: int, root: 
     answers = dds.try_endpoints(domain_id, [talker])
     assert answers.may("talker", "publish", CHATTER) and not answers.may("talker", "publish", SECRET)
     assert verify(root).is_good
+
+
+def test_permissions_that_an_xml_parser_decodes(dds: Probe, domain_id: int, root: Path) -> None:
+    """In UTF-7 the second topic is part of a comment; both implementations read the bytes."""
+    place, twin = root / "enclaves/talker/permissions.p7s", root / "enclaves/talker/permissions.xml"
+    ca = KeystoreView(root).authority(Role.PERMISSIONS, CaAccess())
+    hidden = b"<topic>rt/chatter<!-- +AGE--></topic><topic>rt/secret</topic><topic>+AC0ALQA+-</topic>"
+    document = twin.read_bytes().replace(b"UTF-8", b"UTF-7").replace(b"<topic>rt/chatter</topic>", hidden)
+    place.write_bytes(smime.sign_document(document, ca))
+    twin.unlink()
+
+    talker = Participant("talker", root / "enclaves/talker", publish=(SECRET,))
+    assert dds.try_endpoints(domain_id, [talker]).may("talker", "publish", SECRET)
+    assert not verify(root).is_good
+    (root / "private/register.json").unlink()
+    with pytest.raises(DamagedKeystoreError, match="byte for byte"):
+        renew(root)
+    our_keystore.create(root, domain_id, GRANTS)
+    assert not dds.try_endpoints(domain_id, [talker]).may("talker", "publish", SECRET)
 
 
 def test_a_crl_behind_a_remark(dds: Probe, domain_id: int, root: Path, tmp_path: Path) -> None:

@@ -10,7 +10,6 @@ import pytest
 
 import keystore
 from keystore import (
-    CaAccess,
     DomainRule,
     Domains,
     Governance,
@@ -20,8 +19,6 @@ from keystore import (
     TopicRule,
     roll_over,
 )
-from keystore.disk.view import KeystoreView
-from keystore.signing.smime import sign_document
 from tests.dds import our_keystore
 from tests.dds.probe import Participant, Probe
 from tests.dds.sros2_style import Grant
@@ -115,41 +112,6 @@ def test_launches_that_share_an_enclave_each_keep_their_rights(
         hold.enclaves.clear()
     start("bringup", "/odom")
     assert may() == {"rt/odom", "rt/plan"}
-
-
-CHANGES = {
-    "": set(),
-    "<topic>rt/ch*</topic>": set(),
-    "<topic>**</topic>": {"everything"},
-    "<topic>[!x]*</topic>": {"everything"},
-    "<topic> * </topic>": {"everything"},  # on Cyclone DDS
-    "<topic>[^x]*</topic>": {"everything"},  # on Fast DDS
-    "</topics><partitions><partition>*</partition></partitions>": set(),
-    "</topics><partitions><partition>left</partition></partitions>": {"partitions"},
-}
-
-
-def test_permissions_that_verify_calls_good_are_what_they_seem(
-    dds: Probe, domain_id: int, tmp_path: Path
-) -> None:
-    """Whatever widens the grant, or takes it away, on one of the implementations is found."""
-    our_keystore.create(tmp_path / "ks", domain_id, {TALKER: GRANTS[TALKER]})
-    topics = ("rt/chatter", "rt/cmd_vel")
-    for number, (change, codes) in enumerate(CHANGES.items()):
-        root = tmp_path / str(number)
-        shutil.copytree(tmp_path / "ks", root, symlinks=True)
-        twin = directory(root, TALKER) / "permissions.xml"
-        text, end = twin.read_text(), "</topics>"
-        old = end if change.startswith(end) else "<topic>rt/chatter</topic>"
-        twin.write_text(text.replace(old, change or old, 1))
-        signer = KeystoreView(root).authority(Role.PERMISSIONS, CaAccess())
-        (directory(root, TALKER) / "permissions.p7s").write_bytes(sign_document(twin.read_bytes(), signer))
-        found = {one.code for one in keystore.verify(root).findings} - {"permissions-not-last", "wildcard"}
-        assert found == codes, change
-        talker = Participant("talker", directory(root, TALKER), publish=topics)
-        answers = dds.try_endpoints(domain_id, [talker])
-        may = [answers.may("talker", "publish", topic) for topic in topics]
-        assert may == [True, False] or codes, change
 
 
 STRICTEST = DomainRule(

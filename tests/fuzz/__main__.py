@@ -2,7 +2,8 @@
 
 The first input at which a parser does something else than give a value or refuse is printed, made as small as possible;
 the exit status is then 1. ``cpp-programs`` compiles and runs random programs and prints the first of which inference
-says something false, or misses something silently.
+says something false, or misses something silently. ``dds-documents`` asks Cyclone DDS and Fast DDS of changed
+documents, and prints the first that ``verify`` calls good though one of them grants something else than we read in it.
 """
 
 from __future__ import annotations
@@ -18,16 +19,20 @@ from hypothesis import HealthCheck, given, seed, settings
 
 from tests.addons.inference.cpp.random_programs.generator import program
 from tests.addons.inference.cpp.random_programs.judge import judged, runs
+from tests.dds.conftest import cyclone_probe, domain, fastdds_probe
+from tests.dds.differential import Laboratory
 from tests.fuzz.inputs import damaged
 from tests.fuzz.targets import Target, targets
 
 PROGRAMS, BATCH = "cpp-programs", 30
+DDS_DOCUMENTS, DOCUMENTS = "dds-documents", 200
 ROUND = 1_000  # inputs of one target before it is another one's turn
 
 
 def main(arguments: list[str]) -> int:
     known = targets()
-    names = [*known, PROGRAMS]
+    others = {PROGRAMS: random_programs, DDS_DOCUMENTS: dds_documents}
+    names = [*known, *others]
     chosen = arguments[:1] or names
     if chosen[0] not in names:
         print(f"no target {chosen[0]!r}; there are: {' '.join(names)}", file=sys.stderr)
@@ -37,7 +42,7 @@ def main(arguments: list[str]) -> int:
     while time.monotonic() < until:
         for name in chosen:
             try:
-                count += random_programs() if name == PROGRAMS else one_round(known[name])
+                count += others[name]() if name in others else one_round(known[name])
             except Exception as error:  # whatever it is, it is what we look for
                 print(f"{name}: {type(error).__name__}: {error}", file=sys.stderr)
                 raise
@@ -55,6 +60,16 @@ def random_programs() -> int:
             verdict = judged(one, made, Path(folder) / str(each))
             assert not verdict.silent and not verdict.false, f"{each}: {verdict}\n{one.files}"
     return BATCH
+
+
+def dds_documents() -> int:
+    """Judge some documents; ``AssertionError`` with the first that is read in different ways."""
+    with domain() as chosen, tempfile.TemporaryDirectory() as folder:
+        verdicts = Laboratory(Path(folder), chosen).judge(
+            random.randrange(2**32), DOCUMENTS, (cyclone_probe(), fastdds_probe())
+        )
+    assert not verdicts.differences, verdicts.differences[0]
+    return verdicts.made
 
 
 def one_round(target: Target) -> int:

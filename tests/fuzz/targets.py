@@ -32,9 +32,9 @@ from keystore.disk.store import Content
 from keystore.formats.bundle import parse_manifest
 from keystore.formats.certificate import read_certificates
 from keystore.formats.enclave_name import validate_enclave_name
-from keystore.formats.governance import parse_governance
+from keystore.formats.governance import parse_governance, read_foreign_governance
 from keystore.formats.governance_yaml import parse_governance_yaml
-from keystore.formats.permissions_document import parse_permissions
+from keystore.formats.permissions_document import parse_permissions, read_foreign_permissions
 from keystore.formats.policy_xml import parse_policy
 from keystore.formats.register import parse_register
 from keystore.formats.shares import parse_shares
@@ -275,6 +275,15 @@ def targets() -> dict[str, Target]:
         ),
         "permissions": Target(
             lambda data: parse_permissions(data, "a.xml"), refused, (made["permissions.xml"],), XML
+        ),
+        "foreign-governance": Target(
+            lambda data: read_foreign_governance(data, "a.xml"), refused, (made["governance.xml"],), XML
+        ),
+        "foreign-permissions": Target(
+            lambda data: read_foreign_permissions(data, "/a", "a.xml"),
+            refused,
+            (made["permissions.xml"],),
+            XML,
         ),
         "signed-document": Target(
             lambda data: smime.read_any(data, "a.p7s").embeds(b""),

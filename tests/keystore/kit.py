@@ -25,10 +25,10 @@ from keystore import (
     verify,
 )
 from keystore.disk import layout
-from keystore.disk.signed_documents import trusted_document
 from keystore.disk.view import KeystoreView
 from keystore.formats.certificate import CertificateFacts, read_certificate
 from keystore.formats.permissions_document import parse_permissions
+from keystore.steps.opening import taken_over
 
 NOW = datetime(2031, 5, 1, 12, tzinfo=timezone.utc)
 DAY = timedelta(days=1)
@@ -99,9 +99,8 @@ def certificate_of(root: Path, name: str) -> CertificateFacts:
 
 def granted(root: Path, name: str) -> set[str]:
     """The DDS topics that an enclave may publish, by what is signed."""
-    document = trusted_document(KeystoreView(root), layout.enclave_file(name, layout.PERMISSIONS))
-    (grant,) = parse_permissions(document)
-    return {topic for rule in grant.rules for topic in rule.publish}
+    document, _ = taken_over(KeystoreView(root), name)
+    return set(parse_permissions(document).rules.allow.publish)
 
 
 def crl_of(root: Path) -> x509.CertificateRevocationList:

@@ -21,7 +21,8 @@ from keystore import (
     set_governance,
     verify,
 )
-from keystore.formats.governance import governance_document, parse_governance
+from keystore.errors import OtherFormError
+from keystore.formats.governance import governance_document, parse_governance, read_foreign_governance
 from keystore.formats.governance_yaml import parse_governance_yaml
 from tests.dds.sros2_style import GOVERNANCE
 from tests.keystore.kit import contents, filled, options, policy, snapshot
@@ -81,15 +82,15 @@ def test_yaml_to_document() -> None:
 
 def test_the_defaults_are_sros2s() -> None:
     """Its default document and ours say the same."""
-    theirs = parse_governance(GOVERNANCE.format(domain=0).encode(), "governance.xml")
-    assert theirs == Governance.for_domains(Domains.single(0))
+    theirs, lost = read_foreign_governance(GOVERNANCE.format(domain=0).encode(), "governance.xml")
+    assert lost == () and theirs == Governance.for_domains(Domains.single(0))
     assert theirs == parse_governance_yaml(b"version: 1\ndomain_rules: [{}]", "x.yaml")
 
 
 kinds = st.sampled_from(Protection)
 topic_rules = st.builds(
     TopicRule,
-    topic_expression=st.text(alphabet="rt/ab_*?[]<&>", min_size=1, max_size=12),
+    topic_expression=st.from_regex(r"(?:[rt/ab_*?]|\[!?[a-c]+\])+", fullmatch=True),
     enable_read_access_control=st.booleans(),
     metadata_protection_kind=kinds,
     data_protection_kind=st.sampled_from([Protection.NONE, Protection.SIGN, Protection.ENCRYPT]),
@@ -126,7 +127,8 @@ BAD_YAML = {
     "version: 1\ndomain_rules: [{domains: 231}]": "0..230",
     "version: 1\ndomain_rules: [{domains: 5-3}]": "domain ids",
     "version: 1\ndomain_rules: [{topic_rules: [{}]}]": "topic_expression",
-    "version: 1\ndomain_rules: [{topic_rules: [{topic_expression: ''}]}]": "empty",
+    "version: 1\ndomain_rules: [{topic_rules: [{topic_expression: ''}]}]": "read alike",
+    "version: 1\ndomain_rules: [{topic_rules: [{topic_expression: 'rt/[^a]'}]}]": "read alike",
     "version: 1\ndomain_rules: [{topic_rules: [{topic_expression: a, data_protection_kind: "
     "SIGN_WITH_ORIGIN_AUTHENTICATION}]}]": "data_protection_kind",
     "version: 1\ndomain_rules: [{allow_unauthenticated_participants: true}]": "rtps_protection_kind NONE",
@@ -160,8 +162,11 @@ def test_bad_yaml_is_refused_with_its_place(text: str, message: str) -> None:
     ],
 )
 def test_documents_that_an_implementation_refuses_are_refused(damage: tuple[str, str]) -> None:
+    document = CAMERA_XML.replace(*damage).encode()
     with pytest.raises(InvalidInputError):
-        parse_governance(CAMERA_XML.replace(*damage).encode(), "governance.xml")
+        read_foreign_governance(document, "governance.xml")
+    with pytest.raises(OtherFormError):
+        parse_governance(document, "governance.xml")
 
 
 def test_setting_governance_signs_once(tmp_path: Path) -> None:

@@ -312,9 +312,9 @@ HOSTILE: dict[str, tuple[str, Change]] = {
     "governance for another domain": ("domain-not-governed", govern_domain(domains=Domains.single(7))),
     "another governance by our CA": ("governance-not-last", govern_domain(rtps_protection_kind=Protection.ENCRYPT)),
     # permissions
-    "default ALLOW": ("default-allow", lambda root: resign(root, b"<default>DENY", b"<default>ALLOW")),
+    "default ALLOW": ("other-form", lambda root: resign(root, b"<default>DENY", b"<default>ALLOW")),
     "every topic": (
-        "everything", lambda root: resign(root, b"<topic>rt/chatter", b"<topic>*</topic><topic>rt/chatter"),
+        "everything", lambda root: resign(root, b"<publish><topics>\n", b"<publish><topics>\n<topic>*</topic>\n"),
     ),
     "another topic by our CA": ("permissions-not-last", lambda root: resign(root, b"rt/chatter", b"rt/cmd_vel")),
     "permissions for every domain": (

@@ -10,6 +10,7 @@ import pytest
 from keystore import Policy, apply_policy, create_enclaves, export, provision
 from keystore.disk import layout
 from keystore.formats.certificate import read_certificate
+from keystore.formats.domains import Domains
 from keystore.formats.permissions_document import parse_permissions
 from keystore.verb import main
 from tests.keystore.kit import DAY, NOW, actions, filled, options, policy, snapshot
@@ -68,8 +69,8 @@ def test_create_enclave_takes_a_domain(tmp_path: Path) -> None:
     root = str(tmp_path / "ks")
     assert main(["create", root, "--domain-id", "0-10"]) == 0
     assert main(["create-enclave", root, "/a", "--allow-all", "--domain-id", "7"]) == 0
-    (grant,) = parse_permissions((tmp_path / "ks/enclaves/a/permissions.xml").read_bytes())
-    assert {rule.domains for rule in grant.rules} == {((7, 7),)}
+    permissions = parse_permissions((tmp_path / "ks/enclaves/a/permissions.xml").read_bytes())
+    assert permissions.domains == Domains.parse("7")
 
 
 @pytest.mark.parametrize("name", ["a/b", "a/b/bundle.tar.gz"])

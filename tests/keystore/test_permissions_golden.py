@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 
 from keystore import Domains, Validity, read_policy
-from keystore.formats.permissions import permissions_document
-from keystore.formats.permissions_document import Grant, parse_permissions
+from keystore.formats.permissions import Permissions, permissions_document
+from keystore.formats.permissions_document import parse_permissions
 
 GOLDEN = Path(__file__).parent / "golden_permissions"
 CASES = sorted(path.name.removesuffix(".policy.xml") for path in GOLDEN.glob("*.policy.xml"))
@@ -23,13 +23,12 @@ VALIDITY = Validity(datetime(2024, 1, 1, tzinfo=timezone.utc), datetime(2034, 1,
 Rules = Sequence[tuple[bool, tuple[Sequence[str], Sequence[str]]]]
 
 
-def ours(case: str) -> Grant:
+def ours(case: str) -> Permissions:
     (enclave,) = read_policy(GOLDEN / f"{case}.policy.xml").policy.enclaves
     document = permissions_document(
         f"CN={enclave.path}", enclave, validity=VALIDITY, domains=Domains.single(0)
     )
-    (grant,) = parse_permissions(document)
-    return grant
+    return parse_permissions(document)
 
 
 def theirs(case: str) -> dict[str, Any]:
@@ -37,8 +36,9 @@ def theirs(case: str) -> dict[str, Any]:
     return value
 
 
-def our_rules(grant: Grant) -> Rules:
-    return [(rule.qualifier.value == "ALLOW", (rule.publish, rule.subscribe)) for rule in grant.rules]
+def our_rules(permissions: Permissions) -> Rules:
+    rules = permissions.rules
+    return [(True, rules.first), (False, rules.deny), (True, rules.allow)]
 
 
 def their_rules(document: dict[str, Any]) -> Rules:
@@ -64,20 +64,17 @@ def probes(rules: Rules) -> Iterable[str]:
 
 @pytest.mark.parametrize("case", CASES)
 def test_head_of_the_grant(case: str) -> None:
-    grant, expected = ours(case), theirs(case)
-    assert (grant.subject_name, grant.name, grant.default.value) == (
-        expected["subject"],
-        expected["name"],
-        expected["default"],
-    )
-    assert grant.rules[0].domains == ((0, 0),)
+    permissions, expected = ours(case), theirs(case)
+    assert (permissions.subject, permissions.name) == (expected["subject"], expected["name"])
+    assert expected["default"] == "DENY" and permissions.domains == Domains.single(0)
 
 
 @pytest.mark.parametrize("case", [case for case in CASES if case != "denials"])
 def test_exactly_the_same_topics_are_granted(case: str) -> None:
     expected = their_rules(theirs(case))
-    (rule,) = ours(case).rules
-    for direction, topics in enumerate((rule.publish, rule.subscribe)):
+    rules = ours(case).rules
+    assert not rules.first and not rules.deny
+    for direction, topics in enumerate(rules.allow):
         granted = {topic for each in expected for topic in each[1][direction]}
         assert list(topics) == sorted(granted)
 

@@ -27,9 +27,10 @@ from keystore import (
     provision,
 )
 from keystore.disk import layout
-from keystore.disk.signed_documents import trusted_document
+from keystore.disk.signed_documents import own_document
 from keystore.disk.view import KeystoreView
 from keystore.formats.permissions_document import parse_permissions
+from keystore.formats.validity import iso
 from tests.keystore.kit import (
     ARTICLE,
     DAY,
@@ -217,10 +218,10 @@ def test_what_ends_soon_is_renewed_only_when_asked(tmp_path: Path) -> None:
 
 def test_the_permissions_end_with_the_certificate(tmp_path: Path) -> None:
     root = filled(tmp_path / "ks", ["/a"], now=NOW, lifetime=90 * DAY)
-    document = trusted_document(KeystoreView(root), "enclaves/a/permissions.p7s")
-    (grant,) = parse_permissions(document)
-    assert (grant.not_before, grant.not_after) == ("2031-04-30T12:00:00", "2031-07-30T12:00:00")
-    assert grant.subject_name == "CN=ros.a"
+    document = own_document(KeystoreView(root), "enclaves/a/permissions.p7s")
+    permissions = parse_permissions(document)
+    assert tuple(map(iso, permissions.validity)) == ("2031-04-30T12:00:00Z", "2031-07-30T12:00:00Z")
+    assert permissions.subject == "CN=ros.a"
 
 
 def test_a_new_domain_extends_the_governance(tmp_path: Path) -> None:

@@ -83,7 +83,7 @@ def test_an_sros2_keystore_is_extended_in_place(sros2: Path) -> None:
     ]
     after = contents(sros2)
     assert {name for name in after if before.get(name) != after[name]} == {
-        "private/register.json", "enclaves/governance.p7s",
+        "private/register.json", "enclaves/governance.p7s", "enclaves/governance.xml",
         *(f"enclaves/new/{name}" for name in layout.ENCLAVE_FILES - {"crl.pem"}),
     }  # fmt: skip
     directory = sros2 / "enclaves/new"
@@ -105,6 +105,26 @@ def test_renew_repairs_an_sros2_keystore(sros2: Path) -> None:
     before = snapshot(sros2)
     assert not renew(sros2, options=renewing()).changed
     assert snapshot(sros2) == before
+
+
+def test_the_take_over_names_what_it_could_not_carry_over(sros2: Path) -> None:
+    ca = sros2_style.Credential.of_ca(sros2)
+    document = (sros2 / "enclaves/a/permissions.xml").read_text()
+    changed = document.replace("<default>DENY", "<default>ALLOW").replace("rt/chatter", "rt/[^c]*")
+    (sros2 / "enclaves/a/permissions.p7s").write_bytes(ca.sign(changed))
+    governance = (
+        (sros2 / "enclaves/governance.xml").read_text().replace("<id>0</id>", "<id>0</id><id>300</id>")
+    )
+    (sros2 / "enclaves/governance.p7s").write_bytes(ca.sign(governance))
+    done = " ".join(renew(sros2, options=renewing()).created)
+    for named in (
+        "of the governance: domain ids from 300",
+        "of /a: default ALLOW",
+        r"of /a: publish 'rt/[^c]*'",
+    ):
+        assert f"not taken over: {named}" in done.replace("of the permissions of", "of"), done
+    assert codes(sros2) == set() and granted(sros2, "/a") == {"ros_discovery_info"}
+    assert granted(sros2, "/b/a") == {"ros_discovery_info", "rt/chatter"}
 
 
 def test_what_an_enclave_of_the_old_keystore_signed_is_not_taken_over(sros2: Path) -> None:

@@ -13,7 +13,8 @@ from pathlib import Path
 
 import pytest
 
-from keystore import Finding, KeystoreError, RemoveOptions, Severity, remove, verify
+from keystore import Finding, KeystoreError, RemoveOptions, Severity, SubjectScheme, remove, verify
+from keystore.disk.view import KeystoreSettings
 from keystore.verb import main
 from tests.dds import sros2_style
 from tests.keystore import test_verification as damages
@@ -138,22 +139,26 @@ PLANTED: dict[str, tuple[str, Plant]] = {
     "signed by an enclave": ("permissions enclaves/a/permissions.p7s", damages.by_an_enclave),
     "expired permissions": ("permissions-expired enclaves/a/permissions.p7s", damages.permissions_of_the_past),
     "impossible dates": (
-        "permissions-dates enclaves/a/permissions.p7s",
+        "other-form enclaves/a/permissions.p7s",
         lambda root: damages.resign(root, b"<not_after>20", b"<not_after>19"),
     ),
     "empty topic": (
-        "permissions enclaves/a/permissions.p7s",
+        "other-form enclaves/a/permissions.p7s",
         lambda root: damages.resign(root, b"<topic>rt/chatter", b"<topic/><topic>x"),
     ),
     "two grants": (
-        "several-grants",
+        "other-form",
         lambda root: damages.resign(root, b"</grant>\n", b"</grant>\n" + damages.second_grant()),
     ),
     "governance garbled": ("governance", write("enclaves/governance.p7s")),
     "governance signed by an enclave": ("governance", governance_by_an_enclave),
     "governance.xml garbled": ("twin-differs", write("enclaves/governance.xml")),
-    "settings garbled": ("settings", write("secure-keystore.json")),
-    "settings too deep": ("settings", write("secure-keystore.json", b"[" * 100_000)),
+    "settings garbled": ("settings-changed", write("secure-keystore.json")),
+    "settings of compatible subjects": (
+        "settings-changed secure-keystore.json",
+        write("secure-keystore.json", KeystoreSettings(SubjectScheme.COMPATIBLE).to_json()),
+    ),
+    "lost settings": ("settings-changed", lose("secure-keystore.json")),
     "settings open": ("writable-by-others", mode("secure-keystore.json", 0o666)),
     "CA key open to the group": (
         "unsafe-owner private/identity_ca.key.pem", mode("private/identity_ca.key.pem", 0o660),

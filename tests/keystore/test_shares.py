@@ -65,8 +65,8 @@ def running(root: Path) -> Iterator[LaunchHold]:
 
 def granted(root: Path, name: str = "/") -> set[str]:
     directory = root / layout.enclave_directory(name)
-    (grant,) = parse_permissions((directory / "permissions.xml").read_bytes())
-    return {topic for rule in grant.rules for topic in rule.publish} - {"ros_discovery_info"}
+    permissions = parse_permissions((directory / "permissions.xml").read_bytes())
+    return set(permissions.rules.allow.publish) - {"ros_discovery_info"}
 
 
 def test_another_launch_adds_its_share(root: Path) -> None:
@@ -233,8 +233,8 @@ class TestDropping:
 def test_domains_are_united_as_those_of_one_launch_are(root: Path) -> None:
     start(root, BRINGUP, policy("/", "/odom"), domains=Domains.single(0))
     start(root, NAVIGATION, policy("/", "/plan"), domains=Domains.single(7))
-    (grant,) = parse_permissions((root / "enclaves/permissions.xml").read_bytes())
-    assert grant.rules[0].domains == ((0, 0), (7, 7)) and codes(root) == set()
+    permissions = parse_permissions((root / "enclaves/permissions.xml").read_bytes())
+    assert str(permissions.domains) == "0,7" and codes(root) == set()
     (told,) = shared_enclaves(root, "/third.launch.py", [policy("/")])
     assert "do all of it in each of the domains 0,7" in told.added
 

@@ -83,10 +83,10 @@ def many_topics(root: Path) -> None:
 
 DAMAGES: list[tuple[str, str, Damage]] = [
     ("key-mismatch", "enclaves/a/key.pem", swap_certificates),
-    ("permissions", "enclaves/a/permissions.p7s", lambda root: resign(root, b"<allow_rule>", b"<permit_rule>")),
+    ("other-form", "enclaves/a/permissions.p7s", lambda root: resign(root, b"<allow_rule>", b"<permit_rule>")),
     ("wrong-grant", "enclaves/a/permissions.p7s", lambda root: resign(root, b"CN=ros.a<", b"CN=ros.b<")),
     (
-        "governance", "enclaves/governance.p7s",
+        "other-form", "enclaves/governance.p7s",
         lambda root: (root / "enclaves/governance.p7s").write_bytes(sign(root, b"<dds/>")),
     ),
     ("too-large", "enclaves/a/permissions.p7s", many_topics),

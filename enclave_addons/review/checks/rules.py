@@ -24,7 +24,7 @@ _TABLE: Mapping[str, tuple[str, str]] = {
                     "let the publisher offer it, or the subscription request less"),
     "node-name-twice": ("Two nodes have the same full name: rcl warns, tools confuse them.",
                         "give each a name of its own"),
-    "wildcard": ("A permission has a wildcard: it covers names that may be unintended.",
+    "wildcard": ("A permission has a wildcard: it covers names that may be unintended, and * also matches /.",
                  "name what is meant, or accept it with the reason why that is not possible"),
     "enclave-shared": ("Nodes of one enclave have permissions that only other nodes of it request.",
                        "give them enclaves of their own (enclave=, --enclave-scope node); secure-plan suggest "
