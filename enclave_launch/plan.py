@@ -44,12 +44,14 @@ Named = tuple[Operation, str]
 
 class Found(NamedTuple):
     """The nodes of one executable or component under one start, as a source of knowledge has them. ``doubt``: what they
-    were described for is another version; ``descriptions``: all that were compared, if there are several."""
+    were described for is another version; ``outdated``: the source has changed since the manifest was written from it;
+    ``descriptions``: all that were compared, if there are several."""
 
     interfaces: tuple[NodeInterface, ...]
     origin: InterfaceOrigin = InterfaceOrigin.PACKAGE
     doubt: str = ""
     descriptions: tuple[Described, ...] = ()
+    outdated: bool = False
 
     @property
     def source(self) -> str:

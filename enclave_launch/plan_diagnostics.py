@@ -23,12 +23,14 @@ from enclave_launch.diagnostics.permissions import (
     descriptions_differ,
     library_version,
     manifest_lacks,
+    manifest_outdated,
     no_manifest,
     node_name_unknown,
     record_lacks,
     recording_incomplete,
 )
 from enclave_launch.plan import (
+    Described,
     InterfaceOrigin,
     Missing,
     Named,
@@ -109,9 +111,18 @@ def _difference(program: str, item: PlannedProcess | PlannedComponent) -> Iterat
     granted = {named for each in item.descriptions if each.used for named in each.names}
     others = [each for each in item.descriptions[1:] if not each.found.doubt]
     beyond = {named: place for each in others for named, place in each.names.items() if named not in granted}
-    if first.found.origin in (InterfaceOrigin.RECORDED, InterfaceOrigin.PACKAGE):
+    if first.found.origin in (InterfaceOrigin.RECORDED, InterfaceOrigin.PACKAGE, InterfaceOrigin.NAMED):
         unknown = [text for each in others if not each.used for text in each.open]
-        if first.found.origin is InterfaceOrigin.PACKAGE and first.used and beyond:
+        if first.found.outdated:
+            vanished = (
+                {}
+                if unknown
+                else {each: first.names[each] for each in first.names if not _is_in(each, others)}
+            )
+            if beyond or vanished or unknown:
+                said = _places(beyond), _places(vanished), unknown
+                yield manifest_outdated(program, first.found.source, *said, item.location)
+        elif first.found.origin is not InterfaceOrigin.RECORDED and first.used and beyond:
             yield manifest_lacks(program, first.found.source, _places(beyond), item.location)
         elif first.found.origin is InterfaceOrigin.RECORDED and first.used and (beyond or unknown):
             yield record_lacks(program, first.found.source, _places(beyond), unknown, item.location)
@@ -124,6 +135,10 @@ def _difference(program: str, item: PlannedProcess | PlannedComponent) -> Iterat
         apart |= {named: place for named, place in library.names.items() if named not in first.names}
     if apart:
         yield descriptions_differ(program, library.found.source, _places(apart), item.location)
+
+
+def _is_in(named: Named, descriptions: Iterable[Described]) -> bool:
+    return any(named in each.names for each in descriptions)
 
 
 def _places(names: Mapping[Named, str]) -> list[str]:

@@ -81,7 +81,8 @@ class NodeInterface(NamedTuple):
     and remap it and give it parameters; ``None``: not known. ``parameter_services``: the program does not switch them
     off. ``depends``: what varies with its start. ``runs``: of a recorded node, how many it was seen in; ``incomplete``:
     why they may not have shown all of it. ``parameters_complete``: its description says that ``parameters`` lists all.
-    ``unused_configuration``: what the program does not take of the files that it is given, and why.
+    ``unused_configuration``: what the program does not take of the files that it is given, and why. ``source_digest``:
+    of a manifest that inference wrote, the digest of the source it was made from (``nodl.infer.source_digest``).
     """
 
     package: str | None
@@ -104,6 +105,7 @@ class NodeInterface(NamedTuple):
     incomplete: tuple[str, ...] = ()
     parameters_complete: bool = False
     unused_configuration: tuple[str, ...] = ()
+    source_digest: str = ""
 
 
 class ManifestNode(NamedTuple):

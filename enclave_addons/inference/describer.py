@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from enclave_addons.inference.executable import InferredExecutable, infer_executable, infer_plugin
 from enclave_addons.inference.reach import SourcesInReach
+from enclave_addons.inference.source_digest import source_digest
 from enclave_addons.inference.start import Start
 from nodl.node_interface import NodeInterface
 
@@ -40,6 +41,10 @@ class SourceInference:
             start_of=started,
             compiled_only=compiled_only,
         )
+
+    def digest(self, interfaces: Sequence[NodeInterface]) -> str:
+        """Return the digest of the sources that these nodes of one program come from."""
+        return source_digest(interfaces)
 
     def infer_plugin(self, plugin_class: str, instance: str, start: Start) -> tuple[NodeInterface, ...]:
         """Infer a plugin that a node loads, and the nodes that the plugin makes."""

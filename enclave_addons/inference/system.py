@@ -41,7 +41,7 @@ def infer_paths(paths: Iterable[str | Path]) -> InferredSystem:
 
     Raises ``FileNotFoundError`` for a path that does not exist. A file that cannot be parsed is a gap.
     """
-    found = list(dict.fromkeys(file for path in paths for file in _source_files(Path(path))))
+    found = list(dict.fromkeys(file for path in paths for file in source_files(Path(path))))
     files = [file for file in found if file.endswith(".py") or not file.endswith(CPP_SUFFIXES)]
     nodes, gaps = _python(files)
     cpp_nodes, cpp_gaps = _cpp([file for file in found if file not in files])
@@ -144,7 +144,8 @@ def _executable(entries: list[EntryPoint], file: str, package: Package | None) -
     return next((name for name, script in scripts.items() if script == file), None)
 
 
-def _source_files(path: Path) -> Iterator[str]:
+def source_files(path: Path) -> Iterator[str]:
+    """Yield the Python and C++ sources in ``path``, a file or a folder; raises ``FileNotFoundError``."""
     if path.is_file():
         yield os.path.abspath(path)
         return

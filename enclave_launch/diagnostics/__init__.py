@@ -58,6 +58,7 @@ class Code(str, Enum):
         "manifest-lacks",
         "The source of a program makes interfaces that its manifest does not have",
     )
+    MANIFEST_OUTDATED = "manifest-outdated", "The source has changed since a manifest was inferred from it"
     RECORD_UNDECIDED = "record-undecided", "A recorded name may be fixed, or the value of a parameter"
     RECORD_LACKS = "record-lacks", "Other descriptions of a node have names that were never recorded"
     RECORDING_INCOMPLETE = "recording-incomplete", "The record of a node may be incomplete"

@@ -36,6 +36,29 @@ def manifest_lacks(program: str, manifest: str, lacks: Sequence[str], place: Sou
     return Diagnostic(Code.MANIFEST_LACKS, program, text, place, remedy)
 
 
+def manifest_outdated(
+    program: str,
+    manifest: str,
+    lacks: Sequence[str],
+    vanished: Sequence[str],
+    unknown: Sequence[str],
+    place: SourceLocation,
+) -> Diagnostic:
+    """Report a manifest of inference. ``vanished``: what only it has; ``unknown``: what the source leaves open."""
+    texts = []
+    if lacks:
+        texts.append(
+            f"the manifest lacks, so {_they_are(lacks)} not permitted: {some_of(lacks, _INTERFACES, '; ')}"
+        )
+    if vanished:
+        texts.append(f"only the manifest has: {some_of(vanished, _INTERFACES, '; ')}")
+    if unknown:
+        texts.append(f"the source leaves open: {some_of(unknown, _INTERFACES, '; ')}")
+    since = f"the source of {program} has changed since its manifest ({manifest}) was written from it"
+    remedy = "write the manifest again (secure-nodl infer -o), or remove it if the source says all"
+    return Diagnostic(Code.MANIFEST_OUTDATED, program, "; ".join((since, *texts)), place, remedy)
+
+
 def record_lacks(
     program: str, record: str, lacks: Sequence[str], unknown: Sequence[str], place: SourceLocation
 ) -> Diagnostic:

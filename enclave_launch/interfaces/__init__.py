@@ -130,6 +130,8 @@ class InterfaceFinder:
         name = subject.executable or subject.plugin or ""
         named = self._lookup.find(subject.package or "", executable=subject.executable, plugin=subject.plugin)
         found = [_of_manifest(named)] if named else []
+        if named and any(each.source_digest for each in named.found):
+            return self._with_its_source(found[0], subject, started)
         if found and found[0].origin is InterfaceOrigin.NAMED:
             return _Known((*found,))
         if named.named:
@@ -145,7 +147,7 @@ class InterfaceFinder:
             found.append(recorded)
         analysed = None
         by_hand = any(each.origin is InterfaceOrigin.PACKAGE for each in found)
-        if not by_hand or (self._sources is not None and self._sources.hold(subject.package)):
+        if self._options.infer and (not by_hand or (self._sources and self._sources.hold(subject.package))):
             analysed = self._inferred(subject, started, compiled_only=by_hand)
         if analysed is not None and analysed.interfaces:
             found.append(Found(analysed.interfaces, InterfaceOrigin.ANALYSIS))
@@ -163,6 +165,19 @@ class InterfaceFinder:
         searched.append("looked for a manifest at " + _shortly(named.searched))
         return _Known((*found,), (*searched,), analysed is not None and analysed.of_this_start)
 
+    def _with_its_source(self, manifest: Found, subject: _Subject, started: StartedProgram) -> _Known:
+        """Hold a manifest that inference wrote against the source in reach, which may have changed since.
+
+        Also where the analysis may not describe what has no manifest (``--missing-nodl error``).
+        """
+        sources, analysed = self._sources, self._inferred(subject, started)
+        if sources is None or analysed is None or not analysed.interfaces:
+            return _Known((manifest,))
+        written = {each.source_digest for each in manifest.interfaces if each.source_digest}
+        is_changed = written != {sources.digest(analysed.interfaces)}
+        source = Found(analysed.interfaces, InterfaceOrigin.ANALYSIS)
+        return _Known((manifest._replace(outdated=is_changed), source), of_this_start=analysed.of_this_start)
+
     def _inferred(
         self, subject: _Subject, started: StartedProgram, *, compiled_only: bool = False
     ) -> InferredNodes | None:
@@ -175,12 +190,12 @@ class InterfaceFinder:
         )
 
     def _plugin(self, plugin_class: str, instance: str, start: StartedPlugin) -> tuple[NodeInterface, ...]:
-        return () if self._sources is None else self._sources.infer_plugin(plugin_class, instance, start)
+        if not self._options.infer or self._sources is None:
+            return ()
+        return self._sources.infer_plugin(plugin_class, instance, start)
 
     @cached_property
     def _sources(self) -> SourceDescriber | None:
-        if not self._options.infer:
-            return None
         named = [str(folder) for folder in self._options.source_folders]
         named += [folder for folder in os.environ.get(SOURCE_VARIABLE, "").split(os.pathsep) if folder]
         return source_describer(self._prefixes, named)

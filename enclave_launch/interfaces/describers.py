@@ -79,6 +79,9 @@ class SourceDescriber(Protocol):
     ) -> InferredNodes:
         """Infer the nodes of an executable or component; ``compiled_only`` leaves Python programs out."""
 
+    def digest(self, interfaces: Sequence[NodeInterface]) -> str:
+        """Return the digest of the sources that these nodes of one program come from."""
+
     def infer_plugin(
         self, plugin_class: str, instance: str, start: StartedPlugin
     ) -> tuple[NodeInterface, ...]:

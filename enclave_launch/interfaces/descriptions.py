@@ -74,6 +74,8 @@ def meeting(descriptions: Sequence[Found], start: ProgramStart, *, also_unseen: 
 def _chosen(judged: Sequence[Described], also_unseen: bool) -> tuple[Described, tuple[Described, ...]]:
     """Return the description whose nodes the plan has, and those whose names are added to them."""
     first, others = judged[0], tuple(each for each in judged[1:] if not each.found.doubt)
+    if first.found.origin is InterfaceOrigin.NAMED:
+        return first, ()
     recorded = first.found.origin is InterfaceOrigin.RECORDED
     if recorded or first.found.origin in _MANIFESTS:
         if not first.complete:

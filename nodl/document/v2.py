@@ -85,6 +85,7 @@ def _identified(root: YamlMap, file: str, package: str | None, name: str) -> Nod
         library=ClientLibrary(section.text("library") or "unknown"),
         lifecycle=section.scalar("lifecycle") is True,
         parameter_services=section.scalar("parameter_services") is not False,
+        source_digest=section.text("source_digest"),
     )
 
 

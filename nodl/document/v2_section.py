@@ -119,6 +119,7 @@ SECTION = map_of(
         "library": one_of("rclcpp", "rclpy"),
         "lifecycle": boolean,
         "parameter_services": boolean,
+        "source_digest": text_of(),
         "also": _TEXTS,
         "classes": _TEXTS,
         "own_node": boolean,

@@ -45,7 +45,7 @@ def test_each_names_itself_and_its_version(command: str) -> None:
         ("secure-keystore", ["verfy", "ks"], "verify"),
         ("secure-keystore", ["verify", "--form", "json", "ks"], "--format"),
         ("secure-nodl", ["infr", "x"], "infer"),
-        ("secure-nodl", ["infer", "--with-gap", "x"], "--with-gaps"),
+        ("secure-nodl", ["infer", "--comp", "x"], "--compare"),
     ],
 )
 def test_a_slip_is_wrong_usage_and_answered(command: str, words: list[str], meant: str) -> None:

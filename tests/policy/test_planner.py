@@ -130,7 +130,7 @@ def test_where_interfaces_come_from_and_what_is_doubted_goes_along(plan: Plan) -
         "talker": found, "pk::Talker": found,
     })  # fmt: skip
     for item in (made.processes[1], made.components[0]):
-        assert (item.origin, item.doubt, item.descriptions) == found[1:]
+        assert (item.origin, item.doubt, item.descriptions) == found[1:4]
 
 
 def test_an_enclave_of_which_no_node_is_known_stands_in_the_policy(plan: Plan) -> None:

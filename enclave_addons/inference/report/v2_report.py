@@ -45,7 +45,7 @@ class _Entry(NamedTuple):
 
 def to_v2(nodes: Sequence[NodeInterface]) -> dict[str, str]:
     """Map file name to text. Helper nodes of a ``TransformListener`` are in the document of the node beside them."""
-    listeners = {_key(node) for node in nodes if (node.name or "").endswith(RANDOM_ENDING)}
+    listeners = {program_key(node) for node in nodes if (node.name or "").endswith(RANDOM_ENDING)}
     documents: dict[str, str] = {}
     for node in nodes:
         if (node.name or "").endswith(RANDOM_ENDING):
@@ -53,12 +53,13 @@ def to_v2(nodes: Sequence[NodeInterface]) -> dict[str, str]:
         file = f"{_stem(node)}.nodl.yaml"
         if file in documents:
             file = f"{_stem(node)}.{node.name or len(documents)}.nodl.yaml"
-        documents[file] = _document(node, listener=_key(node) in listeners)
-        listeners.discard(_key(node))
+        documents[file] = _document(node, listener=program_key(node) in listeners)
+        listeners.discard(program_key(node))
     return dict(sorted(documents.items()))
 
 
-def _key(node: NodeInterface) -> tuple[str | None, str | None, str | None]:
+def program_key(node: NodeInterface) -> tuple[str | None, str | None, str | None]:
+    """Return what the nodes of one program have in common."""
     return node.package, node.executable, node.plugin
 
 
@@ -149,6 +150,7 @@ def _section(node: NodeInterface, entries: Iterable[_Entry], listener: bool) -> 
     lines = [f"{key}: {_quoted(value)}" for key, value in fields.items() if value]
     lines += ["lifecycle: true"] * node.lifecycle + ["tf_listener: true"] * listener
     lines += ["parameter_services: false"] * (not node.parameter_services)
+    lines += [f"source_digest: {_quoted(node.source_digest)}"] * bool(node.source_digest)
     lines += _names(entries)
     questions = open_questions(node)
     if questions:

@@ -1,4 +1,8 @@
-"""Infer nodes and their interfaces from source: as text, JSON, or manifests to start from."""
+"""Infer nodes and their interfaces from source: as text, JSON, or manifests to start from.
+
+With -o it writes manifests of the nodes that a secured start would refuse: their source leaves something open (listed
+under gaps), or no launch finds their source.
+"""
 
 from __future__ import annotations
 
@@ -9,14 +13,16 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from enclave_addons.inference.executable import infer_executable
+from enclave_addons.inference.reach import SourcesInReach
 from enclave_addons.inference.report import written
 from enclave_addons.inference.report.comparison import lacking, to_text
-from enclave_addons.inference.report.v2_report import open_questions, to_v2
+from enclave_addons.inference.report.v2_report import open_questions, program_key, to_v2
 from enclave_addons.inference.report.written import ExpandedSystem, expand
+from enclave_addons.inference.source_digest import source_digest
 from enclave_addons.inference.system import InferredSystem, infer_paths
 from enclave_common.command_line import FLAG, PATH, Option
 from enclave_common.terminal import printable
-from enclave_common.words import counted
+from enclave_common.words import counted, some_of
 from nodl.ament_index import PackageNotFoundError, executables, package_prefix, search_prefixes
 from nodl.lookup import ManifestLookup
 from nodl.node_interface import Gap, NodeInterface
@@ -27,7 +33,7 @@ OPTIONS: tuple[Option, ...] = (
     ("subjects PACKAGE|PATH", {"nargs": "+"}, "an installed package, or files and folders"),
     ("-o --output DIR", PATH, "write files into DIR"),
     ("--format", {"choices": ("text", "json", "v2")}, "text (default); with -o: v2"),
-    ("--with-gaps", FLAG, "also write v2 documents of nodes that are not known in full; the gaps stand in them"),
+    ("--all", FLAG, "with -o: also write manifests of nodes that a plan reads from their source by itself"),
     ("--compare", FLAG,
      "say what installed manifests lack of that which the sources make; 1: something is missing"),
     PREFIX,
@@ -102,20 +108,46 @@ def _documents(
         text = written.to_text(expanded)
         here = os.path.join(os.getcwd(), "")
         return {"inferred.txt": text.replace(here, "")}  # as a person would name the files
-    return to_v2(_writable(system, args.with_gaps))
+    nodes = _with_digests(system.nodes)
+    return to_v2(nodes if args.all or not args.output else _refused(nodes, args))
 
 
-def _writable(system: InferredSystem, with_gaps: bool) -> list[NodeInterface]:
-    kept = []
-    for node in system.nodes:
+def _with_digests(nodes: Sequence[NodeInterface]) -> list[NodeInterface]:
+    programs: dict[object, list[NodeInterface]] = {}
+    for node in nodes:
+        programs.setdefault(program_key(node), []).append(node)
+    digests = {key: source_digest(of_one) for key, of_one in programs.items()}
+    return [node._replace(source_digest=digests[program_key(node)]) for node in nodes]
+
+
+def _refused(nodes: Sequence[NodeInterface], args: argparse.Namespace) -> list[NodeInterface]:
+    """Return the nodes that a secured start would refuse without a manifest: a copy of the others only grows old."""
+    prefixes = search_prefixes(args.prefix)
+    sources = SourcesInReach(prefixes)
+    kept, known = [], []
+    for node in nodes:
         questions = open_questions(node)
-        if questions and not with_gaps:
-            who = f"{node.package or '-'}/{node.executable or node.plugin or node.name}"
-            text = f"not written: {who} has {counted(len(questions), 'open question')} (--with-gaps)"
+        who = f"{node.package or '-'}/{node.executable or node.plugin or node.name}"
+        if questions and not args.quiet:
+            text = f"note: {who} has {counted(len(questions), 'open question')}, under gaps in its manifest"
             print(printable(text), file=sys.stderr)
-        else:
+        if questions or not _is_read_by_a_plan(node, sources, prefixes):
             kept.append(node)
+        else:
+            known.append(who)
+    if known:
+        text = f"not written: {some_of(dict.fromkeys(known), 8)}: a plan reads this from the source by itself (--all)"
+        print(printable(text), file=sys.stderr)
     return kept
+
+
+def _is_read_by_a_plan(node: NodeInterface, sources: SourcesInReach, prefixes: Sequence[str]) -> bool:
+    """Return whether a launch in this environment finds the source of ``node``."""
+    if node.package is None or not (node.executable or node.plugin):
+        return False
+    return bool(
+        infer_executable(node.package, node.executable, node.plugin, prefixes=prefixes, sources=sources)
+    )
 
 
 def _infer(subjects: list[str], prefixes: Sequence[str]) -> InferredSystem:

@@ -30,6 +30,8 @@ from enclave_addons.review.verb.keystores import on_zenoh, refuse_edited_files, 
 from enclave_addons.review.verb.plans import is_saved_plan, read_plan, read_saved
 from enclave_common.command_line import TEXT, Option, one_of
 from enclave_common.terminal import json_text, warn
+from enclave_launch.diagnostics import Code
+from enclave_launch.dry_run import DryRun
 from enclave_launch.errors import UsageError
 
 WORDS: tuple[Option, ...] = (
@@ -42,6 +44,9 @@ OPTIONS = {
         ("--build COMMAND", TEXT, "build the revision with it, in a copy; leaves install/"),
     )
 }
+
+
+_HIDDEN = (Code.MANIFEST_LACKS, Code.MANIFEST_OUTDATED)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -63,16 +68,22 @@ def _both(options: argparse.Namespace) -> tuple[PlanDocument, PlanDocument, tupl
         return before, after, ()
     if not os.path.isdir(options.before) and revisions.names_revision(options.before):
         both = revisions.plans_of(options.before, options.words, options)
-        return plan_from_document(both.before), plan_from_document(both.after), both.as_installed
+        return plan_from_document(both.before), _wanted(both.after), both.as_installed
     if options.build:
         raise UsageError("--build has no effect: it is for comparing with REVISION: or REVISION:PATH")
-    after = plan_from_document(read_plan(options.words, options))
+    after = _wanted(read_plan(options.words, options))
     if os.path.isdir(options.before):
         return (*_keystore_and(after, options.before), ())
     if is_saved_plan([options.before]):
         return plan_from_document(read_saved(Path(options.before))), after, ()
     arguments = [word for word in options.words if ":=" in word]
     return plan_from_document(read_plan([options.before, *arguments], options)), after, ()
+
+
+def _wanted(plan: DryRun) -> PlanDocument:
+    """Return the second plan of a comparison. Report a manifest that hides what the source does: no right differs."""
+    warn(*(f"{each.place}: {each.text}; {each.remedy}" for each in plan.diagnostics if each.code in _HIDDEN))
+    return plan_from_document(plan)
 
 
 def _keystore_and(plan: PlanDocument, keystore: str) -> tuple[PlanDocument, PlanDocument]:

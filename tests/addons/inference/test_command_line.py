@@ -101,6 +101,6 @@ def test_declared_encodings_marks_and_line_ends_are_read_as_python_reads_them(
 @pytest.mark.parametrize("kind", ["text", "json", "v2"])
 def test_file_names_that_are_not_utf8(kind: str, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     Path(os.fsdecode(os.fsencode(tmp_path) + b"/\xff.py")).write_text(NODE)
-    assert infer(tmp_path, "--format", kind, "--with-gaps") == 0
-    assert infer(tmp_path, "--format", kind, "--with-gaps", "-o", tmp_path / "out") == 0
+    assert infer(tmp_path, "--format", kind) == 0
+    assert infer(tmp_path, "--format", kind, "--all", "-o", tmp_path / "out") == 0
     assert "fine" in capfd.readouterr().out

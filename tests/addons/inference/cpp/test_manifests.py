@@ -21,7 +21,7 @@ def sources(tmp_path: Path) -> Path:
 
 
 def test_the_document_names_executable_plugin_and_parameter(sources: Path, tmp_path: Path) -> None:
-    assert main(["infer", "-o", str(tmp_path / "nodl"), str(sources), "--with-gaps"]) == 0
+    assert main(["infer", "-o", str(tmp_path / "nodl"), str(sources)]) == 0
     (file,) = (tmp_path / "nodl").iterdir()
     (node,) = read_document(file)
     assert (node.interface.executable, node.interface.plugin) == ("filter_node", "demo::Filter")
@@ -33,7 +33,7 @@ def test_the_document_names_executable_plugin_and_parameter(sources: Path, tmp_p
 
 def test_a_launch_with_the_document_gives_what_live_inference_gives(sources: Path, tmp_path: Path) -> None:
     """Following our own advice freezes no default."""
-    main(["infer", "-o", str(tmp_path / "nodl"), str(sources), "--with-gaps"])
+    main(["infer", "-o", str(tmp_path / "nodl"), str(sources)])
     document = tmp_path / "nodl/filter_node.nodl.yaml"
     document.write_text(document.read_text().partition("    gaps:")[0] + _after_gaps(document.read_text()))
     install(tmp_path)
@@ -53,18 +53,9 @@ def _after_gaps(text: str) -> str:
     return "".join(line for line in rest if not line.startswith("      - {why:"))
 
 
-def test_nothing_is_written_over_gaps_unless_asked(
-    sources: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    write(sources / "src/filter.cpp", FILTER.replace("auto input =", "acme::attach(this); auto input ="))
-    main(["infer", "-o", str(tmp_path / "nodl"), str(sources)])
-    assert list((tmp_path / "nodl").iterdir()) == []
-    assert "not written: demo/filter_node" in capsys.readouterr().err
-
-
 def test_gaps_stand_in_the_document(sources: Path, tmp_path: Path) -> None:
     write(sources / "src/filter.cpp", FILTER.replace("auto input =", "acme::attach(this); auto input ="))
-    main(["infer", "-o", str(tmp_path / "nodl"), str(sources), "--with-gaps"])
+    main(["infer", "-o", str(tmp_path / "nodl"), str(sources)])
     (file,) = (tmp_path / "nodl").iterdir()
     assert "the node is handed to acme::attach()" in file.read_text()
     assert read_document(file)
