@@ -1,6 +1,7 @@
 """Pages of the documentation as scripts: files that a reader writes, commands that a reader types, what they print.
 
-A fenced block whose first line ends in ``file=PATH`` is a file. A block of language ``console`` has commands after
+A fenced block below a line that is a path in backquotes and a colon is that file. A path with ``(an empty file)``
+has no block. A block of language ``console`` has commands after
 ``$`` and below each what it prints; a line ``...`` stands for any lines, ``...`` within a line for any text. A command
 that ends in ``# exit status N`` ends with that status, others with 0. A comment ``<!-- meanwhile: COMMAND -->`` starts
 what the reader has running from there on, and ends what such a comment before it started. Blocks of other languages are
@@ -20,23 +21,12 @@ from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import NamedTuple
 
-from tests.programs import python_program
-
 _BLOCK = re.compile(
-    r"^( *)```(\w+)(?: file=(\S+))?\n(.*?)^ *```$|^<!-- meanwhile: ([^\n]*) -->$", re.S | re.M
+    r"^(?: *`([^`\n]+)`:\n\n)?( *)```(\w+)\n(.*?)^ *```$|^`([^`\n]+)` \(an empty file\)$"
+    r"|^<!-- meanwhile: ([^\n]*) -->$",
+    re.S | re.M,
 )
 _STATUS = re.compile(r"  # exit status (\d+)$")
-_COLCON = """
-# As colcon would place this workspace's packages, from their install rules.
-from pathlib import Path
-from shutil import rmtree
-from enclave_addons.review.verb.source_prefix import install_sources
-rmtree("install", ignore_errors=True)
-prefixes = install_sources(Path("src"), Path("install"))
-listed = ":".join(str(prefix.resolve()) for prefix in prefixes.values())
-Path("install/setup.sh").write_text(f"export AMENT_PREFIX_PATH={listed}:$UNDERLAY\\n")
-print("Summary:", len(prefixes), "packages finished")
-"""
 
 
 class Command(NamedTuple):
@@ -54,9 +44,12 @@ class Meanwhile(NamedTuple):
 def parts(page: Path) -> Iterator[tuple[str, str] | Command | Meanwhile]:
     """Yield the files (path and text) and the commands of a page in their order."""
     for found in _BLOCK.finditer(page.read_text(encoding="utf-8")):
-        indent, language, file, text, meanwhile = found.groups()
+        file, indent, language, text, empty_file, meanwhile = found.groups()
         if meanwhile:
             yield Meanwhile(meanwhile)
+            continue
+        if empty_file:
+            yield empty_file, ""
             continue
         lines = [line.removeprefix(indent) for line in text.splitlines()]
         if file:
@@ -117,13 +110,6 @@ def _do(command: Command, page: Path, script: Path, folder: Path, environment: d
     assert _is_shown(done.stdout, command.shown), "\n".join(
         ("the page shows:", *command.shown, "printed:", place)
     )
-
-
-def make_colcon(folder: Path) -> None:
-    """Put a ``colcon`` into ``folder`` that installs Python packages from their sources."""
-    colcon = folder / "colcon"
-    colcon.write_text(python_program(_COLCON))
-    colcon.chmod(0o755)
 
 
 def reader_environment(home: Path, tools: Path, underlay: str = "") -> dict[str, str]:

@@ -9,12 +9,22 @@ from pathlib import Path
 import pytest
 
 import enclave_launch
+<<<<<<< HEAD
 from tests.addons.observation.graph.nodes import LOOPBACK
 from tests.addons.recording.conftest import rclpy_python
 from tests.dds import sros2_style
 from tests.dds.conftest import domain_id as domain_id
 from tests.docs.my_robot import DEMO_NODES, RCLPY_NODES, make_my_robot
 from tests.docs.pages import Command, make_colcon, parts, read_aloud, reader_environment, write_files
+=======
+from enclave_launch import RunSettings, endpoint_seen, find_launch_file, launch_source, start_unsecured
+from tests.dds import sros2_style
+from tests.dds.conftest import domain_id as domain_id
+from tests.docs.my_robot import DEMO_NODES, RCLPY_NODES, make_my_robot
+from tests.docs.pages import Command, parts, read_aloud, reader_environment, write_files
+from tests.graph.nodes import LOOPBACK
+from tests.recording.conftest import rclpy_python
+>>>>>>> de3a8a31 (Tutorial: a package that colcon builds, tested with real colcon and real rclpy)
 
 ROOT = Path(__file__).parent.parent.parent
 DOCS = ROOT / "docs"
@@ -50,33 +60,64 @@ PROVISION = ["secure-launch", "--secure", "--provision-only", "--keystore", "ks"
 
 @pytest.fixture
 def workspace(tmp_path: Path) -> Path:
+    """An empty folder, beside a ``bin`` with real colcon, whose Python has real rclpy."""
     (tmp_path / "bin").mkdir()
-    make_colcon(tmp_path / "bin")
+    colcon = rclpy_python("jazzy").with_name("colcon")
+    assert colcon.exists(), "./dev test installs it"
+    (tmp_path / "bin" / "colcon").symlink_to(colcon)
     folder = tmp_path / "robot_ws"
     folder.mkdir()
     return folder
+
+
+@pytest.fixture
+def robot(workspace: Path) -> Path:
+    """The workspace of the tutorial, built."""
+    write_files(TUTORIAL, workspace)
+    (workspace / "enclaves.review.yaml").unlink()
+    environment = reader_environment(workspace.parent, workspace.parent / "bin")
+    subprocess.run(["colcon", "build"], cwd=workspace, env=environment, check=True, capture_output=True)
+    return workspace
 
 
 def test_the_tutorial_does_what_it_says(workspace: Path) -> None:
     read_aloud(TUTORIAL, workspace, reader_environment(workspace.parent, workspace.parent / "bin"))
 
 
+@pytest.mark.dds
+def test_the_nodes_of_the_tutorial_run_and_use_the_names_of_its_plan(
+    robot: Path, domain_id: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    prefix = robot / "install" / "robot"
+    (modules,) = prefix.glob("lib/python3*/site-packages")
+    for name, text in {
+        "AMENT_PREFIX_PATH": str(prefix),
+        "PYTHONPATH": str(modules),
+        "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
+        "ROS_DISTRO": "jazzy",
+        "ROS_DOMAIN_ID": str(domain_id),
+        "ROS_LOG_DIR": str(robot / "log"),
+    }.items():
+        monkeypatch.setenv(name, text)
+    names = {"camera-1": ["/image"], "planner-2": ["/image", "/cmd_vel"], "base-3": ["/cmd_vel"]}
+    launch_file = find_launch_file("robot", "robot.launch.xml")
+    with start_unsecured(launch_source(launch_file), options=RunSettings(record=True)) as launch:
+        for process, topics in names.items():
+            for topic in topics:
+                launch.wait_until(endpoint_seen(process, topic), timeout=120)
+
+
 @pytest.mark.parametrize(
     "page", [page for page in SHOWN if page.stem not in WITH_NODES], ids=lambda page: page.stem
 )
-def test_a_page_does_what_it_says(workspace: Path, page: Path) -> None:
-    write_files(TUTORIAL, workspace)
-    (workspace / "enclaves.review.yaml").unlink()
-    environment = reader_environment(workspace.parent, workspace.parent / "bin")
-    subprocess.run(["colcon", "build"], cwd=workspace, env=environment, check=True, capture_output=True)
-    make_my_robot(workspace.parent / "my_robot", DEMO_NODES)
-    environment["AMENT_PREFIX_PATH"] = (
-        f"{workspace / 'install' / 'robot'}:{workspace.parent / 'my_robot'}:{DEMO}"
-    )
+def test_a_page_does_what_it_says(robot: Path, page: Path) -> None:
+    environment = reader_environment(robot.parent, robot.parent / "bin")
+    make_my_robot(robot.parent / "my_robot", DEMO_NODES)
+    environment["AMENT_PREFIX_PATH"] = f"{robot / 'install' / 'robot'}:{robot.parent / 'my_robot'}:{DEMO}"
     if page.name not in ("fix-a-refused-node.md", "second-robot.md"):
         provision = [*PROVISION, "robot", "robot.launch.xml"]
-        subprocess.run(provision, cwd=workspace, env=environment, check=True, capture_output=True)
-    read_aloud(page, workspace, environment)
+        subprocess.run(provision, cwd=robot, env=environment, check=True, capture_output=True)
+    read_aloud(page, robot, environment)
 
 
 @pytest.mark.dds
