@@ -82,7 +82,7 @@ class NodeInterface(NamedTuple):
     off. ``depends``: what varies with its start. ``runs``: of a recorded node, how many it was seen in; ``incomplete``:
     why they may not have shown all of it. ``parameters_complete``: its description says that ``parameters`` lists all.
     ``unused_configuration``: what the program does not take of the files that it is given, and why. ``source_digest``:
-    of a manifest that inference wrote, the digest of the source it was made from (``nodl.infer.source_digest``).
+    of a manifest that inference wrote, the digest of its source.
     """
 
     package: str | None

@@ -9,22 +9,13 @@ from pathlib import Path
 import pytest
 
 import enclave_launch
-<<<<<<< HEAD
+from enclave_launch import RunSettings, endpoint_seen, find_launch_file, launch_source, start_unsecured
 from tests.addons.observation.graph.nodes import LOOPBACK
 from tests.addons.recording.conftest import rclpy_python
 from tests.dds import sros2_style
 from tests.dds.conftest import domain_id as domain_id
 from tests.docs.my_robot import DEMO_NODES, RCLPY_NODES, make_my_robot
-from tests.docs.pages import Command, make_colcon, parts, read_aloud, reader_environment, write_files
-=======
-from enclave_launch import RunSettings, endpoint_seen, find_launch_file, launch_source, start_unsecured
-from tests.dds import sros2_style
-from tests.dds.conftest import domain_id as domain_id
-from tests.docs.my_robot import DEMO_NODES, RCLPY_NODES, make_my_robot
 from tests.docs.pages import Command, parts, read_aloud, reader_environment, write_files
-from tests.graph.nodes import LOOPBACK
-from tests.recording.conftest import rclpy_python
->>>>>>> de3a8a31 (Tutorial: a package that colcon builds, tested with real colcon and real rclpy)
 
 ROOT = Path(__file__).parent.parent.parent
 DOCS = ROOT / "docs"

@@ -55,7 +55,7 @@ class Robot:
         return ("--nodl", nodl, "--prefix", str(self.prefix), str(self.folder / "robot.launch.xml"))
 
     def ask(self, *command: str) -> str:
-        module = "enclave_launch" if command[0] == "--dry-run" else "enclave_launch.verb.secure_plan"
+        module = "enclave_launch" if command[0] == "--dry-run" else "enclave_addons.review.verb"
         words = [sys.executable, "-m", module, *command, *self.words]
         done = subprocess.run(words, capture_output=True, text=True, cwd=self.folder, timeout=60, check=False)
         return done.stdout + done.stderr
