@@ -84,7 +84,9 @@ def renew(
             if name in (named or ()) or not is_tool_enclave(name)
         }
         due = with_domains(root, due)
+        tools: dict[str, datetime] = {}
         if view.shares_one_ca:
+            tools = {name: end for name, end in rollover.tool_enclaves(view).items() if name not in wanted}
             rollover.separate_permissions_ca(opened, wanted, due, now, encrypt=chosen.encrypt_ca_keys)
             repaired.append("permissions CA separated from the identity CA; deploy all enclaves together")
         repaired += [f"made {name} private" for name in _close_modes(opened)]
@@ -92,6 +94,7 @@ def renew(
         if mirror_governance(opened):
             repaired.append("governance.xml made equal to the signed governance.p7s")
     report = bring_about(root, wanted, due)
+    report = rollover.with_tools_reissued(report, tools, provisioning, now)
     if chosen.revoke_old:
         with opened_for_change(root, now, provisioning) as opened:
             changed = named if named is not None else [one.enclave for one in report.enclaves if one.actions]

@@ -19,6 +19,7 @@ from datetime import datetime
 from enum import Enum
 from pathlib import Path
 
+from enclave_common.words import some_of
 from keystore.add_ons import follow
 from keystore.disk import layout, safe_files, store
 from keystore.disk.signed_documents import governance_stands
@@ -44,6 +45,7 @@ from keystore.steps.incoming_ca import install_incoming, put_incoming
 from keystore.steps.opening import opened_for_change
 from keystore.steps.options import ProvisionOptions, ProvisionReport
 from keystore.steps.provisioning import bring_about, keep, rehearse
+from keystore.steps.removal import RemoveOptions, remove
 
 
 class Step(str, Enum):
@@ -74,9 +76,11 @@ def roll_over(
     creation = _creation(chosen, now, encrypt)
     with opened_for_change(root, now, chosen) as opened:
         install_incoming(opened)
-        wanted = {
-            name: WantedEnclave(keep) for name in KeystoreView(root).enclaves() if not is_tool_enclave(name)
-        }
+        wanted = {name: WantedEnclave(keep) for name in KeystoreView(root).enclaves()}
+        tools = tool_enclaves(KeystoreView(root))
+        for name, end in tools.items():
+            if end <= now:
+                del wanted[name]  # not worth a signature of the new CA
         if step is Step.START:
             _refuse_without_keys(opened, roles, chosen.access)
         for role in roles:
@@ -93,8 +97,43 @@ def roll_over(
     if step is not Step.SWITCH:
         warnings = tuple(follow(root, chosen))
         return ProvisionReport(root, tuple(text for text in done if text), (), warnings)
-    report = bring_about(root, wanted, with_domains(root, chosen))
+    robots = {name: one for name, one in wanted.items() if name not in tools}
+    report = bring_about(root, robots, with_domains(root, chosen))
+    report = with_tools_reissued(report, tools, chosen, now)
     return report._replace(created=(*(text for text in done if text), *report.created))
+
+
+def tool_enclaves(view: KeystoreView) -> dict[str, datetime]:
+    """Return the enclaves of tools whose certificate can be read, and when each ends."""
+    facts = {name: view.readable_certificate(name) for name in view.enclaves() if is_tool_enclave(name)}
+    return {name: found.validity.not_after for name, found in facts.items() if found is not None}
+
+
+def with_tools_reissued(
+    report: ProvisionReport, tools: Mapping[str, datetime], options: ProvisionOptions, now: datetime
+) -> ProvisionReport:
+    """Issue the enclaves of tools again under the present CAs, each for what is left of its life; remove ended ones."""
+    root = report.keystore
+    for name, end in tools.items():
+        if end > now:
+            until = with_domains(root, options._replace(lifetime=None, valid_until=end))
+            again = bring_about(root, {name: WantedEnclave(keep)}, until)
+            report = report._replace(
+                enclaves=(*report.enclaves, *again.enclaves),
+                warnings=tuple(dict.fromkeys((*report.warnings, *again.warnings))),
+            )
+    if ended := [name for name, end in tools.items() if end <= now]:
+        changing = RemoveOptions(
+            access=options.access,
+            lock_timeout=options.lock_timeout,
+            durable=options.durable,
+            now=options.now,
+            revoke=False,
+        )
+        remove(root, ended, options=changing)
+        removed = f"removed {some_of(ended, 8)}: made for tools, and ended"
+        report = report._replace(created=(*report.created, removed))
+    return report
 
 
 def _creation(options: ProvisionOptions, now: datetime, encrypt: bool) -> CreateOptions:
@@ -249,9 +288,7 @@ def _retire_for_good(opened: Store, role: Role) -> None:
 
 def _refuse_to_strand(opened: Store, roles: Collection[Role]) -> None:
     view = KeystoreView(opened.root)
-    stranded = [
-        name for name in view.enclaves() if not is_tool_enclave(name) and _hangs_on_old_ca(view, name, roles)
-    ]
+    stranded = [name for name in view.enclaves() if _hangs_on_old_ca(view, name, roles)]
     governance = Role.PERMISSIONS in roles and not governance_stands(view, None)
     if not stranded and not governance:
         return

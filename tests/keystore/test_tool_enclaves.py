@@ -11,9 +11,10 @@ from pathlib import Path
 import pytest
 
 import keystore
-from keystore import create_tool_enclave
+from keystore import Role, Step, create_tool_enclave, list_enclaves, provision, roll_over, verify
 from keystore.formats.tool_needs import TABLE, TOOLS, ToolTarget, tool_policy, tool_targets
 from keystore.verb import main
+from tests.keystore.kit import options, policy
 
 DOCS = Path(__file__).parents[2] / "docs" / "running-systems.md"
 
@@ -111,3 +112,20 @@ def test_the_help_names_every_tool() -> None:
         check=True,
     )
     assert all(f"  {tool.name} " in ran.stdout for tool in TABLE)
+
+
+def test_it_follows_a_new_ca_for_what_is_left_of_its_life_and_an_ended_one_goes(tmp_path: Path) -> None:
+    start = datetime(2030, 1, 1, tzinfo=timezone.utc)
+    later = start + timedelta(hours=5)
+    root = tmp_path / "ks"
+    provision(root, [policy("/robot")], options=options(now=start))
+    ended = create_tool_enclave(root, "list", options=options(now=start, lifetime=timedelta(hours=1)))
+    alive = create_tool_enclave(root, "echo", ["/x"], options=options(now=start, lifetime=timedelta(hours=8)))
+    roll_over(root, Step.START, tuple(Role), options=options(now=later))
+    report = roll_over(root, Step.SWITCH, tuple(Role), options=options(now=later))
+    assert list_enclaves(root) == ["/robot", alive.enclave]
+    assert f"removed {ended.enclave}: made for tools, and ended" in report.created
+    assert report.validities[alive.enclave].not_after == alive.ends
+    assert verify(root, now=later).is_good
+    roll_over(root, Step.FINISH, tuple(Role), options=options(now=later))
+    assert verify(root, now=later).is_good
