@@ -35,6 +35,10 @@ class NoDLError(Exception):
     """Base class of all NoDL errors."""
 
 
+class NoManifestError(NoDLError):
+    """A folder that was named for its manifests has none."""
+
+
 class NoNoDLFilesError(NoDLError):
     """A package without NoDL files."""
 

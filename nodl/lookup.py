@@ -23,7 +23,7 @@ from typing import NamedTuple
 from enclave_common.words import some_of
 from nodl.ament_index import INDEX_FOLDER, PackageNotFoundError, list_resources, package_share_directory
 from nodl.document import RESOURCE_TYPE, V1_SUFFIX, V2_SUFFIXES, read_document, resource_key
-from nodl.errors import ConflictingNoDLError
+from nodl.errors import ConflictingNoDLError, NoManifestError
 from nodl.node_interface import ManifestNode, NodeInterface
 
 
@@ -141,7 +141,10 @@ def _files(path: str) -> list[str]:
     if not os.path.isdir(path):
         return [path]
     suffixes = (V1_SUFFIX, *(suffix for suffix in V2_SUFFIXES if suffix.startswith(".nodl.")))
-    return sorted(str(file) for file in Path(path).rglob("*.nodl.*") if file.name.endswith(suffixes))
+    found = sorted(str(file) for file in Path(path).rglob("*.nodl.*") if file.name.endswith(suffixes))
+    if not found:
+        raise NoManifestError(f"--nodl {path}: no manifest in this folder (*{', *'.join(suffixes)})")
+    return found
 
 
 def _program(node: ManifestNode) -> str:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
 
+from enclave_common.words import did_you_mean
 from enclave_launch.description.entity import ScanRole
 from enclave_launch.host.current import current_host
 
@@ -48,6 +49,18 @@ def check_required_arguments(description: Any, given: list[str]) -> None:
     if None not in names and required.keys() <= names:
         return
     _complain(required, given)
+
+
+def misspelt(description: Any, given: Iterable[str]) -> Iterator[tuple[str, str]]:
+    """Yield each given argument that is not declared and resembles one that is, with a question for the person.
+
+    Launch takes any argument: a file may read one that it does not declare.
+    """
+    declared = _summarize(description).declared
+    missed = declared.keys() - set(given)
+    for name in given:
+        if name not in declared and (question := did_you_mean(name, missed)):
+            yield name, question
 
 
 def _complain(required: dict[str, Declared], given: list[str]) -> None:

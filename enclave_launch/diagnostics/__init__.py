@@ -42,6 +42,10 @@ class Code(str, Enum):
         "A parameter file cannot be read, so names made from it are not known",
     )
     PARAMETER_FILE_MISSING = "parameter-file-missing", "A parameter file does not exist"
+    INCLUDE_ARGUMENT_UNKNOWN = (
+        "include-argument-unknown",
+        "An include gives an argument that the file does not declare, and that resembles one it does",
+    )
     ROS_DISTRO_UNKNOWN = "ros-distro-unknown", "ROS_DISTRO names an unknown distribution"
     PROGRAM_NOT_INSTALLED = "program-not-installed", "A placeholder stands for the output of a program"
     PROGRAM_NOT_EXECUTABLE = "program-not-executable", "A program that launch would start does not exist"

@@ -113,6 +113,13 @@ def program_not_executable(program: str, text: str, location: SourceLocation | N
     return Diagnostic(Code.PROGRAM_NOT_EXECUTABLE, program, text, location)
 
 
+def include_argument_unknown(
+    name: str, file: str, question: str, location: SourceLocation | None
+) -> Diagnostic:
+    text = f"the include gives the argument {quoted(name)}, which {file} does not declare{question}"
+    return Diagnostic(Code.INCLUDE_ARGUMENT_UNKNOWN, name, text, location)
+
+
 def ros_distro_unknown(name: str, known: Sequence[str], taken: str) -> Diagnostic:
     text = f"ROS_DISTRO={quoted(name)} is not a known distribution: the rules of {taken} are followed"
     remedy = f"set it, or give --distro{did_you_mean(name, known)}"

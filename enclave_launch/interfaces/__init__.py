@@ -13,7 +13,7 @@ from functools import cached_property
 from typing import NamedTuple
 
 from enclave_common.words import counted
-from enclave_launch.errors import ManifestError, translated
+from enclave_launch.errors import ManifestError, UsageError, translated
 from enclave_launch.interfaces.describers import (
     InferredNodes,
     SourceDescriber,
@@ -27,7 +27,7 @@ from enclave_launch.plan import Found, InterfaceOrigin, Missing
 from enclave_launch.policy.node_permissions import UNSEEN
 from enclave_launch.policy.running_node import UnknownNodeName
 from enclave_launch.process import Evaluation, ResolvedComponent, ResolvedProcess
-from nodl.errors import ConflictingNoDLError, NoDLError
+from nodl.errors import ConflictingNoDLError, NoDLError, NoManifestError
 from nodl.lookup import Lookup, ManifestLookup
 from nodl.node_interface import ClientLibrary, NodeInterface
 from nodl.source_ref import SourceRef
@@ -75,12 +75,13 @@ class InterfaceFinder:
     ) -> None:
         """Prepare to answer for one launch; ``launch`` is all that starts, for nodes that must know others.
 
-        Raises ``UsageError`` for a folder of documents that is not there.
+        Raises ``UsageError`` for a folder of documents that is not there, or has no manifest.
         """
         self._options = options or ResolveOptions()
         self._prefixes = prefixes
         self._distro = distro
-        self._lookup = ManifestLookup(prefixes, self._options.manifests)
+        with translated(NoManifestError, UsageError):
+            self._lookup = ManifestLookup(prefixes, self._options.manifests)
         self._library = library_describer(prefixes, self._options, distro, launch, self._plugin)
         self._known: dict[_Subject, _Known] = {}
 

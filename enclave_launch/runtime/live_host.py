@@ -68,6 +68,9 @@ class LiveHost(Host):
         self._tasks: set[asyncio.Task[None]] = set()
         self._planned: dict[str, Mapping[str, str]] = {}  # security variables by process name
         self._watch = EnvironmentWatch(self._watched, self._on_unplanned)
+        if gate is None:  # of a secured launch the plan has told them
+            for warning in self.warnings:
+                self._log.log("WARNING", "launch", str(warning))
         if gate is not None:
             self._tasks.add(self.loop.create_task(self._watch.run(), name="environment watch"))
         self.processes: list[LiveProcess] = []

@@ -4,18 +4,28 @@ from __future__ import annotations
 
 import os
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import datetime, timedelta
 from pathlib import Path
 from typing import NamedTuple
 
+from enclave_common.words import did_you_mean
 from keystore.disk.safe_files import resolve_root
 from keystore.disk.view import keystore_at
 from keystore.errors import InvalidInputError, printable
 from keystore.formats.enclave_name import validate_enclave_name
+from keystore.formats.permissions_patterns import can_meet
 from keystore.formats.policy import EnclavePolicy, Policy
 from keystore.formats.subject import Half, guid_prefix
-from keystore.formats.tool_needs import FOLDER, TOOLS, tool_enclave_name, tool_policy, tool_targets
+from keystore.formats.tool_needs import (
+    FOLDER,
+    TOOLS,
+    is_tool_enclave,
+    tool_enclave_name,
+    tool_policy,
+    tool_targets,
+)
+from keystore.steps.inventory import granted
 from keystore.steps.options import ProvisionOptions, ProvisionReport
 from keystore.steps.provisioning import apply_policy, provision
 
@@ -64,6 +74,7 @@ def create_tool_enclave(
     policy = tool_policy(kind, chosen, enclave)
     report = apply_policy(keystore, Policy((policy,)), options=given)
     root = resolve_root(keystore)
+    report = report._replace(warnings=(*report.warnings, *_unknown_targets(root, chosen)))
     example = kind.example.format(
         keystore=shlex.quote(str(root)), enclave=enclave, target=chosen[0] if chosen else kind.target.value
     )
@@ -78,6 +89,17 @@ def create_tool_enclave(
         f"secure-keystore remove {shlex.quote(str(root))} {enclave}",
         report,
     )
+
+
+def _unknown_targets(root: Path, targets: Sequence[str]) -> Iterator[str]:
+    """Say which targets no enclave of the keystore may use: a slip, or a robot whose permissions are elsewhere."""
+    rules = (
+        rule for enclave, found in granted(root).items() if not is_tool_enclave(enclave) for rule in found
+    )
+    known = sorted({rule.expression for rule in rules})
+    for target in targets if known else ():
+        if not any(can_meet(name, target) or name.startswith(f"{target}/") for name in known):
+            yield f"no enclave of this keystore may use {printable(target)}{did_you_mean(target, known)}"
 
 
 WATCHER = f"{FOLDER}/watch"

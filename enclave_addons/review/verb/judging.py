@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import yaml
 
-from enclave_addons.review.checks import check_plan
+from enclave_addons.review.checks import MEANINGS, check_plan
 from enclave_addons.review.checks.keystore import against_keystore, against_router
 from enclave_addons.review.checks.rules import finding
 from enclave_addons.review.document import PlanDocument, plan_from_document
@@ -26,6 +26,7 @@ from enclave_addons.review.verb.keystores import (
 )
 from enclave_common.command_line import PATH, Option
 from enclave_common.files import read_text
+from enclave_common.words import did_you_mean
 from enclave_common.yaml_reader import load_strict_yaml, problem_of
 from enclave_launch.dry_run import Diagnostic, DryRun
 from enclave_launch.errors import UsageError, translated
@@ -130,11 +131,19 @@ def read_expectations(
             for source, target, why in [_texts(item, ("from", "to"), ("why",), f"{place}: never")]
         ),
         tuple(
-            Accepted(code, subject or "*", why)
+            Accepted(_known_code(code, place), subject or "*", why)
             for item in _items(content, "accept", place)
             for code, why, subject in [_texts(item, ("code", "why"), ("subject",), f"{place}: accept")]
         ),
     )
+
+
+def _known_code(code: str, place: str) -> str:
+    if code not in MEANINGS:
+        raise UsageError(
+            f"{place}: accept: there is no finding with the code {code!r}{did_you_mean(code, MEANINGS)}"
+        )
+    return code
 
 
 def rule_findings(document: DryRun, rules: Iterable[Never]) -> list[Diagnostic]:

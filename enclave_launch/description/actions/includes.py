@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING, Any
 from enclave_launch.description import read_only
 from enclave_launch.description.actions.configurations import SetLaunchConfiguration
 from enclave_launch.description.actions.flow import OpaqueFunction
-from enclave_launch.description.argument_scan import check_required_arguments
+from enclave_launch.description.argument_scan import check_required_arguments, misspelt
 from enclave_launch.description.entity import Action, LaunchDescriptionEntity, ScanRole
 from enclave_launch.description.launch_context import LaunchContext, OpenFile
 from enclave_launch.description.markup.entity import Entity
 from enclave_launch.description.markup.expose import expose_action
 from enclave_launch.description.sources import AnyLaunchDescriptionSource, LaunchDescriptionSource
 from enclave_launch.description.substitution import normalize_to_list_of_substitutions, perform_substitutions
-from enclave_launch.diagnostics.evaluation import include_left_out
+from enclave_launch.diagnostics.evaluation import include_argument_unknown, include_left_out
 from enclave_launch.host.current import current_release
 from enclave_launch.ros_rules.distro import Feature
 
@@ -145,7 +145,11 @@ class IncludeLaunchDescription(Action):
         description = prepare_include(self, context)
         before = {name: context.get_locals_as_dict().get(name) for name in _FILE_LOCALS}
         self.__set_file_locals(context)
-        check_required_arguments(description, self.__argument_names(context))
+        names = self.__argument_names(context)
+        check_required_arguments(description, list(names))
+        for name, question in misspelt(description, names):
+            path = self.__launch_description_source.location
+            context.host.warn(include_argument_unknown(name, path, question, self.source_location))
         arguments = [SetLaunchConfiguration(name, value) for name, value in self.__launch_arguments]
         for argument in arguments:  # an error in one stands where the include stands
             argument.source_location = self.source_location
