@@ -92,6 +92,18 @@ def test_components_have_nobody_who_loads_them(tmp_path: Path, capsys: pytest.Ca
     assert "by the launcher" in capsys.readouterr().err
 
 
+def test_components_that_are_left_out_are_named_on_the_terminal_and_in_what_is_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    launch = launch_file(tmp_path, (DEMO_CONTAINER).read_text(), "robot.launch.xml")
+    out = tmp_path / "out"
+    assert export("systemd", launch, provisioned(launch, tmp_path / "ks"), out, "--accept-unexpressed") == 0
+    said, written = capsys.readouterr().err, "".join(file.read_text() for file in out.glob("*.target"))
+    for component in ("/robot1/talker", "/robot1/inner/listener"):
+        assert f"component {component} is loaded into /robot1/container by the launcher" in said
+        assert f"component {component} is loaded into" in written
+
+
 DEMO_CONTAINER = Path(__file__).parents[3] / "fixtures/demo_ws/share/demo_nodes/launch/container.launch.xml"
 
 
