@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from enclave_addons.deployment.host_keys import HostKey, find_key, forget_pending
+from enclave_common.words import some_of
 from keystore.disk import layout, lock, safe_files, store
 from keystore.disk.archive import read_bundle
 from keystore.disk.container_copies import (
@@ -26,6 +27,7 @@ from keystore.disk.container_copies import (
     differing_copies,
     give_to,
 )
+from keystore.disk.crl_file import listed_in
 from keystore.disk.deployed import differing_files, read_manifest
 from keystore.disk.store import Content, Link
 from keystore.disk.versions import Versions
@@ -33,6 +35,7 @@ from keystore.disk.view import KeystoreView
 from keystore.errors import (
     DamagedKeystoreError,
     InvalidInputError,
+    KeystoreError,
     UnsafeKeystoreError,
     printable,
 )
@@ -40,7 +43,7 @@ from keystore.formats.bundle import BundledEnclave, Manifest, parse_handover, pa
 from keystore.formats.certificate import read_certificates
 from keystore.formats.governance import parse_governance
 from keystore.formats.role import Role
-from keystore.formats.validity import utc_now
+from keystore.formats.validity import LATEST, utc_now
 from keystore.signing import smime
 from keystore.signing.public_key import fingerprint
 from keystore.verification import Severity, verify
@@ -108,7 +111,7 @@ def import_bundle(
     versions = Versions(keystore)
     content = read_bundle(Path(bundle))
     with versions.opened(chosen.lock_timeout):
-        present = _present(versions.current)
+        present = _present(versions.current, chosen.host)
         pins = _pins(present, chosen)
         if not chosen.authorities and versions.current is not None:
             pins = _with_successors(pins, content.get(layout.HANDOVER), KeystoreView(versions.current))
@@ -124,6 +127,7 @@ def import_bundle(
                 return ImportReport(versions.root, present, (), (), Restart.NOBODY, said)
         elif present is not None:
             _refuse_earlier(found, present)
+            _refuse_forgotten(found, KeystoreView(versions.current or versions.root))
         _refuse_weaker(found, present, chosen.accept_weaker)
         return _put_in_force(versions, found, present, chosen.now or utc_now(), differing, owner)
 
@@ -136,11 +140,21 @@ def parse_owner(text: str) -> ContainerUser:
     return ContainerUser(int(uid), int(gid))
 
 
-def _present(version: Path | None) -> Manifest | None:
-    """Return the manifest in force. Its signature was checked when it was imported; ``verify`` checks it again."""
+def _present(version: Path | None, host: str | None) -> Manifest | None:
+    """Return the manifest in force. Its signature was checked when it was imported; ``verify`` checks it again.
+
+    Of one that was deleted or damaged is left what else says what was imported: the name of the version, and the CAs.
+    """
     if version is None:
         return None
-    return read_manifest(safe_files.read(version, layout.BUNDLE), printable(version / layout.BUNDLE))
+    try:
+        return read_manifest(safe_files.read(version, layout.BUNDLE), printable(version / layout.BUNDLE))
+    except DamagedKeystoreError:
+        with suppress(KeystoreError):
+            view = KeystoreView(version)
+            trusted = {role: tuple(fingerprint(ca.der) for ca in view.ca_bundle(role)) for role in Role}
+            return Manifest(host or "", int(version.name.partition(".")[0]), trusted, 0, (), {}, LATEST)
+        return None
 
 
 def _checked(
@@ -221,7 +235,9 @@ def _check_signer(
 def _refuse_other_host(
     manifest: Manifest, present: Manifest | None, options: ImportOptions, place: str
 ) -> None:
-    host = present.host if present is not None else options.host
+    host = (present.host if present is not None else None) or options.host
+    if host is None and present is not None:
+        return  # its name is lost with the manifest; the CAs and the number still hold
     if host is None:
         raise InvalidInputError(
             f"which host is this? Name it with --host (the bundle is for {manifest.host})"
@@ -265,7 +281,8 @@ def _check_authorities(found: _Bundle, options: ImportOptions) -> None:
 
 def _refuse_earlier(found: _Bundle, present: Manifest) -> None:
     """Raise for an earlier bundle or CRL. CRL numbers belong to their issuer: another CA in use begins a new series."""
-    if found.manifest.number <= present.number:
+    damaged = not present.files
+    if found.manifest.number < present.number or (found.manifest.number == present.number and not damaged):
         raise UnsafeKeystoreError(
             f"{found.place} is number {found.manifest.number}, but {present.number} is in force here: an earlier "
             "bundle may restore rights that were removed or revoked since. Export again where the CA is"
@@ -274,6 +291,28 @@ def _refuse_earlier(found: _Bundle, present: Manifest) -> None:
     if issuers[0] == issuers[1] and found.manifest.crl_number < present.crl_number:
         raise UnsafeKeystoreError(
             f"{found.place} has an earlier CRL ({found.manifest.crl_number}) than this host ({present.crl_number})"
+        )
+
+
+def _refuse_forgotten(found: _Bundle, present: KeystoreView) -> None:
+    """Raise for a CRL that lacks what this host knows as revoked: the CA machine was restored from a backup.
+
+    A CRL number does not tell, for it comes from the clock. What a CA revoked is on all its later lists.
+    """
+    pem = safe_files.read_if_there(present.root, layout.CRL)
+    known = listed_in(pem, present, layout.CRL) if pem is not None else None
+    if known is None or fingerprint(known.issuer.der) not in found.manifest.authorities[Role.IDENTITY][:1]:
+        return
+    given = found.files.get(layout.CRL)
+    coming = listed_in(given, present, layout.CRL) if given is not None else None
+    missing = sorted(set(known.revoked) - set(coming.revoked if coming is not None else ()))
+    if missing:
+        listed = some_of([f"{serial:X}" for serial in missing], 8)
+        raise UnsafeKeystoreError(
+            f"{found.place}: its CRL does not list {listed}, which this host "
+            "knows as revoked: the CA machine was restored from a backup. Take this host's list over there, "
+            f"secure-keystore renew KEYSTORE --adopt-crl FILE with {printable(present.root / layout.CRL)}, and export "
+            "again"
         )
 
 

@@ -175,10 +175,11 @@ def _start(
 
 def _wait_for_the_clock(cert: str) -> str:
     """Return shell words that wait: a board without a battery starts with a clock at which nothing is valid yet."""
+    waiting = f"the clock is earlier than the import of {cert}; waiting until it is set"
     return (
-        f"imported=$(stat -L -c %Y {cert}) || exit 1; "
+        f"imported=$(stat -L -c %Y {shlex.quote(cert)}) || exit 1; "
         '[ "$(date +%s)" -ge "$imported" ] || '
-        f'echo "the clock is earlier than the import of {cert}; waiting until it is set" >&2; '
+        f"echo {shlex.quote(waiting)} >&2; "
         'until [ "$(date +%s)" -ge "$imported" ]; do sleep 1; done'
     )
 
@@ -186,14 +187,19 @@ def _wait_for_the_clock(cert: str) -> str:
 def _link_credentials(enclave: str, keystore: str) -> str:
     """Return the script that makes the enclave's directory.
 
-    The stand-in for a CRL is left out. If the manifest of the imported bundle lists a CRL, it was removed: an error.
+    The stand-in for a CRL is left out. If the manifest of the imported bundle lists a CRL, it was removed: an error. So
+    it is that an imported keystore, which is a link to a version, has no manifest.
     """
-    crl = f'"$place/{layout.ENCLAVE_CRL}"'
+    crl, manifest = f'"$place/{layout.ENCLAVE_CRL}"', shlex.quote(f"{keystore}/{layout.BUNDLE}")
+    lost_manifest, lost_crl = (
+        f"echo {shlex.quote(f'{keystore}/{name} was imported and is missing: import the bundle again')} >&2; exit 1"
+        for name in (layout.BUNDLE, layout.CRL)
+    )
     return (
-        f'place="$RUNTIME_DIRECTORY/{layout.enclave_directory(enclave)}" && mkdir -p "$place" && '
+        f"if [ -L {shlex.quote(keystore)} ] && [ ! -e {manifest} ]; then {lost_manifest}; fi; "
+        f'place="$RUNTIME_DIRECTORY"/{shlex.quote(layout.enclave_directory(enclave))} && mkdir -p "$place" && '
         f'ln -sf "$CREDENTIALS_DIRECTORY"/* "$place" && if [ "$(cat {crl})" = {NO_CRL} ]; then '
-        f"if grep -qs {layout.CRL} {keystore}/{layout.BUNDLE}; then "
-        f'echo "{keystore}/{layout.CRL} was imported and is missing: import the bundle again" >&2; exit 1; fi; '
+        f"if grep -qs {layout.CRL} {manifest}; then {lost_crl}; fi; "
         f"rm {crl}; fi"
     )
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from datetime import datetime
 from functools import lru_cache
+from typing import NamedTuple
 
 from cryptography import x509
 from cryptography.exceptions import UnsupportedAlgorithm
@@ -26,8 +27,12 @@ def crl_validity(view: KeystoreView) -> Validity:
 
 def crl_number(view: KeystoreView) -> int:
     """Return the CRLNumber (RFC 5280 section 5.2.3), 0 without one. Raises DamagedKeystoreError."""
+    return _number(load_crl(view))
+
+
+def _number(crl: x509.CertificateRevocationList) -> int:
     try:
-        return load_crl(view).extensions.get_extension_for_class(x509.CRLNumber).value.crl_number
+        return crl.extensions.get_extension_for_class(x509.CRLNumber).value.crl_number
     except x509.ExtensionNotFound:
         return 0
 
@@ -60,6 +65,39 @@ def revoked_serials(view: KeystoreView) -> dict[int, datetime]:
     return {entry.serial_number: time_of(entry, "revocation_date") for entry in load_crl(view)}
 
 
+class ListedCrl(NamedTuple):
+    """A CRL that one of our identity CAs signed. ``issuer``: SHA-256 of that CA's certificate."""
+
+    place: str
+    issuer: CertificateFacts
+    number: int
+    revoked: dict[int, datetime]
+
+
+def crls_in(view: KeystoreView) -> list[ListedCrl]:
+    """Return every CRL in the tree that an identity CA trusted here signed, whoever put it there, in whatever form:
+    in ``public/`` and in the enclaves, where an rmw reads it."""
+    places = [layout.CRL, *(layout.enclave_file(name, layout.ENCLAVE_CRL) for name in view.enclaves())]
+    found = []
+    for place in places:
+        if safe_files.link_target(view.root, place) is None:
+            pem = safe_files.read_if_there(view.root, place)
+            found += [listed] if pem is not None and (listed := listed_in(pem, view, place)) else []
+    return found
+
+
+def listed_in(pem: bytes, view: KeystoreView, place: str) -> ListedCrl | None:
+    """Return the CRL in a file if one of the identity CAs trusted here signed it."""
+    crl = _parsed(pem)
+    issuer = next(
+        (ca for ca in view.ca_bundle(Role.IDENTITY) if crl is not None and _is_signed(pem, ca)), None
+    )
+    if crl is None or issuer is None:
+        return None
+    revoked = {entry.serial_number: time_of(entry, "revocation_date") for entry in crl}
+    return ListedCrl(place, issuer, _number(crl), revoked)
+
+
 def load_crl(view: KeystoreView) -> x509.CertificateRevocationList:
     """Read the CRL. Raises DamagedKeystoreError unless the file is exactly a CRL that the identity CA signed."""
     return read_crl(
@@ -85,7 +123,7 @@ def is_crl(pem: bytes) -> bool:
     return crl is not None and crl.public_bytes(Encoding.PEM) == pem
 
 
-@lru_cache(maxsize=4)  # a launch asks for the same file before each of its processes
+@lru_cache(maxsize=16)  # a launch asks for the same file before each of its processes
 def _parsed(pem: bytes) -> x509.CertificateRevocationList | None:
     try:
         crl = x509.load_pem_x509_crl(pem)
@@ -96,7 +134,7 @@ def _parsed(pem: bytes) -> x509.CertificateRevocationList | None:
     return crl
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=16)
 def _is_signed(pem: bytes, ca: CertificateFacts) -> bool:
     crl = _parsed(pem)
     assert crl is not None, "parsed before"

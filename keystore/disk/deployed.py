@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 from keystore.disk import layout, safe_files
+from keystore.disk.versions import imported_at
 from keystore.disk.view import KeystoreView
 from keystore.errors import DamagedKeystoreError, KeystoreError, printable
 from keystore.formats.bundle import Manifest, parse_manifest
@@ -25,8 +26,12 @@ def read_manifest(signed: bytes, place: str, signers: Iterable[CertificateFacts]
 def deployed_manifest(view: KeystoreView) -> Manifest | None:
     """Return the signed manifest of an imported keystore, None without an import. Raises DamagedKeystoreError."""
     signed = safe_files.read_if_there(view.root, layout.BUNDLE)
-    if signed is None:
+    if signed is None and imported_at(view.root) == view.root:
         return None
+    if signed is None:
+        raise DamagedKeystoreError(
+            f"{printable(view.root / layout.BUNDLE)} is missing: nobody can tell what was imported"
+        )
     return read_manifest(signed, printable(view.root / layout.BUNDLE), view.ca_bundle(Role.PERMISSIONS))
 
 

@@ -13,10 +13,11 @@ keystore can be put back from a backup or copied in; the register says whether i
 from __future__ import annotations
 
 import base64
+import hashlib
 import json
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
-from datetime import datetime, timedelta
+from datetime import datetime
 from enum import Enum
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
@@ -24,12 +25,11 @@ from typing import Any, NamedTuple
 from keystore.errors import DamagedKeystoreError
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.role import Role
-from keystore.formats.validity import iso, later, parse_time
+from keystore.formats.validity import iso, parse_time
 
 _VERSION = 1
+
 _time = lru_cache(maxsize=1024)(parse_time)  # what was issued together has the same dates
-REVOKED_MARGIN = timedelta(days=400)
-"""How long a revoked certificate stays on the CRL after it has ended; longer than a clock may jump unasked."""
 UNKNOWN = ""
 """In place of an enclave, subject or key: of certificates that only a CRL lists."""
 
@@ -187,14 +187,17 @@ class Register:
     def without_ended(self, now: datetime) -> Register:
         """Forget what nobody can use any more; what is in force stays, so that an enclave is still known.
 
-        What was revoked stays longer: a clock that is wrong today must not take it off the CRL.
+        What was revoked stays while its CA is trusted: neither a wrong clock nor a host may miss it on the CRL.
         """
+        trusted = {
+            hashlib.sha256(ca).hexdigest()
+            for (role, ca) in self.authorities
+            if self.trusts_authority(role, ca)
+        }
         certificates = {
             serial: one
             for serial, one in self.certificates.items()
-            if one.in_force
-            or one.not_after > now
-            or (one.revoked and later(one.not_after, REVOKED_MARGIN) > now)
+            if one.in_force or one.not_after > now or (one.revoked and one.issuer in trusted)
         }
         documents = tuple(
             one for one in self.documents if one.not_after > now or one is self.permissions(one.enclave)

@@ -183,6 +183,10 @@ def _identity(enclave: _Enclave) -> _Found:
         matches = facts is not None and facts.public_key == public
         problem = _certificate_problem(enclave, facts, matches) if has_cert else "no certificate"
         return _Found(Reissue.CERTIFICATE if problem else Reissue.NOTHING, facts, problem)
+    if key is None and enclave.read(layout.KEY_URI) is not None:
+        # The key is in a token, and the certificate says which one it is.
+        problem = _certificate_problem(enclave, facts, True) if has_cert else "no certificate"
+        return _Found(Reissue.CERTIFICATE if problem else Reissue.NOTHING, facts, problem)
     if key is None:
         return _Found(Reissue.KEY_PAIR, facts, "no private key" if has_cert else NEW)
     if mode & 0o077:

@@ -28,6 +28,7 @@ from keystore.formats.validity import Validity, iso
 from keystore.signing.authority import Authority
 from keystore.signing.certificate_request import public_half
 from keystore.signing.private_key import PublicKey, key_pem, new_key
+from keystore.signing.public_key import fingerprint
 from keystore.signing.records import certificate_record, permissions_record
 from keystore.signing.smime import sign_document
 from keystore.steps.crl import can_revoke, revocable
@@ -194,6 +195,8 @@ class EnclaveWriter:
         self, state: EnclaveState, entries: dict[str, Content | Link], actions: list[str]
     ) -> PublicKey:
         """Return the key to certify: a new one, which is added to ``entries``, or the one that is there."""
+        if self._view.enclave_file(state.enclave, layout.KEY_URI) is not None:
+            return self._token_key(state)
         made_on_host = self._view.has_request(state.enclave)
         if state.reissue is Reissue.KEY_PAIR and made_on_host:
             raise InvalidInputError(
@@ -212,6 +215,20 @@ class EnclaveWriter:
         return public_half(
             safe_files.read_private(self._view.root, relative), printable(self._view.root / relative)
         )
+
+    def _token_key(self, state: EnclaveState) -> PublicKey:
+        """Return the key in a token that is to be certified again: the one that was certified here before."""
+        held = self._register.in_force(state.enclave)
+        is_ours = (
+            state.facts is not None and held is not None and held.key == fingerprint(state.facts.public_key)
+        )
+        if state.reissue is Reissue.KEY_PAIR or state.facts is None or not is_ours:
+            raise InvalidInputError(
+                f"the key of enclave {state.enclave} is in a token ({layout.KEY_URI}), so a new one is made there: "
+                f"secure-keystore request KEYSTORE {state.enclave}, then sign it here; for a key in a file remove "
+                f"{printable(self._view.root / layout.enclave_file(state.enclave, layout.KEY_URI))}"
+            )
+        return state.facts.certificate.public_key()  # type: ignore[return-value]
 
     def _subject(self, enclave: str, new_generation: bool) -> str:
         """Return the subject it has; another one for a new generation, or after a change of the scheme."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from datetime import datetime, timedelta
@@ -11,7 +11,7 @@ from pathlib import Path
 
 from enclave_common.words import counted
 from keystore.disk import layout, lock, safe_files, store
-from keystore.disk.crl_file import crl_number, revoked_serials
+from keystore.disk.crl_file import ListedCrl, crls_in, load_crl
 from keystore.disk.register_file import needs_register
 from keystore.disk.signed_documents import foreign_document, foreign_governance, own_document
 from keystore.disk.store import Store
@@ -58,7 +58,7 @@ def opened_for_change(
         if needs_register(KeystoreView(root)):
             take_over(opened)
         elif opened.has_register:
-            _adopt_newer_crl(opened)
+            _adopt_crls(opened)
             _restore_settings(opened)
         yield opened
         opened.keep_adopted()
@@ -82,18 +82,38 @@ def _check_clock(opened: Store, now: datetime, *, accepted: bool) -> None:
         batch.record(opened.register)
 
 
-def _adopt_newer_crl(opened: Store) -> None:
-    """Take over a CRL that knows more than the register, as after ``private/`` was restored from a backup.
-
-    Nobody who was revoked comes back. A CRL that our CA did not sign says nothing.
+def _adopt_crls(opened: Store) -> None:
+    """Take over what any CRL in the tree lists and the register does not, as after ``private/`` was restored from a
+    backup, or where somebody revoked with openssl. Nobody who was revoked comes back.
     """
     view = KeystoreView(opened.root)
-    with suppress(DamagedKeystoreError):
-        if view.has_crl and crl_number(view) > opened.register.crl_number:
-            newer = _with_crl(view, opened.register)
-            with opened.batch() as batch:
-                batch.record(newer)
-            opened.notes.append("the CRL is newer than the register: what it revokes was recorded")
+    newer = with_crls(opened, crls_in(view))
+    if newer != opened.register:
+        with opened.batch() as batch:
+            batch.record(newer)
+
+
+def with_crls(opened: Store, found: Iterable[ListedCrl]) -> Register:
+    """Return the register with all that these CRLs list; what was new of it is told."""
+    register = opened.register
+    for crl in found:
+        issuer, end = fingerprint(crl.issuer.der), crl.issuer.validity.not_after
+        known = dict(register.certificates)
+        fresh = {
+            serial: at
+            for serial, at in crl.revoked.items()
+            if serial not in known or not known[serial].revoked
+        }
+        for serial, at in fresh.items():
+            unknown = IssuedCertificate(serial, UNKNOWN, UNKNOWN, UNKNOWN, issuer, at, end, replaced=True)
+            known[serial] = known.get(serial, unknown)._replace(revoked=at)
+        if fresh:
+            listed = ", ".join(f"{serial:X}" for serial in sorted(fresh))
+            opened.notes.append(f"{crl.place} lists revoked serial numbers that were not on record: {listed}")
+        if fresh or crl.number > register.crl_number or not register.crl_published:
+            number = max(register.crl_number, crl.number) + bool(fresh)
+            register = replace(register, certificates=known, crl_number=number, crl_published=True)
+    return register
 
 
 def _restore_settings(opened: Store) -> None:
@@ -123,7 +143,10 @@ def take_over(opened: Store) -> None:
         register = replace(register, governance=_governance(view, lost))
     register = register.with_certificates(_issued(view))
     register = register.with_documents(_documents(view, register, lost))
-    opened.adopt(_with_crl(view, register))
+    if view.has_crl:
+        load_crl(view)
+    opened.adopt(register)
+    opened.adopt(with_crls(opened, crls_in(view)))
     opened.notes.append(
         f"register made from the files in this keystore: {counted(len(opened.register.certificates), 'certificate')}"
     )
@@ -209,24 +232,3 @@ def taken_over(view: KeystoreView, enclave: str) -> tuple[bytes, tuple[str, ...]
         found = read_foreign_permissions(foreign, enclave, where)
         return found.permissions.document(), found.lost
     return document, ()
-
-
-def _with_crl(view: KeystoreView, register: Register) -> Register:
-    if not view.has_crl:
-        return register
-    issuer, end = fingerprint(view.ca(Role.IDENTITY).der), view.ca(Role.IDENTITY).validity.not_after
-    revoked = revoked_serials(view)
-    unknown = {
-        serial: IssuedCertificate(
-            serial, UNKNOWN, UNKNOWN, UNKNOWN, issuer, revoked_at, end, replaced=True, revoked=revoked_at
-        )
-        for serial, revoked_at in revoked.items()
-        if serial not in register.certificates
-    }
-    known = {
-        serial: one._replace(revoked=one.revoked or revoked.get(serial))
-        for serial, one in register.certificates.items()
-    }
-    return replace(
-        register, certificates={**unknown, **known}, crl_number=crl_number(view), crl_published=True
-    )

@@ -53,6 +53,8 @@ class RemoveReport:
     revoked: int
     """How many certificates the CRL lists now."""
     warnings: tuple[str, ...] = ()
+    gone: tuple[str, ...] = ()
+    """Enclaves that an earlier run removed."""
 
 
 def remove(
@@ -62,9 +64,9 @@ def remove(
 
     Repeating completes an interrupted run.
 
-    Enclaves below a removed one stay. One whose files are lost is revoked as the register knows it.
-    Raises InvalidInputError for an enclave that was never there, SigningUnavailableError on a host: it revokes nothing,
-    and the next import brings back what is only deleted.
+    Enclaves below a removed one stay. One whose files are lost is revoked as the register knows it; so is one that was
+    removed already. Raises InvalidInputError for an enclave that was never there, SigningUnavailableError on a host: it
+    revokes nothing, and the next import brings back what is only deleted.
     """
     chosen = options or RemoveOptions()
     now = chosen.now or utc_now()
@@ -78,7 +80,9 @@ def remove(
             )
         view = KeystoreView(root)
         lost = {one.enclave for one in revocable(view, opened.register, wanted)}
-        view.require_enclaves(set(wanted) - lost)
+        known = {name for name in wanted if opened.register.of_enclave(name)} - set(view.enclaves())
+        view.require_enclaves(set(wanted) - known)
+        gone = known - lost
         warnings = _strike(opened, wanted, chosen, now)
         for name in wanted:
             opened.remove(layout.shares(name))
@@ -90,7 +94,8 @@ def remove(
     zenoh = ProvisionOptions(
         access=chosen.access, lock_timeout=chosen.lock_timeout, durable=chosen.durable, now=chosen.now
     )
-    return RemoveReport(tuple(wanted), revoked, (*warnings, *follow(root, zenoh)))
+    removed = tuple(name for name in wanted if name not in gone)
+    return RemoveReport(removed, revoked, (*warnings, *follow(root, zenoh)), tuple(sorted(gone)))
 
 
 def _strike(opened: Store, names: list[str], options: RemoveOptions, now: datetime) -> list[str]:

@@ -16,12 +16,14 @@ from pathlib import Path
 
 from enclave_common.words import counted, some_of
 from keystore.disk import layout, safe_files
+from keystore.disk.crl_file import listed_in
 from keystore.disk.register_file import describe, read_register
 from keystore.disk.store import Store, refresh_copies
 from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import DamagedKeystoreError, InvalidInputError, printable
 from keystore.formats.certificate import read_der
 from keystore.formats.enclave_name import validate_enclave_name
+from keystore.formats.given_file import read_given
 from keystore.formats.role import Role
 from keystore.formats.subject import SubjectScheme, scheme_of
 from keystore.formats.tool_needs import is_tool_enclave
@@ -32,7 +34,7 @@ from keystore.steps.crl import restore_crl
 from keystore.steps.enclave_state import Reissue
 from keystore.steps.governance import mirror_governance
 from keystore.steps.incoming_ca import install_incoming
-from keystore.steps.opening import opened_for_change
+from keystore.steps.opening import opened_for_change, with_crls
 from keystore.steps.options import ProvisionOptions, ProvisionReport
 from keystore.steps.provisioning import bring_about, keep
 from keystore.steps.removal import revoke_replaced
@@ -51,6 +53,8 @@ class RenewOptions:
     revoke_old: bool = False
     """Also revoke the certificates that these enclaves had before: for keys that may have been copied."""
     encrypt_ca_keys: bool = False
+    adopt_crl: Path | None = None
+    """A CRL of this keystore's identity CA that a host has: what it lists stays revoked."""
     provisioning: ProvisionOptions = field(default_factory=ProvisionOptions)
 
 
@@ -76,6 +80,8 @@ def renew(
     due = provisioning if named is not None else provisioning._replace(renew_within=chosen.within)
     with opened_for_change(root, now, provisioning) as opened:
         install_incoming(opened)
+        if chosen.adopt_crl is not None:
+            _adopt(opened, chosen.adopt_crl)
         repaired = [*opened.notes, *_restore_trust_files(opened)]
         view = KeystoreView(root)
         wanted = {
@@ -106,6 +112,18 @@ def renew(
     else:
         report = report._replace(warnings=(*report.warnings, *_still_valid(root, report, now)))
     return report._replace(created=(*repaired, *report.created))
+
+
+def _adopt(opened: Store, place: Path) -> None:
+    """Take over the list of a host: after a restore from a backup it may know more than this keystore."""
+    listed = listed_in(read_given(place), KeystoreView(opened.root), printable(place))
+    if listed is None:
+        raise InvalidInputError(
+            f"{printable(place)} is not a CRL that an identity CA of this keystore signed"
+        )
+    register = with_crls(opened, [listed])
+    with opened.batch() as batch:
+        batch.record(register)
 
 
 def _still_valid(root: Path, report: ProvisionReport, now: datetime) -> list[str]:

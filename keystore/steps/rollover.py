@@ -64,8 +64,11 @@ def roll_over(
     *,
     options: ProvisionOptions | None = None,
     encrypt: bool = False,
+    lost_key: bool = False,
 ) -> ProvisionReport:
     """Do one step of replacing CAs; repeating an interrupted step completes it.
+
+    ``lost_key``: the key of the permissions CA is gone, so nobody can tell hosts who follows.
 
     Raises InvalidInputError for a step out of order. What would stop ``start`` or ``switch`` half-way raises before
     anything is written: SigningUnavailableError for a key that does not open, DamagedKeystoreError for a document.
@@ -82,7 +85,7 @@ def roll_over(
             if end <= now:
                 del wanted[name]  # not worth a signature of the new CA
         if step is Step.START:
-            _refuse_without_keys(opened, roles, chosen.access)
+            _refuse_without_keys(opened, roles, chosen.access, lost_key)
         for role in roles:
             _forget_installed(opened, role)
         if step is Step.SWITCH and (successors := _successors(opened, roles, chosen.access)):
@@ -91,8 +94,11 @@ def roll_over(
             _refuse_to_strand(opened, roles)
             _refuse_without_start(opened, roles)
         done = [_STEPS[step](opened, role, creation) for role in roles]
-        if step is Step.START:
+        if step is Step.START and not lost_key:
             _hand_over(opened, chosen.access)
+        elif step is Step.START:
+            opened.remove(layout.SIGNED_HANDOVER)
+            done.append("no handover: pin the new CAs on each host, secure-keystore import --require-ca")
         refresh_copies(opened)
     if step is not Step.SWITCH:
         warnings = tuple(follow(root, chosen))
@@ -145,14 +151,18 @@ def _creation(options: ProvisionOptions, now: datetime, encrypt: bool) -> Create
     )
 
 
-def _refuse_without_keys(opened: Store, roles: Collection[Role], access: CaAccess) -> None:
+def _refuse_without_keys(opened: Store, roles: Collection[Role], access: CaAccess, lost_key: bool) -> None:
     """Open the keys before anything is written. The permissions CA signs who follows; an identity CA may be elsewhere.
 
     What opens the present keys encrypts the new ones, too.
     """
     view = KeystoreView(opened.root)
+    if lost_key and (Role.PERMISSIONS not in roles or not opened.has_register):
+        raise InvalidInputError("--lost-key is for the permissions CA of a keystore that issues")
     for role in Role:
-        if role is Role.PERMISSIONS or (role in roles and view.key_file(role) is not None):
+        if (role is Role.PERMISSIONS and not lost_key) or (
+            role is Role.IDENTITY and role in roles and view.key_file(role) is not None
+        ):
             view.authority(role, access)
 
 

@@ -27,6 +27,7 @@ def run(arguments: argparse.Namespace) -> int:
     report = remove(arguments.keystore, arguments.enclaves, options=options)
     if not arguments.quiet:
         common.print_lines(f"removed {name}" for name in report.removed)
+        common.print_lines(f"already removed: {name}" for name in report.gone)
     if report.revoked:
         print(
             f"{counted(report.revoked, 'revoked certificate')} in the CRL; deploy the new crl.pem to all enclaves"

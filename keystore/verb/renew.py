@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from enclave_common.command_line import FLAG
+from enclave_common.command_line import FLAG, PATH
 from keystore.errors import InvalidInputError
 from keystore.formats.role import Role
 from keystore.formats.validity import parse_duration, parse_end, utc_now
@@ -30,9 +30,11 @@ OPTIONS: common.Table = (
     ("--all", FLAG, "renew every enclave"),
     ("--new-keys", FLAG, "new private keys too, not only certificates"),
     common.REVOKE_OLD,
+    ("--adopt-crl FILE", PATH, "keep revoked what this CRL lists: of a host that knows more"),
     ("--ca", {"choices": ("start", "switch", "finish")}, "a step of replacing CAs"),
     ("--ca-role", {"choices": ("identity", "permissions", "both"), "default": "both"},
      "which CA to replace (both)"),
+    ("--lost-key", FLAG, "with --ca start: the permissions CA's key is gone, and hosts are pinned anew"),
     ("--ca-valid-for TIME", {"default": "10y"}, "validity of new CAs (10y)"),
     common.ENCRYPTION,
     *common.PROVISIONING,
@@ -55,6 +57,7 @@ def _renew(arguments: argparse.Namespace, options: ProvisionOptions) -> Provisio
         new_keys=arguments.new_keys,
         revoke_old=arguments.revoke_old,
         encrypt_ca_keys=arguments.encrypt_ca_keys,
+        adopt_crl=arguments.adopt_crl,
         provisioning=options,
     )
     return renew(arguments.keystore, arguments.enclaves or None, options=wanted)
@@ -65,7 +68,14 @@ def _roll_over(arguments: argparse.Namespace, options: ProvisionOptions) -> Prov
         raise InvalidInputError("--ca concerns all enclaves; do not name any")
     roles = tuple(Role) if arguments.ca_role == "both" else (Role(f"{arguments.ca_role}_ca"),)
     step = Step(arguments.ca)
-    report = roll_over(arguments.keystore, step, roles, options=options, encrypt=arguments.encrypt_ca_keys)
+    report = roll_over(
+        arguments.keystore,
+        step,
+        roles,
+        options=options,
+        encrypt=arguments.encrypt_ca_keys,
+        lost_key=arguments.lost_key,
+    )
     following = {
         Step.START: "deploy to all, then: --ca switch",
         Step.SWITCH: "deploy (Cyclone DDS: to all at once), then: --ca finish",

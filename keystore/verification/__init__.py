@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from keystore.add_ons import zenoh_files
 from keystore.disk import layout, safe_files
-from keystore.disk.crl_file import revoked_serials
+from keystore.disk.crl_file import crls_in
 from keystore.disk.deployed import find_differences
 from keystore.disk.versions import imported_at
 from keystore.disk.view import KeystoreView, keystore_at
@@ -96,10 +96,7 @@ def _findings(
         return
     yield from _check_settings(view, register)
     yield from _check_deployment(view)
-    try:
-        revoked = frozenset(revoked_serials(view))
-    except KeystoreError:
-        revoked = frozenset()  # the CRL itself was reported above
+    revoked = frozenset(serial for crl in crls_in(view) for serial in crl.revoked)
     yield from check_enclaves(view, register, revoked, now)
     yield from check_by_openssl(view)
     if view.has_zenoh_router:

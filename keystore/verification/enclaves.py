@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import datetime
@@ -53,6 +54,7 @@ from keystore.verification.finding import Finding, Severity
 from keystore.verification.governance import check_domains
 from keystore.verification.issued import check_certificate_issued, check_permissions_issued
 
+_TOKEN_URI = re.compile(rb"pkcs11:[!-~]*?(?:object|id)=[!-~]+\s*\Z")
 _BROKEN_HASHES = frozenset({"md5", "sha1"})
 
 
@@ -140,6 +142,7 @@ class _EnclaveCheck:
     def findings(self) -> Iterator[Finding]:
         try:
             yield from self._missing()
+            yield from self._token()
             yield from self._certificate()
             yield from self._links()
             yield from self._permissions()
@@ -155,6 +158,13 @@ class _EnclaveCheck:
                 continue  # the key is on its host, or in a token
             if self._read(name) is None:
                 yield self.error("missing", name, "missing: a process cannot start with this enclave")
+
+    def _token(self) -> Iterator[Finding]:
+        uri = self._read(layout.KEY_URI)
+        if uri is not None and not _TOKEN_URI.match(uri):
+            fix = repair.run_on(self._view.root, "rm", f"{self._directory}/{layout.KEY_URI}", "then renew it")
+            text = "is no pkcs11: URI that names a key (object= or id=)"
+            yield self._finding(Severity.ERROR, "key", layout.KEY_URI, text, fix)
 
     def _certificate(self) -> Iterator[Finding]:
         pem = self._read(layout.CERT)

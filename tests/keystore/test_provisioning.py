@@ -19,12 +19,14 @@ from keystore import (
     InvalidInputError,
     NotAKeystoreError,
     Policy,
+    RenewOptions,
     SubjectScheme,
     UnsafeKeystoreError,
     apply_policy,
     create_enclave,
     list_enclaves,
     provision,
+    renew,
 )
 from keystore.disk import layout
 from keystore.disk.signed_documents import own_document
@@ -36,6 +38,7 @@ from tests.keystore.kit import (
     DAY,
     NOW,
     actions,
+    certificate_of,
     codes,
     contents,
     created,
@@ -386,3 +389,36 @@ def test_no_symlinks_on_this_file_system(tmp_path: Path, monkeypatch: pytest.Mon
     assert codes(root) == set()
     (root / "enclaves/a/governance.p7s").write_bytes(b"old")
     assert "copy-differs" in codes(root)
+
+
+URI = b"pkcs11:token=robot;object=a;type=private"
+
+
+def with_token(tmp_path: Path, uri: bytes) -> Path:
+    root = filled(tmp_path / "ks", ["/a"])
+    (root / "enclaves/a/key.pem").unlink()
+    (root / "enclaves/a/key.p11").write_bytes(uri)
+    return root
+
+
+def test_a_key_in_a_token_is_certified_again_and_never_replaced(tmp_path: Path) -> None:
+    root = with_token(tmp_path, URI)
+    key = certificate_of(root, "/a").public_key
+    assert codes(root) == set()
+    report = provision(root, [policy("/a", "/other")], options=options())
+    assert "key and certificate" not in actions(report)["/a"]
+    assert certificate_of(root, "/a").public_key == key and not (root / "enclaves/a/key.pem").exists()
+    with pytest.raises(InvalidInputError, match="in a token"):
+        renew(root, ["/a"], options=RenewOptions(new_keys=True, provisioning=options()))
+    (root / "enclaves/a/cert.pem").write_bytes(
+        (filled(tmp_path / "other", ["/a"]) / "enclaves/a/cert.pem").read_bytes()
+    )
+    with pytest.raises(InvalidInputError, match="in a token"):
+        provision(root, [policy("/a", "/other")], options=options())
+
+
+@pytest.mark.parametrize(
+    "uri", [b"garbage", b"", b"pkcs11:", b"pkcs11:token=robot", URI + b"\nmore", b"file:///object=a"]
+)
+def test_what_names_no_key_in_a_token_is_not_good(tmp_path: Path, uri: bytes) -> None:
+    assert "key" in codes(with_token(tmp_path, uri))

@@ -114,6 +114,23 @@ def test_the_number_of_a_crl_only_grows(root: Path) -> None:
     assert numbers == sorted(set(numbers))
 
 
+def test_a_removal_is_completed_by_the_same_command(root: Path) -> None:
+    name = KeystoreView(root).enclaves()[0]
+    first, again = (remove(root, [name], options=quick()) for _ in range(2))
+    assert (first.removed, first.gone, again.removed, again.gone) == ((name,), (), (), (name,))
+    assert again.revoked == first.revoked == 1
+    with pytest.raises(InvalidInputError, match="no enclave /never"):
+        remove(root, ["/never"], options=quick())
+
+
+def test_a_revoked_certificate_stays_on_the_list_while_its_ca_is_trusted(tmp_path: Path) -> None:
+    root = filled(tmp_path / "ks", ["/a", "/b"], now=NOW, lifetime=10 * DAY)
+    serial = certificate_of(root, "/b").serial
+    remove(root, ["/b"], options=quick(now=NOW))
+    provision(root, [policy("/a")], options=options(now=NOW + 900 * DAY, lifetime=10 * DAY))
+    assert crl_of(root).get_revoked_certificate_by_serial_number(serial) is not None
+
+
 def test_a_launch_renews_a_crl_that_has_ended(root: Path) -> None:
     remove(root, ["/c"], options=quick(now=NOW - 300 * DAY))
     later = NOW + 100 * DAY

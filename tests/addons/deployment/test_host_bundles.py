@@ -5,15 +5,18 @@ from __future__ import annotations
 import os
 import shutil
 from collections.abc import Callable, Mapping
+from datetime import timedelta
 from pathlib import Path
 
 import pytest
+from cryptography import x509
 
 from enclave_addons.deployment.host_bundles import enclaves_of_hosts
 from enclave_addons.deployment.hosts import parse_hosts
 from enclave_addons.deployment.importing import Restart
 from keystore import (
     BundleOptions,
+    DamagedKeystoreError,
     HostBundle,
     ImportOptions,
     ImportReport,
@@ -28,6 +31,7 @@ from keystore import (
     export_hosts,
     import_bundle,
     pinned,
+    provision,
     remove,
     renew,
     roll_over,
@@ -37,9 +41,10 @@ from keystore.disk import layout
 from keystore.disk.archive import archive_bytes, read_archive
 from keystore.disk.container_copies import ContainerUser
 from keystore.disk.store import Content
+from keystore.formats.validity import utc_now
 from keystore.verb import main
 from tests.keystore.fault_driver import KILLED, install_fault
-from tests.keystore.kit import contents, filled, mode, options
+from tests.keystore.kit import contents, filled, mode, options, policy
 
 NAMES = ("/base", "/base/camera", "/arm", "/arm/hand")
 HOSTS = {"base": ["/base*"], "arm": ["/arm*"]}
@@ -153,6 +158,68 @@ def test_a_replay_after_revocation_is_refused(ca: Path, host: Path, tmp_path: Pa
     assert report.removed == ("/base/camera",)
     assert report.restart is Restart.ALL, "all that must refuse the revoked one read the CRL at their start"
     refused(host, tmp_path / "first/base.bundle", UnsafeKeystoreError, "an earlier bundle")
+
+
+def exported_later(ca: Path, output: Path) -> Path:
+    """Numbers are times: a later one than any bundle of this test has."""
+    later = BundleOptions(durable=False, now=utc_now() + timedelta(minutes=2))
+    return export_hosts(ca, output, {"base": ["/base"]}, options=later)[0].path
+
+
+def revoked_here(host: Path) -> int:
+    return len(x509.load_pem_x509_crl((host / layout.CRL).read_bytes()))
+
+
+def test_a_ca_restored_from_a_backup_does_not_take_revocations_back(
+    ca: Path, host: Path, tmp_path: Path
+) -> None:
+    shutil.copytree(ca, tmp_path / "backup", symlinks=True)
+    remove(ca, ["/base/camera", "/arm"], options=RemoveOptions(durable=False))
+    import_bundle(host, exported(ca, tmp_path / "two").path)
+    shutil.rmtree(ca)
+    shutil.copytree(tmp_path / "backup", ca, symlinks=True)
+    refused(host, exported_later(ca, tmp_path / "none"), UnsafeKeystoreError, "earlier CRL|knows as revoked")
+    later = utc_now() + timedelta(minutes=1)
+    remove(ca, ["/arm/hand"], options=RemoveOptions(durable=False, now=later))
+    refused(host, exported_later(ca, tmp_path / "three"), UnsafeKeystoreError, "--adopt-crl FILE")
+
+    given = RenewOptions(adopt_crl=host / layout.CRL, provisioning=options())
+    told = renew(ca, ["/base"], options=given).created
+    assert "lists revoked serial numbers that were not on record" in told[0]
+    import_bundle(host, exported_later(ca, tmp_path / "four"))
+    assert revoked_here(host) == 3
+    other = filled(tmp_path / "other", ["/a", "/b"])
+    remove(other, ["/b"], options=RemoveOptions(durable=False))
+    with pytest.raises(InvalidInputError, match="not a CRL that an identity CA of this keystore signed"):
+        renew(ca, options=RenewOptions(adopt_crl=other / layout.CRL, provisioning=options()))
+
+
+@pytest.mark.parametrize("damage", ["deleted", "damaged"])
+def test_without_its_manifest_an_imported_keystore_is_nothing(
+    ca: Path, host: Path, tmp_path: Path, damage: str
+) -> None:
+    """Also with the CRL gone and a revoked enclave put back, which would be a keystore that never was imported."""
+    camera = tmp_path / "camera"
+    shutil.copytree(host / "enclaves/base/camera", camera, symlinks=True)
+    remove(ca, ["/base/camera"], options=RemoveOptions(durable=False))
+    bundle = exported(ca, tmp_path / "two").path
+    import_bundle(host, bundle)
+    shutil.copytree(camera, host / "enclaves/base/camera", symlinks=True)
+    for crl in (host / layout.CRL, *host.rglob("enclaves/**/crl.pem")):
+        crl.unlink()
+    (host / layout.BUNDLE).unlink()
+    if damage == "damaged":
+        (host / layout.BUNDLE).write_bytes(b"x")
+    assert "bundle-differs" in {one.code for one in verify(host).findings}
+    with pytest.raises(DamagedKeystoreError, match=r"bundle\.p7s.*Import the bundle again"):
+        provision(host, [policy("/base/camera")], options=options(create=False))
+
+    refused_earlier = tmp_path / "first/base.bundle"
+    with pytest.raises(UnsafeKeystoreError, match="an earlier bundle"):
+        import_bundle(host, refused_earlier)
+    import_bundle(host, bundle)
+    assert {finding.code for finding in verify(host).findings} <= {"no-ca-key"}
+    assert revoked_here(host) == 1 and not (host / "enclaves/base/camera").exists()
 
 
 def test_another_hosts_bundle_is_refused(ca: Path, host: Path, tmp_path: Path) -> None:
