@@ -47,6 +47,11 @@ ENTRY_POINTS = {
         "library = enclave_addons.library.access:LibraryAccess",
         "inference = enclave_addons.inference.describer:SourceInference",
     ],
+    "enclave_launch.companion": ["recording = enclave_addons.recording.denials:explaining"],
+    "secure_launch.mode": [
+        "observation = enclave_addons.observation.mode",
+        "recording = enclave_addons.recording.mode",
+    ],
     "secure_keystore.verb": [
         "export = enclave_addons.deployment.keystore_verb.export",
         "import = enclave_addons.deployment.keystore_verb.import",
@@ -55,7 +60,6 @@ ENTRY_POINTS = {
         "sign = enclave_addons.deployment.keystore_verb.sign",
         "fleet = enclave_addons.deployment.keystore_verb.fleet",
         "zenoh = enclave_addons.zenoh.verb.zenoh",
-        "denials = enclave_addons.zenoh.verb.denials",
     ],
     "secure_nodl.verb": [
         "check-record = enclave_addons.recording.verb.check_record",

@@ -8,7 +8,8 @@ import re
 import shutil
 import sys
 import textwrap
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from typing import Any, NoReturn, Protocol
@@ -307,3 +308,26 @@ def guarded(program: str, work: Callable[[], int], *mistakes: type[Exception]) -
 def _drop_output() -> None:
     """Discard what is still buffered; otherwise the interpreter reports the error again at exit."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+@dataclass(frozen=True)
+class CommandLine:
+    """A parsed command line.
+
+    Attributes:
+        options: Every option with its value.
+        given: The names of the options that were written.
+    """
+
+    options: argparse.Namespace
+    given: frozenset[str]
+
+
+def read_command_line(parser: CommandParser, argv: Sequence[str] | None) -> CommandLine:
+    """Parse as ``parse_intermixed_args`` does, separating given values from defaults."""
+    defaults = {action.dest: action.default for action in parser.arguments}
+    for action in parser.arguments:
+        action.default = argparse.SUPPRESS
+    given = vars(parser.parse_intermixed_args(argv))
+    known = {name: value for name, value in defaults.items() if value is not argparse.SUPPRESS}
+    return CommandLine(argparse.Namespace(**{**known, **given}), frozenset(given))

@@ -10,7 +10,8 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 
-from enclave_common.dependencies import installed
+from enclave_common.add_ons import add_on
+from enclave_common.dependencies import absence
 from enclave_common.terminal import warn
 from enclave_launch.errors import UsageError
 from enclave_launch.evaluation.programs import check_programs
@@ -145,14 +146,15 @@ def _recording(launch: _Launch, settings: RunSettings) -> LaunchCompanion | None
     secured = not isinstance(launch, UnsecuredLaunch)
     if settings.record is False or (settings.record is None and not secured):
         return None
-    if settings.record is None and not installed("enclave_addons.recording"):
+    explaining = add_on("enclave_launch.companion", "recording")
+    if explaining is None:
+        if settings.record:
+            raise UsageError(f"RunSettings.record: {absence('enclave_addons.recording')}")
         return None
-    from enclave_addons.recording.denials import Explainer  # an add-on: recording
-    from enclave_addons.recording.learning import new_run
-    from enclave_addons.recording.recording import Recording
-
     source = _source(launch)
+    plan = None if isinstance(launch, UnsecuredLaunch) else launch.plan
     distro = source.host_options.distro or os.environ.get("ROS_DISTRO", "")
-    run = new_run(source.launch_file, distro, "none", secured=secured)
-    explainers = [] if isinstance(launch, UnsecuredLaunch) else [Explainer(launch.plan)]
-    return Recording(run, explainers, optional=settings.record is None)
+    companion: LaunchCompanion = explaining(
+        source.launch_file, distro, plan, optional=settings.record is None
+    )
+    return companion

@@ -29,13 +29,6 @@ ALLOWED = {
     "enclave_addons": {*CORE},
 }
 
-# Modules of the core that still import an add-on, each when it is needed.
-STILL_IMPORT_AN_ADD_ON = {
-    "enclave_launch/running.py",
-    "enclave_launch/verb/secure_launch.py",
-    "enclave_launch/verb/start.py",
-}
-
 # The floors of each package, lowest first: a room imports its own modules and those of the floors below it.
 FLOORS: dict[str, tuple[set[str], ...]] = {
     "enclave_launch": (
@@ -166,9 +159,7 @@ def test_arrows_between_the_packages_point_one_way(package: str) -> None:
         for name in imports_of(path)
         if name.split(".")[0] in forbidden
     ]
-    assert {each.partition(" ")[0] for each in wrong} == {
-        each for each in STILL_IMPORT_AN_ADD_ON if each.startswith(f"{package}/")
-    }
+    assert wrong == []
 
 
 def _imports_from(path: Path, *, types: bool) -> Iterator[tuple[str, list[str]]]:

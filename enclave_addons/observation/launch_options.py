@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import argparse
+import os
+import sys
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
@@ -11,6 +13,7 @@ from enclave_addons.observation.drift.compare import Security
 from enclave_addons.observation.drift.expected import out_of_sight
 from enclave_addons.observation.drift_watch import DriftWatch, WatchOptions
 from enclave_addons.observation.graph.observing import chosen_source
+from enclave_common.terminal import warn
 from enclave_launch.dry_run import DryRun
 from enclave_launch.errors import ProvisionError, UsageError, translated
 from enclave_launch.flow import run_unsecured
@@ -18,9 +21,24 @@ from enclave_launch.options import RunSettings
 from enclave_launch.plan import LaunchPlan
 from enclave_launch.report.plan_json import plan_document
 from enclave_launch.secured import ProvisionedLaunch
+from enclave_launch.verb.planning import resolve_target
+from enclave_launch.verb.start import Company, run_settings, start
+from enclave_launch.verb.target import LaunchTarget
+from enclave_launch.verb.usage import unsecured_notice
 from keystore.errors import KeystoreError
 from keystore.steps.tool_enclaves import enclaves_by_guid, provide_watcher
 from nodl.errors import NoDLError
+
+
+def launch(target: LaunchTarget, options: argparse.Namespace, keystore: str | None) -> int:
+    """Run and watch the launch. Return its status, or that of the findings."""
+    if keystore is not None:
+        watch = partial(watch_of_secured_launch, options=options)
+        return start(target, options, keystore, Company(check=check_watch, watch=watch))
+    plan = resolve_target(target, options)
+    warn(*plan.problems, *plan.warnings)
+    print(f"secure-launch: {unsecured_notice(os.environ)}", file=sys.stderr)
+    return watch_plain_launch(plan, options, run_settings(options))
 
 
 def watch_plain_launch(plan: LaunchPlan, options: argparse.Namespace, settings: RunSettings) -> int:

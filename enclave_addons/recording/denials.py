@@ -12,11 +12,12 @@ from collections import deque
 from typing import NamedTuple
 
 from enclave_addons.recording.grants import WORDS, Description, Need, PlannedGrants
+from enclave_addons.recording.learning import new_run
 from enclave_addons.recording.reasons import MIXED_MIDDLEWARES, NOT_AS_PLANNED, Cause, cause_of
 from enclave_addons.recording.record.assembly import RecordedNode, RecordedProcess
 from enclave_addons.recording.record.lines import EndpointMade, Initialised, Line, NodeMade
 from enclave_addons.recording.record.requested import REFUSED, EndpointRole, RequestedEndpoint, role_of
-from enclave_addons.recording.recording import Listener
+from enclave_addons.recording.recording import Listener, Recording
 from enclave_addons.recording.remedies import Patch, Remedies
 from enclave_common.terminal import printable
 from enclave_common.words import some_of
@@ -97,6 +98,19 @@ class NotJoined(NamedTuple):
             return printable(f"{head}: {self.cause.what}; {self.cause.remedy} (said: {self.cause.said})")
         said = "; ".join(self.texts) or "no reason was given; see its output"
         return printable(f"{head}: {said}")
+
+
+def explaining(launch_file: str, distro: str, plan: LaunchPlan | None, *, optional: bool) -> Recording:
+    """Return a recording of a launch that explains what DDS refuses.
+
+    Args:
+        launch_file: The launch file, for the record.
+        distro: The ROS distribution, for the record.
+        plan: The plan of a secured launch. Without one every endpoint is an event, and nothing is explained.
+        optional: The launch goes on if it cannot be recorded, and reports that.
+    """
+    run = new_run(launch_file, distro, "none", secured=plan is not None)
+    return Recording(run, [] if plan is None else [Explainer(plan)], optional=optional)
 
 
 class Explainer(Listener):

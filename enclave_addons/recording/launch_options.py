@@ -26,7 +26,6 @@ from enclave_addons.recording.learning import (
     prepare_folder,
     write_manifests,
 )
-from enclave_addons.recording.markers import MarkerRun, questions
 from enclave_addons.recording.recording import Recording
 from enclave_common.dependencies import installed
 from enclave_common.files import write_text
@@ -37,6 +36,8 @@ from enclave_launch.flow import run_unsecured
 from enclave_launch.options import RunSettings
 from enclave_launch.plan import LaunchPlan
 from enclave_launch.runtime.companion import LaunchCompanion
+from enclave_launch.verb.planning import resolve_target
+from enclave_launch.verb.start import Company, run_settings, start
 from enclave_launch.verb.target import LaunchTarget
 from nodl.errors import NoDLError
 
@@ -46,9 +47,17 @@ Start = Callable[["LaunchCompanion"], int]
 """Run the launch with a companion; gives the exit status."""
 
 
+def launch(target: LaunchTarget, options: argparse.Namespace, keystore: str | None) -> int:
+    """Learn from a run, or audit one. Return the exit status."""
+    if options.audit:
+        return audit_launch(resolve_target(target, options), options, run_settings(options))
+    return learn_launch(
+        target, options, lambda companion: start(target, options, keystore, Company(companion=companion))
+    )
+
+
 def learn_launch(target: LaunchTarget, options: argparse.Namespace, start: Start) -> int:
-    """Record one run (two for ``--learn-parameters``), write what was learnt, return the status of the launch."""
-    patience: float | None = options.learn_for
+    """Record one run, write what was learnt, return the status of the launch."""
     folder = Path(options.learn).absolute()
     prepare_folder(folder)
     isolation = isolate(options.learn_isolation)
@@ -56,18 +65,11 @@ def learn_launch(target: LaunchTarget, options: argparse.Namespace, start: Start
     _say(f"learning: every process runs as ever{unsecured}; {DEVICES_STAY_REAL}")
     _say(f"isolated by: {isolation.value}")
 
-    def record(patience: float | None, markers: MarkerRun | None = None) -> int:
-        distro = options.distro or os.environ.get("ROS_DISTRO", "")
-        run = new_run(target.launch_file, distro, isolation.value, secured=options.secure)
-        recording = Recording(run, [QuietWatch(patience)], markers)
-        status = start(recording)
-        keep_record(folder, run, recording.data)
-        return status
-
-    status = record(patience)
-    if options.learn_parameters and (found := questions(folder)):
-        _say(f"a second run, with marker values for {found.shown}")
-        status = max(status, record(patience or 5.0, MarkerRun(found)))
+    distro = options.distro or os.environ.get("ROS_DISTRO", "")
+    run = new_run(target.launch_file, distro, isolation.value, secured=options.secure)
+    recording = Recording(run, [QuietWatch(options.learn_for)])
+    status = start(recording)
+    keep_record(folder, run, recording.data)
     _report(write_manifests(folder), folder)
     if installed("enclave_addons.inference") and options.missing_nodl == "infer":
         _report_unseen(folder, options)

@@ -17,7 +17,6 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from enclave_addons.recording.markers import Marked, MarkerRun
 from enclave_addons.recording.programs import (
     RECORD_VARIABLE,
     inspect_command,
@@ -96,7 +95,6 @@ class Recording:
         self,
         run: RecordedRun,
         listeners: Sequence[Listener] = (),
-        markers: MarkerRun | None = None,
         *,
         optional: bool = False,
     ) -> None:
@@ -107,10 +105,8 @@ class Recording:
         self.unheard: set[int] = set()  # pids of which nothing is to be expected
         self.data = b""
         self._listeners: tuple[Listener, ...] = (EndpointEvents(), *listeners)
-        self._markers = markers
         self._optional = optional
         self._processes: dict[str, ResolvedProcess] = {}
-        self._marked: dict[str, Marked] = {}
         self._reader = LineReader()
         self._lost: list[str] = []
         self._untold: list[tuple[float, Line]] = []
@@ -160,9 +156,6 @@ class Recording:
         program = inspect_command(spec.cmd, spec.environment.get("PATH", os.defpath))
         if program.obstacle:
             self._not_recorded(process.process_name, program.obstacle)
-        if self._markers is not None:
-            self._marked[process.process_name] = self._markers.mark(process, spec.cmd)
-            spec = spec._replace(cmd=self._marked[process.process_name].cmd)
         try:
             record = self._files.path_of(process.process_name)
         except OSError as error:
@@ -179,7 +172,7 @@ class Recording:
             process = self._processes[event.name]
             if self._folder is not None:
                 self._files.started(event.name, event.pid)
-            self._add(_started(process, event.pid, self._marked.get(event.name)))
+            self._add(_started(process, event.pid))
         elif isinstance(event, ProcessExited):
             self.running.pop(event.pid, None)
         elif isinstance(event, LaunchOver) and self._folder is not None:
@@ -311,8 +304,7 @@ class Recording:
                 self._not_recorded(started.process, why)
 
 
-def _started(process: ResolvedProcess, pid: int, marked: Marked | None) -> StartedProcess:
-    parameters = {**process.parameters, **(marked.parameters if marked else {})}
+def _started(process: ResolvedProcess, pid: int) -> StartedProcess:
     return StartedProcess(
         pid=pid,
         process=process.process_name,
@@ -321,9 +313,9 @@ def _started(process: ResolvedProcess, pid: int, marked: Marked | None) -> Start
         kind=process.kind,
         fqn=process.fqn or "",
         location=str(process.location),
-        arguments=marked.arguments if marked else tuple(own_words(process)),
+        arguments=tuple(own_words(process)),
         rules=tuple(parse_ros_arguments(process.cmd).remaps),
-        parameters=_plain(parameters),
+        parameters=_plain(process.parameters),
     )
 
 

@@ -21,7 +21,7 @@ from typing import Any
 from ros2launch.option import OptionExtension
 
 from enclave_addons.ros2 import attributes  # noqa: F401  # ``enclave=`` in Python launch files, secured or not
-from enclave_common.command_line import add_options
+from enclave_common.command_line import CommandLine, add_options
 from enclave_common.terminal import safe_output, stdout_is_for_the_plan
 from enclave_launch.errors import EnclaveLaunchError, UsageError
 
@@ -52,7 +52,6 @@ class EnclaveOption(OptionExtension):  # type: ignore[misc]  # untyped without R
         from enclave_launch.verb.usage import (
             FOR_PLAN,
             FOR_SECURE,
-            CommandLine,
             check_needs_secure,
             check_views,
         )

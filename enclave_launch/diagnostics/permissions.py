@@ -85,7 +85,7 @@ def record_undecided(
         f"node {node}: the recorded name may be fixed, or the value of {' or '.join(parameters)}; what is granted, as "
         f"no run decides: {', '.join(names)}"
     )
-    remedy = "record it once more with another value (--learn-parameters does that)"
+    remedy = "record it once more with another value of the parameter"
     return Diagnostic(Code.RECORD_UNDECIDED, node, text, place, remedy)
 
 

@@ -14,7 +14,6 @@ from enclave_common.command_line import (
     PATHS,
     TEXT,
     TEXTS,
-    TIME,
     CommandParser,
     Option,
     OptionGroup,
@@ -29,6 +28,7 @@ from enclave_launch.options import ResolveOptions
 from enclave_launch.policy.node_permissions import ALSO
 from enclave_launch.ros_rules.distro import Distro
 from enclave_launch.verb.completion import launch_words
+from enclave_launch.verb.modes import modes
 
 DESCRIPTION = """\
 Launch a ROS 2 launch file (XML, YAML or Python), with or without ROS installed.
@@ -100,8 +100,8 @@ POLICY: tuple[Option, ...] = (
 )  # fmt: skip
 LOOKING: tuple[Option, ...] = (
     ("--dry-run", FLAG, "print the plan; start nothing, write nothing"),
-    ("--format", one_of("tree", "json", "policy", "html", "markdown", "dot", "mermaid"),
-     "of the dry run: tree (default), json, the derived SROS2 policy, or a report as of secure-plan report"),
+    ("--format", one_of("tree", "json", "policy"),
+     "of the dry run: tree (default), json, or the derived SROS2 policy"),
     ("--explain ENCLAVE|NODE|TOPIC", TEXT,
      "why each permission is there: manifest, remap rule or built-in, with file and line"),
     ("--dump-params", FLAG, "print every node's parameters as one YAML file"),
@@ -134,29 +134,12 @@ RUNNING: tuple[Option, ...] = (
     ("-d --debug", FLAG, "more output from the launcher itself"),
     ("--restart-expiring", FLAG,
      "shortly before a certificate or permissions expire: stop the launch, renew them, start it again"),
-    ("--watch", FLAG, "observe the DDS domain during the launch and report what differs from the plan"),
-    ("--watch-report FILE", PATH, "write the findings of --watch as JSON lines, too"),
-    ("--watch-accept NODE", TEXTS,
-     "with --watch: a node that may run beside the plan, such as '/_ros2cli*' (repeatable)"),
     ("--log-limit SIZE", {"type": size_in_bytes},
      "start a new log file at this size (such as 100M; the previous one becomes <name>.1); default: no limit"),
     ("-a --show-all-subprocesses-output", FLAG,
      "show all output of the processes on the screen (sets OVERRIDE_LAUNCH_PROCESS_OUTPUT)"),
     ("--launch-prefix COMMAND", TEXT, "put this before the commands of all processes"),
     ("--launch-prefix-filter REGEX", TEXT, "only if the executable's name matches"),
-)  # fmt: skip
-RECORDING: tuple[Option, ...] = (
-    ("--learn DIR", PATH,
-     "run the launch, record what its nodes request, and write their manifests into DIR"),
-    ("--learn-for TIME", TIME,
-     "end the learning run when nothing new was recorded for TIME, such as 10s (default: at Ctrl-C)"),
-    ("--learn-isolation", one_of("auto", "local", "none"),
-     "isolate the learning run in a network namespace, else on this machine (auto), only the latter, or not"),
-    ("--learn-parameters", FLAG,
-     "a second run with marker values decides which names come from which parameters"),
-    ("--audit", FLAG,
-     "run unsecured, and report what the plan would refuse and what it grants that nobody requests"),
-    ("--audit-report FILE", PATH, "write the audit as JSON, too"),
 )  # fmt: skip
 DENIALS: tuple[Option, ...] = (
     ("--no-explain-denials", FLAG, "do not record secured processes to explain what DDS refuses them"),
@@ -181,7 +164,8 @@ def build_parser() -> CommandParser:
         ("looking without starting", (*LOOKING, *WRITTEN)),
         ("evaluating the launch file", EVALUATION),
         ("running", RUNNING),
-        ("recording what nodes request", (*RECORDING, *DENIALS)),
+        ("explaining denials", DENIALS),
+        *((mode.TITLE, mode.OPTIONS) for mode in modes()),
     ):
         parser.add_options(options, title)
     return parser

@@ -9,7 +9,13 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import yaml
 
-from enclave_common.command_line import CommandParser, complete, guarded
+from enclave_common.command_line import (
+    CommandLine,
+    CommandParser,
+    complete,
+    guarded,
+    read_command_line,
+)
 from enclave_common.terminal import (
     printable,
     printable_lines,
@@ -28,18 +34,20 @@ from enclave_launch.host.plan_host import PlanHost
 from enclave_launch.plan import LaunchPlan
 from enclave_launch.prefixes import ament_prefixes
 from enclave_launch.report.explained import explainable, explained
-from enclave_launch.report.plan_json import plan_document, plan_json
+from enclave_launch.report.plan_json import plan_json
 from enclave_launch.report.terminal_style import terminal_style_of
 from enclave_launch.report.tree import plan_tree
 from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.security_environment import SecuritySettings
+from enclave_launch.verb.modes import check_modes
 from enclave_launch.verb.options import build_parser, resolve_options
 from enclave_launch.verb.planning import planned
 from enclave_launch.verb.target import LaunchTarget, find_target
 from enclave_launch.verb.usage import (
-    CommandLine,
-    check_options,
-    read_command_line,
+    FOR_PLAN,
+    FOR_SECURE,
+    check_needs_secure,
+    check_views,
 )
 from keystore.formats.policy import Policy
 from keystore.formats.policy_xml import policy_xml
@@ -53,6 +61,21 @@ def main(argv: Sequence[str] | None = None) -> int:
         complete(parser)
         line = read_command_line(parser, argv)
         return guarded("secure-launch", lambda: _main(line, parser), EnclaveLaunchError)
+
+
+def check_options(line: CommandLine, actions: Sequence[argparse.Action]) -> None:
+    """Refuse options without effect: ``UsageError`` names the flag that is missing."""
+    given, options = line.given, line.options
+    only_shown = check_views(line, actions)
+    mode = check_modes(line, actions, only_shown=only_shown)
+    if options.provision_only and only_shown:
+        raise UsageError(
+            "--provision-only writes the keystore and starts nothing: give it with --secure alone"
+        )
+    if not options.secure:
+        check_needs_secure(actions, given & FOR_SECURE)
+        if not (only_shown or (mode is not None and mode.plans(options))):
+            check_needs_secure(actions, given & FOR_PLAN, "--secure (or --dry-run, --audit, --watch)")
 
 
 def _main(line: CommandLine, parser: CommandParser) -> int:
@@ -122,15 +145,7 @@ def _plan_text(plan: LaunchPlan, options: argparse.Namespace, keystore: str | No
     if options.format == "json":
         security = SecuritySettings(keystore, options.strategy) if keystore else None
         return plan_json(plan, security) + "\n"
-    if options.format == "policy":
-        return _policy_text(plan)
-
-    from enclave_addons.review.verb.report import report_text  # cryptography
-    from enclave_launch.dry_run import DryRun  # pydantic
-
-    there = keystore if keystore is not None and os.path.isdir(keystore) else None
-    dry_run = DryRun(**plan_document(plan))
-    return report_text(dry_run, options.format, " ".join(options.words), keystore=there)
+    return _policy_text(plan)
 
 
 def _policy_text(plan: LaunchPlan) -> str:

@@ -6,8 +6,10 @@ import argparse
 import os
 import sys
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from datetime import timedelta
+from typing import Protocol
 
 from enclave_common.terminal import counted_progress, printable, warn
 from enclave_common.words import counted, some_of
@@ -22,8 +24,9 @@ from enclave_launch.policy.sharing import gains_by_sharing
 from enclave_launch.runtime.companion import LaunchCompanion
 from enclave_launch.runtime.ros_services import require_rclpy
 from enclave_launch.secured import ProvisionedLaunch
+from enclave_launch.verb.modes import chosen_mode
 from enclave_launch.verb.options import resolve_options
-from enclave_launch.verb.planning import planned, resolve_target
+from enclave_launch.verb.planning import planned
 from enclave_launch.verb.target import LaunchTarget
 from enclave_launch.verb.usage import PERMISSIVE_NOTICE, unsecured_notice
 from keystore.errors import InvalidInputError
@@ -36,61 +39,76 @@ from keystore.steps.options import ProvisionOptions
 from keystore.steps.signing_process import SigningProcess
 
 
+class Watch(LaunchCompanion, Protocol):
+    """A companion whose findings change the exit status of the launch."""
+
+    def status(self, of_launch: int) -> int:
+        """Return the exit status of the launch, or that of the findings."""
+
+
+def _nothing_to_check(plan: LaunchPlan) -> None:
+    pass
+
+
+def _nothing_to_watch(launch: ProvisionedLaunch) -> Watch | None:
+    return None
+
+
+@dataclass(frozen=True)
+class Company:
+    """What accompanies a launch in a mode.
+
+    Attributes:
+        check: Called with the plan before keys are made. It raises an ``EnclaveLaunchError``.
+        companion: Takes the place of what explains denials.
+        watch: Makes a further companion of the provisioned launch.
+    """
+
+    check: Callable[[LaunchPlan], None] = _nothing_to_check
+    companion: LaunchCompanion | None = None
+    watch: Callable[[ProvisionedLaunch], Watch | None] = _nothing_to_watch
+
+
+ALONE = Company()
+
+
 def launch_target(target: LaunchTarget, options: argparse.Namespace, keystore: str | None) -> int:
-    """Learn from, audit or start ``target``, as the options say. Return the exit status."""
-    if options.learn is not None:
-        from enclave_addons.recording.launch_options import learn_launch  # an add-on: recording
-
-        return learn_launch(target, options, lambda companion: start(target, options, keystore, companion))
-    if options.audit:
-        from enclave_addons.recording.launch_options import audit_launch  # an add-on: recording
-
-        return audit_launch(resolve_target(target, options), options, _run_settings(options))
-    return start(target, options, keystore)
+    """Run ``target`` in the mode that the options choose, or just start it. Return the exit status."""
+    mode = chosen_mode(options)
+    return start(target, options, keystore) if mode is None else mode.launch(target, options, keystore)
 
 
 def start(
     target: LaunchTarget,
     options: argparse.Namespace,
     keystore: str | None,
-    companion: LaunchCompanion | None = None,
+    company: Company = ALONE,
 ) -> int:
     """Launch ``target``, secured if ``keystore`` is given, wait until it is over, and return the exit status."""
     if keystore is None:
-        if options.watch:
-            from enclave_addons.observation.launch_options import watch_plain_launch  # an add-on: observation
-
-            plan = resolve_target(target, options)
-            warn(*plan.problems, *plan.warnings)
-            print(f"secure-launch: {unsecured_notice(os.environ)}", file=sys.stderr)
-            return watch_plain_launch(plan, options, _run_settings(options))
-        return _launch_plainly(target, options, companion)
+        return _launch_plainly(target, options, company.companion)
     sign_elsewhere(options, keystore)
-    while (status := _launch(planned(target, options, keystore), options, keystore, companion)) is None:
+    while (status := _launch(planned(target, options, keystore), options, keystore, company)) is None:
         pass  # what it used was about to end: planned, renewed and started once more
     return status
 
 
 def _launch_plainly(
-    target: LaunchTarget, options: argparse.Namespace, companion: LaunchCompanion | None = None
+    target: LaunchTarget, options: argparse.Namespace, companion: LaunchCompanion | None
 ) -> int:
     """Launch without enclaves: nobody has to know what the nodes say to each other."""
     launch = launch_source(target.launch_file, target.arguments, options=resolve_options(options))
     print(f"secure-launch: {unsecured_notice(os.environ)}", file=sys.stderr)
-    return run_unsecured(launch, options=_run_settings(options)._replace(companion=companion))
+    return run_unsecured(launch, options=run_settings(options)._replace(companion=companion))
 
 
-def _launch(
-    plan: LaunchPlan, options: argparse.Namespace, keystore: str, companion: LaunchCompanion | None = None
-) -> int | None:
+def _launch(plan: LaunchPlan, options: argparse.Namespace, keystore: str, company: Company) -> int | None:
     """Provision and run; return the exit status, None to renew and start again (``--restart-expiring``)."""
     warn(*(() if options.quiet else plan.warnings))
     if not options.provision_only:
         _check_before_keys_are_made(plan, keystore)
-        if options.watch and not plan.problems:
-            from enclave_addons.observation.launch_options import check_watch  # an add-on: observation
-
-            check_watch(plan)
+        if not plan.problems:
+            company.check(plan)
     if options.strategy == "Permissive":
         print(f"secure-launch: {PERMISSIVE_NOTICE}", file=sys.stderr)
     launch = provision(plan, keystore, options=security_options(options))
@@ -102,16 +120,9 @@ def _launch(
     warn(*repaired, *gaps, *expiry_notices(launch, options.warn_expiry))
     if options.provision_only:
         return 0
-    deadline = watch = None
-    if options.restart_expiring:
-        deadline = renewal_deadline(launch, utc_now())
-    if options.watch:
-        from enclave_addons.observation.launch_options import (
-            watch_of_secured_launch,  # an add-on: observation
-        )
-
-        watch = watch_of_secured_launch(launch, options)
-    settings = _run_settings(options)._replace(companion=companion, deadline=deadline, watch=watch)
+    deadline = renewal_deadline(launch, utc_now()) if options.restart_expiring else None
+    watch = company.watch(launch)
+    settings = run_settings(options)._replace(companion=company.companion, deadline=deadline, watch=watch)
     status = run(launch, options=settings)
     if watch is not None:
         status = watch.status(status)
@@ -128,7 +139,8 @@ def _check_before_keys_are_made(plan: LaunchPlan, keystore: str) -> None:
         require_rclpy()
 
 
-def _run_settings(options: argparse.Namespace) -> RunSettings:
+def run_settings(options: argparse.Namespace) -> RunSettings:
+    """Return the options of a run."""
     return RunSettings(
         noninteractive=options.noninteractive,
         debug=options.debug,

@@ -7,20 +7,10 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from typing import NamedTuple
 
-from enclave_common.command_line import CommandParser
+from enclave_common.command_line import CommandLine
 from enclave_launch.errors import UsageError
 from enclave_launch.verb.options import DENIALS, LATE, PASSPHRASE, POLICY, SECURITY, names_of
-
-
-class CommandLine(NamedTuple):
-    """A parsed command line. ``options``: every option with its value; ``given``: the names of those that were
-    written."""
-
-    options: argparse.Namespace
-    given: frozenset[str]
-
 
 FOR_SECURE = names_of((*SECURITY, *PASSPHRASE, *LATE, *DENIALS)) - {"secure"} | {"restart_expiring"}
 """Options of a keystore or of secured processes."""
@@ -28,48 +18,7 @@ FOR_SECURE = names_of((*SECURITY, *PASSPHRASE, *LATE, *DENIALS)) - {"secure"} | 
 FOR_PLAN = names_of(POLICY)
 """Options of the plan: an unsecured launch makes none."""
 
-_FOR_LEARN = {"learn_for", "learn_isolation", "learn_parameters"}
 _VIEWS = ("explain", "dump_params", "show_args", "print_description")
-
-
-def read_command_line(parser: CommandParser, argv: Sequence[str] | None) -> CommandLine:
-    """Parse as ``parse_intermixed_args`` does, separating given values from defaults."""
-    defaults = {action.dest: action.default for action in parser.arguments}
-    for action in parser.arguments:
-        action.default = argparse.SUPPRESS
-    given = vars(parser.parse_intermixed_args(argv))
-    known = {name: value for name, value in defaults.items() if value is not argparse.SUPPRESS}
-    return CommandLine(argparse.Namespace(**{**known, **given}), frozenset(given))
-
-
-def check_options(line: CommandLine, actions: Sequence[argparse.Action]) -> None:
-    """Refuse options without effect: ``UsageError`` names the flag that is missing."""
-    given, options = line.given, line.options
-    is_view = check_views(line, actions)
-    if options.learn is None:
-        check_needs_secure(actions, given & _FOR_LEARN, "--learn")
-    elif is_view:
-        raise UsageError("--learn runs the launch; nothing else is looked at")
-    if not options.audit:
-        check_needs_secure(actions, given & {"audit_report"}, "--audit")
-    elif options.secure or options.learn is not None or is_view:
-        raise UsageError(
-            "--audit runs the launch unsecured and reports what --secure would refuse: give it alone"
-        )
-    if not options.watch:
-        check_needs_secure(actions, given & {"watch_report", "watch_accept"}, "--watch")
-    elif is_view or options.audit or options.learn is not None:
-        raise UsageError(
-            "--watch is for a launch that runs as planned: it is not for --dry-run, --audit or --learn"
-        )
-    if options.provision_only and (is_view or options.learn is not None or options.watch):
-        raise UsageError(
-            "--provision-only writes the keystore and starts nothing: give it with --secure alone"
-        )
-    if not options.secure:
-        check_needs_secure(actions, given & FOR_SECURE)
-        if not (is_view or options.audit or options.watch):
-            check_needs_secure(actions, given & FOR_PLAN, "--secure (or --dry-run, --audit, --watch)")
 
 
 def check_views(line: CommandLine, actions: Sequence[argparse.Action]) -> bool:

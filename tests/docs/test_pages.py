@@ -27,22 +27,21 @@ SHOWN = [page for page in (*HOW_TO, *OTHERS) if any(isinstance(part, Command) fo
 WITH_NODES = ("asyncio", "learn-from-a-run", "observe-a-running-system", "sros2-keystore", "watch-for-drift")
 """Their commands start nodes, or look at nodes that run: each has its test below."""
 ELSEWHERE = {
-    "docker compose -f compose/compose.yaml up": "deployment/test_podman.py",
-    "kubectl apply -f k8s/": "deployment/test_podman.py",
+    "docker compose -f compose/compose.yaml up": "addons/deployment/test_podman.py",
+    "kubectl apply -f k8s/": "addons/deployment/test_podman.py",
     "echo 'pkcs11:": "keystore/test_pkcs11.py",
-    "ros2 launch ": "ros2/test_ros2_launch.py",
-    "secure-keystore create ks --external-identity-ca ": "deployment/test_recipes.py",
+    "ros2 launch ": "addons/ros2/test_ros2_launch.py",
+    "secure-keystore create ks --external-identity-ca ": "addons/deployment/test_recipes.py",
     "secure-keystore create ks --identity-ca ": "keystore/test_pkcs11.py",
-    "secure-keystore import /etc/ros/keystore ": "deployment/test_booted.py",
-    "secure-keystore request host-ks ": "deployment/test_recipes.py",
-    "secure-keystore sign ks ": "deployment/test_recipes.py",
-    "secure-keystore units ": "deployment/test_booted.py",
-    "secure-launch --learn nodl robot ": "recording/test_learning.py",
+    "secure-keystore import /etc/ros/keystore ": "addons/deployment/test_booted.py",
+    "secure-keystore request host-ks ": "addons/deployment/test_recipes.py",
+    "secure-keystore sign ks ": "addons/deployment/test_recipes.py",
+    "secure-keystore units ": "addons/deployment/test_booted.py",
+    "secure-launch --learn nodl robot ": "addons/recording/test_learning.py",
     "secure-launch --secure --keystore ks ": "dds/test_secure_launch.py",
-    "RMW_IMPLEMENTATION=rmw_zenoh_cpp ": "zenoh/test_secure_launch.py",
-    "RUST_LOG=zenoh": "zenoh/test_denials.py",
-    "ZENOH_ROUTER_CONFIG_URI=": "zenoh/test_router_process.py",
-    "ZENOH_SESSION_CONFIG_URI=": "zenoh/test_planned_traffic.py",
+    "RMW_IMPLEMENTATION=rmw_zenoh_cpp ": "addons/zenoh/test_secure_launch.py",
+    "ZENOH_ROUTER_CONFIG_URI=": "addons/zenoh/test_router_process.py",
+    "ZENOH_SESSION_CONFIG_URI=": "addons/zenoh/test_planned_traffic.py",
 }
 """How commands begin that need what a page cannot have (ROS 2, root, another CA): the test that does the same."""
 DEMO = ROOT / "fixtures" / "demo_ws"

@@ -125,3 +125,20 @@ def test_colcon_build(clone: Path, tools: Path, tmp_path: Path, option: list[str
         reads_cpp=False,
         more={"PATH": path, "PYTHONPATH": modules},
     )
+
+
+def test_the_core_without_its_add_ons(clone: Path, tmp_path: Path) -> None:
+    """A wheel without ``enclave_addons`` plans, provisions and verifies. The verb of an add-on says what is absent."""
+    core = tmp_path / "core"
+    shutil.copytree(clone, core)
+    shutil.rmtree(core / "enclave_addons")
+    do("python3", "-m", "venv", str(tmp_path / "venv"), cwd=tmp_path)
+    do(str(tmp_path / "venv" / "bin" / "pip"), "install", "-q", ".", cwd=core)
+    commands = tmp_path / "venv" / "bin"
+    demo = ("--prefix", str(DEMO), "demo_nodes", "talker_listener.launch.xml")
+    assert "publish: /chatter" in do(str(commands / "secure-launch"), "--dry-run", *demo, cwd=tmp_path)
+    secured = ("--secure", "--keystore", "ks", "--provision-only", *demo)
+    assert "keystore ks created" in do(str(commands / "secure-launch"), *secured, cwd=tmp_path)
+    assert "0 findings: good" in do(str(commands / "secure-keystore"), "verify", "ks", cwd=tmp_path)
+    absent = do(str(commands / "secure-nodl"), "infer", ".", cwd=tmp_path, status=1)
+    assert "enclave_addons is not part of this installation" in absent

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 from enclave_addons.recording.record.assembly import Record
 from enclave_addons.recording.record.lines import RecordedRun
-from enclave_addons.recording.record.origins import FIXED, MARKER, Name, NameOrigin, Observation, origins_of
+from enclave_addons.recording.record.origins import FIXED, Name, NameOrigin, Observation, origins_of
 from enclave_addons.recording.record.requested import RequestedEndpoint, RequestedNode, all_requested
 from nodl.names import split_fqn
 from nodl.node_interface import ClientLibrary, EndpointKind
@@ -24,7 +24,7 @@ _TF_LISTENER = "transform_listener_impl_*"
 """The node that tf2_ros makes for a ``TransformListener`` that was given none; our section has a word for it."""
 _RANDOM = re.compile(r"(static_transform_publisher)_([A-Za-z0-9]+)\Z")  # tf2_ros, when it is given no name
 
-_UNTIL_DECIDED = "all are granted until a run with another value decides (--learn-parameters)"
+_UNTIL_DECIDED = "all are granted until a run with another value decides"
 
 OBSERVED = "observed"
 """What ``RequestedNode.started_as`` is for a node of the graph, which says nothing of states."""
@@ -202,8 +202,6 @@ def _entries(seen: Sequence[_Seen]) -> Iterable[LearntEndpoint]:
     origins = origins_of(observations)
     done: set[object] = set()
     for name, origin in origins.items():
-        if MARKER in name.name:
-            continue  # what followed it was seen under its usual name too
         key = (name.kind, name.type, origin.source) if origin.source else name
         if key in done:
             continue

@@ -26,9 +26,6 @@ _SEPARATORS = "/_"
 _MOST_COMBINATIONS = 32  # of parameters in one name; real ones have two or three
 _PREFERRED = re.compile(r"(topic|topic_name)\Z")
 
-MARKER = "enclave_launch_marker_"
-"""Values that a run for learning gives in place of a user's begin so; none is a name that a manifest may have."""
-
 Inputs = Mapping[str, object]
 """Parameters by name; of the command line words as ``<1>``, ``<2>`` and the values of options by their names."""
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import shutil
 import signal
 import subprocess
 import sys
@@ -122,14 +121,21 @@ def test_a_parameter_that_only_the_program_knows_is_known_with_its_default(learn
 
 def test_a_second_run_proves_a_parameter_that_only_the_program_knows(tmp_path: Path) -> None:
     file = tmp_path / "one.launch.xml"
-    file.write_text('<launch><node pkg="rclpy_nodes" exec="listener"/></launch>')
-    ran = secure_launch(
-        *("--learn", str(tmp_path / "learnt"), "--learn-for", "2s", "--learn-isolation", "local"),
-        *("--learn-parameters", str(file)),
-        variables=environment("jazzy", tmp_path),
-    )
-    assert ran.returncode == 0, ran.stdout + ran.stderr
-    assert "marker values for listener: input_topic\n" in ran.stderr
+    for inside in ("", '<param name="input_topic" value="murmur"/>'):
+        file.write_text(f'<launch><node pkg="rclpy_nodes" exec="listener">{inside}</node></launch>')
+        ran = secure_launch(
+            *(
+                "--learn",
+                str(tmp_path / "learnt"),
+                "--learn-for",
+                "2s",
+                "--learn-isolation",
+                "local",
+                str(file),
+            ),
+            variables=environment("jazzy", tmp_path),
+        )
+        assert ran.returncode == 0, ran.stdout + ran.stderr
     text = (tmp_path / "learnt" / "rclpy_nodes__listener.nodl.yaml").read_text()
     assert "parameter: input_topic\n      default: chatter\n      proof: another value was followed" in text
 
@@ -223,22 +229,6 @@ def test_after_one_run_another_launch_has_all_it_needs_and_what_is_beyond_is_tol
             assert names <= graph[node][kind], node
             for beyond in graph[node][kind] - names:
                 assert beyond.rpartition("/")[2] in told, (node, beyond)
-
-
-def test_with_marker_values_the_plan_of_another_launch_is_its_live_graph(
-    learnt: Learnt, live_graph: Graph, tmp_path: Path
-) -> None:
-    folder = tmp_path / "learnt"
-    shutil.copytree(learnt.folder, folder)
-    ran = secure_launch(
-        *("--learn", str(folder), "--learn-for", "3s", "--learn-isolation", "local", "--learn-parameters"),
-        *("rclpy_nodes", "learn.launch.xml"),
-        variables=environment(learnt.release, tmp_path),
-    )
-    assert ran.returncode == 0, ran.stdout + ran.stderr
-    plan = resolved("other.launch.xml", learnt.release, folder)
-    assert graph_of(plan) == live_graph
-    assert all(each.code is not Code.RECORD_UNDECIDED for each in plan.warnings)
 
 
 @pytest.mark.dds

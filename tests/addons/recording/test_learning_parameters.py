@@ -1,10 +1,8 @@
-"""--learn-parameters: a second run with marker values decides where names come from."""
+"""A second run with other values decides where names come from."""
 
 from __future__ import annotations
 
 from pathlib import Path
-
-import pytest
 
 from enclave_launch import LaunchPlan, ResolveOptions, resolve
 from enclave_launch.diagnostics import Code
@@ -24,14 +22,12 @@ def learn(folder: Path, stand_in: Path, program: Program, *arguments: str) -> di
     ran = workspace.run("--learn", str(folder / "learnt"), *LEARN, *arguments)
     assert ran.returncode == 0, ran.stdout + ran.stderr
     (file,) = (folder / "learnt").glob(f"{PACKAGE}__{program.name}*.nodl.yaml")
-    assert "enclave_launch_marker" not in file.read_text()
     (node,) = read_document(file)
     return {endpoint.kind.value: endpoint.name for endpoint in node.interface.endpoints}
 
 
-@pytest.mark.parametrize("again", [False, True])
 def test_a_word_of_the_command_line_beside_a_fixed_name_of_the_same_value(
-    again: bool, stand_in: Path, tmp_path: Path
+    stand_in: Path, tmp_path: Path
 ) -> None:
     """Matching takes both for the argument; the second run sees that one of them stays."""
     program = Program(
@@ -39,9 +35,11 @@ def test_a_word_of_the_command_line_beside_a_fixed_name_of_the_same_value(
         "node relay\nsubscription %1 std_msgs/msg/String\npublisher scan std_msgs/msg/Bool\nwait\n",
         attributes='args="scan"',
     )
-    names = learn(tmp_path, stand_in, program, *(["--learn-parameters"] if again else []))
-    assert names["subscription"].parts == (ParameterPart("<1>"),)
-    assert names["publisher"].parts == (("scan",) if again else (ParameterPart("<1>"),))
+    first = learn(tmp_path, stand_in, program)
+    assert first["subscription"].parts == first["publisher"].parts == (ParameterPart("<1>"),)
+    again = learn(tmp_path, stand_in, program._replace(attributes='args="front"'))
+    assert again["subscription"].parts == (ParameterPart("<1>"),)
+    assert again["publisher"].parts == ("scan",)
 
 
 def test_a_parameter_that_only_looks_like_the_source_is_ruled_out(stand_in: Path, tmp_path: Path) -> None:
@@ -50,8 +48,8 @@ def test_a_parameter_that_only_looks_like_the_source_is_ruled_out(stand_in: Path
         "node fixed\npublisher map nav_msgs/msg/OccupancyGrid\nwait\n",
         inside='<param name="world" value="map"/>',
     )
-    assert learn(tmp_path / "a", stand_in, program)["publisher"].parts == (ParameterPart("world"),)
-    decided = learn(tmp_path / "b", stand_in, program, "--learn-parameters")
+    assert learn(tmp_path, stand_in, program)["publisher"].parts == (ParameterPart("world"),)
+    decided = learn(tmp_path, stand_in, program._replace(inside='<param name="world" value="hall"/>'))
     assert decided["publisher"].parts == ("map",)
 
 
@@ -151,7 +149,7 @@ def test_two_words_of_one_value_are_told_apart(stand_in: Path, tmp_path: Path) -
     )
     first = learn(tmp_path, stand_in, program)
     assert first["subscription"].parts == first["publisher"].parts == ("scan",), "undecided"
-    names = learn(tmp_path, stand_in, program, "--learn-parameters")
+    names = learn(tmp_path, stand_in, program._replace(attributes='args="front rear"'))
     assert names["subscription"].parts == (ParameterPart("<1>"),)
     assert names["publisher"].parts == (ParameterPart("<2>"),)
 
@@ -180,7 +178,7 @@ def test_a_folder_that_cannot_be_written_is_told_before_anything_runs(stand_in: 
 
 
 def test_the_value_of_an_option_is_an_input_as_a_parameter_is(stand_in: Path, tmp_path: Path) -> None:
-    """The second run gives the option a marker, and the name follows."""
+    """The second run gives the option another value, and the name follows."""
     program = Program(
         "relay",
         "node relay\nsubscription %2 std_msgs/msg/String\nwait\n",
@@ -188,7 +186,7 @@ def test_the_value_of_an_option_is_an_input_as_a_parameter_is(stand_in: Path, tm
     )
     names = learn(tmp_path, stand_in, program)
     assert names["subscription"].parts == (ParameterPart("--topic"),)
-    learn(tmp_path, stand_in, program, "--learn-parameters")
+    learn(tmp_path, stand_in, program._replace(attributes='args="--topic side"'))
     (file,) = (tmp_path / "learnt").glob("*.nodl.yaml")
     assert "proof: another value was followed" in file.read_text()
     other = program._replace(attributes='args="--topic front"')
@@ -207,6 +205,6 @@ def test_two_values_within_one_name_are_found_and_a_number_stays_a_number(
     )
     first = learn(tmp_path, stand_in, program)
     assert first["publisher"].parts == ("robot_1/status",) and first["subscription"].parts == ("fleet/alpha",)
-    names = learn(tmp_path, stand_in, program, "--learn-parameters")
+    names = learn(tmp_path, stand_in, program._replace(attributes='args="beta 2"'))
     assert names["publisher"].parts == ("robot_", ParameterPart("<2>"), "/status")
     assert names["subscription"].parts == ("fleet/", ParameterPart("<1>"))

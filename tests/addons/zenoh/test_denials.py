@@ -176,22 +176,6 @@ def test_a_name_of_before_and_rules_of_before_are_told_as_such(tmp_path: Path) -
         assert "no enclave that is on Zenoh here has this name" in nobody.why
 
 
-def test_the_verb_reads_files_and_tells_by_its_exit_status(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    keystore, log = filled(tmp_path / "ks", ("/a",)), tmp_path / "router.log"
-    main(["zenoh", str(keystore)])
-    log.write_text(ZENOHD)
-    capsys.readouterr()
-    assert main(["denials", str(keystore), str(log)]) == 1
-    assert "refused: enclave /a may not publish /secret" in capsys.readouterr().out
-    assert main(["denials", str(keystore), str(log), "--format", "json"]) == 1
-    assert json.loads(capsys.readouterr().out)["denials"][0]["who"] == "enclave /a"
-    log.write_text(ZENOHD.replace("unauthorized", "authorized"))
-    assert main(["denials", str(keystore), str(log)]) == 0
-    assert main(["denials", str(keystore), str(tmp_path / "missing.log")]) == 2
-
-
 HANDSHAKES = {
     "certificate expired: verification time 1795327740 (UNIX), but certificate is not valid after 17953": "has expired",
     "UnknownIssuer": "another CA",
