@@ -316,8 +316,10 @@ AS_UPSTREAM_HAS_IT = {  # launch, launch_ros and the NoDL v1 API name both so, a
 }  # fmt: skip
 # dry_run.py: their JSON
 AS_THE_PLAN_HAS_IT = {"Diagnostic", "LauncherCall", "Node", "Reaction", "Respawn"}
-# of Python in enclave_addons/inference/, of C++ in enclave_addons/inference/cpp/
-IN_BOTH_KINDS_OF_INFERENCE = {"Call", "Frame", "Text", "Unknown"}
+# of Python in enclave_addons/inference/kernel/ and python/, of C++ in enclave_addons/inference/cpp/
+IN_BOTH_KINDS_OF_INFERENCE = {
+    "Bound", "Call", "Class", "Frame", "Function", "Machine", "Obj", "StepLimitExceeded", "Text", "Unknown",
+}  # fmt: skip
 
 
 def test_a_public_class_has_its_name_alone() -> None:

@@ -15,7 +15,7 @@ import re
 from collections.abc import Iterable, Iterator, Sequence
 
 from enclave_addons.inference.answers.python import CachedAnswer
-from enclave_addons.inference.program import Program, ProgramTarget
+from enclave_addons.inference.python.program import Program, ProgramTarget
 from enclave_addons.inference.start import (
     NO_LAUNCH,
     InferredProgram,
@@ -74,9 +74,7 @@ def _inferred(
         cached = CachedAnswer(program, (path, key.package, key.executable, target, said))
         answer: InferredProgram | None = cached.find()
         if answer is None:
-            from enclave_addons.inference.analysis import (
-                infer_program,  # the whole analysis of Python comes with it
-            )
+            from enclave_addons.inference.python.analysis import infer_program  # the whole analysis of Python
 
             answer = infer_program(program, target, path, key, launch, lost)
             cached.store(answer)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 from enclave_addons.inference.cpp.entry import Answer
 from enclave_addons.inference.packages import read_package
-from enclave_addons.inference.program import Program, ProgramTarget
+from enclave_addons.inference.python.program import Program, ProgramTarget
 from enclave_common.files import read_text
 
 if TYPE_CHECKING:

@@ -9,15 +9,16 @@ from functools import partial
 from pathlib import Path
 from typing import NamedTuple, TypeVar
 
-from enclave_addons.inference.analysis import analyse_rest, failure, start, without_collector
 from enclave_addons.inference.answers.python import CachedAnswer
-from enclave_addons.inference.interpreter.run import Run
-from enclave_addons.inference.net import may_make_interfaces, unsettled_places
+from enclave_addons.inference.kernel.findings import Gaps
+from enclave_addons.inference.kernel.results import interfaces_of
 from enclave_addons.inference.packages import EntryPoint, Package, find_package, scripts_of
-from enclave_addons.inference.program import Program
-from enclave_addons.inference.results import interfaces_of
+from enclave_addons.inference.python.analysis import analyse_rest, failure, start, without_collector
+from enclave_addons.inference.python.check import may_make_interfaces, unsettled_places
+from enclave_addons.inference.python.program import Program
+from enclave_addons.inference.python.run import Run
 from enclave_addons.inference.start import LaunchKey
-from nodl.node_interface import Gap, NodeInterface
+from nodl.node_interface import ClientLibrary, Gap, NodeInterface
 from nodl.source_ref import SourceRef
 
 Found = TypeVar("Found")
@@ -77,20 +78,20 @@ def _analysed(
     runs: list[tuple[Run, LaunchKey]] = []
     for each in starts:
         runs.extend(_attempted(partial(_runs, program, each), each.file, failed))
-    called = {node for run, _ in runs for node in run.called}
-    instantiated = {node for run, _ in runs for node in run.instantiated}
+    entered = {node for run, _ in runs for node in run.entered}
     for run, _ in runs:
-        analyse_rest(run, called, instantiated)
-    everywhere = {node for run, _ in runs for node in run.entries}
-    instantiated.update(node for run, _ in runs for node in run.instantiated)
-    unsettled: list[Gap] = []
+        analyse_rest(run, entered)
+    entered.update(node for run, _ in runs for node in run.entered)
     nodes: list[NodeInterface] = []
+    gaps = Gaps()
     for run, origin in runs:
-        nodes.extend(_attempted(partial(interfaces_of, run.findings, origin), run.main.path, failed))
-        settle = partial(unsettled_places, run, everywhere, instantiated)
-        unsettled.extend(_attempted(settle, run.main.path, failed))
-    gaps = [Gap(source, why) for run, _ in runs for source, why in run.findings.gaps]
-    return nodes, [*gaps, *unsettled]
+        found = _attempted(
+            partial(interfaces_of, run.findings, origin, ClientLibrary.RCLPY), run.main.path, failed
+        )
+        nodes.extend(found)
+        run.findings.gaps.include(_attempted(partial(unsettled_places, run, entered), run.main.path, failed))
+        gaps.include(run.findings.gaps.listed())
+    return nodes, gaps.listed(whole=False)
 
 
 def _attempted(analyse: Callable[[], Iterable[Found]], file: str, failed: list[Gap]) -> list[Found]:

@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import json
-import os
 import tempfile
-import zlib
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
-from unittest.mock import patch
 
 import yaml
 
@@ -46,7 +43,6 @@ from nodl.document.v2 import parse_v2
 from nodl.errors import InvalidNoDLError
 from nodl.remap import InvalidRemapRuleError, parse_rule
 from nodl.ros_arguments import parse_ros_arguments
-from tests.addons.inference.random_programs import random_program, silently_missing
 from tests.addons.observation.graph.made import one_node
 from tests.addons.observation.graph.test_discovery_info import encoded
 
@@ -93,14 +89,6 @@ def template(data: str) -> None:
 
 def words(*listed: str) -> tuple[bytes, ...]:
     return tuple(word.encode() for word in listed)
-
-
-def random_python(data: bytes) -> None:
-    """Run and infer the program whose seed these bytes are."""
-    seed = zlib.crc32(data)
-    with tempfile.TemporaryDirectory() as folder, patch.dict(os.environ, {"XDG_CACHE_HOME": folder}):
-        missing = silently_missing(seed, Path(folder))
-    assert not missing, f"{missing} of this program:\n{random_program(seed)}"
 
 
 def observed_document() -> dict[str, object]:
@@ -330,7 +318,6 @@ def targets() -> dict[str, Target]:
             (json.dumps(observed_document()).encode(),),
             words("[", "]", "{", "}", "null", "true", '"', "1e999", ","),
         ),
-        "inference-python": Target(random_python, (), (b"0",), words("1", "2", "3")),
         "domains": Target(text(Domains.parse), refused, (b"0-10,42", b"all"), words("-", ",", "9")),
         "enclave-name": Target(
             text(validate_enclave_name), refused, (b"/a/b",), words("/", "..", "//", "\n")

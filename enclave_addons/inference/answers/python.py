@@ -11,26 +11,21 @@ from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import nodl
 from enclave_addons.inference.answers.codec import keep_variant, variants
 from enclave_addons.inference.answers.folder import CacheFolder, digest, digest_of
 
 if TYPE_CHECKING:
-    from enclave_addons.inference.program import Program
+    from enclave_addons.inference.python.program import Program
 
 VARIANTS = 32
 """Number of answers cached for one question, under different launches or after different edits; the newest stay."""
 
 
-_OWN_SOURCES = (
-    "*.py", "dependence/*.py", "document/*.py", "infer/*.py", "infer/answers/*.py", "infer/interpreter/*.py",
-    "infer/models/*.py", "infer/cpp/*.py", "infer/cpp/reading/*.py",
-)  # fmt: skip
-
-
 def own_sources() -> list[Path]:
     """Return the files of our own code that answers depend on."""
-    root = Path(__file__).parents[2]
-    return sorted(path for pattern in _OWN_SOURCES for path in root.glob(pattern))
+    inference, nodl_package = Path(__file__).parents[1], Path(nodl.__file__).parent
+    return sorted(path for folder in (inference, nodl_package) for path in folder.rglob("*.py"))
 
 
 @lru_cache(maxsize=1)

@@ -9,7 +9,7 @@ from enclave_addons.inference.cpp.entry import FixedMapping
 from enclave_addons.inference.cpp.findings import AllocatedNode, Condition, PossibleEndpoint
 from enclave_addons.inference.cpp.program import ProgramFindings
 from enclave_addons.inference.cpp.running.values import NodeNamePart, Text, Value, concatenated, plain
-from enclave_addons.inference.results import UNDECIDED, certainty_of, own_name
+from enclave_addons.inference.kernel.results import UNDECIDED, certainty_of, own_name
 from enclave_addons.inference.start import Start
 from nodl.dependence import Dependence, Variation, When
 from nodl.name_template import NameTemplate, ParameterPart, Part, UnknownPart, melted

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
-from enclave_addons.inference.results import UNDECIDED
+from enclave_addons.inference.kernel.results import UNDECIDED
 from enclave_addons.inference.system import InferredSystem
 from enclave_common.terminal import json_text, printable
 from nodl.name_template import NameTemplate, UnknownPart

@@ -10,9 +10,10 @@ from typing import Any
 
 import pytest
 
-from enclave_addons.inference import analysis, infer_executable, infer_paths, packages
+from enclave_addons.inference import infer_executable, infer_paths, packages
 from enclave_addons.inference.answers.python import own_sources
-from enclave_addons.inference.program import Program, ProgramTarget
+from enclave_addons.inference.python import analysis
+from enclave_addons.inference.python.program import Program, ProgramTarget
 
 PROGRAM = """\
 #!/usr/bin/python3
@@ -114,8 +115,9 @@ def test_what_was_changed_back_is_known_again(prefix: Path, analyses: list[str])
 
 def test_an_answer_ends_with_any_change_of_our_own_code() -> None:
     script = (
-        "import sys, enclave_addons.inference.analysis\n"
-        "print(*(m.__file__ for n, m in sys.modules.items() if n.startswith('nodl.')), sep='\\n')"
+        "import sys, enclave_addons.inference.python.analysis\n"
+        "print(*(m.__file__ for n, m in sys.modules.items() if n.startswith(('nodl.', 'enclave_addons.inference.'))),"
+        " sep='\\n')"
     )
     loaded = subprocess.run(
         [sys.executable, "-c", script], capture_output=True, text=True, check=True

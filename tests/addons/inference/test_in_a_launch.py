@@ -329,11 +329,6 @@ def test_options_of_the_command_line_decide_which_interfaces_there_are(
     assert names & {"/raw", "/status", "/fast"} == published
 
 
-def test_a_flag_that_another_spelling_may_give_is_open(launch: Launch, prefix: Path) -> None:
-    install_program(prefix, PYTHON + OPTIONS, "flags")
-    assert launch('<launch><node pkg="demo" exec="flags" args="-r"/></launch>').problems
-
-
 DECIDED = """
 import rclpy
 from rclpy.node import Node
@@ -570,16 +565,6 @@ def test_members_by_name_and_number_options_as_keywords_and_parts_of_paths_are_d
     assert own - {"/rosout", "/parameter_events"} == published
 
 
-def test_members_that_compare_as_their_class_says_decide_nothing(launch: Launch, prefix: Path) -> None:
-    class_of = (
-        "None\nclass Kind(enum.IntEnum):\n    GRID = 0\n    GRAPH = 1\n"
-        "    def __gt__(self, other): return True"
-    )
-    install_program(prefix, PYTHON + MEMBERS.format(kind=class_of), "members")
-    plan = launch('<launch><node pkg="demo" exec="members"/></launch>')
-    assert ("publish", "/edges") in permissions(plan)
-
-
 NUMBERS = """
 import argparse
 import os
@@ -749,16 +734,6 @@ def test_words_that_are_not_only_the_launchs_are_gaps(
 ) -> None:
     install_program(prefix, PYTHON + LISTS.format(parser=parser, read=read), "lists")
     assert launch('<launch><node pkg="demo" exec="lists" args="@file"/></launch>').problems
-
-
-def test_argparse_that_is_given_the_words_of_ros_takes_them(launch: Launch, prefix: Path) -> None:
-    """``-r`` of the launch's remap rule is short for the program's own ``--rear`` where that is declared with it."""
-    program = LISTS.format(parser="", read="parse_known_args()").replace('"--rear"', '"-r", "--rear"')
-    install_program(prefix, PYTHON + program, "lists")
-    plan = launch('<launch><node pkg="demo" exec="lists" name="own"/></launch>')
-    own = {name for operation, name in permissions(plan) if operation == "publish"}
-    assert "/front" not in own
-    assert any("__node:=own" in str(problem) for problem in plan.problems)
 
 
 CONFIGURED = """

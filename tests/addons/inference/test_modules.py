@@ -8,7 +8,7 @@ import pytest
 
 from enclave_addons.inference import infer_paths
 from tests.addons.inference.recorder import record
-from tests.addons.inference.test_deceptions import claim
+from tests.addons.inference.truth import claim
 
 _MAIN = """\
 import rclpy

@@ -136,12 +136,6 @@ def test_a_parameter_decides_in_a_comprehension(tmp_path: Path) -> None:
     assert _names(node, {"right": True}) == {"right"}
 
 
-def test_which_entry_of_a_table_a_parameter_chooses_is_a_gap_until_a_launch_says(tmp_path: Path) -> None:
-    table = "drivers = {'usb': Usb, 'serial': Serial}\nd = p('driver', 'usb')\n"
-    node = _inferred(tmp_path, DRIVERS + table + "driver = drivers[d]()\ndriver.start(self)")
-    assert node.gaps
-
-
 def test_an_object_that_is_made_at_several_places_is_there_if_one_of_them_made_it(tmp_path: Path) -> None:
     loop = "driver = None\nfor each in ('a', 'b'):\n    wanted = p(each, False)\n    if wanted:\n        driver = Usb()"
     node = _inferred(tmp_path, DRIVERS + loop + "\nif driver:\n    driver.start(self)")

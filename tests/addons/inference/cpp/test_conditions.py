@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from enclave_addons.inference import InferredSystem, infer_paths
+from enclave_addons.inference.kernel.results import UNDECIDED as UNDECIDED_NOTE
 from enclave_addons.inference.report.written import expand, to_json, to_text
-from enclave_addons.inference.results import UNDECIDED as UNDECIDED_NOTE
 from nodl.node_interface import Certainty
 from tests.addons.inference.cpp.workspace import gaps, in_class, infer
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from enclave_addons.inference import InferredSystem, infer_paths
-from enclave_addons.inference.results import UNDECIDED
+from enclave_addons.inference.kernel.results import UNDECIDED
 from nodl.names import InvalidNameError, expand_name
 from nodl.node_interface import Certainty
 from tests.addons.inference.cpp.random_programs.generator import HEAD, TYPES, Program

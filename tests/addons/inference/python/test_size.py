@@ -1,0 +1,17 @@
+"""Inference of Python stays as small as it is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from enclave_addons import inference
+
+LINES = {"kernel": 1_300, "python": 5_300, "models": 300}
+
+
+@pytest.mark.parametrize("room", LINES)
+def test_a_room_of_inference_does_not_grow(room: str) -> None:
+    files = (Path(inference.__file__).parent / room).glob("*.py")
+    assert sum(len(file.read_text().splitlines()) for file in files) <= LINES[room]
