@@ -7,6 +7,7 @@
     ├── UnsafeKeystoreError          the owner of the files: links, owners or modes that let others in
     ├── DamagedKeystoreError         the operator: a file is missing, unreadable or not what it should be
     ├── NotInstalledError            the installer: an add-on is not part of this installation
+    ├── WrongClockError              the operator: the clock of this machine cannot be right
     ├── SigningUnavailableError      the holder of the CA key: no key here, no passphrase, a token that refuses
     ├── KeystoreBusyError            another run holds the lock
     └── StorageError                 the system: disk full, read-only, no permission
@@ -64,6 +65,10 @@ class DamagedKeystoreError(KeystoreError):
 
 class OtherFormError(DamagedKeystoreError):
     """A signed document is not in the form that is written here, so DDS implementations may read something else."""
+
+
+class WrongClockError(KeystoreError):
+    """The clock of this machine cannot be right."""
 
 
 class NotInstalledError(KeystoreError):

@@ -27,6 +27,7 @@ from keystore.errors import (
     storage_errors,
 )
 from keystore.formats.certificate import CertificateFacts, read_certificate, read_certificates
+from keystore.formats.clock import refuse_clock_before
 from keystore.formats.enclave_name import validate_enclave_name
 from keystore.formats.role import Role
 from keystore.formats.subject import SubjectScheme
@@ -117,11 +118,16 @@ class KeystoreView:
             bundles[role] = [*coming, *present]
         return bundles
 
+    def refuse_clock(self, now: datetime) -> None:
+        """Raise WrongClockError if ``now`` is before a CA of this keystore begins."""
+        refuse_clock_before(now, (self.ca(role) for role in Role))
+
     def refuse_ended(self, now: datetime, *roles: Role) -> None:
         """Raise DamagedKeystoreError if one of these CAs is not valid now, so that what it signs would not be."""
+        self.refuse_clock(now)
         if not all(self.ca(role).validity.covers(now) for role in roles):
             raise DamagedKeystoreError(
-                "a CA of this keystore is expired, or not yet valid (is the clock right?); to replace it: "
+                "a CA of this keystore is expired; to replace it: "
                 f"secure-keystore renew {shlex.quote(str(self.root))} --ca start"
             )
 

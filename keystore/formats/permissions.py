@@ -26,7 +26,7 @@ from keystore.formats.domains import Domains
 from keystore.formats.permissions_names import DISCOVERY_TOPIC, Topics, add_dds_topics, full_name
 from keystore.formats.permissions_patterns import any_matches, can_meet, covers, has_wildcard
 from keystore.formats.policy import EnclavePolicy, PolicyError, Qualifier
-from keystore.formats.validity import Validity
+from keystore.formats.validity import ZONES, Validity
 
 HEAD = (
     b'<?xml version="1.0" encoding="UTF-8"?>\n'
@@ -199,8 +199,8 @@ def _criteria(tag: str, topics: Topics) -> str:
 @lru_cache(maxsize=64)  # certificates that were made together have the same
 def _dates(validity: Validity) -> str:
     return (
-        f"<validity><not_before>{_utc(validity.not_before)}</not_before>"
-        f"<not_after>{_utc(validity.not_after)}</not_after></validity>\n"
+        f"<validity><not_before>{_utc(validity.not_before - ZONES)}</not_before>"
+        f"<not_after>{_utc(validity.not_after + ZONES)}</not_after></validity>\n"
     )
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import suppress
+from datetime import timedelta
 from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
@@ -19,14 +20,14 @@ from keystore.formats.permissions_patterns import can_meet, covers
 from keystore.formats.policy import Operation, PolicyError, Qualifier, Rule
 from keystore.formats.safe_xml import not_as_written, parse_foreign, parse_own
 from keystore.formats.subject import names_enclave
-from keystore.formats.validity import Validity, parse_time
+from keystore.formats.validity import ZONES, Validity, parse_time
 
 
 def parse_permissions(document: bytes, where: str = "permissions.xml") -> Permissions:
     """Read what ``Permissions.document`` wrote. Raises OtherFormError for any other document."""
     root = parse_own(document, HEAD, where)
     with suppress(InvalidInputError, LookupError, ValueError):
-        found = _read(root[0][0], [])
+        found = _read(root[0][0], [], margin=ZONES)
         if found.document() == document:
             return found
     raise not_as_written(where)
@@ -55,7 +56,7 @@ def read_foreign_permissions(document: bytes, enclave: str, where: str) -> Taken
     ]
     if _text(mine, "default") != "DENY":
         lost.append("default ALLOW: everything that no rule names")
-    found = _read(mine, lost)
+    found = _read(mine, lost, margin=timedelta(0))
     first, allow = found.rules.first, found.rules.allow
     whole = _topic_sets((*first.publish, *allow.publish), (*first.subscribe, *allow.subscribe))
     found = found._replace(rules=found.rules._replace(allow=whole))
@@ -69,8 +70,11 @@ def _is_for(grant: Element, enclave: str) -> bool:
     return names_enclave(_text(grant, "subject_name").strip().removeprefix("CN="), enclave)
 
 
-def _read(grant: Element, lost: list[str]) -> Permissions:
-    """Read a grant into the order that we write: an allow rule before the deny rule, the deny rule, an allow rule."""
+def _read(grant: Element, lost: list[str], margin: timedelta) -> Permissions:
+    """Read a grant into the order that we write: an allow rule before the deny rule, the deny rule, an allow rule.
+
+    The document begins and ends by ``margin`` outside of its certificate's life.
+    """
     rules = [_rule(child, lost) for child in grant if child.tag in ("allow_rule", "deny_rule")]
     domains = next((rule.domains for rule in rules if rule.is_allowed), rules[0].domains)
     denials = [at for at, rule in enumerate(rules) if not rule.is_allowed]
@@ -95,7 +99,8 @@ def _read(grant: Element, lost: list[str]) -> Permissions:
         grant.get("name", ""),
         _text(grant, "subject_name").strip(),
         Validity(
-            parse_time(_text(grant, "validity/not_before")), parse_time(_text(grant, "validity/not_after"))
+            parse_time(_text(grant, "validity/not_before")) + margin,
+            parse_time(_text(grant, "validity/not_after")) - margin,
         ),
         domains,
         DdsRules(first, deny, allow),

@@ -1,8 +1,8 @@
 """From when until when a certificate and its permissions hold: one value for both. Performs no I/O.
 
-The DDS implementations disagree about permissions dates: Cyclone DDS reads UTC, Fast DDS the local time of
-the process, in every release inspected. Hence back-dating by more than 14 hours (the most easterly offset),
-and no promise of an expiry more precise than that on Fast DDS.
+The DDS implementations disagree about the dates of permissions: Cyclone DDS reads UTC, Fast DDS the standard local time
+of the process. Both read those of certificates as UTC. So a permissions document begins before its certificate and ends
+after it, each by ``ZONES``, and the certificate decides in every time zone.
 """
 
 from __future__ import annotations
@@ -16,8 +16,10 @@ from keystore.errors import InvalidInputError, printable
 BACKDATE = timedelta(days=1)
 """As SROS2, for clocks behind ours and Connext 5.3.1; Fast DDS needs at least 14 h."""
 DEFAULT_LIFETIME = timedelta(days=3650)
+ZONES = timedelta(hours=14)
+"""The largest distance of a time zone's standard time from UTC (Pacific/Kiritimati)."""
 # Cyclone DDS counts nanoseconds in 64 bits (until 2262-04-11) and refuses later dates as expired.
-LATEST = datetime(2262, 4, 11, tzinfo=timezone.utc)
+LATEST = datetime(2262, 4, 11, tzinfo=timezone.utc) - ZONES
 
 _UNITS = {"s": "seconds", "m": "minutes", "h": "hours", "d": "days", "w": "weeks"}
 _DURATION = re.compile(r"([0-9]{1,6})([smhdwy])\Z")
@@ -29,7 +31,7 @@ class _Ends(NamedTuple):
 
 
 class Validity(_Ends):
-    """Both ends in UTC, whole seconds (X.509 has no fractions), ``not_after`` capped to 2262-04-11.
+    """Both ends in UTC, whole seconds (X.509 has no fractions), ``not_after`` capped to 2262-04-10.
 
     Raises InvalidInputError when it would end before it begins.
     """

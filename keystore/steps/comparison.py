@@ -85,6 +85,8 @@ def compare(
         return None  # a run was interrupted: of changing a CA, or of giving the CRL to all
     if needs_register(view):
         return None
+    if options.now is None:
+        view.refuse_clock(now)
     register = read_register(root)
     refuse_foreign_authorities(view, register)
     refuse_changed_deployment(view, wanted)
@@ -121,9 +123,10 @@ def differences(
     chosen = with_domains(root, options or ProvisionOptions())._replace(renew_within=timedelta(0))
     view = KeystoreView(root)
     view.require_complete()
+    now = chosen.now or utc_now()
+    view.refuse_clock(now)
     register = read_register(root)
     refuse_foreign_authorities(view, register)
-    now = chosen.now or utc_now()
     wanted = wanted_enclave(root, policy, chosen)
     state = inspect_wanted(view, register, policy.path, wanted, chosen, now)
     reasons = [] if state.is_good else [*state.reasons]

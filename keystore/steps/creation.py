@@ -16,6 +16,7 @@ from keystore.disk.store import Store
 from keystore.disk.view import KeystoreSettings, KeystoreView
 from keystore.errors import DamagedKeystoreError, InvalidInputError, printable
 from keystore.formats.certificate import CertificateFacts, given_certificates, read_der
+from keystore.formats.clock import refuse_clock_before_program
 from keystore.formats.domains import Domains
 from keystore.formats.given_file import read_given
 from keystore.formats.governance import Governance, governance_document, parse_governance
@@ -83,8 +84,10 @@ def create_keystore(keystore: Path | str, options: CreateOptions | None = None) 
     root = resolve_root(keystore)
     KeystoreView(root).refuse_foreign()
     refuse_unusable(chosen)
-    store.create_root(root)
     now = chosen.now or utc_now()
+    if chosen.now is None and not chosen.accept_clock:
+        refuse_clock_before_program(now, printable(root))
+    store.create_root(root)
     with opened_for_change(root, now, chosen) as opened:
         return complete(opened, chosen)
 

@@ -58,7 +58,8 @@ def publish_crl(opened: Store, register: Register, access: CaAccess, now: dateti
         )
     view.refuse_ended(now, Role.IDENTITY)
     issuer = view.authority(Role.IDENTITY, access)
-    end = min(now + CRL_LIFETIME, issuer.validity.not_after)
+    in_force = (one.not_after for one in register.certificates.values() if one.in_force)
+    end = min(max([now + CRL_LIFETIME, *in_force]), issuer.validity.not_after)
     revoked = register.revoked(fingerprint(issuer.facts.der))
     crl = issuer.revocation_list(revoked, now - BACKDATE, end, register.crl_number)
     with opened.batch() as batch:

@@ -29,7 +29,7 @@ from keystore.formats.permissions_document import parse_permissions, taken_away
 from keystore.formats.register import Register
 from keystore.formats.role import Role
 from keystore.formats.subject import names_enclave, subject_name
-from keystore.formats.validity import BACKDATE, Validity
+from keystore.formats.validity import BACKDATE, Validity, iso
 from keystore.signing import smime
 from keystore.signing.certificate_request import public_half, request_key
 from keystore.signing.private_key import spki
@@ -223,8 +223,12 @@ def _certificate_problem(enclave: _Enclave, facts: CertificateFacts | None, matc
         return "the certificate names another subject"
     if not issued_by(facts, enclave.view.ca(Role.IDENTITY)):
         return "the certificate is by another CA"
-    if not facts.validity.covers(enclave.now):
-        return "the certificate is expired or not yet valid"
+    if enclave.now < facts.validity.not_before:
+        return (
+            f"the certificate is not yet valid (from {iso(facts.validity.not_before)}; is the clock right?)"
+        )
+    if enclave.now > facts.validity.not_after:
+        return "the certificate is expired"
     if facts.validity.not_after < enclave.due:
         return "the certificate expires soon"
     if not matches_key:

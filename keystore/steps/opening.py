@@ -16,7 +16,7 @@ from keystore.disk.register_file import needs_register
 from keystore.disk.signed_documents import foreign_document, foreign_governance, own_document
 from keystore.disk.store import Store
 from keystore.disk.view import KeystoreView
-from keystore.errors import DamagedKeystoreError, KeystoreError, OtherFormError, printable
+from keystore.errors import DamagedKeystoreError, KeystoreError, OtherFormError, WrongClockError, printable
 from keystore.formats.certificate import CertificateFacts, given_certificates, read_certificates
 from keystore.formats.governance import governance_document, parse_governance
 from keystore.formats.permissions_document import parse_permissions, read_foreign_permissions
@@ -49,7 +49,7 @@ def opened_for_change(
     """Open as ``store.opened``; a complete keystore without a register gets one made from its contents.
 
     It is written with the first change, so that a change which is refused leaves the keystore as it was.
-    Raises DamagedKeystoreError if the clock cannot be right, unless that is accepted or the caller gave the time.
+    Raises WrongClockError if the clock cannot be right, unless that is accepted or the caller gave the time.
     """
     with store.opened(root, timeout=options.lock_timeout, durable=options.durable) as opened:
         if options.now is None:
@@ -70,10 +70,12 @@ _BACK, _AHEAD = timedelta(days=1), timedelta(days=366)
 def _check_clock(opened: Store, now: datetime, *, accepted: bool) -> None:
     """Refuse a wrong clock: certificates would expire at the wrong time, and revocations could be forgotten."""
     last = opened.register.written
-    if last is None or last - _BACK <= now <= last + _AHEAD:
+    if last is None:
+        return
+    if last - _BACK <= now <= last + _AHEAD:
         return
     if not accepted:
-        raise DamagedKeystoreError(
+        raise WrongClockError(
             f"the clock says {iso(now)}, and the register was written at {iso(last)}: set the clock, or, if it is "
             f"right, accept it with secure-keystore renew {printable(opened.root)} --accept-clock"
         )

@@ -25,11 +25,12 @@ from keystore.disk.signed_documents import governance_domains, governance_in_for
 from keystore.disk.store import Batch, Store
 from keystore.disk.view import KeystoreView, keystore_at
 from keystore.errors import InvalidInputError, KeystoreError, StorageError, printable
+from keystore.formats.clock import refuse_clock_before_program
 from keystore.formats.enclave_name import check_distinct, validate_enclave_name
 from keystore.formats.policy import EnclavePolicy, Operation, Policy, Profile, Qualifier, Rule
 from keystore.formats.role import Role
 from keystore.formats.subject import SubjectScheme
-from keystore.formats.validity import DEFAULT_LIFETIME, Validity, utc_now
+from keystore.formats.validity import DEFAULT_LIFETIME, Validity, iso, utc_now
 from keystore.signing.authority import Authority
 from keystore.steps.comparison import (
     WantedEnclave,
@@ -124,10 +125,29 @@ def bring_about(
 ) -> ProvisionReport:
     """Compare, and reconcile what differs. ``root`` is resolved, the names are valid and in order."""
     now = options.now or utc_now()
+    if options.now is None and not options.accept_clock:
+        refuse_clock_before_program(now, printable(root))
     if (report := compare(root, wanted, options, now)) is None:
         report = reconcile(root, wanted, options, now)
         report = report._replace(warnings=(*report.warnings, *follow(root, options)))
-    return report._replace(warnings=(*report.warnings, *exposures(KeystoreView(root))))
+    view = KeystoreView(root)
+    limited = _limited_by_ca(view, report, options)
+    return report._replace(warnings=(*report.warnings, *limited, *exposures(view)))
+
+
+def _limited_by_ca(view: KeystoreView, report: ProvisionReport, options: ProvisionOptions) -> Iterator[str]:
+    """Report that new certificates end with a CA, before the requested end."""
+    requested = options.requested_end()
+    if requested is None or not any(enclave.actions for enclave in report.enclaves):
+        return
+    for role in Role:
+        end = view.ca(role).validity.not_after
+        if end < requested:
+            yield (
+                f"the {role.label} ends at {iso(end)}, before the requested {iso(requested)}: so do the new "
+                "certificates and permissions"
+            )
+            return
 
 
 def create_enclaves(

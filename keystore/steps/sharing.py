@@ -57,11 +57,13 @@ class EnclaveShare:
         if self.mine is None:
             return others
         before = _own(self.present, self.owner)
-        mine = Share(self.owner, self.mine.domains, merged_profiles(self.mine.profiles), self.mine.types)
+        # The same launch runs in other domains, too: a domain stays until its owner gives the share up.
+        domains = self.mine.domains if before is None else united_domains((before, self.mine))
+        mine = Share(self.owner, domains, merged_profiles(self.mine.profiles), self.mine.types)
         if before is not None and _loses(before, mine) and self._is_in_use(others):
             profiles = merged_profiles((*before.profiles, *mine.profiles))
             types = tuple(sorted({**dict(before.types), **dict(mine.types)}.items()))
-            mine = Share(self.owner, united_domains((before, mine)), profiles, types)
+            mine = Share(self.owner, domains, profiles, types)
         return tuple(sorted((*others, mine)))
 
     def _is_in_use(self, others: Iterable[Share]) -> bool:
@@ -94,7 +96,7 @@ def _own(shares: Iterable[Share], owner: str) -> Share | None:
 
 
 def _loses(before: Share, mine: Share) -> bool:
-    return not is_part_of(before.profiles, mine.profiles) or united_domains((before, mine)) != mine.domains
+    return not is_part_of(before.profiles, mine.profiles)
 
 
 def shares_in_use(shares: Iterable[EnclaveShare]) -> list[str]:

@@ -64,7 +64,6 @@ def run(arguments: argparse.Namespace) -> int:
         names={role: given[f"{role.value}_name"] for role in Role if given[f"{role.value}_name"]},
         imported=imported,
         encrypt_ca_keys=arguments.encrypt_ca_keys,
-        now=now,
         **common.change(arguments),
     )
     report = create_keystore(arguments.keystore, options)

@@ -14,7 +14,7 @@ from keystore.disk.crl_file import crls_in
 from keystore.disk.deployed import find_differences
 from keystore.disk.versions import imported_at
 from keystore.disk.view import KeystoreView, keystore_at
-from keystore.errors import KeystoreError, NotInstalledError, storage_errors
+from keystore.errors import KeystoreError, NotInstalledError, WrongClockError, storage_errors
 from keystore.formats.governance import Governance
 from keystore.formats.register import Register
 from keystore.formats.validity import utc_now
@@ -83,6 +83,13 @@ def _register_file(view: KeystoreView) -> bytes | None:
 def _findings(
     view: KeystoreView, access: CaAccess, now: datetime, required: Requirements
 ) -> Iterator[Finding]:
+    try:
+        view.refuse_clock(now)
+    except WrongClockError as error:
+        yield Finding(Severity.ERROR, "clock", ".", str(error), "timedatectl")
+        return
+    except KeystoreError:
+        pass  # the checks below report what cannot be read
     yield from check_parents(view.root)
     yield from check_files(view.root)
     register, problems = load_register(view)

@@ -51,7 +51,7 @@ def test_the_whole_document() -> None:
         "<permissions>",
         '<grant name="/enclave">',
         "<subject_name>CN=/enclave</subject_name>",
-        "<validity><not_before>2026-01-01T00:00:00</not_before><not_after>2027-01-01T00:00:00</not_after></validity>",
+        "<validity><not_before>2025-12-31T10:00:00</not_before><not_after>2027-01-01T14:00:00</not_after></validity>",
         "<allow_rule>",
         "<domains><id>0</id></domains>",
         "<publish><topics>",

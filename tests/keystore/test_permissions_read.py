@@ -36,7 +36,7 @@ PERMISSIONS = permissions_document(
 GOVERNANCE = governance_document(Governance.for_domains(Domains.parse("8-9,12")))
 GRANT = PERMISSIONS[PERMISSIONS.index(b"<grant") : PERMISSIONS.index(b"</permissions>")]
 OTHER_GRANT = GRANT.replace(b"ros.a", b"ros.z")
-DATES = b"<not_before>2026-01-01T00:00:00<"
+DATES = b"<not_before>2025-12-31T10:00:00<"
 CRITERIA = b"<publish><topics>\n<topic>rt/z</topic>\n</topics>%s</publish>"
 
 TAKEN, REFUSED = "taken over", "refused"
@@ -113,9 +113,9 @@ SPELLINGS: dict[str, tuple[bytes, bytes, str]] = {
         b"<subscribe>", CRITERIA % b"<partitions><partition>p</partition></partitions>" + b"<subscribe>", TAKEN,
     ),
     "an attribute": (b"<topic>rt/c<", b'<topic x="1">rt/c<', REFUSED),
-    "a date with a zone": (DATES, b"<not_before>2026-01-01T00:00:00+09:00<", TAKEN),
-    "a date with a fraction": (DATES, b"<not_before>2026-01-01T00:00:00.5<", TAKEN),
-    "a blank beside a date": (DATES, b"<not_before> 2026-01-01T00:00:00<", REFUSED),
+    "a date with a zone": (DATES, b"<not_before>2025-12-31T10:00:00+09:00<", TAKEN),
+    "a date with a fraction": (DATES, b"<not_before>2025-12-31T10:00:00.5<", TAKEN),
+    "a blank beside a date": (DATES, b"<not_before> 2025-12-31T10:00:00<", REFUSED),
     "an end too late for Cyclone DDS": (b"<not_after>2036", b"<not_after>2300", TAKEN),
 }  # fmt: skip
 

@@ -131,10 +131,12 @@ def test_a_revoked_certificate_stays_on_the_list_while_its_ca_is_trusted(tmp_pat
     assert crl_of(root).get_revoked_certificate_by_serial_number(serial) is not None
 
 
-def test_a_launch_renews_a_crl_that_has_ended(root: Path) -> None:
+def test_a_launch_renews_a_crl_that_has_ended(tmp_path: Path) -> None:
+    root = filled(tmp_path / "ks", ["/a", "/c"], now=NOW - 300 * DAY, lifetime=30 * DAY)
     remove(root, ["/c"], options=quick(now=NOW - 300 * DAY))
     later = NOW + 100 * DAY
     wished = [policy("/a")]
+    provision(root, wished, options=options(now=NOW))
     assert not provision(root, wished, options=options(now=NOW)).created
     assert provision(root, wished, options=options(now=later)).created == (
         "CRL published again: the CRL has expired",
@@ -173,8 +175,15 @@ def test_an_unknown_enclave_changes_nothing(root: Path) -> None:
     assert snapshot(root) == before
 
 
+def test_a_crl_lasts_as_long_as_the_certificates_in_force(tmp_path: Path) -> None:
+    """Both DDS refuse every participant once the CRL has ended, so it may not end before what it is for."""
+    root = filled(tmp_path / "ks", ["/a", "/b"], now=NOW, lifetime=900 * DAY)
+    remove(root, ["/b"], options=quick(now=NOW))
+    assert crl_validity(KeystoreView(root)).not_after == certificate_of(root, "/a").validity.not_after
+
+
 def test_the_crl_is_renewed_before_it_ends(tmp_path: Path) -> None:
-    root = filled(tmp_path / "ks", ["/a", "/b"], now=NOW)
+    root = filled(tmp_path / "ks", ["/a", "/b"], now=NOW, lifetime=100 * DAY)
     remove(root, ["/b"], options=quick(now=NOW))
     late = NOW + 350 * DAY
     assert "CRL" in [one.what for one in status(root, now=late).due(30 * DAY)]

@@ -239,6 +239,18 @@ def test_domains_are_united_as_those_of_one_launch_are(root: Path) -> None:
     assert "do all of it in each of the domains 0,7" in told.added
 
 
+def test_the_same_launch_in_another_domain_keeps_the_first(root: Path) -> None:
+    """Two robots run one launch file in domains 1 and 2: the second start revokes nothing of the first."""
+    start(root, BRINGUP, policy("/", "/odom"), domains=Domains.single(1))
+    first = (root / "enclaves/cert.pem").read_bytes()
+    start(root, BRINGUP, policy("/", "/odom"), domains=Domains.single(2))
+    permissions = parse_permissions((root / "enclaves/permissions.xml").read_bytes())
+    assert str(permissions.domains) == "1-2" and not (root / "public/crl.pem").exists()
+    assert (root / "enclaves/cert.pem").read_bytes() == first
+    drop_shares(root, BRINGUP, options=options())
+    assert codes(root) == set()
+
+
 class TestWhatCannotBeUnited:
     def test_a_denial_of_what_the_other_needs(self, root: Path) -> None:
         def ruled(*rules: Rule) -> EnclavePolicy:

@@ -2,28 +2,33 @@
 
 from __future__ import annotations
 
-from datetime import datetime, timedelta
+from datetime import datetime, timedelta, timezone
 from pathlib import Path
 
 import pytest
 from cryptography import x509
 
 from keystore import (
-    DamagedKeystoreError,
+    CreateOptions,
     InvalidInputError,
     Policy,
     RemoveOptions,
     RenewOptions,
     Step,
     apply_policy,
+    create_enclave,
+    create_keystore,
     create_tool_enclave,
+    provision,
     remove,
     renew,
     roll_over,
+    verify,
 )
 from keystore.disk import layout
+from keystore.errors import WrongClockError
 from keystore.formats.validity import utc_now
-from keystore.steps import opening, provisioning, renewal, tool_enclaves
+from keystore.steps import creation, opening, provisioning, renewal, tool_enclaves
 from keystore.verb import main
 from tests.keystore.kit import DAY, certificate_of, contents, filled, options, policy
 
@@ -113,7 +118,7 @@ def test_a_clock_far_from_the_registers_time_is_refused(
     before = contents(root)
     for module in (renewal, provisioning):
         monkeypatch.setattr(module, "utc_now", lambda: utc_now() + shift)
-    with pytest.raises(DamagedKeystoreError, match="--accept-clock"):
+    with pytest.raises(WrongClockError, match="--accept-clock"):
         renew(root, ["/a"], options=renewing())
     assert contents(root) == before
     if shift > timedelta(0):
@@ -140,3 +145,53 @@ def test_what_was_issued_by_a_clock_ahead_is_issued_again(
     before = (root / "enclaves/b/cert.pem").read_bytes()
     filled(root, ["/a", "/b"])
     assert ((root / "enclaves/b/cert.pem").read_bytes() != before) is renewed
+
+
+BOOT = datetime(1970, 1, 1, 0, 2, tzinfo=timezone.utc)
+"""A board without a battery clock boots in 1970."""
+
+
+def test_a_first_boot_in_1970_makes_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    for module in (creation, provisioning):
+        monkeypatch.setattr(module, "utc_now", lambda: BOOT)
+    root = tmp_path / "ks"
+    for create in (lambda: create_keystore(root), lambda: filled(root)):
+        with pytest.raises(WrongClockError, match=r"the clock says 1970.* --accept-clock"):
+            create()
+        assert not root.exists()
+    create_keystore(root, CreateOptions(accept_clock=True))
+    assert root.exists()
+
+
+def test_a_clock_before_the_keystore_is_named_and_nothing_else(
+    root: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing has expired: what has not begun is no reason to replace it."""
+    assert verify(root).is_good
+    (finding,) = verify(root, now=BOOT).findings
+    assert finding.code == "clock" and "set the clock" in finding.message
+    before = contents(root)
+    monkeypatch.setattr(provisioning, "utc_now", lambda: utc_now() - 3 * DAY)
+    with pytest.raises(WrongClockError, match="the CAs of this keystore begin at"):
+        provision(root, [policy("/a"), policy("/b")], options=options())
+    assert contents(root) == before
+
+
+def test_a_lifetime_that_the_ca_cuts_short_is_reported(tmp_path: Path) -> None:
+    root = tmp_path / "ks"
+    create_keystore(root, CreateOptions(ca_lifetime=20 * DAY))
+    said = create_enclave(root, "/a", options=options(lifetime=365 * DAY)).warnings
+    assert any("CA ends at" in each for each in said)
+    said = create_enclave(root, "/b", options=options(lifetime=10 * DAY)).warnings
+    assert not any("CA ends at" in each for each in said)
+
+
+def test_permissions_outlast_their_certificate_by_every_time_zone(root: Path) -> None:
+    """Fast DDS reads the dates of permissions as local time, Cyclone DDS as UTC; those of certificates both as UTC."""
+    text = (root / "enclaves/a/permissions.xml").read_text()
+    begin, end = (
+        datetime.fromisoformat(text.partition(f"<{tag}>")[2].partition("<")[0]).replace(tzinfo=timezone.utc)
+        for tag in ("not_before", "not_after")
+    )
+    certificate = certificate_of(root, "/a").validity
+    assert certificate.not_before - begin == end - certificate.not_after == timedelta(hours=14)
