@@ -157,5 +157,7 @@ def test_each_wildcard_of_a_policy_is_said(
     (tmp_path / "wide.xml").write_text(POLICY.replace("<topic>chatter<", f"<topic>{written}<"))
     assert main(["apply-policy", str(root), str(tmp_path / "wide.xml")]) == 0
     assert capsys.readouterr().err == (
-        f"secure-keystore: warning: enclave /talker is granted by wildcard: {said}\n" if said else ""
+        f"secure-keystore: warning: enclave /talker is granted by wildcard (* also matches /): {said}\n"
+        if said
+        else ""
     )
