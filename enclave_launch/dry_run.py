@@ -179,10 +179,23 @@ class Diagnostic(_Strict, frozen=True):
         return str(SourceLocation(self.file or "", self.line if self.file else 0))
 
 
+class Release(_Strict, frozen=True):
+    """The rules that were followed."""
+
+    distro: str
+    versions: dict[str, str] = _described("the version of each package whose changes matter")
+    assumed: list[str] = _described(
+        "the packages that are not installed: their newest known version is taken"
+    )
+
+
 class DryRun(_Strict, frozen=True):
     """The whole document."""
 
     version: Literal[1]
+    release: Optional[Release] = Field(
+        None, description="absent in documents of older versions of this program"
+    )
     processes: list[Process]
     components: list[Component]
     enclaves: dict[str, Enclave]

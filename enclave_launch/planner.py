@@ -43,6 +43,7 @@ def make_plan(evaluation: Evaluation, inputs: PlanInputs) -> LaunchPlan:
     derived = derive_policy(
         nodes_of(processes, components, launcher),
         distro=evaluation.distro,
+        rcl=evaluation.release.rcl,
         options=options.policy,
         # Enclaves of which no node is known: of executables to which the launch file gives one, and of processes
         # without a manifest, which must not be missing from what is shown.

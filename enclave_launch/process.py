@@ -7,6 +7,7 @@ from types import MappingProxyType
 from typing import Literal, NamedTuple
 
 from enclave_launch.diagnostics import Diagnostic
+from enclave_launch.ros_rules.distro import DEFAULT, Release, release_of
 from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.source_location import SourceLocation
 
@@ -140,5 +141,10 @@ class Evaluation(NamedTuple):
     launcher_calls: tuple[LauncherCall, ...] = ()
     unforeseeable: tuple[Unforeseeable, ...] = ()
     warnings: tuple[Diagnostic, ...] = ()
-    distro: str = "rolling"  # whose rules were followed
+    release: Release = release_of(DEFAULT)  # whose rules were followed
     reactions: tuple[Reaction, ...] = ()
+
+    @property
+    def distro(self) -> str:
+        """Return the name of the distribution whose rules were followed."""
+        return self.release.distro.value

@@ -153,7 +153,7 @@ def _recording(launch: _Launch, settings: RunSettings) -> LaunchCompanion | None
         return None
     source = _source(launch)
     plan = None if isinstance(launch, UnsecuredLaunch) else launch.plan
-    distro = source.host_options.distro or os.environ.get("ROS_DISTRO", "")
+    distro = (source.host_options.distro or os.environ.get("ROS_DISTRO", "")).partition("@")[0]
     companion: LaunchCompanion = explaining(
         source.launch_file, distro, plan, optional=settings.record is None
     )

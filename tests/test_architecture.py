@@ -315,7 +315,7 @@ AS_UPSTREAM_HAS_IT = {  # launch, launch_ros and the NoDL v1 API name both so, a
     "ProcessExited", "ProcessStarted",  # the events of launch, and what a library user hears of them
 }  # fmt: skip
 # dry_run.py: their JSON
-AS_THE_PLAN_HAS_IT = {"Diagnostic", "LauncherCall", "Node", "Reaction", "Respawn"}
+AS_THE_PLAN_HAS_IT = {"Diagnostic", "LauncherCall", "Node", "Reaction", "Release", "Respawn"}
 # of Python in enclave_addons/inference/kernel/ and python/, of C++ in enclave_addons/inference/cpp/
 IN_BOTH_KINDS_OF_INFERENCE = {
     "Bound", "Call", "Class", "Frame", "Function", "Machine", "Obj", "StepLimitExceeded", "Text", "Unknown",

@@ -65,7 +65,7 @@ def learn_launch(target: LaunchTarget, options: argparse.Namespace, start: Start
     _say(f"learning: every process runs as ever{unsecured}; {DEVICES_STAY_REAL}")
     _say(f"isolated by: {isolation.value}")
 
-    distro = options.distro or os.environ.get("ROS_DISTRO", "")
+    distro = (options.distro or os.environ.get("ROS_DISTRO", "")).partition("@")[0]
     run = new_run(target.launch_file, distro, isolation.value, secured=options.secure)
     recording = Recording(run, [QuietWatch(options.learn_for)])
     status = start(recording)

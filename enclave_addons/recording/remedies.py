@@ -115,7 +115,9 @@ class Remedies:
             if len(nodes) > 1 and after.name != before.name:
                 continue
             node = described.node._replace(interface=after._replace(name=before.name, depends=None))
-            return (need.operation, need.name) in names_of(node, self._plan.distro)[0]
+            return (need.operation, need.name) in names_of(
+                node, self._plan.distro, self._plan.evaluation.release.rcl
+            )[0]
         return False
 
     def _policy_cures(self, patch: Patch, need: Need) -> bool:

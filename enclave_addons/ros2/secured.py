@@ -53,7 +53,7 @@ def secured(
     release = choose_release(options.distro, os.environ.get("ROS_DISTRO"), search_prefixes())
     finder = InterfaceFinder(search_prefixes(), options, release.distro.value)
     inputs = PlanInputs(LaunchSource("<program>"), finder, options.plan_options())
-    nothing_yet = Evaluation((), (), distro=release.distro.value)
+    nothing_yet = Evaluation((), (), release=release)
     launch = flow.provision(make_plan(nothing_yet, inputs), keystore, options=security_options)
     return _enclosed(description, EnclaveSession(launch), launch)
 

@@ -147,7 +147,7 @@ def _evaluation(host: PlanHost) -> Evaluation:
         tuple(host.calls),
         tuple(host.unforeseen),
         tuple(host.warnings),
-        host.release.distro.value,
+        host.release,
         tuple(host.reactions),
     )
 

@@ -46,7 +46,8 @@ T = TypeVar("T")
 class HostOptions(NamedTuple):
     """Properties of the world that an evaluation knows, in a dry run and live.
 
-    ``distro``: whose rules to follow, ``None`` for that of the environment. ``anonymous_seed``: two hosts with the same
+    ``distro``: whose rules to follow, as in ``--distro``, ``None`` for that of the environment.
+    ``anonymous_seed``: two hosts with the same
     seed give the same names at random, in the same order.
     """
 

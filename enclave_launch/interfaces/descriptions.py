@@ -29,6 +29,7 @@ from enclave_launch.policy.running_node import (
     node_of_process,
 )
 from enclave_launch.process import ResolvedComponent, ResolvedProcess
+from enclave_launch.ros_rules.distro import Version
 from nodl.node_interface import Endpoint, NodeInterface
 
 _MANIFESTS = (InterfaceOrigin.NAMED, InterfaceOrigin.PACKAGE)
@@ -103,9 +104,11 @@ def _names(description: Found, start: ProgramStart) -> tuple[dict[Named, str], t
     return names, tuple(left)
 
 
-def names_of(node: RunningNode, distro: str) -> tuple[dict[Named, str], tuple[str, ...]]:
+def names_of(
+    node: RunningNode, distro: str, rcl: Version | None = None
+) -> tuple[dict[Named, str], tuple[str, ...]]:
     """Return the names that ``node`` is described to need, and what its description leaves open."""
-    found = node_permissions(node, distro=distro, options=PolicyOptions())
+    found = node_permissions(node, distro=distro, options=PolicyOptions(), rcl=rcl)
     declared = (each for each in found.permissions if each.reason.origin == "declared")
     return {(each.operation, each.name): each.reason.place for each in declared}, tuple(
         f"{each.diagnostic.text} ({each.diagnostic.location})" for each in found.unresolved

@@ -24,6 +24,7 @@ from enclave_launch.diagnostics.permissions import (
 )
 from enclave_launch.policy.node_permissions import NodePermissions, PolicyOptions, Reason, node_permissions
 from enclave_launch.policy.running_node import RunningNode
+from enclave_launch.ros_rules.distro import Version
 from enclave_launch.source_location import SourceLocation
 from keystore.formats.permissions import dds_rules
 from keystore.formats.permissions_names import full_name
@@ -90,15 +91,18 @@ def derive_policy(
     distro: str,
     options: PolicyOptions | None = None,
     also: Iterable[str] = (),
+    rcl: Version | None = None,
 ) -> DerivedPolicy:
     """Derive the policy of all ``nodes``; ``also``: enclaves that must exist though no node in them is known.
+
+    ``rcl``: the version whose rules hold, by default the newest of ``distro``.
 
     Raises ``ValueError`` for an unknown distribution.
     """
     chosen = options or PolicyOptions()
     collection = _Collection({path: {} for path in also}, {}, [], [])
     for node in nodes:
-        collection.add(node_permissions(node, distro=distro, options=chosen), chosen.policy_file)
+        collection.add(node_permissions(node, distro=distro, options=chosen, rcl=rcl), chosen.policy_file)
     derived = collection.result()
     if chosen.policy_file is not None:
         derived = merge_policy_file(derived, chosen.policy_file)

@@ -18,7 +18,7 @@ from enclave_launch.diagnostics.permissions import (
     record_undecided,
 )
 from enclave_launch.policy.running_node import RunningNode
-from enclave_launch.ros_rules.distro import REMAPS_WHOLE_ACTIONS
+from enclave_launch.ros_rules.distro import Version, moves_whole_actions
 from enclave_launch.source_location import SourceLocation
 from keystore.formats.policy import Operation
 from keystore.formats.policy_xml import PolicyDocument
@@ -121,21 +121,24 @@ class NodePermissions(NamedTuple):
     warnings: list[Diagnostic]
 
 
-def node_permissions(node: RunningNode, *, distro: str, options: PolicyOptions) -> NodePermissions:
+def node_permissions(
+    node: RunningNode, *, distro: str, options: PolicyOptions, rcl: Version | None = None
+) -> NodePermissions:
     """Return everything that ``node`` needs under its final name, with what ``options`` add.
 
+    ``rcl`` is the version whose rules hold, by default the newest of ``distro``.
     Raises ``ValueError`` for an unknown distribution.
     """
-    return _Collector(node, distro, options).collect()
+    return _Collector(node, distro, options, rcl).collect()
 
 
 class _Collector:
-    def __init__(self, node: RunningNode, distro: str, options: PolicyOptions):
+    def __init__(self, node: RunningNode, distro: str, options: PolicyOptions, rcl: Version | None):
         self._options = options
         self._node = node
         self._fqn = node.fqn
         self._distro = distro
-        self._whole = distro in REMAPS_WHOLE_ACTIONS
+        self._whole = moves_whole_actions(distro, rcl)
         self._names = NodeNames(node.name, node.namespace, node.rules)
         self._result = NodePermissions(node, [], [], [])
 

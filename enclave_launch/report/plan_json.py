@@ -12,6 +12,7 @@ from enclave_launch.policy.derivation import LIST_NAMES, allowed_names
 from enclave_launch.policy.node_permissions import Reason
 from enclave_launch.process import LauncherCall, Reaction, RemapRule
 from enclave_launch.report.unknown import label, unknown_by_enclave
+from enclave_launch.ros_rules.distro import PACKAGES, Release
 from enclave_launch.ros_rules.parameter_value import ParameterValue
 from enclave_launch.security_environment import SecuritySettings, secured_command, secured_environment
 from keystore.formats.policy import Qualifier, Rule
@@ -24,6 +25,7 @@ def plan_document(plan: LaunchPlan, security: SecuritySettings | None = None) ->
     """Return the plan as plain values; ``security``: how ``--secure`` would start the processes."""
     return {
         "version": VERSION,
+        "release": _release(plan.evaluation.release),
         "processes": [_process(item, security) for item in plan.processes],
         "components": [_component(item) for item in plan.components],
         "enclaves": _enclaves(plan),
@@ -36,6 +38,11 @@ def plan_document(plan: LaunchPlan, security: SecuritySettings | None = None) ->
             *(_diagnostic(warning, "warning") for warning in plan.warnings),
         ],
     }
+
+
+def _release(release: Release) -> dict[str, object]:
+    assumed = [package for package in PACKAGES if package not in release.installed]
+    return {"distro": release.distro.value, "versions": release.versions, "assumed": assumed}
 
 
 def plan_json(plan: LaunchPlan, security: SecuritySettings | None = None) -> str:

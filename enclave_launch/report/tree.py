@@ -30,7 +30,7 @@ class Branch(NamedTuple):
 def plan_tree(plan: LaunchPlan, style: TerminalStyle | None = None) -> str:
     """Format the plan as a tree; interfaces that every node has are counted, not listed."""
     style = style or TerminalStyle()
-    lines = style.wrapped(style.one_line(f"{plan.launch_file} (as {plan.distro})"), "", "    ")
+    lines = style.wrapped(style.one_line(f"{plan.launch_file} (as {plan.evaluation.release})"), "", "    ")
     gains = gains_by_sharing(plan.derived, composed_only=True)
     lines += _draw([_enclave(plan, enclave, gains) for enclave in plan.derived.policy.enclaves], style)
     outside = _outside(plan)

@@ -22,11 +22,12 @@ from enclave_common.command_line import (
     add_version,
     one_of,
 )
+from enclave_common.words import did_you_mean
 from enclave_launch.enclave import EnclaveScope
 from enclave_launch.errors import UsageError, translated
 from enclave_launch.options import ResolveOptions
 from enclave_launch.policy.node_permissions import ALSO
-from enclave_launch.ros_rules.distro import Distro
+from enclave_launch.ros_rules.distro import DEFAULT, Distro, choose_release
 from enclave_launch.verb.completion import launch_words
 from enclave_launch.verb.modes import modes
 
@@ -110,10 +111,28 @@ WRITTEN: tuple[Option, ...] = (
     ("-s --show-args --show-arguments", FLAG, "print the launch arguments that the file declares"),
     ("-p --print --print-description", {**FLAG, "dest": "print_description"}, "print the launch description"),
 )
+
+
+def distribution(text: str) -> str:
+    """Return ``text`` if it names a distribution, or one of a day; raises argparse.ArgumentTypeError."""
+    known = [distro.value for distro in Distro]
+    name = text.partition("@")[0]
+    if name not in known:
+        question = did_you_mean(name, known)
+        raise argparse.ArgumentTypeError(f"'{name}' is no known distribution ({', '.join(known)}){question}")
+    try:
+        choose_release(text, None)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+    return text
+
+
 EVALUATION: tuple[Option, ...] = (
     ("--prefix DIR", PATHS, "ament install prefix, searched before AMENT_PREFIX_PATH (repeatable)"),
-    ("--distro", {"choices": [distro.value for distro in Distro]},
-     "ROS distribution to behave like (default: ROS_DISTRO, else the newest)"),
+    ("--distro NAME[@DATE]", {"type": distribution},
+     f"ROS distribution to behave like: {', '.join(distro.value for distro in Distro)} (default: ROS_DISTRO, else "
+     f"{DEFAULT.value}). Installed packages decide the version, else the newest known patch release, or that of the "
+     "date, as in jazzy@2025-03"),
     ("--allow-missing-packages", FLAG,
      "go on with a marked placeholder for packages that are not installed"),
     ("--no-python", FLAG, "refuse to run Python launch files (they are code)"),

@@ -29,6 +29,7 @@ from tests.programs import install_package
 
 CASES = Path(__file__).parent / "cases"
 DISTROS = ("humble", "jazzy", "rolling")
+RECORDED_IN = "2024-12"  # what was run: launch 1.0.7, 3.4.3 and 3.7.1 with their launch_ros
 EVERYWHERE = "everywhere"
 SYNTAXES = ("xml", "yaml", "py")
 

@@ -28,7 +28,7 @@ def run(case: Case, distro: str, folder: Path, prefix: Path, *, with_supposition
     logs: list[tuple[str, str]] = []
     error: tuple[str, str] | None = None
     with _surroundings(folder, variables), _recorded(logs):
-        host = PlanHost(distro=distro)
+        host = PlanHost(distro=f"{distro}@{case_files.RECORDED_IN}")
         try:
             evaluation = evaluate(main, parse_arguments(case.arguments), host=host)
         except EvaluationError as failure:

@@ -12,7 +12,7 @@ from enclave_launch.evaluation.evaluate import evaluation_surroundings
 from enclave_launch.host.plan_host import PlanHost
 
 from . import public_api
-from .case_files import DISTROS
+from .case_files import DISTROS, RECORDED_IN
 
 # Inner workings that have public names upstream.
 NOT_OURS = {
@@ -26,7 +26,7 @@ NOT_OURS = {
 @pytest.mark.parametrize("distro", DISTROS)
 def test_names_and_arguments(distro: str) -> None:
     problems = []
-    with evaluation_surroundings(PlanHost(distro=distro)):
+    with evaluation_surroundings(PlanHost(distro=f"{distro}@{RECORDED_IN}")):
         for name, parameters in public_api.recorded(distro):
             problem = None if name in NOT_OURS else _problem(name, parameters)
             if problem:

@@ -31,7 +31,7 @@ PYTHON = [
 
 
 def visited(main: Path, case: Case, user_code_results: RecordedResults) -> tuple[Evaluation, str]:
-    host = PlanHost(HostOptions("rolling", anonymous_seed=1), user_code_results=user_code_results)
+    host = PlanHost(HostOptions("rolling@2024-12", anonymous_seed=1), user_code_results=user_code_results)
     try:
         return evaluate(main, parse_arguments(case.arguments), host=host), ""
     except EvaluationError as error:

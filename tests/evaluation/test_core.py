@@ -117,19 +117,63 @@ def test_cancelled_timers_do_not_fire_and_a_saved_clock_comes_back() -> None:
 def test_the_distribution_is_asked_for_else_the_environments_else_the_newest() -> None:
     assert choose_release("humble", "jazzy").distro is Distro.HUMBLE
     assert choose_release(None, "jazzy").distro is Distro.JAZZY
-    assert choose_release(None, "iron").distro is Distro.ROLLING
+    assert choose_release(None, "iron").distro is choose_release(None, None).distro is Distro.LYRICAL
     with pytest.raises(ValueError, match="noetic"):
         choose_release("noetic", None)
 
 
 def test_an_installed_launch_of_the_same_series_decides_the_version(tmp_path: Path) -> None:
-    for package, version in (("launch", "1.0.14"), ("launch_ros", "0.19.13")):
-        folder = tmp_path / "share" / package
+    _install(tmp_path, launch="1.0.8", launch_ros="0.19.13")
+    assert choose_release("humble", None).has(Feature.EQUALS_IF)
+    installed = choose_release("humble", None, [str(tmp_path)])
+    assert not installed.has(Feature.EQUALS_IF) and installed.has(Feature.WILDCARD_SECTIONS)
+    assert str(installed) == "humble; installed: launch 1.0.8, launch_ros 0.19.13; assumed: rcl 5.3.13"
+    assert choose_release("jazzy", None, [str(tmp_path)]) == release_of(Distro.JAZZY)
+
+
+def test_an_installed_rolling_of_any_age_decides(tmp_path: Path) -> None:
+    _install(tmp_path, launch="3.9.6", launch_ros="0.29.5", rcl="10.3.2")
+    installed = choose_release("rolling", None, [str(tmp_path)])
+    assert installed.has(Feature.TIMER_CAPTURES_ENVIRONMENT) and not installed.has(Feature.DECLARE_BOOLEAN)
+    assert choose_release("kilted", None, [str(tmp_path)]) == release_of(Distro.KILTED)
+
+
+def test_each_package_decides_for_its_own_features(tmp_path: Path) -> None:
+    _install(tmp_path, rcl="9.2.7")
+    jazzy = choose_release("jazzy", None, [str(tmp_path)])
+    assert jazzy.installed == {"rcl"}
+    assert not jazzy.has(Feature.WHOLE_ACTIONS) and jazzy.has(Feature.TIMER_COPIES_CONFIGURATIONS)
+
+
+@pytest.mark.parametrize(
+    ("name", "versions"),
+    [
+        ("jazzy", ("3.4.12", "0.26.13", "9.2.11")),
+        ("jazzy@2025-03", ("3.4.3", "0.26.6", "9.2.4")),
+        ("jazzy@2025-06-22", ("3.4.4", "0.26.7", "9.2.6")),
+        ("jazzy@2025-06-23", ("3.4.5", "0.26.8", "9.2.7")),
+        ("jazzy@2025", ("3.4.9", "0.26.10", "9.2.8")),
+    ],
+)
+def test_a_date_names_the_patch_releases_of_that_time(
+    name: str, versions: tuple[str, ...], tmp_path: Path
+) -> None:
+    _install(tmp_path, launch="3.4.4")
+    prefixes = [str(tmp_path)] if "@" in name else []  # a date wins over what is installed
+    assert tuple(choose_release(name, None, prefixes).versions.values()) == versions
+
+
+@pytest.mark.parametrize("name", ["jazzy@", "jazzy@last", "jazzy@2024-01", "lyrical@2025"])
+def test_a_date_that_says_nothing_is_refused(name: str) -> None:
+    with pytest.raises(ValueError, match=r"day, month or year|no version of launch"):
+        choose_release(name, None)
+
+
+def _install(prefix: Path, **versions: str) -> None:
+    for package, version in versions.items():
+        folder = prefix / "share" / package
         folder.mkdir(parents=True)
         (folder / "package.xml").write_text(f"<package><version>{version}</version></package>")
-    assert not choose_release("humble", None).has(Feature.EQUALS_IF)
-    assert choose_release("humble", None, [str(tmp_path)]).has(Feature.EQUALS_IF)
-    assert choose_release("jazzy", None, [str(tmp_path)]) == release_of(Distro.JAZZY)
 
 
 @pytest.mark.parametrize("feature", list(Feature))

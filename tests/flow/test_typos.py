@@ -66,7 +66,7 @@ def test_an_unknown_distribution_in_the_environment_is_told(
     launch = ["--dry-run", "--prefix", str(DEMO), "demo_nodes", "talker_listener.launch.xml"]
     monkeypatch.setenv("ROS_DISTRO", "jazy")
     assert main(launch) == 0
-    assert "the rules of rolling are followed" in (told := capsys.readouterr().out)
+    assert "the rules of lyrical are followed" in (told := capsys.readouterr().out)
     assert "did you mean 'jazzy'?" in told
     monkeypatch.setenv("ROS_DISTRO", "jazzy")
     assert main(launch) == 0

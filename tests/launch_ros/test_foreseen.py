@@ -76,4 +76,16 @@ def test_lifecycle_tags_where_the_release_has_them(launched: Evaluate) -> None:
     assert [process.kind for process in result.processes] == ["lifecycle_node"]
     assert [component.fqn for component in result.components] == ["/m"]
     with pytest.raises(Exception, match="Unrecognized entity of the type: lifecycle_node"):
-        launched(text, distro="jazzy")
+        launched(text, distro="jazzy@2026-06")
+
+
+def test_autostart_is_performed_where_the_release_does_so(launched: Evaluate) -> None:
+    """Releases before the tag lifecycle_node keep the substitution, which counts as true whatever it says."""
+    text = "from launch.substitutions import EnvironmentVariable\n" + in_python("""
+        LifecycleNode(package="pk", executable="e", name="n", namespace="", autostart=EnvironmentVariable("GONE"))
+    """)
+    assert len(launched(text, distro="jazzy@2026-06", syntax="py").processes) == 1
+    with pytest.raises(Exception, match="GONE"):
+        launched(text, distro="jazzy", syntax="py")
+    tag = '<lifecycle_node pkg="pk" exec="e" name="n" namespace="" autostart="$(var on no)"/>'
+    assert launched(tag, distro="kilted").processes[0].kind == "lifecycle_node"

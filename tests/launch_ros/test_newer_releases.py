@@ -12,7 +12,10 @@ from enclave_launch.process import Evaluation
 Evaluate = Callable[..., Evaluation]
 
 
-@pytest.mark.parametrize(("distro", "applies"), [("jazzy", False), ("rolling", False), ("lyrical", True)])
+@pytest.mark.parametrize(
+    ("distro", "applies"),
+    [("jazzy@2025-05", False), ("jazzy", True), ("rolling@2025-05", False), ("lyrical", True)],
+)
 def test_wildcards_in_parameter_files_of_components(
     launched: Evaluate, tmp_path: Path, distro: str, applies: bool
 ) -> None:
@@ -31,7 +34,7 @@ def test_use_sim_time_of_launch_itself(launched: Evaluate) -> None:
     assert len(launched(text, distro="lyrical").processes) == 1
     assert len(launched(text, "sim:=false", distro="lyrical").processes) == 1
     with pytest.raises(Exception, match="do not agree"):
-        launched(text, distro="jazzy")
+        launched(text, distro="jazzy@2025-08")
 
 
 def test_paths_below_a_package(launched: Evaluate, prefix: Path) -> None:

@@ -210,7 +210,7 @@ def test_of_a_launched_node(launched: Evaluate, tmp_path: Path) -> None:
       <param from="$(dirname)/f.yaml"/><param name="s" value="1e3"/><param name="t" value="'1'"/>
       <param name="deep"><param name="x" value="2.5"/></param>
     </node>"""
-    (process,) = launched(text).processes
+    (process,) = launched(text, distro="jazzy").processes
     assert process.parameters == {
         "late": 1, "rate": 10, "use_sim_time": False, "l": "(1, 2)", "s": 1000.0, "t": "1", "deep.x": 2.5,
     }  # fmt: skip
@@ -234,7 +234,7 @@ def test_a_list_of_texts_of_which_rcl_reads_some_as_another_type_is_not_known(
 ) -> None:
     """PyYAML writes ``y`` and ``1e3`` without quotes; rcl reads a truth and a number, and refuses a mixed list."""
     text = f'<node pkg="pk" exec="e"><param name="p" value="{texts}" value-sep=", "/></node>'
-    (process,) = launched(text).processes
+    (process,) = launched(text, distro="jazzy").processes
     assert process.parameters.get("p") == read
     assert [why for _, why in process.unread_parameter_files] == (
         [] if read else ["line 5: the items of a list must be of one type"]

@@ -115,14 +115,14 @@ def test_rules_of_a_component_come_before_those_of_its_process(node: NodeMaker) 
     assert declared(found) == {"publish /own", "publish /global"}
 
 
-def test_actions_in_humble_and_jazzy_are_remapped_part_by_part(node: NodeMaker) -> None:
+def test_actions_in_humble_are_remapped_part_by_part(node: NodeMaker) -> None:
     rules = ("fib:=whole", "fib/_action/feedback:=news")
-    server = derive(node("action fib", remap=rules))
+    server = derive(node("action fib", remap=rules), distro="humble")
     assert declared(server) == {
         *("reply /fib/_action/send_goal", "reply /fib/_action/cancel_goal", "reply /fib/_action/get_result"),
         *("publish /news", "publish /fib/_action/status"),
     }
-    client = derive(node("goal fib", remap=rules))
+    client = derive(node("goal fib", remap=rules), distro="humble")
     assert {"request /fib/_action/send_goal", "subscribe /news"} <= declared(client)
     (warning,) = client.warnings
     assert str(warning).startswith("demo.launch.xml:7: remap rule fib:=whole has no effect on action /fib")
@@ -139,11 +139,19 @@ def test_five_rules_that_move_an_action_as_one_give_one_permission(node: NodeMak
     assert "publish /fib/_action/status" in declared(apart) and "execute /count" not in declared(apart)
 
 
-@pytest.mark.parametrize("distro", ["kilted", "lyrical", "rolling"])
-def test_actions_from_kilted_on_are_remapped_as_a_whole(node: NodeMaker, distro: str) -> None:
+@pytest.mark.parametrize("distro", ["jazzy", "kilted", "lyrical", "rolling"])
+def test_actions_of_newer_releases_are_remapped_as_a_whole(node: NodeMaker, distro: str) -> None:
     found = derive(node("action fib", remap=("fib:=whole",)), distro=distro)
     assert declared(found) == {"execute /whole"}
     assert found.warnings == ()
+
+
+@pytest.mark.parametrize(("rcl", "name"), [((9, 2, 7), "/fib"), ((9, 2, 8), "/whole")])
+def test_jazzys_rcl_remaps_whole_actions_since_9_2_8(
+    node: NodeMaker, rcl: tuple[int, ...], name: str
+) -> None:
+    found = derive_policy([node("action fib", remap=("fib:=whole",))], distro="jazzy", rcl=rcl)
+    assert declared(found) == {f"execute {name}"}
 
 
 # -- built-in interfaces ---------------------------------------------------------------------------

@@ -130,7 +130,7 @@ class ComposableLifecycleNode(ComposableNode):
 
 def parse_lifecycle_components(entity: Entity, parser: Parser) -> list[ComposableNode]:
     """Parse the ``composable_lifecycle_node`` children; a distribution without them leaves them unread."""
-    if not current_release().has(Feature.LIFECYCLE_TAGS):
+    if not current_release().has(Feature.COMPOSABLE_LIFECYCLE_TAG):
         return []
     children = entity.get_attr("composable_lifecycle_node", data_type=list[Entity], optional=True)
     return [ComposableLifecycleNode.from_entity(child, parser) for child in children or ()]

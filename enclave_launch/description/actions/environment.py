@@ -1,18 +1,23 @@
-"""Environment variables: ``set_env``, ``append_env``, ``unset_env``, ``reset_env``, ``set_ros_log_dir``; groups push
-and pop their scope.
+"""Environment variables: ``set_env``, ``append_env``, ``unset_env``, ``reset_env``, ``rep_env``, ``set_ros_log_dir``.
+
+Groups push and pop their scope.
 """
 
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from typing import Any
 
+from enclave_launch.description import read_only
 from enclave_launch.description.entity import Action
 from enclave_launch.description.launch_context import LaunchContext
 from enclave_launch.description.markup.entity import Entity, Parser
 from enclave_launch.description.markup.expose import expose_action
 from enclave_launch.description.substitution import (
+    SomeSubstitutionsType,
     Substitution,
+    normalize_to_list_of_substitutions,
     perform_substitutions,
 )
 from enclave_launch.description.templates import TemplateAction, template
@@ -90,6 +95,43 @@ class ResetEnvironment(Action):
 
     def execute(self, context: LaunchContext) -> None:
         context._reset_environment()
+
+
+@expose_action("rep_env", feature=Feature.REPLACE_ENVIRONMENT)
+@read_only("environment")
+class ReplaceEnvironmentVariables(Action):
+    """Make the environment exactly the given variables."""
+
+    environment: Mapping[Any, Any] = {}
+
+    def __init__(self, environment: Mapping[Any, Any] | None = None, **kwargs: Any) -> None:
+        super().__init__(**kwargs)
+        self.__environment = dict(environment or {})
+
+    @classmethod
+    def parse(cls, entity: Entity, parser: Parser) -> tuple[type[Action], dict[str, Any]]:
+        _, kwargs = super().parse(entity, parser)
+        given = entity.get_attr("env", data_type=list[Entity], optional=True) or ()
+        parse = parser.parse_substitution
+        kwargs["environment"] = {
+            tuple(parse(child.get_attr("name"))): parse(child.get_attr("value")) for child in given
+        }
+        for child in given:
+            child.assert_entity_completely_parsed()
+        return cls, kwargs
+
+    def execute(self, context: LaunchContext) -> None:
+        context.process_environment.assign(
+            {
+                _performed(context, name): _performed(context, value)
+                for name, value in self.__environment.items()
+            }
+        )
+
+
+def _performed(context: LaunchContext, text: SomeSubstitutionsType) -> str:
+    """Perform a text, a substitution or several."""
+    return perform_substitutions(context, normalize_to_list_of_substitutions(text))
 
 
 @expose_action("set_ros_log_dir", feature=Feature.SET_ROS_LOG_DIR)

@@ -25,6 +25,7 @@ from enclave_launch.description.substitution import (
     normalize_to_list_of_substitutions,
     perform_substitutions,
 )
+from enclave_launch.description.typed_values import normalize_typed_substitution, perform_typed_substitution
 from enclave_launch.host.current import current_release
 from enclave_launch.process import UNSPECIFIED_NODE_NAME, LauncherCall, ProcessKind
 from enclave_launch.ros_rules.distro import Feature
@@ -32,7 +33,7 @@ from enclave_launch.ros_rules.distro import Feature
 _CHANGE_STATE = "lifecycle_msgs/srv/ChangeState"
 
 
-@expose_action("lifecycle_node", feature=Feature.LIFECYCLE_TAGS)
+@expose_action("lifecycle_node", feature=Feature.LIFECYCLE_NODE_TAG)
 @read_only("node_autostart")
 class LifecycleNode(Node):
     """Answers ``ChangeState`` events; ``autostart`` (newer distributions) configures and activates."""
@@ -45,22 +46,22 @@ class LifecycleNode(Node):
         *,
         name: SomeSubstitutionsType,
         namespace: SomeSubstitutionsType,
-        autostart: bool | None = None,
+        autostart: bool | SomeSubstitutionsType | None = None,
         **kwargs: Any,
     ):
         if autostart is not None and not current_release().has(Feature.LIFECYCLE_AUTOSTART):
             kwargs["autostart"] = autostart  # the base class refuses it, as upstream does
         super().__init__(name=name, namespace=namespace, **kwargs)
-        self.__node_autostart = bool(autostart)
+        self.__node_autostart: Any = autostart or False
 
     @classmethod
     def parse(
         cls, entity: Entity, parser: Parser, ignore: list[str] | None = None
     ) -> tuple[type[LifecycleNode], dict[str, Any]]:
         _, kwargs = super().parse(entity, parser, ignore)
-        autostart = entity.get_attr("autostart", data_type=bool, optional=True)
+        autostart = entity.get_attr("autostart", data_type=bool, optional=True, can_be_str=True)
         if autostart is not None:
-            kwargs["autostart"] = autostart
+            kwargs["autostart"] = parser.parse_if_substitutions(autostart)
         return cls, kwargs
 
     def execute(self, context: LaunchContext) -> list[LaunchDescriptionEntity] | None:
@@ -73,10 +74,17 @@ class LifecycleNode(Node):
         )
         context.register_event_handler(_ChangeStateHandler(self))
         actions = super().execute(context)
-        if not self.__node_autostart:
+        if not self.__wants_autostart(context):
             return actions
 
         return [*(actions or ()), autostart_transition(self.node_name)]
+
+    def __wants_autostart(self, context: LaunchContext) -> bool:
+        """Releases before the tag ``lifecycle_node`` keep what was given: substitutions count as true there."""
+        value = self.__node_autostart
+        if isinstance(value, bool) or not context.host.release.has(Feature.LIFECYCLE_NODE_TAG):
+            return bool(value)
+        return bool(perform_typed_substitution(context, normalize_typed_substitution(value, bool), bool))
 
 
 class _ChangeStateHandler(EventHandler):

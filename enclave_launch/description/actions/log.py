@@ -60,7 +60,7 @@ class Log(LogInfo):
         _, kwargs = super().parse(entity, parser)
         level = entity.get_attr("level", optional=True)
         host = current_host()
-        if level is None and host.release.has(Feature.LOG_NEEDS_LEVEL):
+        if level is None and host.release.has(Feature.LOG_LEVEL_ACTIONS):
             host.warn(log_level_missing())
         kwargs["level"] = parser.parse_substitution("INFO" if level is None else level)
         return cls, kwargs

@@ -33,6 +33,7 @@ ELEMENTS = {
     "push_ros_enclave": "actions.ros_scope",
     "push_ros_namespace": "actions.ros_scope",
     "reset": "actions.configurations",
+    "rep_env": "actions.environment",
     "reset_env": "actions.environment",
     "ros_timer": "actions.timers",
     "set_env": "actions.environment",

@@ -185,7 +185,7 @@ class FindExecutable(TemplateSubstitution):
         return path
 
 
-@expose_substitution("string-join", feature=Feature.JOIN_IN_FRONTENDS)
+@expose_substitution("string-join", feature=Feature.STRING_JOIN_IN_FRONTENDS)
 class StringJoinSubstitution(TemplateSubstitution):
     """Concatenates each component, then joins them with the delimiter."""
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from enclave_launch.description import ament_index as packages
 from enclave_launch.description import read_only
@@ -21,7 +21,7 @@ from enclave_launch.description.substitution import (
 )
 from enclave_launch.description.templates import TemplateSubstitution, described, template
 from enclave_launch.host.current import current_release
-from enclave_launch.ros_rules.distro import Feature
+from enclave_launch.ros_rules.distro import Feature, Since
 from nodl.ament_index import ExecutableNotInstalledError
 
 if TYPE_CHECKING:
@@ -31,12 +31,15 @@ if TYPE_CHECKING:
 class PathOperator:
     """Mixed into such a substitution: ``directory / "launch"`` is a ``PathJoinSubstitution``."""
 
-    def __truediv__(self, other: SomeSubstitutionsType) -> PathJoinSubstitution:
+    path_operator: ClassVar[Since] = Feature.DIRECTORY_OPERATOR
 
+    def __truediv__(self, other: SomeSubstitutionsType) -> PathJoinSubstitution:
+        if not current_release().has(self.path_operator):
+            return NotImplemented
         return PathJoinSubstitution([self, other])
 
 
-@expose_substitution("path-join", feature=Feature.JOIN_IN_FRONTENDS)
+@expose_substitution("path-join", feature=Feature.PATH_JOIN_IN_FRONTENDS)
 class PathJoinSubstitution(Substitution):
     """Joins its parts as ``os.path.join`` does: an absolute part discards what is before it.
 
@@ -63,6 +66,8 @@ class PathJoinSubstitution(Substitution):
         return os.path.join(*("".join([sub.perform(context) for sub in part]) for part in self.__parts))
 
     def __truediv__(self, other: SomeSubstitutionsType) -> PathJoinSubstitution:
+        if not current_release().has(Feature.PATH_JOIN_OPERATOR):
+            return NotImplemented
         return PathJoinSubstitution([*self.substitutions, other])
 
 
@@ -82,6 +87,7 @@ def _part(item: Any) -> list[Substitution]:
 class PathSubstitution(PathOperator, Substitution):
     """A ``pathlib.Path`` as a substitution, or anything that gives a path, with the operator ``/``."""
 
+    path_operator = Feature.PATH_JOIN_OPERATOR
     path: object
 
     def __init__(self, path: object) -> None:
@@ -130,7 +136,7 @@ class ThisLaunchFileDir(PathOperator, TemplateSubstitution):
 
 @expose_substitution("launch_log_dir", feature=Feature.LAUNCH_LOG_DIR)
 @expose_substitution("log_dir")
-class LaunchLogDir(TemplateSubstitution):
+class LaunchLogDir(PathOperator, TemplateSubstitution):
     """The directory of this run's log files."""
 
     refusal = (TypeError, "launch_log_dir/log_dir substitution doesn't expect arguments")
@@ -145,6 +151,7 @@ class LaunchLogDir(TemplateSubstitution):
 class FindPackage(PathOperator, TemplateSubstitution):
     """A directory that belongs to a package; subclasses say which in ``find``."""
 
+    path_operator = Feature.PACKAGE_OPERATOR
     package = template()
     refusal = (AttributeError, "find package substitutions expect 1 argument")
 
@@ -183,6 +190,7 @@ class ExecutableInPackage(FindPackagePrefix):
     """The path ``<prefix>/lib/<package>/<executable>``."""
 
     executable = template()
+    path_operator = Feature.PACKAGE_OPERATOR
     package = template()
     refusal = (AttributeError, "exec-in-package substitution expects 2 arguments")
 
