@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 
 from enclave_launch.description.install import installed
-from enclave_launch.frontend.libyaml import libyaml_for_launch_files
 from enclave_launch.host.environment import Environment, environment_snapshot, environment_untouched
 
 
@@ -36,7 +35,6 @@ class LaunchEnvironment:
         else:
             Environment().assign(self._saved)
         self._stack.enter_context(installed(self._prefixes()))
-        self._stack.enter_context(libyaml_for_launch_files())
 
     def leave(self) -> None:
         """Save it and restore the program's own."""

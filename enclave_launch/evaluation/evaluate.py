@@ -31,7 +31,6 @@ from enclave_launch.evaluation.active_environment import ENVIRONMENT_SWITCH
 from enclave_launch.evaluation.error_text import error_text
 from enclave_launch.evaluation.explore import Explorer
 from enclave_launch.frontend import error_location, python_file
-from enclave_launch.frontend.libyaml import libyaml_for_launch_files
 from enclave_launch.host.current import active_host
 from enclave_launch.host.environment import environment_untouched
 from enclave_launch.host.host import Host
@@ -113,7 +112,6 @@ def evaluation_surroundings(host: Host) -> Iterator[None]:
         stack.enter_context(environment_untouched())
         stack.enter_context(active_host(host))
         stack.enter_context(installed(host.prefixes()))
-        stack.enter_context(libyaml_for_launch_files())
         stack.callback(forget_elements_of_launch_files)
         yield
 

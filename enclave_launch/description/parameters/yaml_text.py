@@ -10,8 +10,10 @@ import yaml
 
 from enclave_common.yaml_reader import load_yaml
 from enclave_launch.description.substitution import TextSubstitution
-from enclave_launch.frontend import libyaml
 from enclave_launch.ros_rules.parameter_file import MAX_BYTES
+
+_FAST = getattr(yaml, "CDumper", yaml.Dumper)
+"""libyaml's emitter, where PyYAML was built with it."""
 
 
 class YamlConstant(TextSubstitution):
@@ -40,7 +42,12 @@ def load_parameter_file(text: str) -> Any:
 
 def dump(value: Any) -> str:
     """Write YAML as PyYAML does by default, Python tags included; block style, sorted keys."""
-    return str(libyaml.dump(value, default_flow_style=False))
+    if isinstance(value, dict | list) and _FAST.yaml_representers == yaml.Dumper.yaml_representers:
+        text = str(yaml.dump(value, Dumper=_FAST, default_flow_style=False))
+        # The two emitters write a text with escapes and an empty key differently, as they do a lone scalar.
+        if "\\" not in text and "'':" not in text:
+            return text
+    return str(yaml.dump(value, default_flow_style=False))
 
 
 class _QuotedText(str):
