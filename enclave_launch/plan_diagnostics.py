@@ -17,7 +17,7 @@ from enclave_launch.diagnostics.enclaves import (
     handshake_fails,
     machine_elsewhere,
 )
-from enclave_launch.diagnostics.evaluation import parameters_unknown
+from enclave_launch.diagnostics.evaluation import nodes_renamed_alike, parameters_unknown
 from enclave_launch.diagnostics.permissions import (
     configuration_unused,
     descriptions_differ,
@@ -85,6 +85,7 @@ def notes(
             yield container_elsewhere(component.fqn, target, _alike(target, processes), component.location)
     started: list[PlannedProcess | PlannedComponent] = [*processes, *components]
     yield from (library_version(each.program, each.doubt, each.location) for each in started if each.doubt)
+    yield from (note for each in started for note in _renamed_alike(each))
     yield from _differences(started)
     yield from _incomplete(nodes_of(processes, components, None))
     for item in processes:
@@ -94,6 +95,15 @@ def notes(
             yield enclave_attribute_unused(process.process_name, path, attribute, place)
     if launcher and any(item.enclave and item.enclave.path == launcher.enclave for item in processes):
         yield enclave_shared_with_launcher(launcher.enclave)
+
+
+def _renamed_alike(item: PlannedProcess | PlannedComponent) -> Iterator[Diagnostic]:
+    originals: dict[str, list[str]] = {}
+    for node in item.nodes:
+        originals.setdefault(node.fqn, []).append(node.original_name)
+    for name, several in originals.items():
+        if len(set(several)) > 1:
+            yield nodes_renamed_alike(item.program, name, several, item.location)
 
 
 def _differences(started: Iterable[PlannedProcess | PlannedComponent]) -> Iterator[Diagnostic]:

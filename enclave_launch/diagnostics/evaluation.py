@@ -66,6 +66,15 @@ def node_name_repeated(node: str, count: int, started_by: str) -> Diagnostic:
     return Diagnostic(Code.NODE_NAME_REPEATED, node, text)
 
 
+def nodes_renamed_alike(
+    program: str, node: str, originals: Sequence[str], place: SourceLocation
+) -> Diagnostic:
+    """Warn that one name for a process is the name of several nodes in it."""
+    text = f"{len(originals)} nodes of {program} ({', '.join(originals)}) all get the name {node}"
+    remedy = f'leave name= out, or rename one of them: ros_args="-r {originals[0]}:__node:=NAME"'
+    return Diagnostic(Code.NODE_NAME_REPEATED, node, text, place, remedy)
+
+
 def not_foreseeable(what: str, location: SourceLocation) -> Diagnostic:
     return Diagnostic(Code.NOT_FORESEEABLE, what, f"not foreseeable: {what}", location)
 

@@ -19,7 +19,9 @@ from enclave_launch.description.launch_context import WatchedConfigurations
 from enclave_launch.description.markup.expose import action_parse_methods, substitution_parse_methods
 from enclave_launch.description.markup.tags import ELEMENTS, SUBSTITUTIONS
 from enclave_launch.errors import EnclaveLaunchError
+from enclave_launch.evaluation.words_elsewhere import word_elsewhere
 from enclave_launch.frontend.error_location import frames
+from enclave_launch.host.current import current_release
 from nodl.ament_index import (
     MISSING_PREFIX,
     ExecutableNotInstalledError,
@@ -96,6 +98,8 @@ def _next_step(error: BaseException, text: str) -> str:
     if isinstance(error.__cause__ or error, ExecutableNotInstalledError):
         missing = cast("ExecutableNotInstalledError", error.__cause__ or error)
         return did_you_mean(missing.executable, executables(missing.folder))
+    if elsewhere := word_elsewhere(text, current_release()):
+        return elsewhere
     if unknown := _UNKNOWN_WORD.match(text):
         known = (
             (SUBSTITUTIONS, substitution_parse_methods) if unknown[1] else (ELEMENTS, action_parse_methods)

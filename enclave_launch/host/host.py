@@ -129,6 +129,7 @@ class Host(ABC):
         self._anonymous_seed = options.anonymous_seed
         self._anonymous_random: Any = None
         self.loads = LoadCache()
+        self.parameter_file_sources: dict[str, str] = {}  # written file -> the one it was made from
         self._prefix_cache: dict[tuple[str, str], str] = {}
         self._executable_cache: dict[tuple[str, str, str], str] = {}
 

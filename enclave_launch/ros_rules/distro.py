@@ -236,6 +236,11 @@ PACKAGES = ("launch", "launch_ros", "rcl")
 _DAY = re.compile(r"\d{4}(-\d{2}(-\d{2})?)?")
 
 
+def version_text(version: Version) -> str:
+    """Return a version with points between its numbers."""
+    return ".".join(map(str, version))
+
+
 class Release(NamedTuple):
     """A distribution with the versions of the packages in the table; asks the table.
 
@@ -255,7 +260,7 @@ class Release(NamedTuple):
     @property
     def versions(self) -> dict[str, str]:
         """Return the version of each package as text."""
-        return {package: ".".join(map(str, getattr(self, package))) for package in PACKAGES}
+        return {package: version_text(getattr(self, package)) for package in PACKAGES}
 
     def __str__(self) -> str:
         """Return the distribution and the versions in words, as for the first line of a plan."""

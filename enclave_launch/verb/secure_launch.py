@@ -7,8 +7,6 @@ import os
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 
-import yaml
-
 from enclave_common.command_line import (
     CommandLine,
     CommandParser,
@@ -28,6 +26,7 @@ from enclave_common.words import did_you_mean
 from enclave_launch.description.actions.arguments import DeclareLaunchArgument
 from enclave_launch.description.introspection import LaunchIntrospector
 from enclave_launch.description.launch_description import LaunchDescription
+from enclave_launch.description.parameters.yaml_text import dump_for_rcl
 from enclave_launch.errors import EnclaveLaunchError, ManifestError, UsageError
 from enclave_launch.evaluation.evaluate import read_description
 from enclave_launch.host.plan_host import PlanHost
@@ -176,9 +175,9 @@ def params_yaml(plan: LaunchPlan) -> str:
             section["ros__parameters"].update({key: _plain(value) for key, value in parameters.items()})
     if not sections:
         return ""
-    text = yaml.safe_dump(sections, sort_keys=True, allow_unicode=True)
+    text = dump_for_rcl(sections, allow_unicode=True)
     readable = printable_lines(text) == text
-    return text if readable else yaml.safe_dump(sections, sort_keys=True)  # with YAML's own escapes
+    return text if readable else dump_for_rcl(sections, allow_unicode=False)  # with YAML's own escapes
 
 
 def _named(plan: LaunchPlan) -> Iterator[tuple[str, Mapping[str, ParameterValue]]]:

@@ -36,6 +36,51 @@ def test_in_a_launch_file(
     assert f"did you mean '{meant}'?" in told and f"{file}:2:" in told
 
 
+@pytest.mark.parametrize(
+    ("element", "told"),
+    [
+        ('<node pkg="demo_nodes" type="talker"/>', 'ROS 2 writes exec="PROGRAM"'),
+        ('<node pkg="demo_nodes" exec="talker" ns="left"/>', 'ROS 2 writes namespace="NAMESPACE"'),
+        ('<group ns="left"><arg name="a"/></group>', "ROS 2 writes <push_ros_namespace"),
+        (
+            '<node pkg="demo_nodes" exec="talker"><rosparam file="p.yaml"/></node>',
+            'ROS 2 writes <param from="FILE"/>',
+        ),
+        ('<rosparam file="p.yaml"/>', "<set_parameters_from_file"),
+        ('<executable cmd="$(arg a)"/>', "ROS 2 writes $(var NAME)"),
+        ('<executable cmd="$(find demo_nodes)/x"/>', "ROS 2 writes $(find-pkg-share PACKAGE)"),
+    ],
+)
+def test_words_of_ros_1_get_those_of_ros_2(
+    element: str, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "old.launch.xml"
+    file.write_text(f"<launch>\n  {element}\n</launch>")
+    message = refused(capsys, str(file))
+    assert "is of ROS 1; ROS 2 writes" in message and told in message
+    assert f"{file}:2:" in message and "did you mean" not in message
+
+
+@pytest.mark.parametrize(
+    ("element", "since"),
+    [
+        (
+            '<executable cmd="$(path-join a b)"/>',
+            "path-join is there since all of lyrical, launch 3.9.7 in rolling",
+        ),
+        ('<for len="2" name="i"/>', "for is there since launch 3.8.0 in kilted"),
+    ],
+)
+def test_words_of_a_newer_release_say_since_when(
+    element: str, since: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "new.launch.xml"
+    file.write_text(f"<launch>\n  {element}\n</launch>")
+    message = refused(capsys, "--distro", "jazzy@2024-12", str(file))
+    assert since in message and "this file is read as jazzy; assumed: launch 3.4.3" in message
+    assert "did you mean" not in message
+
+
 def test_what_is_like_nothing_gets_no_suggestion(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "slip.launch.xml"
     file.write_text('<launch><node pkg="zzz" exec="talker"/></launch>')

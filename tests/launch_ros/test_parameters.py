@@ -259,3 +259,11 @@ values = st.one_of(
 def test_a_written_file_is_what_pyyaml_writes(parameters: dict[str, Any], section: str) -> None:
     expected = yaml.dump({section: {"ros__parameters": parameters}}, default_flow_style=False)
     assert yaml_text.parameter_file(section, parameters) == expected
+
+
+def test_an_error_in_a_file_with_substitutions_names_that_file(launched: Evaluate, tmp_path: Path) -> None:
+    (tmp_path / "f.yaml").write_text(EVERY % "topic: $(var t x), gains: [1, 2.0]")
+    (process,) = launched(
+        '<node pkg="pk" exec="e" name="n"><param from="$(dirname)/f.yaml" allow_substs="true"/></node>'
+    ).processes
+    assert [path for path, _ in process.unread_parameter_files] == [str(tmp_path / "f.yaml")]

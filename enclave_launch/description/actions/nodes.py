@@ -222,7 +222,9 @@ class Node(ExecuteProcess):
             fqn=self.node_name,
             remaps=tuple(self.__placed_remaps(process)),
             parameters=parameters.values,
-            unread_parameter_files=parameters.unread,
+            unread_parameter_files=tuple(
+                (context.host.parameter_file_sources.get(path, path), why) for path, why in parameters.unread
+            ),
         )
 
     def __placed_remaps(self, process: ResolvedProcess) -> Iterator[RemapRule]:

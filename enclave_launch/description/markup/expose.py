@@ -85,6 +85,12 @@ def expose_substitution(name: str, *, feature: Since | None = None) -> Callable[
     return _exposer("substitution", name, feature)
 
 
+def gate_of(kind: str, name: str) -> Since | None:
+    """Return the feature that brought the element or substitution ``name``, if not every release has it."""
+    _lookup(kind, name)
+    return _GATES[kind].get(name)
+
+
 def _lookup(kind: str, name: str) -> ParseMethod | None:
     gate = _GATES[kind].get(name)
     if gate is not None and not current_release().has(gate):

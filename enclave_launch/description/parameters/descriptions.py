@@ -156,4 +156,6 @@ def _substituted(context: LaunchContext, path: Path) -> Path:
         yaml_text.load_parameter_file(text)
     except yaml.YAMLError:
         raise SubstitutionFailure("The substituted parameter file is not a valid yaml file") from None
-    return Path(context.host.write_parameter_file(text))
+    written = context.host.write_parameter_file(text)
+    context.host.parameter_file_sources[written] = str(path)
+    return Path(written)

@@ -11,6 +11,7 @@ import yaml
 from enclave_common.yaml_reader import load_yaml
 from enclave_launch.description.substitution import TextSubstitution
 from enclave_launch.ros_rules.parameter_file import MAX_BYTES
+from enclave_launch.ros_rules.parameter_value import plain_scalar
 
 _FAST = getattr(yaml, "CDumper", yaml.Dumper)
 """libyaml's emitter, where PyYAML was built with it."""
@@ -74,6 +75,23 @@ def _quoted(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return type(value)(_quoted(item) for item in value)
     return _QuotedText(value) if isinstance(value, str) else value
+
+
+class _RclDumper(yaml.SafeDumper):
+    """Writes in quotes what rcl would read as another type, which is more than what YAML would."""
+
+
+def _text_for_rcl(dumper: yaml.SafeDumper, text: str) -> yaml.ScalarNode:
+    style = None if isinstance(plain_scalar(text), str) else "'"
+    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style=style)
+
+
+_RclDumper.add_representer(str, _text_for_rcl)
+
+
+def dump_for_rcl(document: Mapping[str, Any], *, allow_unicode: bool) -> str:
+    """Write a document of parameter sections that rcl reads back as the same values."""
+    return str(yaml.dump(document, Dumper=_RclDumper, sort_keys=True, allow_unicode=allow_unicode))
 
 
 def parameter_file(section: str, parameters: Mapping[str, Any]) -> str:

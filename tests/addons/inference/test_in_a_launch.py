@@ -14,6 +14,7 @@ from pathlib import Path
 import pytest
 
 from enclave_launch import LaunchPlan, ManifestError, ResolveOptions, provision, resolve
+from enclave_launch.diagnostics import Code
 from enclave_launch.report.explained import explain
 from enclave_launch.verb.secure_launch import params_yaml
 
@@ -760,3 +761,22 @@ def test_what_a_file_names_is_open(launch: Launch, prefix: Path) -> None:
     file.write_text("pins: [{name: a}]\n")
     plan = launch('<launch><node pkg="demo" exec="configured"/></launch>')
     assert any("pins/" in str(problem) for problem in plan.problems)
+
+
+TWO_NODES = """#!/usr/bin/python3
+import rclpy
+from rclpy.node import Node
+
+rclpy.init()
+left, right = Node("left"), Node("right")
+"""
+
+
+@pytest.mark.parametrize(("attributes", "is_told"), [('name="arms"', True), ("", False)])
+def test_one_name_for_several_nodes_of_a_program_is_told(
+    attributes: str, is_told: bool, launch: Launch, prefix: Path
+) -> None:
+    install_program(prefix, TWO_NODES, "duo")
+    plan = launch(f'<launch><node pkg="demo" exec="duo" {attributes}/></launch>')
+    told = [each.text for each in plan.warnings if each.code is Code.NODE_NAME_REPEATED]
+    assert told == (["2 nodes of demo/duo (left, right) all get the name /arms"] if is_told else [])
