@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -110,7 +110,6 @@ class Findings:
         self.options = Options()
         self.gaps = Gaps()
         self.global_words: list[tuple[str, ...] | None] = []  # handed to the client library in code
-        self.given: Mapping[str, object] = {}
 
     def node_of(self, identity: object, source: SourceRef) -> FoundNode:
         """Return the node that ``identity`` stands for, new where there was none."""

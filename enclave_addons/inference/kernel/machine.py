@@ -13,7 +13,7 @@ from functools import partial
 from typing import NamedTuple
 
 from enclave_addons.inference.kernel.findings import Findings, FoundEndpoint, FoundNode
-from enclave_addons.inference.kernel.store import CellId, CellStore, Written
+from enclave_addons.inference.kernel.store import CellId, CellStore, Written, same
 from enclave_addons.inference.kernel.texts import Input, Text, pieces_of, text_of
 from enclave_addons.inference.kernel.values import Obj, Value
 from nodl.node_interface import EndpointKind, QosPolicies
@@ -25,6 +25,7 @@ MAX_STEPS = 300_000
 MAX_DEPTH = 60
 MAX_CONTEXTS = 60  # of one function; then its calls are told apart by their object alone
 MAX_ROUNDS = 10
+MAX_REPLAYED = 200  # cells written by a call that is not run again
 MAX_TURNS = 9
 WIDEN_FROM = 3
 
@@ -63,7 +64,21 @@ class Callback:
 
     call: Callable[[], object]
     guards: tuple[Guard, ...]
-    reads: set[CellId] | None = None
+    reads: Written | None = None
+
+
+class Result(NamedTuple):
+    """What a call read, wrote, made and gave."""
+
+    value: Value
+    reads: Written
+    written: Written
+    made: list[Obj]
+    ended: bool
+
+    def holds(self) -> bool:
+        """Return whether all that the call read is as it was."""
+        return all(same(cells.get(key, ()), value) for cells, key, value in self.reads.values())
 
 
 class Machine:
@@ -76,6 +91,7 @@ class Machine:
         self.forks = 0  # how many undecided branches and loops surround the present point
         self.guards: tuple[Guard, ...] = ()
         self.context: object = None
+        self.ended = False  # what was evaluated last never comes back
         self.settling = False
         self.has_inputs = False  # something of a parameter, option or variable was asked for
         self.asks_launch = False  # what it holds may decide more than names
@@ -83,12 +99,15 @@ class Machine:
         self._contexts: dict[object, dict[object, int]] = {}
         self._objects: dict[tuple[object, object, str], Obj] = {}
         self._active: list[tuple[object, object]] = []
+        self._made: list[Obj] = []  # in the order in which they were made or made again
+        self._waits = 0  # how often callbacks were called meanwhile
+        self._results: dict[object, Result] = {}
         self._changed: set[CellId] = set()  # by the latest round of callbacks
 
     def step(self, count: int = 1) -> None:
         """Count steps. Raises ``StepLimitExceeded``."""
         self.steps += count
-        if self.steps + self.store.work // 8 > MAX_STEPS:
+        if self.steps + self.store.work // 4 > MAX_STEPS:
             raise StepLimitExceeded
 
     # --- branches and loops ---------------------------------------------------------------------------------
@@ -112,10 +131,6 @@ class Machine:
         self.store.merge(outcomes)
         self.step()
         return ways
-
-    def maybe(self, action: Callable[[], object]) -> None:
-        """Run ``action`` as something that may happen or not."""
-        self.branch((lambda: (action(), NEXT)[1], lambda: NEXT))
 
     def jump(self, jumps: Jumps) -> None:
         """Leave the call or loop of ``jumps`` from here."""
@@ -192,13 +207,44 @@ class Machine:
         if sum(running is code for running, _ in self._active) >= nested:
             return None
         self.step()
+        known_result = self._results.get((code, key, self.guards))
+        if known_result is not None:
+            self.store.work += len(known_result.reads)
+            if known_result.holds():
+                return self._again(known_result)
         outer, self.context = self.context, self._context_of(code, key)
         self._active.append((code, key))
+        reads, self.store.reads = self.store.reads, {}
+        mark, made, waits = self.store.mark(), len(self._made), self._waits
         try:
-            return body()
+            value = body()
+            own, written = self.store.reads, self.store.written(mark)
+            if waits == self._waits and len(written) <= MAX_REPLAYED:
+                self._results[code, key, self.guards] = Result(
+                    value, own, written, self._made[made:], self.ended
+                )
+            return value
         finally:
+            self.store.work += len(self.store.reads or ())
+            if reads is not None:
+                for place, read in (self.store.reads or {}).items():
+                    reads.setdefault(place, read)
+            self.store.reads = reads
             self._active.pop()
             self.context = outer
+
+    def _again(self, known: Result) -> Value:
+        """Repeat a call whose inputs are as they were: its writes, and what it makes, which now stands for several."""
+        for cells, key, value in known.written.values():
+            self.store.write(cells, key, value)
+        for obj in known.made:
+            obj.summary = True
+        if self.store.reads is not None:
+            for place, read in known.reads.items():
+                self.store.reads.setdefault(place, read)
+        self.store.work += len(known.reads) + len(known.written)
+        self.ended = known.ended
+        return known.value
 
     def _context_of(self, code: object, key: object) -> tuple[object, int]:
         known = self._contexts.setdefault(code, {})
@@ -212,7 +258,9 @@ class Machine:
             found = self._objects[key] = Obj(kind, cls)
             found.place = place
             found.guards = self.guards
+            self._made.append(found)
         else:
+            self._made.append(found)
             found.summary = True
             if found.guards != self.guards:
                 found.guards = ()
@@ -229,12 +277,13 @@ class Machine:
         if self.settling:
             return
         self.settling = True
+        self._waits += 1
         kept, self.guards = self.guards, ()
         for number in range(MAX_ROUNDS if at_end else 2):
             changed: set[CellId] = set()
             known = len(self.callbacks)
             for callback in list(self.callbacks.values()):
-                if callback.reads is None or not callback.reads.isdisjoint(changed | self._changed):
+                if callback.reads is None or not (changed | self._changed).isdisjoint(callback.reads):
                     changed.update(self._called(callback, number >= WIDEN_FROM))
             self._changed = changed
             if not changed and len(self.callbacks) == known:
@@ -252,7 +301,7 @@ class Machine:
         """Say that the callbacks do not come to an end."""
 
     def _called(self, callback: Callback, texts_too: bool) -> list[CellId]:
-        outer_reads, self.store.reads = self.store.reads, set()
+        outer_reads, self.store.reads = self.store.reads, {}
         self.guards = callback.guards
         mark = self.store.mark()
         self.forks += 1

@@ -27,23 +27,26 @@ Written = dict[CellId, tuple[Cells, object, Value]]
 
 
 class CellStore:
-    """The trail of one run. ``reads`` collects which cells are read while it is a set."""
+    """The trail of one run. ``reads`` collects which cells are read, with what they held, while it is a mapping."""
 
     def __init__(self) -> None:
         self.trail: list[tuple[Cells, object, Value | None]] = []
-        self.reads: set[CellId] | None = None
+        self.reads: Written | None = None
         self.work = 0  # entries of the trail that were looked at
 
     def read(self, cells: Cells, key: object, default: Value = BOTTOM) -> Value:
         """Return what a cell holds."""
-        if self.reads is not None and type(cells) is not LocalCells:
-            self.reads.add((id(cells), key))
-        return cells.get(key, default)
+        value = cells.get(key, default)
+        if self.reads is not None and (id(cells), key) not in self.reads:
+            self.reads[id(cells), key] = cells, key, cells.get(key, BOTTOM)
+        return value
 
     def write(self, cells: Cells, key: object, value: Value) -> bool:
         """Replace what a cell holds; return whether that changed it."""
         old = cells.get(key)
-        if old is not None and (old is value or _same(old, value)):
+        if self.reads is not None and type(cells) is not LocalCells and (id(cells), key) not in self.reads:
+            self.reads[id(cells), key] = cells, key, BOTTOM if old is None else old
+        if old is not None and (old is value or same(old, value)):
             return False
         self.trail.append((cells, key, old))
         cells[key] = value
@@ -134,7 +137,7 @@ class CellStore:
             joined = widen(before, cells.get(key, BOTTOM), turn > 2)
             if turn > 6 and not all(contains(before, atom) for atom in joined):
                 joined = join(before, ANY)  # widening must end
-            if not _same(before, joined):
+            if not same(before, joined):
                 stable = False
             self.write(cells, key, joined)
         return stable
@@ -145,5 +148,6 @@ def _absent(cells: Cells) -> Value:
     return BOTTOM if type(cells) is LocalCells else ABSENT
 
 
-def _same(old: Value, new: Value) -> bool:
-    return len(old) == len(new) and all(contains(old, atom) for atom in new)
+def same(old: Value, new: Value) -> bool:
+    """Return whether two values have the same atoms."""
+    return old is new or (len(old) == len(new) and all(contains(old, atom) for atom in new))

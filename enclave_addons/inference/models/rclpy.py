@@ -158,35 +158,6 @@ LIFECYCLE_HOOKS = frozenset(
 )
 
 
-# What rclpy itself calls and reads of every node (node.py, time_source.py but for ``/clock``, executors.py,
-# parameter_service.py, logging_service.py, type_description_service.py, qos_overriding_options.py, action).
-NODE_HOOKS = frozenset({
-    "create_publisher", "create_service", "create_timer", "add_waitable",
-    "add_on_set_parameters_callback", "declare_parameter", "declare_parameters", "has_parameter", "list_parameters",
-    "get_parameter", "get_parameters", "get_parameter_or", "get_parameter_type", "get_parameter_types",
-    "describe_parameter", "describe_parameters", "set_parameters_atomically", "get_name", "get_namespace", "get_clock",
-    "get_logger", "context", "executor", "handle", "default_callback_group",
-    "clients", "guards", "services", "subscriptions", "timers", "waitables",
-})  # fmt: skip
-
-
-# Attributes of rclpy's node by which it knows parameters and makes interfaces, and that are not for programs.
-NODE_PRIVATE = frozenset({
-    "_parameters", "_parameter_overrides", "_descriptors", "_allow_undeclared_parameters",
-    "_pre_set_parameters_callbacks", "_on_set_parameters_callbacks", "_declare_parameter_common",
-    "_set_parameters_atomically", "_set_parameters_atomically_common", "_apply_descriptor", "_apply_descriptors",
-    "_apply_descriptor_and_set", "_call_pre_set_parameters_callback", "_Node__node", "_Node__handle",
-})  # fmt: skip
-
-# Methods of a node that rclpy's own go through, and so a program's own.
-GOES_THROUGH = {
-    "get_parameter": ("has_parameter",),
-    "get_parameter_or": ("has_parameter",),
-    "get_parameters": ("get_parameter", "has_parameter"),
-    "declare_parameter": ("declare_parameters",),
-}
-
-
 class LibraryNode(NamedTuple):
     """A node class of a library. ``name``: what the node is called unless its user says otherwise."""
 

@@ -107,8 +107,7 @@ def entries(run: Run, obj: Obj) -> tuple[list[tuple[object, Value]], bool]:
         elif cell == OTHER and present(value):
             certain = False
     run.store.read(obj.cells, OTHER)
-    if run.store.reads is not None:
-        run.store.reads.add((id(obj.cells), ITEMS))
+    run.store.read(obj.cells, ITEMS)
     return found, certain
 
 

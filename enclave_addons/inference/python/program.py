@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import ast
 import errno
-import functools
 import io
 import os
 import re
@@ -113,10 +112,6 @@ class SourceModule:
         self.is_package = is_package
         self.error = error
         self.error_line = error_line
-
-    @functools.cached_property
-    def has_yield(self) -> bool:
-        return "yield" in self.text
 
     def lines_with(self, pattern: re.Pattern[str]) -> list[int]:
         """Return the numbers of the lines where ``pattern`` is found, in order; it does not span lines."""

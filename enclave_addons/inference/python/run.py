@@ -76,7 +76,6 @@ class Run(Machine):
         self.modules: dict[str, Module] = {}
         self.classes: dict[Class, None] = {}
         self.given_up = False
-        self.ended = False  # what was evaluated last never comes back
         self.entered: set[ast.AST] = set()  # functions, and classes of which objects were made
         self.settled: set[ast.AST] = set()  # calls that made an interface, or that make none
         self.visited: set[ast.AST] = set()  # calls that were made
@@ -154,7 +153,8 @@ class Run(Machine):
         scope: Frame | None = frame
         while scope is not None:
             if name in scope.cells and (scope is frame or scope.cls is None) and name not in scope.elsewhere:
-                held = self.store.read(scope.cells, name)
+                own = scope is frame and scope.cells is not frame.module.cells
+                held = scope.cells[name] if own else self.store.read(scope.cells, name)
                 found = join(found, present(held))
                 if held and (ABSENT[0] not in held or scope.cells is frame.module.cells):
                     return found

@@ -8,7 +8,7 @@ import pytest
 
 from enclave_addons import inference
 
-LINES = {"kernel": 1_300, "python": 5_300, "models": 300}
+LINES = {"kernel": 1_250, "python": 5_250, "models": 275}
 
 
 @pytest.mark.parametrize("room", LINES)
