@@ -17,7 +17,7 @@ from enclave_launch.diagnostics.enclaves import (
     handshake_fails,
     machine_elsewhere,
 )
-from enclave_launch.diagnostics.evaluation import nodes_renamed_alike, parameters_unknown
+from enclave_launch.diagnostics.evaluation import nodes_renamed_alike, parameter_type, parameters_unknown
 from enclave_launch.diagnostics.permissions import (
     configuration_unused,
     descriptions_differ,
@@ -41,6 +41,7 @@ from enclave_launch.plan import (
     nodes_of,
 )
 from enclave_launch.policy import DerivedPolicy, RunningNode
+from enclave_launch.ros_rules.parameter_value import type_name
 from enclave_launch.source_location import SourceLocation
 from keystore.formats.subject import common_name
 
@@ -86,6 +87,7 @@ def notes(
     started: list[PlannedProcess | PlannedComponent] = [*processes, *components]
     yield from (library_version(each.program, each.doubt, each.location) for each in started if each.doubt)
     yield from (note for each in started for note in _renamed_alike(each))
+    yield from (note for each in started for node in each.nodes for note in _mistyped(node, each.location))
     yield from _differences(started)
     yield from _incomplete(nodes_of(processes, components, None))
     for item in processes:
@@ -95,6 +97,13 @@ def notes(
             yield enclave_attribute_unused(process.process_name, path, attribute, place)
     if launcher and any(item.enclave and item.enclave.path == launcher.enclave for item in processes):
         yield enclave_shared_with_launcher(launcher.enclave)
+
+
+def _mistyped(node: RunningNode, place: SourceLocation) -> Iterator[Diagnostic]:
+    for name, declared in node.interface.parameter_types:
+        given = type_name(node.parameters[name]) if name in node.parameters else declared
+        if given not in (declared, "array"):
+            yield parameter_type(node.fqn, name, declared, given, place)
 
 
 def _renamed_alike(item: PlannedProcess | PlannedComponent) -> Iterator[Diagnostic]:

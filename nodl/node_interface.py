@@ -82,7 +82,8 @@ class NodeInterface(NamedTuple):
     off. ``depends``: what varies with its start. ``runs``: of a recorded node, how many it was seen in; ``incomplete``:
     why they may not have shown all of it. ``parameters_complete``: its description says that ``parameters`` lists all.
     ``unused_configuration``: what the program does not take of the files that it is given, and why. ``source_digest``:
-    of a manifest that inference wrote, the digest of its source.
+    of a manifest that inference wrote, the digest of its source. ``parameter_types``: parameters that are declared with
+    exactly this type, as NoDL 2 names it.
     """
 
     package: str | None
@@ -106,6 +107,7 @@ class NodeInterface(NamedTuple):
     parameters_complete: bool = False
     unused_configuration: tuple[str, ...] = ()
     source_digest: str = ""
+    parameter_types: tuple[tuple[str, str], ...] = ()
 
 
 class ManifestNode(NamedTuple):

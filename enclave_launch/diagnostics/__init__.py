@@ -41,6 +41,10 @@ class Code(str, Enum):
         "parameters-unknown",
         "A parameter file cannot be read, so names made from it are not known",
     )
+    PARAMETER_TYPE = (
+        "parameter-type",
+        "A parameter is given a value of another type than its node declares",
+    )
     PARAMETER_FILE_MISSING = "parameter-file-missing", "A parameter file does not exist"
     INCLUDE_ARGUMENT_UNKNOWN = (
         "include-argument-unknown",

@@ -66,6 +66,17 @@ def node_name_repeated(node: str, count: int, started_by: str) -> Diagnostic:
     return Diagnostic(Code.NODE_NAME_REPEATED, node, text)
 
 
+def parameter_type(node: str, name: str, declared: str, given: str, place: SourceLocation) -> Diagnostic:
+    """Warn that a node would end at the declaration of a parameter, as its value is of another type."""
+    text = f"node {node} declares parameter {name} as {declared}, and rcl reads its value as {given}"
+    remedy = "the client library ends the node with an exception of the parameter's type"
+    if declared == "string":
+        remedy += "; quote the value once more, as in value=\"'on'\""
+    elif (declared, given) == ("double", "int"):
+        remedy += "; write it with a point, as in 1.0"
+    return Diagnostic(Code.PARAMETER_TYPE, node, text, place, remedy)
+
+
 def nodes_renamed_alike(
     program: str, node: str, originals: Sequence[str], place: SourceLocation
 ) -> Diagnostic:

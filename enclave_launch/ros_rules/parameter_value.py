@@ -23,6 +23,7 @@ _NAMED_DOUBLE = re.compile(r"([+-]?)\.(inf|Inf|INF)|()\.(nan|NaN|NAN)")
 _BEGIN_NUMBERS = frozenset("+-.0123456789 \t\n\v\f\r")
 _NAMES_OF_NUMBERS = frozenset(("inf", "infinity", "nan"))
 _MOST_DIGITS = 25  # of a number in 64 bits, in whichever base
+_TYPE_NAMES: dict[type, str] = {bool: "bool", int: "int", float: "double", str: "string", bytes: "byte"}
 _SLOTS: dict[type, int] = {bool: 0, int: 1, float: 2, str: 3, bytes: 5}
 
 
@@ -31,6 +32,13 @@ def type_slot(value: ParameterValue) -> int:
     if isinstance(value, tuple):
         return 10 + (_SLOTS.get(type(value[0]), 9) if value else 9)
     return _SLOTS[type(value)]
+
+
+def type_name(value: ParameterValue) -> str:
+    """Return the type of a value as NoDL names it; of an empty array nothing but that."""
+    if isinstance(value, tuple):
+        return f"{type_name(value[0])}_array" if value else "array"
+    return _TYPE_NAMES[type(value)]
 
 
 def plain_scalar(text: str) -> Scalar:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from enclave_common.xml_tree import XmlElement
+from nodl.document.v2_schema import plain_types
 from nodl.errors import (
     InvalidElementError,
     InvalidNodeChildError,
@@ -94,6 +95,7 @@ def _node(element: XmlElement, file: str, package: str | None) -> ManifestNode:
         endpoints=_once(endpoints),
         source=_at(element, file),
         parameters=tuple(parameters),
+        parameter_types=plain_types(parameters),
     )
     return ManifestNode(interface, VERSION, parameters)
 

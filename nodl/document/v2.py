@@ -19,7 +19,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from nodl.document.v2_include import Included, follow_includes
 from nodl.document.v2_learnt import LearntName, learnt_names, logger_services
-from nodl.document.v2_schema import check_document
+from nodl.document.v2_schema import check_document, plain_types
 from nodl.document.v2_section import CATEGORIES, dependence_of, section_of
 from nodl.errors import InvalidElementError, InvalidNoDLDocumentError
 from nodl.name_template import NameTemplate
@@ -51,6 +51,7 @@ def parse_root(
     interface = _identified(root, file, package, name)._replace(
         endpoints=(*_endpoints(documents, learnt_names(root)), *logger_services(root)),
         parameters=tuple(parameters),
+        parameter_types=plain_types(parameters),
         depends=dependence_of(root),
         runs=len(section.listed("runs")),
         incomplete=section.texts("incomplete"),

@@ -7,6 +7,8 @@ section of the opaque ``codegen`` has its rules in ``v2_section``.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from nodl.document.checks import (
     Checker,
     anything,
@@ -103,6 +105,28 @@ PARAMETER_TYPES = (
     *("bool", "int", "double", "string", "none"),
     *("bool_array", "byte_array", "int_array", "double_array", "string_array"),
 )
+
+# Parameter types as v1 files write them freely -> those of v2.
+PARAMETER_TYPE_OF = {
+    **{name: name for name in PARAMETER_TYPES},
+    **dict.fromkeys(("boolean",), "bool"),
+    **dict.fromkeys(
+        ("integer", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64"), "int"
+    ),
+    **dict.fromkeys(("float", "float32", "float64"), "double"),
+    **dict.fromkeys(("str", "std::string"), "string"),
+    **dict.fromkeys(("integer_array", "int64_array"), "int_array"),
+    **dict.fromkeys(("float_array", "float64_array"), "double_array"),
+    **dict.fromkeys(("boolean_array",), "bool_array"),
+}
+
+
+def plain_types(written: Mapping[str, str]) -> tuple[tuple[str, str], ...]:
+    """Return the parameters whose type is a plain one of v2, with that type; the others are not known exactly."""
+    found = ((name, PARAMETER_TYPE_OF.get(kind, "none")) for name, kind in written.items())
+    return tuple((name, kind) for name, kind in found if kind != "none")
+
+
 _PARAMETER = map_of(
     {
         "type": text_of(

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from html import escape
 from typing import NamedTuple
 
-from nodl.document.v2_schema import NAME_PATTERN, PARAMETER_TYPES, TYPE_PATTERN
+from nodl.document.v2_schema import NAME_PATTERN, PARAMETER_TYPE_OF, PARAMETER_TYPES, TYPE_PATTERN
 from nodl.document.v2_section import CATEGORIES, IDENTITY_KEY
 from nodl.errors import InvalidNoDLDocumentError
 from nodl.names import shown
@@ -17,20 +17,6 @@ from nodl.node_interface import ClientLibrary, Endpoint, ManifestNode, NodeInter
 _UNKNOWN_QOS = "{history: SYSTEM_DEFAULT, reliability: SYSTEM_DEFAULT}"
 _PLAIN_SCALAR = re.compile(r"[A-Za-z/][A-Za-z0-9_/.:]*[A-Za-z0-9_]\Z|~/[A-Za-z0-9_/]+\Z")
 _YAML_WORDS = frozenset({"yes", "no", "on", "off", "true", "false", "null", "y", "n"})
-
-# Parameter types as v1 files write them freely -> those of v2.
-_PARAMETER_TYPES = {
-    **{name: name for name in PARAMETER_TYPES},
-    **dict.fromkeys(("boolean",), "bool"),
-    **dict.fromkeys(
-        ("integer", "int8", "int16", "int32", "int64", "uint8", "uint16", "uint32", "uint64"), "int"
-    ),
-    **dict.fromkeys(("float", "float32", "float64"), "double"),
-    **dict.fromkeys(("str", "std::string"), "string"),
-    **dict.fromkeys(("integer_array", "int64_array"), "int_array"),
-    **dict.fromkeys(("float_array", "float64_array"), "double_array"),
-    **dict.fromkeys(("boolean_array",), "bool_array"),
-}
 
 
 class Written(NamedTuple):
@@ -98,7 +84,7 @@ def _own_namespace(interface: NodeInterface) -> str:
 
 
 def _v2_type(node: ManifestNode, written: str) -> str:
-    known = _PARAMETER_TYPES.get(written.lower())
+    known = PARAMETER_TYPE_OF.get(written.lower())
     if known is None:
         raise InvalidNoDLDocumentError.at(
             node.interface.source,

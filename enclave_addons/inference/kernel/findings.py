@@ -64,6 +64,7 @@ class FoundNode:
     Attributes:
         created: The constructor of the client library's node was seen.
         words: Arguments that the program hands to the node; ``None`` among them if they are not known.
+        typed: Parameters of ``defaults`` that can only have the type of their default.
         hears_launch: Whether the node obeys the arguments of its process.
     """
 
@@ -74,6 +75,7 @@ class FoundNode:
     namespaces: Value = BOTTOM
     endpoints: dict[FoundEndpoint, None] = field(default_factory=dict)
     defaults: dict[str, Value] = field(default_factory=dict)
+    typed: dict[str, bool] = field(default_factory=dict)
     cells: dict[object, Value] = field(default_factory=dict)  # parameters that the program sets itself
     set_in_code: dict[str, None] = field(default_factory=dict)
     undeclared_allowed: bool = False

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from enclave_addons.inference.kernel.findings import Findings, FoundEndpoint, FoundNode, Options
 from enclave_addons.inference.kernel.texts import Hole, Input, OwnName, Piece, Text, text_of
 from enclave_addons.inference.kernel.values import ITEMS, Items, Obj, Unknown, Value
@@ -10,6 +12,7 @@ from nodl.name_template import NameTemplate, ParameterPart, Part, UnknownPart, m
 from nodl.node_interface import Certainty, ClientLibrary, Endpoint, Gap, NodeInterface
 from nodl.ros_arguments import parse_ros_arguments
 
+_TYPE_NAMES: dict[type, str] = {bool: "bool", int: "int", float: "double", str: "string"}
 MAX_ALTERNATIVES = 64
 UNDECIDED = "made only under a condition that is not decided before the start"
 
@@ -64,11 +67,20 @@ def _interfaces_of(
             parameters=tuple(sorted({*node.defaults, *node.set_in_code})),
             gaps=tuple(dict.fromkeys(gaps)),
             own_rules=rules,
+            parameter_types=tuple(_parameter_types(node)),
             global_arguments=hears,
         )
         for name in names
         for namespace in namespaces
     ]
+
+
+def _parameter_types(node: FoundNode) -> Iterator[tuple[str, str]]:
+    for name, is_typed in sorted(node.typed.items()):
+        kinds = {_TYPE_NAMES.get(type(atom)) for atom in node.defaults.get(name, ())}
+        kind = kinds.pop() if len(kinds) == 1 else None
+        if is_typed and kind is not None and name not in node.set_in_code:
+            yield name, kind
 
 
 def _own_arguments(node: FoundNode, findings: Findings, gaps: list[Gap]) -> tuple[str, ...]:

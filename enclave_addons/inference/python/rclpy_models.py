@@ -327,9 +327,14 @@ def _default_value(default: Value | None) -> Value:
     return tuple(atom for atom in default or () if atom is not None and not isinstance(atom, External))
 
 
-def _declare(run: Run, node: FoundNode, name: str, default: Value | None, ignored: Value | None) -> None:
+def _declare(
+    run: Run, node: FoundNode, name: str, default: Value | None, ignored: Value | None, *, plain: bool = False
+) -> None:
+    """Declare a parameter. ``plain``: without a descriptor, which may permit other types."""
     value = _default_value(default)
     node.declare(name, value)
+    typed = plain and value == default and not ignored and not node.declares_given
+    node.typed[name] = node.typed.get(name, True) and typed
     if ignored and truth(ignored) is not False:  # what launch says does not count
         _assign(run, node, name, join(value or NONE, BOTTOM if truth(ignored) else ABSENT), None)
 
@@ -366,7 +371,10 @@ def _values_of(run: Run, node: FoundNode, names: Value, call: Call, otherwise: V
 def _declare_parameter(run: Run, node: FoundNode, call: Call) -> Value:
     names = _name(call)
     for name in strings(names):
-        _declare(run, node, name, call.at(1, "value"), call.at(3, "ignore_override"))
+        _declare(
+            run, node, name, call.at(1, "value"), call.at(3, "ignore_override"),
+            plain=call.at(2, "descriptor") is None,
+        )  # fmt: skip
     return parameter_object(run, call, names, _values_of(run, node, names, call))
 
 

@@ -780,3 +780,55 @@ def test_one_name_for_several_nodes_of_a_program_is_told(
     plan = launch(f'<launch><node pkg="demo" exec="duo" {attributes}/></launch>')
     told = [each.text for each in plan.warnings if each.code is Code.NODE_NAME_REPEATED]
     assert told == (["2 nodes of demo/duo (left, right) all get the name /arms"] if is_told else [])
+
+
+DECLARING = """#!/usr/bin/python3
+import rclpy
+from rcl_interfaces.msg import ParameterDescriptor
+from rclpy.node import Node
+
+rclpy.init()
+node = Node("n")
+node.declare_parameter("text", "x")
+node.declare_parameter("rate", 1.0)
+node.declare_parameter("any", "x", ParameterDescriptor(dynamic_typing=True))
+node.declare_parameter("unset")
+node.get_parameter_or("asked", "x")
+"""
+
+
+@pytest.mark.parametrize(
+    ("parameter", "value", "told"),
+    [
+        ("text", "on", "declares parameter text as string, and rcl reads its value as bool"),
+        ("text", "7", "declares parameter text as string, and rcl reads its value as int"),
+        ("rate", "2", "declares parameter rate as double, and rcl reads its value as int"),
+        ("text", "'on'", ""),
+        ("rate", "2.0", ""),
+        ("any", "on", ""),
+        ("unset", "on", ""),
+        ("asked", "on", ""),
+    ],
+)
+def test_a_value_of_another_type_than_the_declared_one_is_told(
+    parameter: str, value: str, told: str, launch: Launch, prefix: Path
+) -> None:
+    install_program(prefix, DECLARING, "typed")
+    given = f'<param name="{parameter}" value="{value}"/>'
+    plan = launch(f'<launch><node pkg="demo" exec="typed" name="n">{given}</node></launch>')
+    found = [each for each in plan.warnings if each.code is Code.PARAMETER_TYPE]
+    assert [each.text for each in found] == ([f"node /n {told}"] if told else [])
+    assert all(each.location is not None and each.location.line == 1 for each in found)
+
+
+def test_the_types_of_a_manifest_count_too(launch: Launch, prefix: Path, tmp_path: Path) -> None:
+    install_program(prefix, "#!/bin/sh", "typed")
+    manifest = tmp_path / "n.nodl.xml"
+    manifest.write_text(
+        '<interface version="1"><node name="n" executable="typed">'
+        '<parameter name="p" type="integer"/></node></interface>'
+    )
+    for value, count in (("1.5", 1), ("1", 0)):
+        text = f'<launch><node pkg="demo" exec="typed"><param name="p" value="{value}"/></node></launch>'
+        plan = launch(text, manifests=(manifest,))
+        assert sum(each.code is Code.PARAMETER_TYPE for each in plan.warnings) == count
